@@ -1,0 +1,38 @@
+"""brdfdb: spectral BRDF tables from published surface parameters.
+
+Importing this package is cheap: the models, the store and the exports load when they are first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import os
+
+    from brdfdb.store import Store
+
+__all__ = ["open"]
+
+
+def open(root: str | os.PathLike[str]) -> Store:
+    """Open a store of tables for reading.
+
+    Parameters
+    ----------
+    root : path
+        The directory that ``brdfdb build --store`` wrote.
+
+    Returns
+    -------
+    Store
+        A mapping from material names to tables: ``brdfdb.open(root)["rolled-brass"].lookup(...)``.
+
+    Raises
+    ------
+    brdfdb.store.StoreError
+        If there is no store at `root`, or one of another format version.
+    """
+    from brdfdb.store import Store
+
+    return Store(root)

@@ -1,0 +1,46 @@
+"""Fresnel reflection of unpolarised light at a plane interface."""
+
+from __future__ import annotations
+
+import math
+
+from brdfdb._numba import elementwise, kernel
+
+
+@kernel
+def unpolarised_kernel(cos_theta: float, n: float, k: float) -> float:
+    """|F|^2 = (|F_s|^2 + |F_p|^2) / 2 at a vacuum interface of complex index n + ik.
+
+    With w = (n + ik)^2 - 1 and q = sqrt(cos^2 + w),
+    F_s = -w / (cos + q)^2 and F_p = w (cos^2 w + cos 2 theta) / ((1 + w) cos + q)^2:
+    the same as the textbook quotients, but the difference that cancels as n -> 1 is taken once, in w.
+    """
+    cos2 = cos_theta * cos_theta
+    w_re = (n - 1.0) * (n + 1.0) - k * k
+    w_im = 2.0 * n * k
+    # q = a + ib, the root with a, b >= 0; each of the two is formed where it does not cancel
+    q2_re = cos2 + w_re
+    modulus = math.sqrt(q2_re * q2_re + w_im * w_im)
+    if q2_re >= 0.0:
+        a = math.sqrt(0.5 * (modulus + q2_re))
+        b = w_im / (2.0 * a) if a > 0.0 else 0.0
+    else:
+        b = math.sqrt(0.5 * (modulus - q2_re))
+        a = w_im / (2.0 * b)
+    w_abs2 = w_re * w_re + w_im * w_im
+    if w_abs2 == 0.0:  # n = 1, k = 0: no interface, and 0 / 0 at grazing
+        return 0.0
+    # F_s
+    d_s = (cos_theta + a) * (cos_theta + a) + b * b
+    F_s2 = w_abs2 / (d_s * d_s)
+    # F_p
+    num_re = cos2 * w_re + (2.0 * cos2 - 1.0)
+    num_im = cos2 * w_im
+    den_re = (1.0 + w_re) * cos_theta + a
+    den_im = w_im * cos_theta + b
+    d_p = den_re * den_re + den_im * den_im
+    F_p2 = w_abs2 * (num_re * num_re + num_im * num_im) / (d_p * d_p)
+    return 0.5 * (F_s2 + F_p2)
+
+
+unpolarised = elementwise(unpolarised_kernel)

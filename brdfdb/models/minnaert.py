@@ -1,0 +1,84 @@
+"""Minnaert 1941: the lunar-photometry reflectance, as Oren and Nayar (1994, section 1) print it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from brdfdb._numba import elementwise, kernel
+from brdfdb.geometry import checked_angles, finished
+from brdfdb.parameters import Floats, ModelSpec, Parameter
+
+K = Parameter("k", "k", "1", 0.0, 1.0, "limb darkening exponent; 1 is Lambert")
+RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "scale; the albedo at k = 1", default=1.0)
+
+
+@kernel
+def _minnaert(cos_i: float, cos_r: float, k: float, rho: float) -> float:
+    return rho * (k + 1.0) / (2.0 * np.pi) * math.pow(cos_i * cos_r, k - 1.0)
+
+
+_evaluate = elementwise(_minnaert)
+
+
+def minnaert(
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    theta_r: ArrayLike,
+    phi_r: ArrayLike,
+    *,
+    k: ArrayLike,
+    rho: ArrayLike = 1.0,
+) -> Floats:
+    """BRDF of Minnaert's law, rho (k + 1) / (2 pi) (cos theta_i cos theta_r)^(k - 1).
+
+    Parameters
+    ----------
+    theta_i, phi_i, theta_r, phi_r : array_like [rad]
+        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
+    k : array_like [1]
+        Exponent, in [0, 1].
+    rho : array_like [1]
+        Scale, in [0, 1].
+
+    Returns
+    -------
+    array [1/sr]
+        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan. For k < 1 the law
+        grows without bound towards grazing; at 90 degrees it is the finite value at the float64 nearest pi/2.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    The directional albedo is rho at k = 1 and rho cos(theta_i)^(k - 1) in general: above 1 near grazing.
+
+    References
+    ----------
+    minnaert1941, orennayar1994 (section 1)
+
+    Examples
+    --------
+    >>> round(float(minnaert(0.3, 0.0, 0.4, 0.0, k=1.0)), 6)
+    0.31831
+    """
+    angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
+    values = _evaluate(np.cos(angles.theta_i), np.cos(angles.theta_r), K.check(k), RHO.check(rho))
+    return finished(values, angles)
+
+
+SPEC = ModelSpec(
+    name="minnaert",
+    version=1,
+    title="Minnaert",
+    equation="Oren and Nayar 1994, section 1",
+    reference="minnaert1941",
+    parameters=(K, RHO),
+    evaluate=minnaert,
+    grazing_pole=True,
+)

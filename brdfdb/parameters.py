@@ -1,0 +1,75 @@
+"""What a model's parameters are: frozen data that feeds checks, recipes, the README table and the tests alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a model: its public name, the paper's symbol, its unit and the values it may take."""
+
+    name: str
+    symbol: str
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    default: float | bool | None = None
+    low_open: bool = False
+
+    @property
+    def interval(self) -> str:
+        """The allowed values as an interval with its unit, for messages and tables."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{'(' if self.low_open else '['}{self.low:g}, {self.high:g}]{unit}"
+
+    def check(self, value: ArrayLike) -> Floats:
+        """Return `value` as float64, or raise a ValueError that names the parameter, the value and the range."""
+        array = np.asarray(value, dtype=np.float64)
+        too_low = array <= self.low if self.low_open else array < self.low
+        bad = too_low | ~(array <= self.high)
+        if np.any(bad):
+            first = array[bad].flat[0] if array.ndim else array[()]
+            raise ValueError(f"{self.name}: {first:g} is outside {self.interval}")
+        return array
+
+
+@dataclass(frozen=True)
+class ModelSpec:
+    """A model as the rest of the library sees it.
+
+    `version` is written into every table and is raised whenever a tabulated value moves. `evaluate` has the call
+    shape ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``; `specular`, where there is a Dirac part, is
+    ``f(theta_i, *, parameters)`` of the parameters named in `specular_parameters`. `spectral` models take
+    ``wavelength_nm, n, k`` beside their own parameters.
+    `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees.
+    `lobe_axes` names the two parameters that make the model anisotropic when they differ.
+    """
+
+    name: str
+    version: int
+    title: str
+    equation: str
+    reference: str
+    parameters: tuple[Parameter, ...]
+    evaluate: Callable[..., Floats]
+    specular: Callable[..., Floats] | None = None
+    specular_parameters: tuple[str, ...] = ()
+    spectral: bool = False
+    grazing_pole: bool = False
+    lobe_axes: tuple[str, str] | None = None
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter called `name`; KeyError if the model has none."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(name)
