@@ -1,0 +1,1 @@
+"""Batch jobs, recipes and the command line of brdfdb."""

@@ -1,0 +1,73 @@
+"""The audit job: audit tables of a store, write the JSON report, show what was found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import brdfdb
+from brdfdb.audit import AuditReport, MaterialAudit, audit, report
+from brdfdb_pipelines import terminal
+
+
+def run(root: Path, names: list[str], report_path: Path) -> AuditReport:
+    """Audit the named materials of a store, or all of them.
+
+    Parameters
+    ----------
+    root : Path
+        Directory of the store.
+    names : list of str
+        Materials; empty for all.
+    report_path : Path
+        The JSON report, written when everything has been audited.
+
+    Raises
+    ------
+    StoreError, UnknownMaterialError
+        If the store or a material is missing or damaged: every file is checked against its manifest.
+    """
+    store = brdfdb.open(root)
+    revisions = {name: store.head(name) for name in names or store}
+    audits: list[MaterialAudit] = []
+    with terminal.progress() as bar:
+        for name in bar.track(revisions, description="auditing"):
+            store.verify(name)
+            audits.append(audit(store[name]))
+    found = report(audits)
+    report_path.write_text(found.model_dump_json(indent=1) + "\n")
+    numbers = ("albedo up to", "model", "table", "smallest")
+    terminal.print_table(
+        f"Audit of {root} (model, table: largest asymmetry under exchange of light and viewer)",
+        ("material", "verdict", *numbers),
+        [_row(a) for a in audits],
+        numbers=numbers,
+    )
+    for a in audits:
+        for reason in _reasons(a):
+            print(f"{a.material}: {reason}")
+    known = sum(a.verdict == "known published excess" for a in audits)
+    print(
+        f"{len(audits)} audited: {len(audits) - known - len(found.violations)} pass, {known} exceed 1 as their "
+        f"published parameters are known to, {len(found.violations)} violate; report in {report_path}"
+    )
+    return found
+
+
+def _row(a: MaterialAudit) -> tuple[str, ...]:
+    return (
+        a.material,
+        a.verdict,
+        f"{a.energy.max_albedo:.4f} at {a.energy.max_at_theta_i_deg:4g}°",
+        f"{a.reciprocity.model.max:.0e}",
+        f"{a.reciprocity.table.max:.0e}",
+        "none" if a.values.smallest is None else f"{a.values.smallest:.3g}",
+    )
+
+
+def _reasons(a: MaterialAudit) -> list[str]:
+    """A sentence for each finding that is not a pass."""
+    reasons = [a.energy.reason] if a.energy.verdict != "passes" else []
+    reasons += ["not reciprocal"] if a.reciprocity.verdict == "violates" else []
+    reasons += [f"{a.values.negative} negative values"] if a.values.negative else []
+    reasons += [f"{a.values.not_finite} values are not finite"] if a.values.not_finite else []
+    return reasons

@@ -1,0 +1,166 @@
+"""The command line `brdfdb`: one subcommand a job. Whatever is heavy is imported by the job that needs it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+FAILED, VIOLATED = 2, 1  # exit codes: an error in one sentence; an audit that found a new violation
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    options = _parser().parse_args(arguments)
+    run: Callable[[argparse.Namespace], int] = options.run
+    try:
+        return run(options)
+    except KeyboardInterrupt:
+        print("brdfdb: interrupted; what was published before stays", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # the reader of our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        if not _is_users(error):
+            raise
+        print(f"brdfdb: {_sentence(error)}", file=sys.stderr)
+        return FAILED
+
+
+def _is_users(error: Exception) -> bool:
+    """Whether an error is about what the user gave, not about this program."""
+    from brdfdb.store import StoreError, UnknownMaterialError
+
+    return isinstance(error, StoreError | UnknownMaterialError | ValueError | OSError)
+
+
+def _sentence(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="brdfdb",
+        description="Spectral BRDF tables from published surface parameters: build, audit, export, look up, serve.",
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def command(name: str, run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=text, description=text)
+        sub.set_defaults(run=run)
+        sub.add_argument(
+            "--store",
+            type=Path,
+            default=Path(os.environ.get("BRDFDB_STORE", "brdf-store")),
+            metavar="DIR",
+            help="directory of the store (default: $BRDFDB_STORE or %(default)s)",
+        )
+        return sub
+
+    build = command("build", _build, "Tabulate the materials of a recipe into the store.")
+    build.add_argument("recipe", type=Path, nargs="?", help="a TOML file; by default every material of the papers")
+    build.add_argument(
+        "--jobs", type=_positive, default=os.cpu_count() or 1, metavar="N", help="threads (default: %(default)s)"
+    )
+
+    audit = command("audit", _audit, "Audit energy, reciprocity, positivity and finiteness; exit 1 on a new violation.")
+    audit.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
+    audit.add_argument("--report", type=Path, metavar="FILE", help="JSON report (default: DIR/audit.json)")
+
+    export = command("export", _export, "Write slices of tables as image files.")
+    export.add_argument("format", choices=["exr"])
+    export.add_argument("names", nargs="*", metavar="NAME", help="materials")
+    export.add_argument("--all", action="store_true", help="every material of the store")
+    export.add_argument(
+        "--out", type=Path, default=Path("brdf-exr"), metavar="DIR", help="directory to write to (default: %(default)s)"
+    )
+    export.add_argument("--half", action="store_true", help="16-bit floats, to look at; default 32-bit, for data")
+
+    lookup = command("lookup", _lookup, "Print f_r [1/sr] of a material at one pair of directions, in degrees.")
+    lookup.add_argument("name", metavar="NAME")
+    for angle in ("theta_i", "phi_i", "theta_r", "phi_r"):
+        lookup.add_argument(angle, type=float, metavar=angle.upper(), help="degrees")
+    lookup.add_argument("--wavelength-nm", type=float, nargs="+", metavar="NM", help="default: all of the table")
+    lookup.add_argument("--json", action="store_true", help="print JSON")
+
+    listing = command("list", _list, "List the materials of the store, or the built-in presets.")
+    listing.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")
+
+    show = command("show", _show, "Show parameters, sources, grid, albedo and files of a material.")
+    show.add_argument("name", metavar="NAME")
+
+    serve = command("serve", _serve, "Answer lookups over HTTP.")
+    serve.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
+    serve.add_argument("--port", type=int, default=8000, help="port (default: %(default)s)")
+    return parser
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value} is not at least 1")
+    return value
+
+
+def _build(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import build
+
+    build.run(options.recipe, options.store, options.jobs)
+    return 0
+
+
+def _audit(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import audit
+
+    report = audit.run(options.store, options.names, options.report or options.store / "audit.json")
+    return VIOLATED if report.violations else 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import export
+
+    if bool(options.names) == options.all:
+        raise ValueError("export: name materials, or give --all")
+    export.run_exr(options.store, options.names, options.out, half=options.half)
+    return 0
+
+
+def _lookup(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import inspect
+
+    angles = (options.theta_i, options.phi_i, options.theta_r, options.phi_r)
+    inspect.lookup(options.store, options.name, angles, options.wavelength_nm, as_json=options.json)
+    return 0
+
+
+def _list(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import inspect
+
+    if options.presets:
+        inspect.list_presets()
+    else:
+        inspect.list_store(options.store)
+    return 0
+
+
+def _show(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import inspect
+
+    inspect.show(options.store, options.name)
+    return 0
+
+
+def _serve(options: argparse.Namespace) -> int:
+    from brdfdb_api.app import serve
+
+    serve(options.store, options.host, options.port)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

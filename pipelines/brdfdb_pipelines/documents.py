@@ -1,0 +1,54 @@
+"""Documents that are generated from the code and kept in the repository for review: JSON Schemas, the README's table.
+
+``python -m brdfdb_pipelines.documents`` in the root of the repository writes them anew; the tests compare. Nothing
+reads them at run time.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from brdfdb.audit import AuditReport
+from brdfdb.materials import Material
+from brdfdb.models import MODELS
+from brdfdb_pipelines.recipe import Recipe
+
+SCHEMAS: dict[str, type[BaseModel]] = {"audit": AuditReport, "material": Material, "recipe": Recipe}
+
+TABLE_BEGIN, TABLE_END = "<!-- generated: models -->", "<!-- end -->"
+
+
+def schema(name: str) -> str:
+    """The text of ``schemas/<name>.schema.json``."""
+    dialect = "https://json-schema.org/draft/2020-12/schema"
+    document: dict[str, Any] = {"$schema": dialect, **SCHEMAS[name].model_json_schema()}
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def model_table() -> str:
+    """The README's table of models and their parameters."""
+    lines = ["| function | model | equations | parameters |", "|---|---|---|---|"]
+    for spec in MODELS.values():
+        parameters = ", ".join(f"`{p.name}` {p.interval}" for p in spec.parameters)
+        if spec.spectral:
+            parameters += ", `wavelength_nm`, `n`, `k`"
+        lines.append(f"| `{spec.name}` | {spec.title} | {spec.equation} | {parameters} |")
+    return "\n".join(lines)
+
+
+def readme(text: str) -> str:
+    """A README with its model table brought up to date."""
+    before, rest = text.split(TABLE_BEGIN)
+    _, after = rest.split(TABLE_END)
+    return f"{before}{TABLE_BEGIN}\n{model_table()}\n{TABLE_END}{after}"
+
+
+if __name__ == "__main__":
+    for name in SCHEMAS:
+        Path("schemas", f"{name}.schema.json").write_text(schema(name), encoding="utf-8")
+    path = Path("README.md")
+    path.write_text(readme(path.read_text(encoding="utf-8")), encoding="utf-8")

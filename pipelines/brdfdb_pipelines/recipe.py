@@ -1,0 +1,179 @@
+"""Recipes: which materials to tabulate, on which grids and at which wavelengths, checked before anything is built."""
+
+from __future__ import annotations
+
+import fnmatch
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from brdfdb.grids import Axis, Grid
+from brdfdb.materials import Material, presets
+from brdfdb.tabulate import check_suits
+
+_STRICT = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class RecipeError(ValueError):
+    """A recipe that cannot be built; str() is one sentence that names the field."""
+
+
+class Range(BaseModel):
+    """Equally spaced numbers from start to stop, both included."""
+
+    model_config = _STRICT
+
+    start: float
+    stop: float
+    step: float = Field(gt=0.0)
+
+    def nodes(self, name: str) -> Axis:
+        """The numbers; RecipeError if the step does not lead from start to stop."""
+        count = (self.stop - self.start) / self.step
+        if count < 0.0 or abs(count - round(count)) > 1e-6:
+            raise RecipeError(f"{name}: steps of {self.step:g} from {self.start:g} do not end at {self.stop:g}")
+        return np.linspace(self.start, self.stop, round(count) + 1)
+
+
+Nodes = Annotated[list[float | Range], Field(min_length=1)]
+
+
+def _nodes(name: str, parts: list[float | Range]) -> Axis:
+    return np.concatenate([part.nodes(name) if isinstance(part, Range) else np.array([part]) for part in parts])
+
+
+class IsotropicGrid(BaseModel):
+    """Axes of a table of an isotropic material."""
+
+    model_config = _STRICT
+
+    theta_i_deg: Nodes
+    theta_r_deg: Nodes
+    delta_phi_deg: Nodes
+
+
+class AnisotropicGrid(BaseModel):
+    """Axes of a table of an anisotropic material."""
+
+    model_config = _STRICT
+
+    theta_i_deg: Nodes
+    phi_i_deg: Nodes
+    theta_r_deg: Nodes
+    phi_r_deg: Nodes
+
+
+class Grids(BaseModel):
+    """The grid for each kind of material."""
+
+    model_config = _STRICT
+
+    isotropic: IsotropicGrid
+    spectral: IsotropicGrid
+    anisotropic: AnisotropicGrid
+
+
+@dataclass(frozen=True)
+class Job:
+    """One table to build."""
+
+    material: Material
+    grid: Grid
+    wavelength_nm: NDArray[np.float64] | None
+
+    @property
+    def size(self) -> int:
+        """Number of values in the table."""
+        return int(np.prod(self.grid.shape)) * (1 if self.wavelength_nm is None else self.wavelength_nm.size)
+
+
+class Recipe(BaseModel):
+    """A recipe file. Angles are degrees, wavelengths nanometres."""
+
+    model_config = _STRICT
+
+    title: str = ""
+    materials: list[str] = Field(min_length=1, description="names or shell patterns")
+    wavelengths_nm: Nodes
+    grids: Grids
+    define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
+
+    def jobs(self) -> list[Job]:
+        """Every table that the recipe asks for.
+
+        Raises
+        ------
+        RecipeError
+            If a name matches nothing, or a material, grid or wavelength is not what it must be.
+        """
+        grids = {name: self._grid(name) for name in Grids.model_fields}
+        wavelengths = _nodes("wavelengths_nm", self.wavelengths_nm)
+        if not (wavelengths[0] > 0.0 and np.all(np.diff(wavelengths) > 0.0)):
+            raise RecipeError("wavelengths_nm: must be positive and increase strictly")
+        jobs = []
+        for material in self._selected():
+            wavelength_nm = None
+            if material.spectral:
+                stated = material.wavelengths_nm
+                wavelength_nm = wavelengths if stated is None else np.array(stated)
+            several = wavelength_nm is not None and wavelength_nm.size > 1
+            kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
+            try:
+                check_suits(material, grids[kind], wavelength_nm)
+            except ValueError as error:
+                raise RecipeError(str(error)) from None
+            jobs.append(Job(material, grids[kind], wavelength_nm))
+        return jobs
+
+    def _grid(self, name: str) -> Grid:
+        parts: dict[str, list[float | Range]] = dict(getattr(self.grids, name))
+        try:
+            return Grid({field.removesuffix("_deg"): _nodes(field, nodes) for field, nodes in parts.items()})
+        except ValueError as error:
+            raise RecipeError(f"grids.{name}.{error}") from None
+
+    def _selected(self) -> list[Material]:
+        known = dict(presets())
+        for name, table in self.define.items():
+            try:
+                known[name] = Material.from_table(name, table)
+            except ValueError as error:
+                raise RecipeError(f"define.{error}") from None
+        chosen: dict[str, Material] = {}
+        for pattern in self.materials:
+            matches = fnmatch.filter(known, pattern)
+            if not matches:
+                raise RecipeError(f"materials: {pattern!r} matches no material; `brdfdb list --presets` names them")
+            chosen |= {name: known[name] for name in matches}
+        return list(chosen.values())
+
+
+def load(path: Path | None = None) -> Recipe:
+    """Read a recipe file, by default the one that comes with the program.
+
+    Raises
+    ------
+    RecipeError
+        If the file cannot be read, is not TOML, or is not a recipe; the message names the file and the field.
+    """
+    source = resources.files("brdfdb_pipelines") / "recipes" / "default.toml" if path is None else path
+    try:
+        content = tomllib.loads(source.read_text())
+    except OSError as error:
+        raise RecipeError(f"{source}: {error.strerror}") from None
+    except ValueError as error:
+        raise RecipeError(f"{source}: not TOML: {error}") from None
+    try:
+        return Recipe.model_validate(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        # pydantic lists each branch of number | range: the names of the branches are not names of the recipe
+        field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range"))
+        said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+        raise RecipeError(f"{source}: {field}: {said}") from None

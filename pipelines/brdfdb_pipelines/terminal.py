@@ -1,0 +1,50 @@
+"""What the command line shows: progress bars on stderr, tables on stdout."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+
+def progress(counted: bool = True) -> Progress:
+    """A progress bar; `counted` shows how many of how many, for tasks that count things."""
+    count = [MofNCompleteColumn()] if counted else []
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        *count,
+        TextColumn("{task.percentage:>3.0f}%"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )
+
+
+def print_table(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: Sequence[str] = ()
+) -> None:
+    """Print rows under column headings; the columns in `numbers` are set to the right.
+
+    When the output is not a terminal, lines are as long as they need to be: nothing is cut for a program to read.
+    """
+    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold", box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, justify="right" if column in numbers else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=Console(width=10_000).measure(table).maximum)
+    console.print(table)
+
+
+def size(count: float) -> str:
+    """A number of bytes as a human reads it."""
+    for unit in ("B", "kB", "MB"):
+        if count < 999.5:
+            return f"{count:.3g} {unit}"
+        count /= 1000.0
+    return f"{count:.3g} GB"

@@ -1,0 +1,74 @@
+"""The house itself: lint, types, import layers, generated documents, and what the README promises."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from brdfdb_pipelines import documents
+
+ROOT = Path(__file__).parent.parent
+SOURCES = [
+    path
+    for folder in ("brdfdb", "pipelines", "api", "tests")
+    for path in sorted((ROOT / folder).rglob("*.py"))
+    if "__pycache__" not in path.parts
+]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(["ruff", "check", "--no-cache", "."], id="lint"),
+        pytest.param(["ruff", "format", "--check", "--no-cache", "."], id="format"),
+        pytest.param(["mypy"], id="types"),
+        pytest.param(["importlinter.cli", "lint-imports"], id="layers"),
+    ],
+)
+def test_static_checks_pass(command: list[str]) -> None:
+    module, *arguments = command
+    if module == "importlinter.cli":
+        run = [sys.executable, "-c", "from importlinter.cli import lint_imports_command; lint_imports_command()"]
+    else:
+        run = [sys.executable, "-m", module, *arguments]
+    done = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_file_says_in_its_first_line_what_lives_there(path: Path) -> None:
+    assert re.match(r'r?"""\S', path.read_text(encoding="utf-8")), f"{path} has no docstring in its first line"
+
+
+@pytest.mark.parametrize("name", documents.SCHEMAS)
+def test_schemas_are_those_of_the_code(name: str) -> None:
+    written = (ROOT / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
+    assert written == documents.schema(name), "run python -m brdfdb_pipelines.documents and review the difference"
+
+
+def test_the_model_table_of_the_readme_is_that_of_the_code() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert text == documents.readme(text), "run python -m brdfdb_pipelines.documents and review the difference"
+
+
+def test_readme_has_exactly_two_set_up_commands() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(re.findall(r"^python3 -m venv .*$", text, flags=re.MULTILINE)) == 2
+
+
+def test_the_check_runs_the_readmes_test_command() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (command,) = [line for line in text.splitlines() if "-m pytest" in line]
+    assert command.startswith("python3 -m venv .venv && .venv/bin/pip install -e '.[test]'")
+    assert 'grep -F -- "-m pytest" README.md' in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_every_reference_key_is_in_the_bibliography() -> None:
+    from brdfdb.models import MODELS
+
+    keys = set(re.findall(r"^@\w+\{(\w+),", (ROOT / "references.bib").read_text(encoding="utf-8"), flags=re.MULTILINE))
+    assert {spec.reference for spec in MODELS.values()} <= keys
