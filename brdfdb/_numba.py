@@ -1,4 +1,8 @@
-"""The only file that calls numba: how kernels are compiled, and a power of two that vectorises."""
+"""The only file that calls numba: how kernels are compiled.
+
+A kernel calls kernels of its own file only. numba keeps compiled code under the digest of the file that holds the
+kernel: one that calls into another file would go on running the old code when that file changes.
+"""
 
 from __future__ import annotations
 
@@ -52,32 +56,3 @@ def _ufunc(function: Callable[..., Any], arity: int) -> Callable[..., Any]:
     signature = numba.float64(*[numba.float64] * arity)
     vectorize = numba.vectorize([signature], cache=True)  # type: ignore[no-untyped-call]  # numba leaves it untyped
     return cast(Callable[..., Any], vectorize(function))
-
-
-_ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it leaves the nearest integer in the low bits of the float
-_UNDERFLOW = -1022.0
-
-
-@kernel
-def fast_exp2(x: float) -> float:
-    """2**x for x <= 1000, within 1e-13 relative (measured 8e-15 for x > -10); 0 below the normal float64.
-
-    Branch-free, so that loops over it vectorise; those over libm's exp do not.
-    """
-    shifted = x + _ROUND
-    r = x - (shifted - _ROUND)
-    # Taylor series, coefficients ln(2)^k / k!: |r| <= 1/2, the first term left out is below 7e-15
-    p = 4.44553827187081e-10
-    p = p * r + 7.054911620801121e-09
-    p = p * r + 1.0178086009239696e-07
-    p = p * r + 1.3215486790144305e-06
-    p = p * r + 1.5252733804059838e-05
-    p = p * r + 0.00015403530393381606
-    p = p * r + 0.0013333558146428441
-    p = p * r + 0.009618129107628477
-    p = p * r + 0.055504108664821576
-    p = p * r + 0.2402265069591007
-    p = p * r + 0.6931471805599453
-    p = p * r + 1.0
-    bits = (np.float64(shifted).view(np.int64) + np.int64(1023)) << np.int64(52)
-    return p * np.int64(bits).view(np.float64) if x > _UNDERFLOW else 0.0

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.parameters import Floats
 
 HALF_PI = np.pi / 2
+PHI_MAX = 1e15  # beyond, neighbouring float64 are more than a tenth of a radian apart
 
 
 def radians(angle_deg: ArrayLike) -> NDArray[np.float64]:
@@ -43,10 +44,12 @@ def check_theta(name: str, theta: ArrayLike) -> Floats:
 
 
 def check_phi(name: str, phi: ArrayLike) -> Floats:
-    """Return an azimuth [rad] as a float array; any finite value and nan are allowed, infinity is a ValueError."""
+    """Return an azimuth [rad] as a float array; nan passes through, what is not in [-1e15, 1e15] is a ValueError."""
     array = _float_array(name, phi)
-    if np.any(np.isinf(array)):
-        raise ValueError(f"{name}: inf is not an angle; allowed is any finite number of radians")
+    bad = np.abs(array) > PHI_MAX
+    if np.any(bad):
+        first = np.atleast_1d(array)[np.atleast_1d(bad)][0]
+        raise ValueError(f"{name}: {first:.9g} rad is outside [-{PHI_MAX:g}, {PHI_MAX:g}] rad")
     return array
 
 

@@ -23,22 +23,23 @@ class Parameter:
     high: float
     meaning: str
     default: float | bool | None = None
-    low_open: bool = False
 
     @property
     def interval(self) -> str:
         """The allowed values as an interval with its unit, for messages and tables."""
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{'(' if self.low_open else '['}{self.low:g}, {self.high:g}]{unit}"
+        return f"[{self.low:g}, {self.high:g}]{unit}"
 
     def check(self, value: ArrayLike) -> Floats:
         """Return `value` as float64, or raise a ValueError that names the parameter, the value and the range."""
-        array = np.asarray(value, dtype=np.float64)
-        too_low = array <= self.low if self.low_open else array < self.low
-        bad = too_low | ~(array <= self.high)
+        given = np.asarray(value)
+        if given.dtype.kind not in "biuf":
+            raise ValueError(f"{self.name}: {value!r} is not a number in {self.interval}")
+        array = given.astype(np.float64)
+        bad = ~((array >= self.low) & (array <= self.high))  # nan too
         if np.any(bad):
             first = array[bad].flat[0] if array.ndim else array[()]
-            raise ValueError(f"{self.name}: {first:g} is outside {self.interval}")
+            raise ValueError(f"{self.name}: {first:.16g} is outside {self.interval}")
         return array
 
 

@@ -14,10 +14,10 @@ from brdfdb.geometry import checked_angles, finished
 from brdfdb.models._he_torrance_series import diffraction_series
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
-WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 0.0, 1e7, "wavelength in vacuum", low_open=True)
+WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum")
 SIGMA_0_UM = Parameter("sigma_0_um", "σ_0", "µm", 0.0, 1e4, "rms roughness; 0 is a mirror")
-TAU_UM = Parameter("tau_um", "τ", "µm", 0.0, 1e6, "autocorrelation length", low_open=True)
-N = Parameter("n", "n", "1", 0.0, 100.0, "refractive index", low_open=True)
+TAU_UM = Parameter("tau_um", "τ", "µm", 1e-6, 1e6, "autocorrelation length")
+N = Parameter("n", "n", "1", 1e-3, 100.0, "refractive index")
 K = Parameter("k", "k", "1", 0.0, 1e4, "extinction coefficient")
 A = Parameter("a", "a", "1", 0.0, 1.0, "albedo of the uniform diffuse part", default=0.0)
 
@@ -104,11 +104,11 @@ def he_torrance(
     theta_i, phi_i, theta_r, phi_r : array_like [rad]
         Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
     wavelength_nm : array_like [nm]
-        Wavelength in vacuum, in (0, 1e7].
+        Wavelength in vacuum, in [1e-3, 1e7].
     sigma_0_um, tau_um : array_like [um]
-        rms roughness, in [0, 1e4], and autocorrelation length, in (0, 1e6].
+        rms roughness, in [0, 1e4], and autocorrelation length, in [1e-6, 1e6].
     n, k : array_like [1]
-        Complex refractive index n + ik at that wavelength; n in (0, 100], k in [0, 1e4].
+        Complex refractive index n + ik at that wavelength; n in [1e-3, 100], k in [0, 1e4].
     a : array_like [1]
         Albedo of the uniform diffuse part, in [0, 1].
 
@@ -139,7 +139,7 @@ def he_torrance(
     --------
     >>> surface = dict(sigma_0_um=0.18, tau_um=3.0, n=0.769, k=6.08)
     >>> round(float(he_torrance(0.5, 0.0, 0.6, 3.0, wavelength_nm=500.0, **surface)), 3)
-    3.489
+    5.388
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     surface = _surface(wavelength_nm, sigma_0_um, tau_um, n, k)
@@ -148,21 +148,22 @@ def he_torrance(
     sin_r, cos_r = np.sin(angles.theta_r), np.cos(angles.theta_r)
     slope = surface.slope
     # Eq. (84), unit vectors: v_xy^2 in the form that keeps its digits near the mirror direction
-    v_z = cos_i + cos_r
-    v_xy2 = (sin_i - sin_r) ** 2 + 4.0 * sin_i * sin_r * np.cos((angles.phi_r - angles.phi_i) / 2.0) ** 2
-    v2 = v_xy2 + v_z**2
+    v_z2 = (cos_i + cos_r) ** 2
+    v_xy2 = (sin_i - sin_r) ** 2 + (4.0 * sin_i * sin_r) * np.cos((angles.phi_r - angles.phi_i) / 2.0) ** 2
     # Eqs (23)-(25)
     S_over_cos_cos = _shadowing(sin_i, cos_i, slope) * _shadowing(sin_r, cos_r, slope)
-    # Eqs (79)-(83); g / v_z^2
+    # Eqs (79)-(83)
     variance = _variance(_hidden(sin_i, cos_i, slope) + _hidden(sin_r, cos_r, slope))
     g_over_vz2 = (2.0 * np.pi * surface.sigma_0 / surface.wavelength_um) ** 2 * variance
-    # Eq. (75)
-    F2 = fresnel.unpolarised(np.minimum(np.sqrt(v2) / 2.0, 1.0), surface.n, surface.k)
     # Eq. (78), with V = (2 pi / lambda)^2 v_xy^2 tau^2 / 4
     correlation = (np.pi * surface.tau / surface.wavelength_um) ** 2
-    D_over_g = correlation / 4.0 * diffraction_series(g_over_vz2 * v_z**2, correlation * v_xy2)
+    D_over_g = diffraction_series(g_over_vz2 * v_z2, correlation * v_xy2)
+    # Eq. (75), at the bisecting angle
+    v2 = v_xy2 + v_z2
+    F2 = fresnel.unpolarised(np.minimum(0.5 * np.sqrt(v2), 1.0), surface.n, surface.k)
     # Eqs (71) and (76)
-    directional_diffuse = F2 / np.pi * v2**2 * D_over_g * (S_over_cos_cos * g_over_vz2)
+    pair = correlation / (4.0 * np.pi) * S_over_cos_cos * g_over_vz2
+    directional_diffuse = F2 * D_over_g * v2**2 * pair
     # Eq. (72)
     return finished(directional_diffuse + albedo / np.pi, angles)
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brdfdb._numba import elementwise, kernel
-from brdfdb.geometry import Angles, checked_angles, finished
+from brdfdb.geometry import HALF_PI, Angles, checked_angles, finished
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a facet")
@@ -16,15 +16,19 @@ OFFSET = Parameter(
     "offset", "", "1", 0.0, 10.0, "constant in A; 0.57 stands in for interreflection (note 7)", default=0.33
 )
 
+_HALF_PI_REST = 6.123233995736766e-17  # pi/2 less the float64 nearest to it
+
 
 @kernel
 def _functional(
     alpha: float,
     beta: float,
     sin_alpha: float,
+    versine_alpha: float,
     tan_beta: float,
     tan_mean: float,
     cos_delta_phi: float,
+    one_less_cos: float,
     rho: float,
     sigma: float,
     interreflection: float,
@@ -34,10 +38,12 @@ def _functional(
     C1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33)
     C2 = 0.45 * sigma2 / (sigma2 + 0.09) * sin_alpha
     if cos_delta_phi < 0.0:
-        C2 = 0.45 * sigma2 / (sigma2 + 0.09) * (sin_alpha - (2.0 * beta / np.pi) ** 3)
+        # sin(alpha) - (2 beta / pi)^3: both near 1 at the horizon, where tan(beta) magnifies what is left
+        x = (HALF_PI - beta + _HALF_PI_REST) * (2.0 / np.pi)
+        C2 = 0.45 * sigma2 / (sigma2 + 0.09) * (x * (3.0 - x * (3.0 - x)) - versine_alpha)
     C3 = 0.125 * sigma2 / (sigma2 + 0.09) * (4.0 * alpha * beta / np.pi**2) ** 2
     # Eq. (27)
-    direct = C1 + cos_delta_phi * C2 * tan_beta + (1.0 - abs(cos_delta_phi)) * C3 * tan_mean
+    direct = C1 + cos_delta_phi * C2 * tan_beta + one_less_cos * C3 * tan_mean
     # Eq. (28)
     bounced = 0.17 * rho * sigma2 / (sigma2 + 0.13) * (1.0 - cos_delta_phi * (2.0 * beta / np.pi) ** 2)
     # Eq. (29)
@@ -113,17 +119,22 @@ def oren_nayar(
     Examples
     --------
     >>> round(float(oren_nayar(0.3, 0.0, 0.4, 0.0, rho=0.9, sigma=0.5)), 4)
-    0.2556
+    0.2639
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     alpha, beta = _alpha_beta(angles)
+    delta_phi = angles.phi_r - angles.phi_i
+    cos_delta_phi = np.cos(delta_phi)
+    sin_alpha, sin_beta = np.sin(alpha), np.sin(beta)
     values = _evaluate_functional(
         alpha,
         beta,
-        np.sin(alpha),
+        sin_alpha,
+        2.0 * np.sin((HALF_PI - alpha + _HALF_PI_REST) / 2.0) ** 2,
         np.tan(beta),
-        np.tan((alpha + beta) / 2.0),
-        np.cos(angles.phi_r - angles.phi_i),
+        (sin_alpha + sin_beta) / (np.cos(alpha) + np.cos(beta)),  # the mean of two angles would round
+        cos_delta_phi,
+        np.sin(delta_phi) ** 2 / (1.0 + np.abs(cos_delta_phi)),  # 1 - |cos|: tan_mean magnifies it near grazing
         RHO.check(rho),
         SIGMA.check(sigma),
         INTERREFLECTION.check(interreflection),
@@ -175,7 +186,7 @@ def oren_nayar_qualitative(
     Examples
     --------
     >>> round(float(oren_nayar_qualitative(0.3, 0.0, 0.4, 0.0, rho=0.9, sigma=0.5)), 4)
-    0.2390
+    0.2362
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     alpha, beta = _alpha_beta(angles)

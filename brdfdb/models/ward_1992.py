@@ -13,8 +13,8 @@ from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "diffuse reflectance")
 RHO_S = Parameter("rho_s", "ρ_s", "1", 0.0, 1.0, "specular reflectance; the tables of the paper call it ρ_r")
-ALPHA_X = Parameter("alpha_x", "α_x", "1", 0.0, 2.0, "standard deviation of the slope along x", low_open=True)
-ALPHA_Y = Parameter("alpha_y", "α_y", "1", 0.0, 2.0, "standard deviation of the slope along y", low_open=True)
+ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "standard deviation of the slope along x")
+ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "standard deviation of the slope along y")
 
 
 @kernel
@@ -64,7 +64,7 @@ def ward(
     rho_d, rho_s : array_like [1]
         Diffuse and specular reflectance, each in [0, 1].
     alpha_x, alpha_y : array_like [1]
-        Standard deviations of the surface slope along x and y, in (0, 2]; the paper holds the model good to 0.2.
+        Standard deviations of the surface slope along x and y, in [1e-6, 2]; the paper holds the model good to 0.2.
 
     Returns
     -------
