@@ -24,7 +24,7 @@ _ENDS: dict[str, tuple[float, float | None]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grid:
     """A rectilinear grid of directions.
 
@@ -61,6 +61,17 @@ class Grid:
         return tuple(nodes.size for nodes in self.axes.values())
 
     @property
+    def reciprocal(self) -> bool:
+        """Whether a table is its own transpose: isotropic, with the same theta nodes for light and viewer."""
+        return not self.anisotropic and np.array_equal(self.axes["theta_i"], self.axes["theta_r"])
+
+    @property
+    def symmetries(self) -> list[str]:
+        """What a table on the grid leaves out or repeats, in words."""
+        mirror = [] if self.anisotropic else ["brdf(delta_phi) = brdf(-delta_phi)"]
+        return mirror + (["brdf(theta_i, theta_r) = brdf(theta_r, theta_i)"] if self.reciprocal else [])
+
+    @property
     def reaches_horizon(self) -> bool:
         """Whether a theta axis has a node at exactly 90 degrees."""
         return any(nodes[-1] == 90.0 for name, nodes in self.axes.items() if name.startswith("theta"))
@@ -68,9 +79,9 @@ class Grid:
 
 def check_axis(name: str, nodes: Any) -> Axis:
     """Return the nodes of axis `name` [degree] as float64, or raise a ValueError saying what is wrong with them."""
-    axis = np.asarray(nodes, dtype=np.float64)
+    axis = np.array(nodes, dtype=np.float64)
     if axis.ndim != 1 or axis.size < 2:
-        raise ValueError(f"{name}: needs at least two nodes, got {axis.size}")
+        raise ValueError(f"{name}: needs a list of at least two nodes, got an array of shape {axis.shape}")
     if not np.all(np.diff(axis) > 0.0):
         raise ValueError(f"{name}: the nodes must increase strictly")
     first, last = _ENDS[name]
@@ -80,4 +91,12 @@ def check_axis(name: str, nodes: Any) -> Axis:
         raise ValueError(f"{name}: ends at {axis[-1]:g} degrees, must end at {last:g}")
     if last is None and not axis[-1] <= 90.0:
         raise ValueError(f"{name}: ends at {axis[-1]:g} degrees, must end at or below 90")
+    return axis
+
+
+def check_wavelengths(nodes: Any) -> Axis:
+    """Return wavelengths [nm] as float64, or raise a ValueError saying what is wrong with them."""
+    axis = np.array(nodes, dtype=np.float64)
+    if axis.ndim != 1 or axis.size == 0 or not (axis[0] > 0.0 and np.all(np.diff(axis) > 0.0)):
+        raise ValueError("wavelengths_nm: must be positive and increase strictly")
     return axis

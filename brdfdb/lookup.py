@@ -91,7 +91,7 @@ class Table:
         values = np.empty((points[0].size, weight.size))
         table = self.brdf.reshape(*(nodes.size for nodes in axes), -1)
         _interpolate(tuple(axes), table, tuple(np.ravel(p) for p in points), low, weight, values)
-        return finished(values.reshape(*shape, -1), angles, trailing=1).reshape(shape + wavelength_shape)[()]
+        return finished(values.reshape(*shape, weight.size), angles, trailing=1).reshape(shape + wavelength_shape)[()]
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the reflectance of the Dirac part; 0 for models that have none.
@@ -148,9 +148,9 @@ class Table:
         outside = (flat < stored[0]) | (flat > stored[-1])
         if np.any(outside):
             raise ValueError(
-                f"wavelength_nm: {flat[outside][0]:g} is outside [{stored[0]:g}, {stored[-1]:g}] nm of {self.name}"
+                f"wavelength_nm: {flat[outside][0]:.9g} is outside [{stored[0]:g}, {stored[-1]:g}] nm of {self.name}"
             )
-        low = np.clip(np.searchsorted(stored, flat, side="right") - 1, 0, max(stored.size - 2, 0))
+        low = np.searchsorted(stored, flat, side="right") - 1
         step = stored[np.minimum(low + 1, stored.size - 1)] - stored[low]
         weight = np.divide(flat - stored[low], step, out=np.zeros(flat.size), where=step > 0.0)
         return low, weight, wanted.shape

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 FORMAT = "brdfdb"
 FORMAT_VERSION = 1
 
-_DECODED = 16  # tables kept decoded by a Store
+_DECODED = 8  # tables kept decoded by a Store
 _CHUNK_VALUES = 1 << 20  # values of a chunk of brdf, 4 MB
 
 
@@ -106,14 +106,15 @@ class Store(Mapping[str, Table]):
         return any(name == known for known in self)  # matched, never joined to a path unseen
 
     def __getitem__(self, name: str) -> Table:
-        revision = self.head(name)
+        group, digest = self._head(name)
         with self._lock:
-            if (name, revision) in self._decoded:
-                self._decoded.move_to_end((name, revision))
-                return self._decoded[name, revision]
-        table = _decode(name, revision, self.path(name))
+            if (name, group.name) in self._decoded:
+                self._decoded.move_to_end((name, group.name))
+                return self._decoded[name, group.name]
+        check_manifest(group, digest, contents=False)
+        table = _decode(name, group)
         with self._lock:
-            self._decoded[name, revision] = table
+            self._decoded[name, group.name] = table
             while len(self._decoded) > _DECODED:
                 self._decoded.popitem(last=False)
         return table
@@ -126,15 +127,17 @@ class Store(Mapping[str, Table]):
         UnknownMaterialError
             If the store has no such material.
         """
-        return str(self._head(name)["revision"])
+        return self.path(name).name
 
     def path(self, name: str) -> Path:
         """Directory of the current revision: a zarr group that xarray opens."""
-        return self.root / "materials" / name / self.head(name)
+        return self._head(name)[0]
 
     def attributes(self, name: str) -> dict[str, Any]:
         """What the current revision says of itself, without decoding its values."""
-        return dict(_read_json(self.path(name) / "zarr.json")["attributes"])
+        group, digest = self._head(name)
+        check_manifest(group, digest, contents=False)
+        return dict(_read_json(group / "zarr.json")["attributes"])
 
     def dataset(self, name: str) -> xr.Dataset:
         """The current revision as a lazy xarray Dataset.
@@ -143,10 +146,14 @@ class Store(Mapping[str, Table]):
         ------
         UnknownMaterialError
             If the store has no such material.
+        StoreError
+            If a file of it is missing: xarray would read nan in its place.
         """
         import xarray as xr
 
-        dataset: xr.Dataset = xr.open_zarr(self.path(name), consolidated=False, chunks=None)
+        group, digest = self._head(name)
+        check_manifest(group, digest, contents=False)
+        dataset: xr.Dataset = xr.open_zarr(group, chunks=None)
         return dataset
 
     def verify(self, name: str) -> None:
@@ -157,31 +164,34 @@ class Store(Mapping[str, Table]):
         StoreError
             Naming the first file that is missing, of another size or of another content.
         """
-        check_manifest(self.path(name), str(self._head(name)["manifest_sha256"]), contents=True)
+        check_manifest(*self._head(name), contents=True)
 
-    def _head(self, name: str) -> dict[str, Any]:
+    def _head(self, name: str) -> tuple[Path, str]:
+        """Directory of the current revision and the digest of its manifest, both from one look at the pointer."""
         if name not in self:
             raise UnknownMaterialError(name, list(self))
-        return _read_json(self.root / "materials" / name / "HEAD.json")
+        pointer = self.root / "materials" / name / "HEAD.json"
+        head = _read_json(pointer)
+        try:
+            return pointer.with_name(head["revision"]), head["manifest_sha256"]
+        except (KeyError, TypeError, ValueError) as error:
+            raise StoreError(f"{name} is damaged: {pointer} does not name a revision and its manifest") from error
 
 
-def _decode(name: str, revision: str, path: Path) -> Table:
+def _decode(name: str, path: Path) -> Table:
     import zarr
 
-    head = _read_json(path.parent / "HEAD.json")
-    if head["revision"] == revision:
-        check_manifest(path, str(head["manifest_sha256"]), contents=False)
     group = zarr.open_group(path, mode="r")
     try:
         arrays = {key: np.asarray(array[...]) for key, array in group.arrays()}
     except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
-        raise StoreError(f"{name} {revision} is damaged: {error}") from error
+        raise StoreError(f"{name} {path.name} is damaged: {error}") from error
     brdf_metadata: Any = group["brdf"].metadata
     dimensions = [d for d in brdf_metadata.dimension_names if d != "wavelength"]
     specular = arrays.get("specular_reflectance")
     return Table(
         name=name,
-        revision=revision,
+        revision=path.name,
         attrs=dict(group.attrs),
         axes_deg={d: arrays[d] for d in dimensions},
         wavelength_nm=arrays.get("wavelength"),
@@ -214,13 +224,15 @@ class Build:
     def __enter__(self) -> Build:
         try:
             _make_store(self.root)
-            _sweep(self.root / ".staging")
-            self._staging.mkdir(parents=True)
-            self._lock = (self._staging / "lock").open("w")
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            with (self.root / ".staging" / "lock").open("wb") as entrance:
+                fcntl.flock(entrance, fcntl.LOCK_EX)  # no other build sweeps before our own lock is held
+                _sweep(self.root / ".staging")
+                self._staging.mkdir()
+                self._lock = (self._staging / "lock").open("wb")
+                fcntl.flock(self._lock, fcntl.LOCK_EX)
             _write_json(self._staging / "recipe.json", self.recipe)
         except OSError as error:
-            raise StoreError(f"cannot write a store at {self.root}: {error.strerror}") from error
+            raise StoreError(f"cannot write a store at {self.root}: {error.strerror or error}") from error
         return self
 
     def __exit__(
@@ -247,31 +259,33 @@ class Build:
             digest = _write_json(_manifest_of(self.root / "materials" / name / revision), {"files": files})
             _swap_json(self.root / "materials" / name / "HEAD.json", {"revision": revision, "manifest_sha256": digest})
         except OSError as error:
-            raise StoreError(f"cannot write {name} to the store at {self.root}: {error.strerror}") from error
+            raise StoreError(f"cannot write {name} to the store at {self.root}: {error.strerror or error}") from error
         return revision, sum(int(entry["size"]) for entry in files.values())
 
 
 def _make_store(root: Path) -> None:
     marker = root / "brdfdb.json"
-    if marker.exists():
-        Store(root)
-        return
     root.mkdir(parents=True, exist_ok=True)
-    if any(path.name != ".staging" for path in root.iterdir()):
+    strangers = [path for path in root.iterdir() if not path.name.startswith(f".{marker.name}.")]
+    if marker.exists():  # asked after the look around: another build may be making the store right now
+        Store(root)
+    elif strangers:
         raise StoreError(f"{root} is not empty and not a store; name an empty or a new directory")
-    (root / "materials").mkdir()
-    _swap_json(marker, {"format": FORMAT, "version": FORMAT_VERSION})
+    else:
+        _swap_json(marker, {"format": FORMAT, "version": FORMAT_VERSION})
+    (root / "materials").mkdir(exist_ok=True)
+    (root / ".staging").mkdir(exist_ok=True)
 
 
 def _sweep(staging: Path) -> None:
     """Remove what builds that were killed left behind: staging directories whose lock nobody holds."""
-    for lock in staging.glob("*/lock"):
-        with lock.open("w") as handle:
-            try:
+    for directory in staging.iterdir():
+        try:
+            with (directory / "lock").open("wb") as handle:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                continue
-            shutil.rmtree(lock.parent, ignore_errors=True)
+                shutil.rmtree(directory, ignore_errors=True)
+        except OSError:  # at work, just ended, or another user's
+            continue
 
 
 def _write_group(path: Path, dataset: xr.Dataset) -> None:
@@ -286,6 +300,18 @@ def _write_group(path: Path, dataset: xr.Dataset) -> None:
             "chunks": _chunks(variable.shape),
         }
     dataset.to_zarr(path, mode="w-", zarr_format=3, consolidated=False, encoding=encoding, write_empty_chunks=True)
+    _consolidate(path)
+
+
+def _consolidate(group: Path) -> None:
+    """Repeat the metadata of the arrays in that of the group, where a plain `xarray.open_zarr` looks for it first.
+
+    As `zarr.consolidate_metadata` does, which warns while doing so. A revision never changes: nothing goes stale.
+    """
+    metadata = _read_json(group / "zarr.json")
+    arrays = {path.parent.name: _read_json(path) for path in sorted(group.glob("*/zarr.json"))}
+    metadata["consolidated_metadata"] = {"kind": "inline", "must_understand": False, "metadata": arrays}
+    _write_json(group / "zarr.json", metadata)
 
 
 def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -310,7 +336,9 @@ def _manifest_of(group: Path) -> Path:
 
 
 def check_manifest(group: Path, digest: str, *, contents: bool) -> None:
-    """Check the files of a revision against its manifest: that they are there, their sizes, and their contents.
+    """Check the files of a revision against its manifest: that they are there and their sizes.
+
+    Also their contents, where no checksum of a chunk tells: of the metadata, and with `contents` of every file.
 
     Raises
     ------
@@ -327,7 +355,7 @@ def check_manifest(group: Path, digest: str, *, contents: bool) -> None:
             raise StoreError(f"{where} is damaged: {name} is missing")
         if path.stat().st_size != entry["size"]:
             raise StoreError(f"{where} is damaged: {name} has {path.stat().st_size} bytes, not {entry['size']}")
-        if contents and hashlib.sha256(path.read_bytes()).hexdigest() != entry["sha256"]:
+        if (contents or path.name == "zarr.json") and hashlib.sha256(path.read_bytes()).hexdigest() != entry["sha256"]:
             raise StoreError(f"{where} is damaged: the content of {name} changed")
 
 
@@ -348,9 +376,11 @@ def _move_in(staged: Path, material: Path) -> str:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        content: dict[str, Any] = json.loads(path.read_text())
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise StoreError(f"cannot read {path}: {error}") from error
+    if not isinstance(content, dict):
+        raise StoreError(f"cannot read {path}: not a JSON object")
     return content
 
 
@@ -367,8 +397,11 @@ def _write_json(path: Path, content: dict[str, Any]) -> str:
 def _swap_json(path: Path, content: dict[str, Any]) -> None:
     """Write a file so that a reader sees the old content or the new, whatever happens in between."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    _write_json(temporary, content)
-    os.replace(temporary, path)
+    try:
+        _write_json(temporary, content)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
     directory = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(directory)

@@ -10,13 +10,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from brdfdb.geometry import radians
-from brdfdb.grids import Grid
+from brdfdb.grids import Grid, check_wavelengths
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
 TABLE_VERSION = 1  # of the variables, dimensions and attributes below
 
-_SLAB = 1 << 16  # values evaluated at a time: their temporaries stay in a core's cache
+_SLAB = 1 << 15  # values evaluated at a time: their temporaries stay in a core's cache
 
 
 def tabulate(
@@ -70,32 +70,43 @@ def check_suits(material: Material, grid: Grid, wavelength_nm: NDArray[np.float6
         raise ValueError(
             f"grid: theta of 90 degrees is a pole of the model {spec.name} ({material.name}); end the axis below 90"
         )
-    material.arguments(wavelength_nm)
+    if wavelength_nm is not None:
+        material.arguments(check_wavelengths(wavelength_nm))
 
 
 def _slabs(
     material: Material, grid: Grid, wavelength_nm: NDArray[np.float64] | None
-) -> Iterator[tuple[tuple[slice, ...], Floats]]:
-    """Pieces of the table: where each goes, and its values."""
+) -> Iterator[tuple[tuple[Any, ...], Floats]]:
+    """Pieces of the table: the index where each goes, and its values."""
+    spectrum: list[tuple[tuple[int, ...], dict[str, Any]]]
+    if wavelength_nm is None:
+        spectrum = [((), material.arguments())]
+    else:
+        spectrum = [((w,), material.arguments(one)) for w, one in enumerate(wavelength_nm)]
+    for block, angles in _blocks(grid):
+        for last, arguments in spectrum:
+            values = material.spec.evaluate(*angles, **arguments)
+            yield (*block, ..., *last), values
+            if grid.reciprocal:  # as every model is: what is right of the block stands below it too
+                here = block[0]
+                mirrored = np.swapaxes(values[:, here.stop - here.start :], 0, 1)
+                yield (slice(here.stop, None), here, ..., *last), mirrored
+
+
+def _blocks(grid: Grid) -> Iterator[tuple[tuple[slice, ...], tuple[NDArray[np.float64], ...]]]:
+    """Blocks of rows of the first axis, and their directions of light and viewer; of a reciprocal grid one half."""
     axes = [radians(nodes) for nodes in grid.axes.values()]
-    first, *inner = axes
-    inner_size = int(np.prod([nodes.size for nodes in inner]))
-    rows = max(1, _SLAB // inner_size)
-    wavelengths = [slice(None)] if wavelength_nm is None else [slice(w, w + 1) for w in range(wavelength_nm.size)]
-    for w in wavelengths:
-        arguments = material.arguments(None if wavelength_nm is None else wavelength_nm[w])
-        for start in range(0, first.size, rows):
-            block = slice(start, start + rows)
-            theta_i, *others = np.ix_(first[block], *inner)
-            if grid.anisotropic:
-                phi_i, theta_r, phi_r = others
-            else:
-                phi_i, (theta_r, phi_r) = np.zeros(()), others
-            values = material.spec.evaluate(theta_i, phi_i, theta_r, phi_r, **arguments)
-            if wavelength_nm is None:
-                yield (block,), values
-            else:
-                yield (block, *[slice(None)] * len(inner), w), values[..., np.newaxis]
+    rows = max(1, _SLAB // int(np.prod(grid.shape[1:])))
+    for start in range(0, grid.shape[0], rows):
+        here = slice(start, min(start + rows, grid.shape[0]))
+        if grid.anisotropic:
+            theta_i, *others = axes
+            yield (here,), np.ix_(theta_i[here], *others)
+        else:
+            theta_i, theta_r, delta_phi = axes
+            viewer = slice(start if grid.reciprocal else 0, None)
+            light, seen, turned = np.ix_(theta_i[here], theta_r[viewer], delta_phi)
+            yield (here, viewer), (light, np.zeros(()), seen, turned)
 
 
 def _dataset(
@@ -133,12 +144,15 @@ def _dataset(
     return xr.Dataset(
         variables,
         coordinates,
-        _attributes(material) | {"anisotropic": grid.anisotropic, "wavelength_range_nm": extent},
+        _attributes(material)
+        | {"anisotropic": grid.anisotropic, "symmetries": grid.symmetries, "wavelength_range_nm": extent},
     )
 
 
 def _attributes(material: Material) -> dict[str, Any]:
     spec = material.spec
+    # parameters by the names that files give them
+    written = dict(zip(material.parameters, material.file_parameters(), strict=True))
     return {
         "title": material.title,
         "material": material.name,
@@ -149,9 +163,9 @@ def _attributes(material: Material) -> dict[str, Any]:
         "model_equation": spec.equation,
         "model_reference": spec.reference,
         "parameters": material.file_parameters(),
-        "parameter_sources": {name: material.sources.get(name, material.source) for name in material.file_parameters()},
+        "parameter_sources": {written[name]: material.sources.get(name, material.source) for name in written},
         "source": material.source,
-        "assumed": list(material.assumed),
+        "assumed": [written.get(name, name) for name in material.assumed],
         "note": material.note,
         "refractive_index": material.refractive_index or "",
         "known_excess": material.known_excess.model_dump() if material.known_excess else {},

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 
+import brdfdb
 from brdfdb_pipelines import documents
 
 ROOT = Path(__file__).parent.parent
@@ -72,3 +77,29 @@ def test_every_reference_key_is_in_the_bibliography() -> None:
 
     keys = set(re.findall(r"^@\w+\{(\w+),", (ROOT / "references.bib").read_text(encoding="utf-8"), flags=re.MULTILINE))
     assert {spec.reference for spec in MODELS.values()} <= keys
+
+
+def kernels() -> list[Dispatcher]:
+    """Every kernel of the library, each once."""
+    modules = [importlib.import_module(found.name) for found in pkgutil.walk_packages(brdfdb.__path__, "brdfdb.")]
+    return [
+        value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, Dispatcher) and value.py_func.__module__ == module.__name__
+    ]
+
+
+def test_a_kernel_calls_kernels_of_its_own_file_only() -> None:
+    # numba's cache knows the file of a kernel, not the files of what it calls: those would stay as they were
+    found = kernels()
+    assert len(found) > 10
+    for kernel in found:
+        function = kernel.py_func
+        names = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+        scopes = [value for value in names.values() if isinstance(value, ModuleType)]
+        called = [value for value in names.values() if isinstance(value, Dispatcher)]
+        called += [getattr(scope, name, None) for scope in scopes for name in names]
+        for callee in called:
+            if isinstance(callee, Dispatcher):
+                assert callee.py_func.__module__ == function.__module__, f"{function.__qualname__} calls {callee}"

@@ -34,7 +34,7 @@ def run(root: Path, names: list[str], report_path: Path) -> AuditReport:
             store.verify(name)
             audits.append(audit(store[name]))
     found = report(audits)
-    report_path.write_text(found.model_dump_json(indent=1) + "\n")
+    report_path.write_text(found.model_dump_json(indent=1) + "\n", encoding="utf-8")
     numbers = ("albedo up to", "model", "table", "smallest")
     terminal.print_table(
         f"Audit of {root} (model, table: largest asymmetry under exchange of light and viewer)",
@@ -54,10 +54,11 @@ def run(root: Path, names: list[str], report_path: Path) -> AuditReport:
 
 
 def _row(a: MaterialAudit) -> tuple[str, ...]:
+    albedo = "not finite" if a.energy.max_albedo is None else f"{a.energy.max_albedo:.4f}"
     return (
         a.material,
         a.verdict,
-        f"{a.energy.max_albedo:.4f} at {a.energy.max_at_theta_i_deg:4g}°",
+        f"{albedo} at {a.energy.max_at_theta_i_deg:4g}°",
         f"{a.reciprocity.model.max:.0e}",
         f"{a.reciprocity.table.max:.0e}",
         "none" if a.values.smallest is None else f"{a.values.smallest:.3g}",

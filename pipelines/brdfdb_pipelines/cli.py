@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 FAILED, VIOLATED = 2, 1  # exit codes: an error in one sentence; an audit that found a new violation
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that lacks a letter shows ? in its place
     options = _parser().parse_args(arguments)
     run: Callable[[argparse.Namespace], int] = options.run
     try:
@@ -34,7 +39,7 @@ def _is_users(error: Exception) -> bool:
     """Whether an error is about what the user gave, not about this program."""
     from brdfdb.store import StoreError, UnknownMaterialError
 
-    return isinstance(error, StoreError | UnknownMaterialError | ValueError | OSError)
+    return isinstance(error, StoreError | UnknownMaterialError | ValueError | OSError | MemoryError)
 
 
 def _sentence(error: Exception) -> str:
@@ -50,8 +55,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    def command(name: str, run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
-        sub = commands.add_parser(name, help=text, description=text)
+    def command(
+        name: str, run: Callable[[argparse.Namespace], int], text: str, among: Any = commands
+    ) -> argparse.ArgumentParser:
+        sub: argparse.ArgumentParser = among.add_parser(name, help=text, description=text)
         sub.set_defaults(run=run)
         sub.add_argument(
             "--store",
@@ -72,14 +79,16 @@ def _parser() -> argparse.ArgumentParser:
     audit.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
     audit.add_argument("--report", type=Path, metavar="FILE", help="JSON report (default: DIR/audit.json)")
 
-    export = command("export", _export, "Write slices of tables as image files.")
-    export.add_argument("format", choices=["exr"])
-    export.add_argument("names", nargs="*", metavar="NAME", help="materials")
-    export.add_argument("--all", action="store_true", help="every material of the store")
-    export.add_argument(
+    text = "Write slices of tables as image files."
+    # a command a format: argparse takes no NAME after an option that follows another positional argument
+    formats = commands.add_parser("export", help=text, description=text).add_subparsers(required=True, metavar="FORMAT")
+    exr = command("exr", _export, "Write slices of tables as OpenEXR files.", formats)
+    exr.add_argument("names", nargs="*", metavar="NAME", help="materials")
+    exr.add_argument("--all", action="store_true", help="every material of the store")
+    exr.add_argument(
         "--out", type=Path, default=Path("brdf-exr"), metavar="DIR", help="directory to write to (default: %(default)s)"
     )
-    export.add_argument("--half", action="store_true", help="16-bit floats, to look at; default 32-bit, for data")
+    exr.add_argument("--half", action="store_true", help="16-bit floats, to look at; default 32-bit, for data")
 
     lookup = command("lookup", _lookup, "Print f_r [1/sr] of a material at one pair of directions, in degrees.")
     lookup.add_argument("name", metavar="NAME")

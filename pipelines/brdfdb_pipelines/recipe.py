@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from brdfdb.grids import Axis, Grid
+from brdfdb.grids import Axis, Grid, check_wavelengths
 from brdfdb.materials import Material, presets
 from brdfdb.tabulate import check_suits
 
-_STRICT = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+_STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+_MOST_NODES = 100_000  # of a range: far above any axis, far below what fills the memory
 
 
 class RecipeError(ValueError):
@@ -36,7 +37,7 @@ class Range(BaseModel):
     def nodes(self, name: str) -> Axis:
         """The numbers; RecipeError if the step does not lead from start to stop."""
         count = (self.stop - self.start) / self.step
-        if count < 0.0 or abs(count - round(count)) > 1e-6:
+        if not 0.0 <= count < _MOST_NODES or abs(count - round(count)) > 1e-6:
             raise RecipeError(f"{name}: steps of {self.step:g} from {self.start:g} do not end at {self.stop:g}")
         return np.linspace(self.start, self.stop, round(count) + 1)
 
@@ -113,9 +114,10 @@ class Recipe(BaseModel):
             If a name matches nothing, or a material, grid or wavelength is not what it must be.
         """
         grids = {name: self._grid(name) for name in Grids.model_fields}
-        wavelengths = _nodes("wavelengths_nm", self.wavelengths_nm)
-        if not (wavelengths[0] > 0.0 and np.all(np.diff(wavelengths) > 0.0)):
-            raise RecipeError("wavelengths_nm: must be positive and increase strictly")
+        try:
+            wavelengths = check_wavelengths(_nodes("wavelengths_nm", self.wavelengths_nm))
+        except ValueError as error:
+            raise RecipeError(str(error)) from None
         jobs = []
         for material in self._selected():
             wavelength_nm = None
@@ -127,7 +129,7 @@ class Recipe(BaseModel):
             try:
                 check_suits(material, grids[kind], wavelength_nm)
             except ValueError as error:
-                raise RecipeError(str(error)) from None
+                raise RecipeError(f"{material.name} on grids.{kind}: {error}") from None
             jobs.append(Job(material, grids[kind], wavelength_nm))
         return jobs
 
@@ -155,7 +157,7 @@ class Recipe(BaseModel):
 
 
 def load(path: Path | None = None) -> Recipe:
-    """Read a recipe file, by default the one that comes with the program.
+    """Read a recipe file, by default the one that comes with the program, and see that it can be built.
 
     Raises
     ------
@@ -164,16 +166,22 @@ def load(path: Path | None = None) -> Recipe:
     """
     source = resources.files("brdfdb_pipelines") / "recipes" / "default.toml" if path is None else path
     try:
-        content = tomllib.loads(source.read_text())
+        content = tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:
         raise RecipeError(f"{source}: {error.strerror}") from None
     except ValueError as error:
         raise RecipeError(f"{source}: not TOML: {error}") from None
     try:
-        return Recipe.model_validate(content)
+        recipe = Recipe.model_validate(content)
+        recipe.jobs()
+    except RecipeError as error:
+        raise RecipeError(f"{source}: {error}") from None
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        # pydantic lists each branch of number | range: the names of the branches are not names of the recipe
+        # pydantic lists each branch of number | range: a table was meant as a range, whatever else is wrong with it,
+        # and the names of the branches are not names of the recipe
+        found = error.errors(include_url=False)
+        first = next(item for item in found if not (item["loc"][-1] == "float" and isinstance(item["input"], dict)))
         field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range"))
         said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
         raise RecipeError(f"{source}: {field}: {said}") from None
+    return recipe

@@ -30,14 +30,16 @@ def print_table(
 
     When the output is not a terminal, lines are as long as they need to be: nothing is cut for a program to read.
     """
-    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold", box=None, pad_edge=False)
+    table = Table(header_style="bold", box=None, pad_edge=False)
     for column in columns:
         table.add_column(column, justify="right" if column in numbers else "left", overflow="fold")
     for row in rows:
         table.add_row(*row)
-    console = Console()
+    console = Console(markup=False, emoji=False, highlight=False)  # a name may hold [brackets] and :colons:
     if not console.is_terminal:
-        console = Console(width=Console(width=10_000).measure(table).maximum)
+        console.width = 10_000
+        console.width = console.measure(table).maximum
+    console.print(title, style="bold", soft_wrap=True)
     console.print(table)
 
 

@@ -1,0 +1,34 @@
+"""How fast one core tabulates the default recipe, model by model: ``python tests/benchmarks/tabulation.py``.
+
+Machines are shared and noisy: compare models or commits in one run, not numbers of different days.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import defaultdict
+
+from brdfdb.tabulate import tabulate
+from brdfdb_pipelines.recipe import load
+
+
+def main(wanted: list[str]) -> None:
+    """Time every table of the default recipe, or those of the models that are named."""
+    jobs = [job for job in load().jobs() if not wanted or job.material.model in wanted]
+    for first in {job.material.model: job for job in jobs}.values():  # compile before the clock runs
+        tabulate(first.material, first.grid, first.wavelength_nm)
+    totals: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
+    for job in jobs:
+        start = time.perf_counter()
+        tabulate(job.material, job.grid, job.wavelength_nm)
+        seconds = time.perf_counter() - start
+        print(f"{job.material.name:36}{job.material.model:14}{job.size / seconds / 1e6:8.1f} million values a second")
+        totals[job.material.model][0] += job.size
+        totals[job.material.model][1] += seconds
+    for model, (size, seconds) in totals.items():
+        print(f"{'all of':36}{model:14}{size / seconds / 1e6:8.1f} million values a second, one core")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

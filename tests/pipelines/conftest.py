@@ -1,0 +1,70 @@
+"""A small recipe with one material of every kind, a store built from it, and what a bad command must leave alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from brdfdb_pipelines import cli
+
+# Grey isotropic, anisotropic, spectral, one wavelength, nothing but a Dirac part
+RECIPE = """\
+title = "Größe: one of every kind"
+materials = ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"]
+wavelengths_nm = [{ start = 400, stop = 700, step = 20 }]
+
+[grids.isotropic]
+theta_i_deg = [{ start = 0, stop = 80, step = 10 }, 85, 89.5]
+theta_r_deg = [{ start = 0, stop = 80, step = 10 }, 85, 89.5]
+delta_phi_deg = [{ start = 0, stop = 180, step = 15 }]
+
+[grids.spectral]
+theta_i_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
+theta_r_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
+delta_phi_deg = [{ start = 0, stop = 180, step = 30 }]
+
+[grids.anisotropic]
+theta_i_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
+phi_i_deg = [{ start = 0, stop = 360, step = 30 }]
+theta_r_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
+phi_r_deg = [{ start = 0, stop = 360, step = 30 }]
+
+[define.mirror]
+title = "Smooth copper: a Dirac part and nothing else"
+model = "he_torrance"
+source = "no paper"
+refractive_index = "main/Cu/Johnson"
+[define.mirror.parameters]
+sigma_0_um = 0
+tau_um = 1
+"""
+NAMES = ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"]
+
+
+@pytest.fixture(scope="session")
+def recipe_text() -> str:
+    """The recipe above."""
+    return RECIPE
+
+
+@pytest.fixture(scope="session")
+def names() -> list[str]:
+    """The materials of the recipe, in its order."""
+    return NAMES
+
+
+@pytest.fixture(scope="session")
+def recipe(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The recipe as a file."""
+    path = tmp_path_factory.mktemp("recipe") / "recipe.toml"
+    path.write_text(RECIPE, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory, recipe: Path) -> Path:
+    """A store that the command line built from the recipe; tests must not change it."""
+    root = tmp_path_factory.mktemp("built") / "store"
+    assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "2"]) == 0
+    return root

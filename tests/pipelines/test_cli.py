@@ -1,0 +1,539 @@
+"""The command line: what each command prints and where, and one sentence and a non-zero exit for every mistake."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+import xarray as xr
+
+import brdfdb
+from brdfdb.grids import Grid
+from brdfdb.materials import Material, presets
+from brdfdb.store import Build
+from brdfdb.tabulate import tabulate
+from brdfdb_pipelines import cli, terminal
+
+COMMANDS = ["build", "audit", "export exr", "lookup", "list", "show", "serve"]
+# of the time to start Python and import the parser; measured 0.03 s here
+HELP_SECONDS = 0.5
+HEAVY = ["numpy", "numba", "xarray", "zarr", "pydantic", "rich", "fastapi", "uvicorn", "OpenEXR", "brdfdb.store"]
+SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "audit.schema.json"
+
+Captured = pytest.CaptureFixture[str]
+
+
+def run(*arguments: object) -> int:
+    return cli.main([str(argument) for argument in arguments])
+
+
+def fails(capsys: Captured, *arguments: object) -> str:
+    """The sentence of a command that fails: the last line of stderr, with no traceback, and nothing on stdout."""
+    assert run(*arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "Traceback" not in err
+    sentence = err.splitlines()[-1]
+    assert sentence.startswith("brdfdb: ")
+    assert err.count("brdfdb: ") == 1
+    return sentence
+
+
+def usage(capsys: Captured, *arguments: object) -> str:
+    """What argparse says of a command line that it cannot read."""
+    with pytest.raises(SystemExit) as caught:
+        run(*arguments)
+    assert caught.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    return err.splitlines()[-1]
+
+
+# Help
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_that_names_the_store(command: str, capsys: Captured) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run(*command.split(), "--help")
+    assert caught.value.code == 0
+    out, err = capsys.readouterr()
+    assert out.startswith(f"usage: brdfdb {command} ")
+    assert "--store DIR" in out
+    assert err == ""
+
+
+def test_the_help_lists_every_command(capsys: Captured) -> None:
+    with pytest.raises(SystemExit) as caught:
+        run("--help")
+    assert caught.value.code == 0
+    out, _ = capsys.readouterr()
+    assert all(f"\n    {command.split()[0]} " in out for command in COMMANDS)
+
+
+def test_the_parser_loads_nothing_heavy() -> None:
+    code = f"import sys; from brdfdb_pipelines import cli; cli._parser(); print(set(sys.modules) & set({HEAVY!r}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
+def test_help_comes_at_once() -> None:
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-m", "brdfdb_pipelines.cli", "--help"], capture_output=True, check=True)
+        seconds.append(time.perf_counter() - start)
+    assert min(seconds) < HELP_SECONDS
+
+
+# Build, list, show
+
+
+def test_build_shows_progress_on_stderr_and_a_table_on_stdout(
+    recipe: Path, tmp_path: Path, names: list[str], capsys: Captured
+) -> None:
+    assert run("build", recipe, "--store", tmp_path / "store") == 0
+    out, err = capsys.readouterr()
+    assert "tabulating" in err
+    assert "tabulating" not in out
+    lines = out.splitlines()
+    assert lines[0].startswith("5 tables, 0.0 million values, in ")
+    assert lines[1].split() == ["material", "model", "grid", "wavelengths", "revision", "stored"]
+    assert [line.split()[0] for line in lines[2:7]] == names
+    assert lines[2].split()[:9] == ["foam", "oren_nayar", "11", "x", "11", "x", "13", "grey", "r000001"]
+    assert lines[4].split()[1:8] == ["he_torrance", "6", "x", "6", "x", "7", "16"]
+    assert lines[7].startswith("stored ")
+    assert lines[7].endswith(f" in {tmp_path / 'store'}")
+
+
+def test_list_names_what_is_in_the_store(built: Path, names: list[str], capsys: Captured) -> None:
+    assert run("list", "--store", built) == 0
+    out, err = capsys.readouterr()
+    lines = out.splitlines()
+    assert lines[0].strip() == f"5 materials in {built}"
+    assert [line.split()[0] for line in lines[2:]] == sorted(names)
+    assert all(line.split()[-1] == "r000001" for line in lines[2:])
+    assert err == ""
+
+
+def test_list_presets_needs_no_store_and_cuts_nothing(tmp_path: Path, capsys: Captured) -> None:
+    assert run("list", "--presets", "--store", tmp_path / "none") == 0
+    out, _ = capsys.readouterr()
+    lines = out.splitlines()
+    assert lines[0].strip() == "59 built-in materials"
+    assert [line.split()[0] for line in lines[2:]] == list(presets())
+    assert all(material.source in out for material in presets().values())
+
+
+@pytest.mark.parametrize("title", ["brass [smooth]", "[/]", "[bold]x", ":smile: at 10:20:30", "Größe " + "x" * 200])
+def test_tables_print_what_they_are_given(title: str, capsys: Captured) -> None:
+    terminal.print_table(f"{title} in [a]", ("material", "title [unit]"), [("a", title), ("b", "")])
+    assert [line.rstrip() for line in capsys.readouterr().out.splitlines()] == [
+        f"{title} in [a]", "material  title [unit]", f"a         {title}", "b",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"])
+def test_show_tells_parameters_source_grid_albedo_and_files(name: str, built: Path, capsys: Captured) -> None:
+    assert run("show", name, "--store", built) == 0
+    out, err = capsys.readouterr()
+    table = brdfdb.open(built)[name]
+    assert out.startswith(f"{name}: {table.attrs['title']}\n")
+    for parameter, value in table.attrs["parameters"].items():
+        assert f"    {parameter:<16}{value!s:<8} " in out
+    assert table.attrs["source"] in out
+    assert table.attrs["note"] in out
+    for axis, nodes in table.axes_deg.items():
+        assert f"    {axis:<16}{nodes.size} nodes, 0 to {nodes[-1]:g} degrees" in out
+    assert ("none, the table is grey" in out) == (table.wavelength_nm is None)
+    assert str(brdfdb.open(built).path(name)) in out
+    assert err == ""
+    wavelengths = 1 if table.wavelength_nm is None or table.wavelength_nm.size == 1 else 3
+    rows = out.splitlines()[-1 - wavelengths : -1]
+    albedos = np.array([row.split()[-4:] for row in rows], dtype=np.float64)
+    assert np.all((albedos > 0.0) & (albedos < 1.3))
+
+
+def test_show_says_what_was_assumed(built: Path, capsys: Captured) -> None:
+    assert run("show", "blue-plastic", "--store", built) == 0
+    out, _ = capsys.readouterr()
+    assert "    tau_um          1.0      assumed, see the note\n" in out
+    assert "  excess      He et al. 1991" in out
+    assert "  n, k        other/ZeonexE48R/Sultanova of refractiveindex.info\n" in out
+
+
+def test_the_store_may_be_named_by_the_environment(
+    built: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    monkeypatch.setenv("BRDFDB_STORE", str(built))
+    assert run("show", "foam") == 0
+    assert str(built) in capsys.readouterr().out
+
+
+# Lookup
+
+
+def test_lookup_prints_a_line_a_wavelength(built: Path, capsys: Captured) -> None:
+    table = brdfdb.open(built)["scene-copper-sphere"]
+    assert run("lookup", "scene-copper-sphere", 30, 0, 20, 180, "--store", built) == 0
+    out, err = capsys.readouterr()
+    angles = np.deg2rad([30.0, 0.0, 20.0, 180.0])
+    assert table.wavelength_nm is not None
+    expected = zip(table.wavelength_nm, table.lookup(*angles), table.specular_reflectance(angles[0]), strict=True)
+    assert out.splitlines() == [
+        f"{nm:g} nm  {value:.6g} /sr  and {dirac:.6g} of the light in the exact mirror direction"
+        for nm, value, dirac in expected
+    ]
+    assert err == ""
+
+
+def test_lookup_of_a_grey_material_is_one_number(built: Path, capsys: Captured) -> None:
+    assert run("lookup", "rolled-brass", 30, 10, 20, 200, "--store", built) == 0
+    out, _ = capsys.readouterr()
+    value = brdfdb.open(built)["rolled-brass"].lookup(*np.deg2rad([30.0, 10.0, 20.0, 200.0]))
+    assert out == f"{value:.6g} /sr\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "wavelengths"),
+    [
+        ("foam", [], None),
+        ("foam", ["--wavelength-nm", "500", "90000"], [500.0, 90000.0]),
+        ("scene-copper-sphere", ["--wavelength-nm", "410"], [410.0]),
+        ("scene-copper-sphere", ["--wavelength-nm", "700", "400.5"], [700.0, 400.5]),
+        ("blue-plastic", [], [460.0]),
+    ],
+)
+def test_lookup_as_json(
+    name: str, options: list[str], wavelengths: list[float] | None, built: Path, capsys: Captured
+) -> None:
+    assert run("lookup", name, 30, -10, 20, 540, "--json", "--store", built, *options) == 0
+    answer = json.loads(capsys.readouterr().out)
+    table = brdfdb.open(built)[name]
+    angles = np.deg2rad([30.0, -10.0, 20.0, 540.0])
+    assert answer == {
+        "material": name,
+        "revision": "r000001",
+        "unit": "1/sr",
+        "wavelength_nm": wavelengths,
+        "brdf": np.atleast_1d(table.lookup(*angles, wavelengths)).tolist(),
+        "specular_reflectance": np.atleast_1d(table.specular_reflectance(angles[0], wavelengths)).tolist(),
+    }
+
+
+def test_lookup_below_the_horizon_is_0(built: Path, capsys: Captured) -> None:
+    assert run("lookup", "foam", 30, 0, 90.001, 0, "--store", built) == 0
+    assert capsys.readouterr().out == "0 /sr\n"
+    assert run("lookup", "foam", 30, 0, 90, 0, "--store", built) == 0
+    assert capsys.readouterr().out != "0 /sr\n"
+
+
+@pytest.mark.parametrize(
+    ("angles", "parameter"),
+    [
+        ((-5, 0, 0, 0), "theta_i"),
+        ((180.5, 0, 0, 0), "theta_i"),
+        ((0, 0, -0.0001, 0), "theta_r"),
+        ((0, 0, 1e300, 0), "theta_r"),
+        (("nan", 0, 0, 0), "theta_i"),
+        ((0, "nan", 0, 0), "phi_i"),
+        ((0, 0, "nan", 0), "theta_r"),
+        ((0, 0, 0, "nan"), "phi_r"),
+        ((0, "inf", 0, 0), "phi_i"),
+        (("inf", 0, 0, 0), "theta_i"),
+        ((0, 0, 0, "1e999"), "phi_r"),
+    ],
+)
+def test_a_bad_angle_is_named_in_degrees(
+    angles: tuple[object, ...], parameter: str, built: Path, capsys: Captured
+) -> None:
+    sentence = fails(capsys, "lookup", "foam", *angles, "--store", built)
+    assert sentence.startswith(f"brdfdb: {parameter}: ")
+    assert "degrees" in sentence
+    assert "rad" not in sentence
+
+
+@pytest.mark.parametrize("wavelength", ["399", "701", "nan", "-5", "0", "inf"])
+def test_a_bad_wavelength_is_named(wavelength: str, built: Path, capsys: Captured) -> None:
+    arguments = ("lookup", "scene-copper-sphere", 0, 0, 0, 0, "--store", built, "--wavelength-nm", wavelength)
+    assert fails(capsys, *arguments).startswith(f"brdfdb: wavelength_nm: {float(wavelength):g} is ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("lookup", "foam", "north", 0, 0, 0), "argument THETA_I: invalid float value: 'north'"),
+        (("lookup", "foam", 0, 0, 0), "the following arguments are required: PHI_R"),
+        (("lookup",), "the following arguments are required: NAME, THETA_I, PHI_I, THETA_R, PHI_R"),
+        (("build", "--jobs", "0"), "argument --jobs: 0 is not at least 1"),
+        (("build", "--jobs", "many"), "argument --jobs: invalid _positive value: 'many'"),
+        (("serve", "--port", "http"), "argument --port: invalid int value: 'http'"),
+        (("export", "png", "foam"), "argument FORMAT: invalid choice: 'png'"),
+        (("shine",), "argument COMMAND: invalid choice: 'shine'"),
+        ((), "the following arguments are required: COMMAND"),
+    ],
+)
+def test_a_command_line_that_cannot_be_read_is_one_line(
+    arguments: tuple[object, ...], said: str, capsys: Captured
+) -> None:
+    assert said in usage(capsys, *arguments)
+
+
+# Stores and names that are not there
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("audit",),
+        ("audit", "foam"),
+        ("export", "exr", "--all"),
+        ("list",),
+        ("show", "foam"),
+        ("serve",),
+        ("lookup", "foam", 0, 0, 0, 0),
+    ],
+    ids=lambda arguments: "-".join(map(str, arguments)),
+)
+@pytest.mark.parametrize("what", ["missing", "empty", "file"])
+def test_a_missing_store_is_one_sentence(
+    arguments: tuple[object, ...], what: str, tmp_path: Path, capsys: Captured
+) -> None:
+    root = tmp_path / what
+    if what == "empty":
+        root.mkdir()
+    elif what == "file":
+        root.write_text("")
+    sentence = fails(capsys, *arguments, "--store", root)
+    assert sentence.startswith(f"brdfdb: no store at {root}: brdfdb.json is missing there; `brdfdb build` makes one")
+
+
+@pytest.mark.parametrize("name", ["fome", "../foam", "foam/r000001", ""])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("audit", "{}"),
+        ("audit", "foam", "{}"),
+        ("export", "exr", "{}", "--out", os.devnull),
+        ("show", "{}"),
+        ("lookup", "{}", 0, 0, 0, 0),
+    ],
+    ids=lambda arguments: "-".join(map(str, arguments)),
+)
+def test_an_unknown_material_is_one_sentence_with_the_closest_names(
+    arguments: tuple[str, ...], name: str, built: Path, capsys: Captured
+) -> None:
+    sentence = fails(capsys, *(name if a == "{}" else a for a in arguments), "--store", built)
+    assert sentence.startswith(f"brdfdb: no material {name!r} in the store")
+    if name == "fome":
+        assert sentence.endswith("; closest: foam")
+
+
+def test_a_damaged_store_is_one_sentence(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    root = tmp_path / "store"
+    shutil.copytree(built, root)
+    (root / "materials" / "foam" / "r000001" / "brdf" / "c" / "0" / "0" / "0").unlink()
+    said = "brdfdb: foam r000001 is damaged: brdf/c/0/0/0 is missing"
+    for arguments in (("audit",), ("show", "foam"), ("lookup", "foam", 0, 0, 0, 0), ("list",)):
+        assert fails(capsys, *arguments, "--store", root) == said
+    assert fails(capsys, "export", "exr", "foam", "--store", root, "--out", tmp_path / "exr") == said
+
+
+# Directories that cannot be written
+
+
+def test_a_store_that_cannot_be_written_is_one_sentence(recipe: Path, tmp_path: Path, capsys: Captured) -> None:
+    (tmp_path / "file").write_text("precious")
+    root = tmp_path / "file" / "store"
+    assert fails(capsys, "build", recipe, "--store", root) == f"brdfdb: cannot write a store at {root}: Not a directory"
+    said = fails(capsys, "build", recipe, "--store", tmp_path)
+    assert said == f"brdfdb: {tmp_path} is not empty and not a store; name an empty or a new directory"
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_slices_that_cannot_be_written_are_one_sentence(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    (tmp_path / "file").write_text("precious")
+    for out in (tmp_path / "file", tmp_path / "file" / "exr"):
+        sentence = fails(capsys, "export", "exr", "foam", "--store", built, "--out", out)
+        assert sentence.startswith(f"brdfdb: {out}: ")
+    assert (tmp_path / "file").read_text() == "precious"
+
+
+def test_a_report_that_cannot_be_written_is_one_sentence(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    (tmp_path / "file").write_text("precious")
+    for report in (tmp_path, tmp_path / "file" / "report.json", tmp_path / "none" / "report.json"):
+        sentence = fails(capsys, "audit", "foam", "--store", built, "--report", report)
+        assert sentence.startswith(f"brdfdb: {report}: ")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+# Export
+
+
+def test_export_takes_names_or_all_and_its_options_anywhere(
+    built: Path, tmp_path: Path, names: list[str], capsys: Captured
+) -> None:
+    said = "brdfdb: export: name materials, or give --all"
+    assert fails(capsys, "export", "exr", "--store", built) == said
+    assert fails(capsys, "export", "exr", "foam", "--all", "--store", built) == said
+    assert run("export", "exr", "--store", built, "--out", tmp_path / "some", "foam", "mirror") == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("6 EXR files, ")
+    assert out.endswith(f" in {tmp_path / 'some'}\n")
+    assert "exporting" in err
+    assert len(list((tmp_path / "some").iterdir())) == 6
+    assert run("export", "exr", "--all", "--half", "--out", tmp_path / "all", "--store", built) == 0
+    assert capsys.readouterr().out.startswith("15 EXR files, ")
+    assert {path.name.rsplit("_")[0] for path in (tmp_path / "all").iterdir()} == set(names)
+
+
+# Audit
+
+
+def test_audit_of_some_materials_reports_those(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    report = tmp_path / "report.json"
+    code = run("audit", "mirror", "foam", "mirror", "--store", built, "--report", report)
+    out, err = capsys.readouterr()
+    assert code == 0
+    assert "auditing" in err
+    assert "auditing" not in out
+    lines = out.splitlines()
+    assert lines[0].startswith(f"Audit of {built}")
+    assert [line.split()[:2] for line in lines[2:4]] == [["mirror", "passes"], ["foam", "passes"]]
+    assert lines[-1] == (
+        f"2 audited: 2 pass, 0 exceed 1 as their published parameters are known to, 0 violate; report in {report}"
+    )
+    document = json.loads(report.read_bytes())
+    jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
+    assert [entry["material"] for entry in document["materials"]] == ["mirror", "foam"]
+    assert document["violations"] == []
+
+
+def spoil(dataset: xr.Dataset, index: tuple[int, ...], value: float) -> xr.Dataset:
+    dataset["brdf"].values[index] = value
+    return dataset
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: spoil(d, (1, 2, 1), -0.1), "1 negative values"),
+        (lambda d: spoil(d, (1, 2, 1), np.nan), "1 values are not finite"),
+        (lambda d: spoil(d, (1, 2, 1), np.inf), "1 values are not finite"),
+        (lambda d: spoil(d, (1, 2, 1), 0.1), "not reciprocal"),
+        (lambda d: d.assign(brdf=d["brdf"] * np.float32(2.5)), "reflects 1.25 of what arrives at 0 degrees"),
+    ],
+    ids=["negative", "nan", "inf", "asymmetric", "bright"],
+)
+def test_a_violation_is_exit_code_1_and_stands_in_the_report(
+    change: Callable[[xr.Dataset], xr.Dataset], said: str, tmp_path: Path, capsys: Captured
+) -> None:
+    grey = {"title": "Grey", "model": "lambert", "source": "no paper", "parameters": {"rho": 0.5}}
+    theta = [0, 30, 60, 80]
+    grid = Grid({"theta_i": theta, "theta_r": theta, "delta_phi": [0, 90, 180]})
+    with Build(tmp_path, {}) as build:
+        build.publish("good", tabulate(Material.from_table("good", grey), grid))
+        build.publish("bad", change(tabulate(Material.from_table("bad", grey), grid)))
+    assert run("audit", "--store", tmp_path) == 1
+    out, err = capsys.readouterr()
+    assert f"bad: {said}\n" in out
+    assert "good: " not in out
+    assert "2 audited: 1 pass, 0 exceed 1 as their published parameters are known to, 1 violate" in out
+    assert "Traceback" not in err
+    document = json.loads((tmp_path / "audit.json").read_text(encoding="utf-8"))
+    jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
+    assert document["violations"] == ["bad"]
+    assert run("audit", "good", "--store", tmp_path) == 0
+
+
+def test_audit_notices_a_file_that_was_exchanged_for_a_sound_one(tmp_path: Path, capsys: Captured) -> None:
+    grid = Grid({"theta_i": [0, 80], "theta_r": [0, 80], "delta_phi": [0, 90, 180]})
+    with Build(tmp_path, {}) as build:
+        for name, rho in (("grey", 0.25), ("white", 0.75)):
+            table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
+            build.publish(name, tabulate(Material.from_table(name, table), grid))
+    grey, white = (brdfdb.open(tmp_path).path(name) / "brdf" / "c" / "0" / "0" / "0" for name in ("grey", "white"))
+    assert (grey.stat().st_size, grey.read_bytes() != white.read_bytes()) == (white.stat().st_size, True)
+    shutil.copyfile(white, grey)
+    said = fails(capsys, "audit", "--store", tmp_path)
+    assert said == "brdfdb: grey r000001 is damaged: the content of brdf/c/0/0/0 changed"
+
+
+WHITE = """
+[define.white]
+title = "White, rough"
+model = "oren_nayar"
+source = "no paper"
+[define.white.parameters]
+rho = 1
+sigma_deg = 20
+"""
+KNOWN = """
+[define.white.known_excess]
+max_albedo = 1.05
+from_theta_i_deg = 75
+citation = "Erratum of eqs 27 and 28: Größe"
+"""
+GRID = "[{ start = 0, stop = 88, step = 2 }, 89, 89.5]"
+
+
+@pytest.mark.parametrize(("known", "code"), [("", 1), (KNOWN, 0)], ids=["unknown", "known"])
+def test_white_oren_nayar_violates_unless_its_excess_is_known(
+    known: str, code: int, recipe_text: str, tmp_path: Path, capsys: Captured
+) -> None:
+    before, grids = recipe_text.split("[grids.isotropic]")
+    _, rest = grids.split("delta_phi_deg", 1)
+    text = before + f"[grids.isotropic]\ntheta_i_deg = {GRID}\ntheta_r_deg = {GRID}\ndelta_phi_deg" + rest
+    text = text.replace('"mirror"]', '"mirror", "white"]') + WHITE + known
+    recipe = tmp_path / "recipe.toml"
+    recipe.write_text(text, encoding="utf-8")
+    assert run("build", recipe, "--store", tmp_path / "store") == 0
+    capsys.readouterr()
+    assert run("audit", "white", "--store", tmp_path / "store") == code
+    out, _ = capsys.readouterr()
+    document = json.loads((tmp_path / "store" / "audit.json").read_text(encoding="utf-8"))
+    (entry,) = document["materials"]
+    assert entry["verdict"] == ("known published excess" if known else "violates")
+    assert entry["energy"]["max_albedo"] == pytest.approx(1.046, abs=0.003)
+    assert ("white: Erratum of eqs 27 and 28: Größe\n" in out) == bool(known)
+
+
+# Terminals and locales
+
+
+def python(*arguments: object, **environment: str) -> Any:
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, env={**os.environ, **environment}, capture_output=True, check=False)
+
+
+def test_a_terminal_without_the_letters_is_no_error(built: Path, tmp_path: Path) -> None:
+    report = tmp_path / "report.json"
+    arguments = ["-m", "brdfdb_pipelines.cli", "audit", "foam", "--store", built, "--report", report]
+    done = python(*arguments, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert b" at " in done.stdout
+    assert b"\xc2" not in done.stdout
+    assert b"?" in done.stdout
+
+
+def test_no_file_is_opened_in_the_encoding_of_the_locale(recipe: Path, tmp_path: Path) -> None:
+    code = """
+import sys, warnings
+warnings.filterwarnings("error", category=EncodingWarning, module=r"brdfdb")
+from brdfdb_pipelines.cli import main
+recipe, store, report = sys.argv[1:]
+for command in (["build", recipe], ["audit", "foam", "--report", report], ["show", "foam"], ["list"]):
+    assert main([*command, "--store", store]) == 0
+"""
+    done = python("-X", "warn_default_encoding", "-c", code, recipe, tmp_path / "store", tmp_path / "report.json")
+    assert done.returncode == 0, done.stderr.decode()

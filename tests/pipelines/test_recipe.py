@@ -1,0 +1,309 @@
+"""Recipes: what each field does, and one sentence with file and field for every way to get one wrong."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb.materials import presets
+from brdfdb_pipelines import cli
+from brdfdb_pipelines.recipe import Range, RecipeError, load
+
+GOOD = """\
+title = "one"
+materials = ["foam"]
+wavelengths_nm = [500, 550]
+[grids.isotropic]
+theta_i_deg = [{ start = 0, stop = 80, step = 40 }]
+theta_r_deg = [0, 80]
+delta_phi_deg = [0, 180]
+[grids.spectral]
+theta_i_deg = [0, 40]
+theta_r_deg = [0, 40]
+delta_phi_deg = [0, 90, 180]
+[grids.anisotropic]
+theta_i_deg = [0, 60]
+phi_i_deg = [0, 180, 360]
+theta_r_deg = [0, 60]
+phi_r_deg = [0, 180, 360]
+"""
+DEFINED = """\
+[define.mine]
+title = "My own"
+model = "ward"
+source = "me"
+[define.mine.parameters]
+rho_d = 0.1
+rho_s = 0.2
+alpha_x = 0.3
+alpha_y = 0.3
+"""
+COPPER = GOOD.replace("foam", "scene-copper-sphere")
+
+
+def tree(root: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+
+
+def write(directory: Path, text: str, old: str = "", new: str = "") -> Path:
+    """A recipe file in which `old` is replaced by `new`, once."""
+    assert text.count(old) >= 1
+    path = directory / "bad.toml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+def changed(old: str, new: str, said: str, text: str = GOOD) -> object:
+    return pytest.param(text, old, new, said, id=f"{new or 'without'} {'' if new else old}"[:60])
+
+
+UNKNOWN = "unknown key"
+BAD = [
+    # unknown keys, at each level
+    changed('title = "one"', "colour = 5", f"colour: {UNKNOWN}"),
+    changed("[grids.isotropic]", "[grids.polar]\nx = 1\n[grids.isotropic]", f"grids.polar: {UNKNOWN}"),
+    changed("delta_phi_deg = [0, 180]", "phi_r_deg = [0]", "grids.isotropic.delta_phi_deg: Field required"),
+    changed("[grids.isotropic]\n", "[grids.isotropic]\nphi_i_deg = [0]\n", f"grids.isotropic.phi_i_deg: {UNKNOWN}"),
+    changed("step = 40", "step = 40, count = 3", f"grids.isotropic.theta_i_deg.0.count: {UNKNOWN}"),
+    changed('source = "me"', 'source = "me"\ncolour = "red"', "define.mine: colour: ", GOOD + DEFINED),
+    # missing keys
+    changed('materials = ["foam"]\n', "", "materials: Field required"),
+    changed("wavelengths_nm = [500, 550]\n", "", "wavelengths_nm: Field required"),
+    changed(", step = 40", "", "grids.isotropic.theta_i_deg.0.step: Field required"),
+    changed('title = "My own"\n', "", "define.mine: title: Field required", GOOD + DEFINED),
+    changed('model = "ward"\n', "", "define.mine: model: Field required", GOOD + DEFINED),
+    changed("alpha_y = 0.3\n", "", "define.mine: alpha_y: missing", GOOD + DEFINED),
+    # another type
+    changed('title = "one"', "title = 5", "title: "),
+    changed('["foam"]', '"foam"', "materials: "),
+    changed('["foam"]', "[5]", "materials.0: "),
+    changed("[500, 550]", "500", "wavelengths_nm: "),
+    changed("[500, 550]", '["500", 550]', "wavelengths_nm.0: "),
+    changed("[500, 550]", "[500, true]", "wavelengths_nm.1: "),
+    changed("[0, 80]", "[0, [80]]", "grids.isotropic.theta_r_deg.1: "),
+    changed("[0, 80]", "[0, 1979-05-27]", "grids.isotropic.theta_r_deg.1: "),
+    changed("[0, 80]", "{ start = 0, stop = 80, step = 1 }", "grids.isotropic.theta_r_deg: "),
+    changed("step = 40", 'step = "40"', "grids.isotropic.theta_i_deg.0.step: "),
+    changed("step = 40", "step = true", "grids.isotropic.theta_i_deg.0.step: "),
+    changed('title = "one"', "define = 5", "define: "),
+    changed('title = "one"', "define.mine = 5", "define.mine: "),
+    # numbers that are none
+    changed("[500, 550]", "[500, nan]", "wavelengths_nm.1: "),
+    changed("[500, 550]", "[500, inf]", "wavelengths_nm.1: "),
+    changed("[0, 80]", "[0, -inf]", "grids.isotropic.theta_r_deg.1: "),
+    changed("[0, 80]", f"[0, 1{'0' * 400}]", "grids.isotropic.theta_r_deg.1: "),
+    changed("step = 40", "step = nan", "grids.isotropic.theta_i_deg.0.step: "),
+    changed("step = 40", "step = inf", "grids.isotropic.theta_i_deg.0.step: "),
+    changed("stop = 80", "stop = inf", "grids.isotropic.theta_i_deg.0.stop: "),
+    # ranges that lead nowhere
+    changed("step = 40", "step = 30", "grids.isotropic.theta_i_deg: steps of 30 from 0 do not end at 80"),
+    changed("step = 40", "step = 0", "grids.isotropic.theta_i_deg.0.step: "),
+    changed("step = 40", "step = -40", "grids.isotropic.theta_i_deg.0.step: "),
+    changed("start = 0", "start = 81", "grids.isotropic.theta_i_deg: steps of 40 from 81 do not end at 80"),
+    changed("step = 40", "step = 1e-300", "grids.isotropic.theta_i_deg: steps of 1e-300 from 0 do not end at 80"),
+    changed("step = 40", "step = 1e-9", "grids.isotropic.theta_i_deg: steps of 1e-09 from 0 do not end at 80"),
+    changed("stop = 80, step = 40", "stop = 1e308, step = 1e-308", "grids.isotropic.theta_i_deg: steps of 1e-308"),
+    # axes that are none
+    changed("[0, 80]", "[0, 80, 40]", "grids.isotropic.theta_r: the nodes must increase strictly"),
+    changed("[0, 80]", "[0, 0, 80]", "grids.isotropic.theta_r: the nodes must increase strictly"),
+    changed("[0, 80]", "[]", "grids.isotropic.theta_r_deg: "),
+    changed("[0, 80]", "[0]", "grids.isotropic.theta_r: needs a list of at least two nodes"),
+    changed("[0, 80]", "[10, 80]", "grids.isotropic.theta_r: starts at 10 degrees, must start at 0"),
+    changed("[0, 80]", "[0, 91]", "grids.isotropic.theta_r: ends at 91 degrees, must end at or below 90"),
+    changed("[0, 180]", "[0, 90]", "grids.isotropic.delta_phi: ends at 90 degrees, must end at 180"),
+    changed("phi_i_deg = [0, 180, 360]", "phi_i_deg = [0, 180]", "grids.anisotropic.phi_i: ends at 180 degrees"),
+    changed("[0, 80]", "[0, 90]", "foam on grids.isotropic: grid: theta of 90 degrees is a pole of the model"),
+    # wavelengths
+    changed("[500, 550]", "[]", "wavelengths_nm: "),
+    changed("[500, 550]", "[550, 500]", "wavelengths_nm: must be positive and increase strictly"),
+    changed("[500, 550]", "[500, 500]", "wavelengths_nm: must be positive and increase strictly"),
+    changed("[500, 550]", "[0, 550]", "wavelengths_nm: must be positive and increase strictly"),
+    changed("[500, 550]", "[100, 550]", "scene-copper-sphere on grids.spectral: wavelength_nm: 100 has no", COPPER),
+    changed("[500, 550]", "[500, 9e9]", "scene-copper-sphere on grids.spectral: wavelength_nm: 9e+09 has no", COPPER),
+    # materials
+    changed('["foam"]', "[]", "materials: "),
+    changed('["foam"]', '["foam", "fome"]', "materials: 'fome' matches no material; `brdfdb list --presets` names"),
+    changed('["foam"]', '["foam", "steel-*"]', "materials: 'steel-*' matches no material"),
+    changed('["foam"]', '["../foam"]', "materials: '../foam' matches no material"),
+    changed("alpha_y = 0.3", "alpha_y = -1", "define.mine: alpha_y: -1 is outside ", GOOD + DEFINED),
+    changed("alpha_y = 0.3", "alpha_y = nan", "define.mine: alpha_y: nan is outside ", GOOD + DEFINED),
+    changed("alpha_y = 0.3", 'alpha_y = "0.3"', "define.mine: alpha_y: '0.3' is not a number", GOOD + DEFINED),
+    changed("alpha_y = 0.3", "alpha_y = true", "define.mine: alpha_y: True is not a number", GOOD + DEFINED),
+    changed("alpha_y = 0.3", "alpha_z = 0.3", "define.mine: alpha_z: 0.3 given, but the parameters", GOOD + DEFINED),
+    changed('"ward"', '"wart"', "define.mine: model: 'wart' is not one of lambert, ", GOOD + DEFINED),
+    changed('"ward"', '"he_torrance"', "define.mine: rho_d: 0.1 given, but the parameters of he_tor", GOOD + DEFINED),
+    changed("[define.mine]", '[define."../x"]\nmodel = "lambert"\n[define.mine]', "define.../x: ", GOOD + DEFINED),
+    # not TOML
+    changed('title = "one"', "title = ", "not TOML: "),
+    changed('title = "one"', 'title = "one', "not TOML: "),
+    changed('title = "one"', 'title = "one"\ntitle = "two"', "not TOML: "),
+]
+
+
+def refused(path: Path, root: Path, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """`build` says so in one sentence with file and field, and neither makes a store nor changes one."""
+    before = tree(root.parent)
+    assert cli.main(["build", str(path), "--store", str(root)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"brdfdb: {path}: {said}")
+    assert err.count("\n") == 1
+    assert tree(root.parent) == before
+
+
+@pytest.mark.parametrize(("text", "old", "new", "said"), BAD)
+def test_a_bad_recipe_is_one_sentence_and_nothing_is_written(
+    text: str, old: str, new: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(write(tmp_path, text, old, new), tmp_path / "store", said, capsys)
+    assert not (tmp_path / "store").exists()
+
+
+def test_a_bad_recipe_leaves_the_old_revision_served(
+    tmp_path: Path, built: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heads = {name: brdfdb.open(built).head(name) for name in brdfdb.open(built)}
+    before = tree(built)
+    refused(write(tmp_path, GOOD, "[0, 80]", "[0, 90]"), built, "foam on grids.isotropic: ", capsys)
+    assert tree(built) == before
+    store = brdfdb.open(built)
+    store.verify("foam")
+    assert {name: store.head(name) for name in store} == heads
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("none.toml", "No such file or directory"), (".", "Is a directory"), ("file/none.toml", "Not a directory")],
+)
+def test_a_recipe_that_cannot_be_read_is_one_sentence(
+    name: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    refused(tmp_path / name, tmp_path / "store", said, capsys)
+
+
+@pytest.mark.parametrize("data", [b'title = "Gr\xf6\xdfe"', b"\xff\xfe\x00", b"\x00", b"PK\x03\x04\x00\x00\xe5"])
+def test_a_file_of_something_else_is_one_sentence(
+    data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_bytes(data)
+    refused(path, tmp_path / "store", "not TOML: ", capsys)
+
+
+def test_recipes_are_utf8_whatever_the_locale_is(recipe: Path) -> None:
+    environment = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    code = (
+        "import codecs, locale, sys; from pathlib import Path; from brdfdb_pipelines.recipe import load\n"
+        "assert codecs.lookup(locale.getpreferredencoding(False)).name == 'ascii'\n"
+        "print(ascii(load(Path(sys.argv[1])).title))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, recipe], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, ascii("Größe: one of every kind") + "\n"), done.stderr
+
+
+# What the fields do
+
+
+def recipe_of(directory: Path, text: str) -> Path:
+    path = directory / "recipe.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_every_preset_is_a_job_of_the_default_recipe() -> None:
+    jobs = load().jobs()
+    assert [job.material.name for job in jobs] == list(presets())
+    assert len(jobs) == 59
+    for job in jobs:
+        assert job.grid.anisotropic == job.material.anisotropic
+        assert (job.wavelength_nm is not None) == job.material.spectral
+        assert job.grid.axes["theta_i"].tolist() == job.grid.axes["theta_r"].tolist()
+        stated = job.material.wavelengths_nm
+        if job.wavelength_nm is not None:
+            wavelengths = np.arange(380.0, 781.0, 10.0) if stated is None else np.array(stated)
+            assert job.wavelength_nm.tolist() == wavelengths.tolist()
+
+
+def test_the_kind_of_a_material_chooses_its_grid(tmp_path: Path) -> None:
+    names = ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic"]
+    text = GOOD.replace('["foam"]', str(names))
+    jobs = {job.material.name: job for job in load(recipe_of(tmp_path, text)).jobs()}
+    assert {name: job.grid.shape for name, job in jobs.items()} == {
+        "foam": (3, 2, 2),
+        "rolled-brass": (2, 3, 2, 3),
+        "scene-copper-sphere": (2, 2, 3),
+        "blue-plastic": (3, 2, 2),  # stated at one wavelength: as many values as a grey one
+    }
+    assert {name: job.size for name, job in jobs.items()} == {
+        "foam": 12, "rolled-brass": 36, "scene-copper-sphere": 24, "blue-plastic": 12,
+    }  # fmt: skip
+    wavelengths = {name: job.wavelength_nm for name, job in jobs.items()}
+    assert wavelengths["foam"] is None
+    assert wavelengths["scene-copper-sphere"] is not None
+    assert wavelengths["scene-copper-sphere"].tolist() == [500.0, 550.0]
+    assert wavelengths["blue-plastic"] is not None
+    assert wavelengths["blue-plastic"].tolist() == list(presets()["blue-plastic"].wavelengths_nm or ())
+
+
+@pytest.mark.parametrize(
+    ("patterns", "chosen"),
+    [
+        (["foam"], ["foam"]),
+        (["rolled-*"], ["rolled-brass", "rolled-aluminum"]),
+        (["rolled-brass", "rolled-*", "rolled-brass"], ["rolled-brass", "rolled-aluminum"]),
+        (["rolled-?rass"], ["rolled-brass"]),
+        (["mine"], ["mine"]),
+        (["m*e"], ["mine"]),
+    ],
+)
+def test_patterns_choose_each_material_once(patterns: list[str], chosen: list[str], tmp_path: Path) -> None:
+    text = GOOD.replace('["foam"]', str(patterns)) + DEFINED
+    names = [job.material.name for job in load(recipe_of(tmp_path, text)).jobs()]
+    assert names == chosen
+
+
+def test_a_defined_material_is_what_was_written(tmp_path: Path) -> None:
+    (job,) = load(recipe_of(tmp_path, GOOD.replace('["foam"]', '["mine"]') + DEFINED)).jobs()
+    assert job.material.parameters == {"rho_d": 0.1, "rho_s": 0.2, "alpha_x": 0.3, "alpha_y": 0.3}
+    assert (job.material.title, job.material.source) == ("My own", "me")
+    assert job.grid.shape == (3, 2, 2)
+
+
+def test_a_defined_material_that_nobody_asked_for_is_checked_and_not_built(tmp_path: Path) -> None:
+    assert [job.material.name for job in load(recipe_of(tmp_path, GOOD + DEFINED)).jobs()] == ["foam"]
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "step", "nodes"),
+    [
+        (0.0, 0.3, 0.1, [0.0, 0.1, 0.2, 0.3]),
+        (380.0, 780.0, 200.0, [380.0, 580.0, 780.0]),
+        (5.0, 5.0, 1.0, [5.0]),
+        (0.0, 1.0, 1.0 / 3.0, [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]),
+    ],
+)
+def test_a_range_includes_both_ends(start: float, stop: float, step: float, nodes: list[float]) -> None:
+    found = Range(start=start, stop=stop, step=step).nodes("theta")
+    np.testing.assert_allclose(found, nodes, rtol=1e-15)
+    assert (found[0], found[-1]) == (start, stop)
+
+
+def test_a_range_of_more_nodes_than_any_memory_holds_is_refused() -> None:
+    with pytest.raises(RecipeError, match=r"^theta: steps of 1e-09 from 0 do not end at 90$"):
+        Range(start=0.0, stop=90.0, step=1e-9).nodes("theta")
+
+
+def test_the_recipe_in_a_table_builds_the_same_table_again(recipe: Path, built: Path) -> None:
+    written = brdfdb.open(built).attributes("mirror")["recipe"]
+    assert written == load(recipe).model_dump(mode="json")
+    again = type(load(recipe)).model_validate(written)
+    assert [job.material for job in again.jobs()] == [job.material for job in load(recipe).jobs()]

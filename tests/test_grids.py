@@ -1,0 +1,109 @@
+"""Grids: which axes there are, and one exact sentence for everything that can be wrong with one."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb.grids import ANISOTROPIC_AXES, ISOTROPIC_AXES, Grid, check_axis, check_wavelengths
+
+ISOTROPIC = {"theta_i": [0, 30, 80], "theta_r": [0, 89.5], "delta_phi": [0, 7, 90, 180]}
+ANISOTROPIC = {"theta_i": [0, 80], "phi_i": [0, 120, 240, 360], "theta_r": [0, 10, 80], "phi_r": [0, 180, 360]}
+
+
+@pytest.mark.parametrize(
+    ("name", "nodes", "sentence"),
+    [
+        ("theta_i", [], "theta_i: needs a list of at least two nodes, got an array of shape (0,)"),
+        ("theta_i", [0.0], "theta_i: needs a list of at least two nodes, got an array of shape (1,)"),
+        ("theta_r", 30.0, "theta_r: needs a list of at least two nodes, got an array of shape ()"),
+        ("theta_r", [[0, 1], [2, 3]], "theta_r: needs a list of at least two nodes, got an array of shape (2, 2)"),
+        ("theta_i", [0, 20, 10], "theta_i: the nodes must increase strictly"),
+        ("theta_i", [0, 10, 10], "theta_i: the nodes must increase strictly"),
+        ("theta_i", [0, np.nan, 10], "theta_i: the nodes must increase strictly"),
+        ("theta_i", [np.nan, 10], "theta_i: the nodes must increase strictly"),
+        ("phi_r", [360, 0], "phi_r: the nodes must increase strictly"),
+        ("theta_i", [1, 10], "theta_i: starts at 1 degrees, must start at 0"),
+        ("theta_r", [-10, 10], "theta_r: starts at -10 degrees, must start at 0"),
+        ("theta_i", [-np.inf, 10], "theta_i: starts at -inf degrees, must start at 0"),
+        ("delta_phi", [-180, 180], "delta_phi: starts at -180 degrees, must start at 0"),
+        ("delta_phi", [0, 90], "delta_phi: ends at 90 degrees, must end at 180"),
+        ("delta_phi", [0, 360], "delta_phi: ends at 360 degrees, must end at 180"),
+        ("phi_i", [0, 180], "phi_i: ends at 180 degrees, must end at 360"),
+        ("phi_r", [0, 355], "phi_r: ends at 355 degrees, must end at 360"),
+        ("theta_i", [0, 90.5], "theta_i: ends at 90.5 degrees, must end at or below 90"),
+        ("theta_r", [0, np.nextafter(90, 91)], "theta_r: ends at 90 degrees, must end at or below 90"),
+        ("theta_r", [0, np.inf], "theta_r: ends at inf degrees, must end at or below 90"),
+    ],
+)
+def test_an_axis_that_cannot_be_is_refused_in_one_sentence(name: str, nodes: Any, sentence: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(sentence)}$"):
+        check_axis(name, nodes)
+
+
+@pytest.mark.parametrize("axes", [ISOTROPIC, ANISOTROPIC])
+def test_a_grid_reports_the_sentence_of_the_axis_that_is_wrong(axes: dict[str, list[float]]) -> None:
+    for name in axes:
+        with pytest.raises(ValueError, match=f"^{name}: the nodes must increase strictly$"):
+            Grid({**axes, name: [0, 10, 5]})
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        (),
+        ("theta_i", "theta_r"),
+        ("theta_r", "theta_i", "delta_phi"),
+        ("theta_i", "theta_r", "phi_i", "phi_r"),
+        (*ISOTROPIC_AXES, "wavelength"),
+        ("theta_i", "phi_i", "theta_r", "delta_phi"),
+    ],
+)
+def test_other_sets_or_orders_of_axes_are_refused(names: tuple[str, ...]) -> None:
+    sentence = f"grid axes: {names} is neither {ISOTROPIC_AXES} nor {ANISOTROPIC_AXES}"
+    with pytest.raises(ValueError, match=f"^{re.escape(sentence)}$"):
+        Grid({name: [0, 180] for name in names})
+
+
+def test_a_grid_says_what_it_is() -> None:
+    isotropic, anisotropic = Grid(ISOTROPIC), Grid(ANISOTROPIC)
+    assert not isotropic.anisotropic
+    assert anisotropic.anisotropic
+    assert isotropic.shape == (3, 2, 4)
+    assert anisotropic.shape == (2, 4, 3, 3)
+    assert tuple(isotropic.axes) == ISOTROPIC_AXES
+    assert tuple(anisotropic.axes) == ANISOTROPIC_AXES
+    assert all(nodes.dtype == np.float64 for nodes in isotropic.axes.values())
+    assert isotropic.axes["delta_phi"].tolist() == [0.0, 7.0, 90.0, 180.0]
+
+
+@pytest.mark.parametrize(("last_i", "last_r", "reaches"), [(90, 80, True), (80, 90, True), (89.999999, 80, False)])
+def test_a_grid_knows_whether_it_reaches_the_horizon(last_i: float, last_r: float, reaches: bool) -> None:
+    grid = Grid({"theta_i": [0, last_i], "theta_r": [0, last_r], "delta_phi": [0, 90, 180]})
+    assert grid.reaches_horizon is reaches
+
+
+def test_a_grid_does_not_change_when_the_callers_arrays_or_its_fields_are_assigned_to() -> None:
+    nodes = np.array([0.0, 40.0, 80.0])
+    grid = Grid({**ISOTROPIC, "theta_i": nodes})
+    nodes[1] = -1.0
+    assert grid.axes["theta_i"].tolist() == [0.0, 40.0, 80.0]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        grid.axes = {}  # type: ignore[misc]  # that is the point
+
+
+@pytest.mark.parametrize(
+    "wavelengths", [[], 500.0, [0.0, 500.0], [-1.0], [550.0, 500.0], [500.0, 500.0], [np.nan], [[400.0, 500.0]]]
+)
+def test_wavelengths_that_cannot_be_are_refused(wavelengths: Any) -> None:
+    with pytest.raises(ValueError, match=r"^wavelengths_nm: must be positive and increase strictly$"):
+        check_wavelengths(wavelengths)
+
+
+def test_wavelengths_are_taken_as_they_are() -> None:
+    assert check_wavelengths([500]).tolist() == [500.0]
+    assert check_wavelengths((380.5, 400, 2000)).dtype == np.float64
