@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from brdfdb._numba import elementwise, kernel
 
 
@@ -19,7 +21,7 @@ def _unpolarised(cos_theta: float, n: float, k: float) -> float:
     sin2 = (1.0 - cos_theta) * (1.0 + cos_theta)
     e_re = (n - k) * (n + k)  # 1 + w, which keeps its digits as n -> 0
     # n - 1 to 15 decimals: an index is typed as a decimal, and the float64 nearest to 1.000001 is off by 8e-11 of n - 1
-    n_less_1 = math.floor((n - 1.0) * 1e15 + 0.5) * 1e-15
+    n_less_1: float = np.floor((n - 1.0) * 1e15 + 0.5) * 1e-15
     w_re = n_less_1 * (n_less_1 + 2.0) - k * k
     w_im = 2.0 * n * k
     # q = a + ib, the root with a, b >= 0; each of the two is formed where it does not cancel

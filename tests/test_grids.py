@@ -87,6 +87,13 @@ def test_a_grid_knows_whether_it_reaches_the_horizon(last_i: float, last_r: floa
     assert grid.reaches_horizon is reaches
 
 
+def test_a_grid_is_reciprocal_where_light_and_viewer_share_their_nodes() -> None:
+    assert not Grid(ISOTROPIC).reciprocal
+    assert Grid({**ISOTROPIC, "theta_r": ISOTROPIC["theta_i"]}).reciprocal
+    assert not Grid({**ISOTROPIC, "theta_r": [0, 30, 80.5]}).reciprocal
+    assert not Grid({**ANISOTROPIC, "theta_r": ANISOTROPIC["theta_i"]}).reciprocal
+
+
 def test_a_grid_does_not_change_when_the_callers_arrays_or_its_fields_are_assigned_to() -> None:
     nodes = np.array([0.0, 40.0, 80.0])
     grid = Grid({**ISOTROPIC, "theta_i": nodes})

@@ -311,6 +311,13 @@ def test_defaults_are_filled_in_and_integers_are_numbers():
             "plaster: interreflection: 0.5 is not true or false",
         ),
         ("plaster", plaster(colour="red"), "plaster: colour: Extra inputs are not permitted"),
+        ("plaster", plaster(model=["ward"]), "plaster: model: Input should be a valid string"),
+        ("plaster", plaster(parameters=5), "plaster: parameters: Input should be a valid dictionary"),
+        (
+            "plaster",
+            plaster(known_excess={"max_albedo": np.inf, "from_theta_i_deg": 80, "citation": "Fig. 1"}),
+            "plaster: known_excess.max_albedo: Input should be a finite number",
+        ),
         ("plaster", plaster(source=""), "plaster: source: String should have at least 1 character"),
         ("Wall plaster", plaster(), "Wall plaster: name: String should match pattern '^[a-z0-9]+(-[a-z0-9]+)*$'"),
         (
@@ -361,3 +368,11 @@ def test_in_memory_the_units_are_those_of_the_model():
     fields = plaster(name="plaster", parameters={"rho": 0.9, "sigma": 2.0})
     with pytest.raises(ValidationError, match=r"sigma: 2 is outside \[0, 1\.5708\] rad"):
         Material.model_validate(fields)
+
+
+def test_sources_and_assumptions_take_the_names_of_the_file():
+    material = Material.from_table(
+        "plaster", plaster(sources={"sigma_deg": "Fig. 2"}, assumed=["sigma_deg"], note="sigma_deg is a guess")
+    )
+    assert material.sources == {"sigma": "Fig. 2"}
+    assert material.assumed == ("sigma",)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from brdfdb.spectra import refractive_index
 from brdfdb.tabulate import check_suits, tabulate
 
 ISOTROPIC = Grid({"theta_i": [0, 30, 60, 89.5], "theta_r": [0, 30, 45, 60, 85], "delta_phi": [0, 50, 90, 180]})
+THETA = [0, 10, 25, 45, 60, 80, 89.5]
+RECIPROCAL = Grid({"theta_i": THETA, "theta_r": THETA, "delta_phi": [0, 50, 90, 180]})
 ANISOTROPIC = Grid(
     {"theta_i": [0, 40, 85], "phi_i": [0, 70, 200, 360], "theta_r": [0, 40, 60], "phi_r": [0, 90, 250, 360]}
 )
@@ -58,9 +61,9 @@ def directions(grid: Grid) -> tuple[Any, ...]:
 @pytest.mark.parametrize(
     ("made_up", "grid"),
     [
-        pytest.param(m, grid, id=f"{m.model}-{'an' if m.anisotropic else ''}isotropic-on-{len(grid.shape)}d")
+        pytest.param(m, grid, id=f"{m.model}-{'an' if m.anisotropic else ''}isotropic-on-{len(grid.shape)}d{kind}")
         for m in GREY
-        for grid in (ISOTROPIC, ANISOTROPIC)
+        for grid, kind in ((ISOTROPIC, ""), (RECIPROCAL, "-reciprocal"), (ANISOTROPIC, ""))
         if grid.anisotropic or not m.anisotropic
     ],
 )
@@ -73,7 +76,7 @@ def test_every_node_holds_the_model_rounded_once(made_up: Material, grid: Grid) 
     assert list(table.data_vars) == ["brdf"]
 
 
-@pytest.mark.parametrize("grid", [ISOTROPIC, ANISOTROPIC], ids=["isotropic", "anisotropic"])
+@pytest.mark.parametrize("grid", [ISOTROPIC, RECIPROCAL, ANISOTROPIC], ids=["isotropic", "reciprocal", "anisotropic"])
 @pytest.mark.parametrize("wavelengths", [WAVELENGTHS, WAVELENGTHS[:1]], ids=["three", "one"])
 def test_a_spectral_table_holds_the_model_with_the_wavelength_last(
     grid: Grid, wavelengths: NDArray[np.float64]
@@ -91,22 +94,47 @@ def test_a_spectral_table_holds_the_model_with_the_wavelength_last(
     assert table["n"].dims == table["k"].dims == ("wavelength",)
 
 
-@pytest.mark.parametrize("made_up", [GREY[2], GREY[5]], ids=["isotropic", "anisotropic"])
-def test_tabulating_in_pieces_gives_the_same_table(made_up: Material, monkeypatch: pytest.MonkeyPatch) -> None:
-    grid = ANISOTROPIC if made_up.anisotropic else ISOTROPIC
-    whole = tabulate(made_up, grid)
+@pytest.mark.parametrize("grid", [ISOTROPIC, ANISOTROPIC], ids=["isotropic", "anisotropic"])
+@pytest.mark.parametrize("position", range(4))
+def test_every_axis_reaches_the_model_as_what_it_is_called(
+    position: int, grid: Grid, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def angle(*angles: Any, rho: float) -> Any:
+        return rho * angles[position] + sum(np.zeros_like(a) for a in angles)
+
+    monkeypatch.setitem(models.MODELS, "lambert", replace(models.MODELS["lambert"], evaluate=angle))
+    found = tabulate(GREY[0], grid)["brdf"].values
+    np.testing.assert_array_equal(found, (0.5 * directions(grid)[position]).astype(np.float32))
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 100])
+@pytest.mark.parametrize(
+    ("made_up", "grid", "wavelengths"),
+    [
+        (GREY[2], ISOTROPIC, None),
+        (GREY[2], RECIPROCAL, None),
+        (GREY[5], ANISOTROPIC, None),
+        (rough_copper(), ISOTROPIC, WAVELENGTHS),
+        (rough_copper(), RECIPROCAL, WAVELENGTHS),
+        (rough_copper(), ANISOTROPIC, WAVELENGTHS),
+    ],
+)
+def test_a_table_does_not_depend_on_the_pieces_that_it_is_made_in(
+    made_up: Material, grid: Grid, wavelengths: Any, rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = tabulate(made_up, grid, wavelengths)
     calls: list[int] = []
-    monkeypatch.setattr(module, "_SLAB", 2 * int(np.prod(grid.shape[1:])))
-    pieces = tabulate(made_up, grid, progress=calls.append)
+    monkeypatch.setattr(module, "_SLAB", rows * int(np.prod(grid.shape[1:])))
+    pieces = tabulate(made_up, grid, wavelengths, calls.append)
     xr.testing.assert_identical(pieces, whole)
-    assert len(calls) == -(-grid.shape[0] // 2)
-    assert sum(calls) == np.prod(grid.shape)
+    assert sum(calls) == whole["brdf"].size
+    assert len(calls) >= -(-grid.shape[0] // rows)
 
 
-def test_progress_counts_every_value_of_a_spectral_table() -> None:
-    calls: list[int] = []
-    tabulate(rough_copper(), ISOTROPIC, WAVELENGTHS, calls.append)
-    assert sum(calls) == np.prod(ISOTROPIC.shape) * 3
+@pytest.mark.parametrize("made_up", [*GREY[:5], rough_copper()], ids=lambda m: m.model)
+def test_on_a_reciprocal_grid_a_table_is_its_own_transpose_to_the_last_bit(made_up: Material) -> None:
+    brdf = tabulate(made_up, RECIPROCAL, WAVELENGTHS if made_up.spectral else None)["brdf"].values
+    np.testing.assert_array_equal(brdf, np.swapaxes(brdf, 0, 1))
 
 
 @pytest.mark.parametrize("sigma_0_um", [0.0, 0.02], ids=["smooth", "slightly rough"])

@@ -36,7 +36,7 @@ class KnownExcess(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    max_albedo: float = Field(gt=1.0)
+    max_albedo: float = Field(gt=1.0, allow_inf_nan=False)
     from_theta_i_deg: float = Field(ge=0.0, le=90.0)
     citation: Text
 
@@ -90,13 +90,19 @@ class Material(BaseModel):
     def from_table(cls, name: str, table: Mapping[str, Any]) -> Material:
         """The material that a table of a TOML file describes; ValueError with one sentence if it does not.
 
-        Parameters are read as `file_parameters` writes them: angles in degrees, under names that end in ``_deg``.
+        Parameters, and their names in sources and assumed, are read as `file_parameters` writes them: angles in
+        degrees, under names that end in ``_deg``.
         """
         fields = {**table, "name": name}
-        spec = MODELS.get(table.get("model", ""))
+        model, parameters = table.get("model"), table.get("parameters", {})
         try:
-            if spec is not None:
-                fields["parameters"] = _from_file(spec, table.get("parameters", {}))
+            if isinstance(model, str) and model in MODELS and isinstance(parameters, Mapping):
+                fields["parameters"] = _from_file(MODELS[model], parameters)
+                own = {_as_written(parameter).name: parameter.name for parameter in MODELS[model].parameters}
+                if isinstance(sources := table.get("sources"), Mapping):
+                    fields["sources"] = {own.get(written, written): source for written, source in sources.items()}
+                if isinstance(assumed := table.get("assumed"), list):
+                    fields["assumed"] = [own.get(str(written), written) for written in assumed]
             return cls.model_validate(fields)
         except ValidationError as error:
             raise ValueError(f"{name}: {'; '.join(_sentence(item) for item in error.errors())}") from None

@@ -220,5 +220,6 @@ def diffraction_series(g: Floats, V: Floats) -> Floats:
     rows: NDArray[np.float64] = np.ascontiguousarray(np.broadcast_to(V_array, shape)).reshape(-1, length)
     row_shape = (*shape[:-1], shape[-1] // length)
     total: NDArray[np.float64] = np.empty_like(rows)
-    _sum_rows(np.ravel(np.broadcast_to(g_array, row_shape)), rows, total)
+    with np.errstate(all="ignore"):  # uncompiled, NumPy flags the overflow of V / g^2 that `_peak` is made for
+        _sum_rows(np.ravel(np.broadcast_to(g_array, row_shape)), rows, total)
     return total.reshape(np.broadcast_shapes(np.shape(g), np.shape(V)))

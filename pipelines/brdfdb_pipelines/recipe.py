@@ -136,9 +136,14 @@ class Recipe(BaseModel):
     def _grid(self, name: str) -> Grid:
         parts: dict[str, list[float | Range]] = dict(getattr(self.grids, name))
         try:
-            return Grid({field.removesuffix("_deg"): _nodes(field, nodes) for field, nodes in parts.items()})
-        except ValueError as error:
+            axes = {field.removesuffix("_deg"): _nodes(field, nodes) for field, nodes in parts.items()}
+        except RecipeError as error:
             raise RecipeError(f"grids.{name}.{error}") from None
+        try:
+            return Grid(axes)
+        except ValueError as error:
+            axis, _, said = str(error).partition(":")
+            raise RecipeError(f"grids.{name}.{axis}_deg:{said}") from None
 
     def _selected(self) -> list[Material]:
         known = dict(presets())

