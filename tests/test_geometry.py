@@ -1,0 +1,266 @@
+"""The conventions of directions: units, checks, frames, the fold of the azimuth, half and difference angles."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from brdfdb.geometry import (
+    HALF_PI,
+    PHI_MAX,
+    Angles,
+    check_phi,
+    check_theta,
+    checked_angles,
+    degrees,
+    directions_from_half_difference,
+    finished,
+    fold_delta_phi,
+    radians,
+    spherical_angles,
+    unit_vector,
+)
+
+VECTOR = 1e-15  # components of unit vectors; worst measured: 7e-16
+
+
+def drawn_directions(count: int = 500) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    rng = np.random.default_rng(1998)
+    return np.arccos(rng.uniform(-1.0, 1.0, count)), rng.uniform(-np.pi, np.pi, count)
+
+
+# Units
+
+
+def test_90_degrees_is_the_horizon_to_the_last_bit() -> None:
+    assert radians(90.0) == HALF_PI == np.pi / 2
+    assert radians(180) == np.pi
+    assert radians([0, 90]).dtype == np.float64
+
+
+def test_degrees_and_radians_are_inverse() -> None:
+    angles = np.linspace(-720.0, 720.0, 1441)
+    np.testing.assert_allclose(degrees(radians(angles)), angles, rtol=3e-16)
+
+
+# Checks
+
+
+def test_theta_keeps_float32_and_float64_and_widens_the_rest() -> None:
+    for given_as, dtype in (
+        (np.float32(0.5), np.float32),
+        (np.float64(0.5), np.float64),
+        (np.float16(0.5), np.float64),
+        (np.longdouble(0.5), np.float64),
+        (1, np.float64),
+        ([0, 1], np.float64),
+        (np.array([], dtype=np.int8), np.float64),
+    ):
+        assert check_theta("theta", given_as).dtype == dtype
+        assert check_phi("phi", given_as).dtype == dtype
+
+
+@pytest.mark.parametrize(
+    "inside", [0.0, -0.0, 5e-324, HALF_PI, np.pi, np.float32(np.pi), np.nan, [0.0, np.nan]], ids=repr
+)
+def test_theta_from_0_to_pi_is_allowed(inside: Any) -> None:
+    np.testing.assert_array_equal(check_theta("theta", inside), inside)
+
+
+def test_float32_nearest_pi_lies_above_pi_and_is_allowed() -> None:
+    assert float(np.float32(np.pi)) > np.pi
+    with pytest.raises(ValueError, match=r"^theta: "):
+        check_theta("theta", np.nextafter(np.float32(np.pi), np.float32(4.0)))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (-0.1, "theta: -0.1 rad (-5.72958 degrees) is outside [0, pi] rad"),
+        (90, "theta: 90 rad (5156.62 degrees) is outside [0, pi] rad"),
+        ([[0.1, 4.0], [-1.0, 0.0]], "theta: 4 rad (229.183 degrees) is outside [0, pi] rad"),
+        (np.inf, "theta: inf rad (inf degrees) is outside [0, pi] rad"),
+        (True, "theta: True is not a number of radians"),
+        ("0.1", "theta: '0.1' is not a number of radians"),
+        (0.1j, "theta: 0.1j is not a number of radians"),
+        (None, "theta: None is not a number of radians"),
+    ],
+    ids=str,
+)
+def test_theta_refuses_with_the_name_the_value_and_the_range(wrong: Any, message: str) -> None:
+    with pytest.raises(ValueError) as caught:  # noqa: PT011  # the whole message is compared
+        check_theta("theta", wrong)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("inside", [0.0, -PHI_MAX, PHI_MAX, np.nan, [1e6, np.nan]], ids=repr)
+def test_phi_of_any_turn_is_allowed(inside: Any) -> None:
+    np.testing.assert_array_equal(check_phi("phi", inside), inside)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (np.inf, "phi: inf rad is outside [-1e+15, 1e+15] rad"),
+        ([0.0, -np.inf], "phi: -inf rad is outside [-1e+15, 1e+15] rad"),
+        (2e15, "phi: 2e+15 rad is outside [-1e+15, 1e+15] rad"),
+        (False, "phi: False is not a number of radians"),
+    ],
+    ids=str,
+)
+def test_phi_refuses_with_the_name_the_value_and_the_range(wrong: Any, message: str) -> None:
+    with pytest.raises(ValueError) as caught:  # noqa: PT011  # the whole message is compared
+        check_phi("phi", wrong)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("position", range(4))
+def test_checked_angles_names_the_angle(position: int) -> None:
+    angles = [0.1, 0.2, 0.3, 0.4]
+    angles[position] = -np.inf
+    with pytest.raises(ValueError, match=f"^{Angles._fields[position]}: -inf rad"):
+        checked_angles(*angles)
+
+
+def test_checked_angles_holds_thetas_at_the_horizon_and_notes_what_lies_below() -> None:
+    angles = checked_angles([0.1, HALF_PI, np.nextafter(HALF_PI, 2.0), np.pi, np.nan], 0.0, 0.2, 0.0)
+    np.testing.assert_array_equal(angles.theta_i, [0.1, HALF_PI, HALF_PI, HALF_PI, np.nan])
+    np.testing.assert_array_equal(angles.below, [False, False, True, True, False])
+    single = checked_angles(np.float32([0.1, HALF_PI, 1.5707965]), 0.0, np.float32(HALF_PI), 0.0)
+    np.testing.assert_array_equal(single.below, [False, False, True])
+    np.testing.assert_array_equal(single.theta_i, [np.float32(0.1), HALF_PI, HALF_PI])
+    assert single.theta_r == HALF_PI
+    assert all(angle.dtype == np.float64 for angle in single[:4])
+
+
+def test_float32_in_is_float32_out_unless_an_array_says_float64() -> None:
+    one, two = np.float32(0.1), np.float64(0.1)
+    assert checked_angles(one, one, one, one).dtype == np.float32
+    assert checked_angles(one, 0.1, [0.1], 1).dtype == np.float32
+    assert checked_angles(one, one, two, one).dtype == np.float64
+    assert checked_angles(one, one, one, np.array(1)).dtype == np.float64
+    assert checked_angles(0.1, 0.1, [0.1], 1).dtype == np.float64
+
+
+def test_finished_writes_zero_below_the_horizon_and_nan_where_an_angle_is_nan() -> None:
+    angles = checked_angles(np.array([0.1, 2.0, np.nan, 2.0]), np.array([0.0, 0.0, 0.0, np.nan]), 0.3, 0.0)
+    values = np.array([5.0, 6.0, 7.0, 8.0])
+    result = finished(values, angles)
+    np.testing.assert_array_equal(result, [5.0, 0.0, np.nan, np.nan])
+    np.testing.assert_array_equal(values, [5.0, 6.0, 7.0, 8.0])
+
+
+def test_finished_broadcasts_into_an_array_of_its_own() -> None:
+    value = np.array([1.0])
+    result = finished(value, checked_angles(np.zeros((3, 1)), 0.0, np.zeros(2), 0.0))
+    assert result.shape == (3, 2)
+    result[0, 0] = 9.0
+    assert value[0] == 1.0
+    assert (result.ravel()[1:] == 1.0).all()
+    assert isinstance(finished(np.float64(1.0), checked_angles(0.0, 0.0, 0.0, 0.0)), np.float64)
+
+
+# Frames
+
+
+def test_unit_vectors_of_the_axes() -> None:
+    for theta, phi, axis in ((0.0, 0.0, [0, 0, 1]), (HALF_PI, 0.0, [1, 0, 0]), (HALF_PI, HALF_PI, [0, 1, 0])):
+        np.testing.assert_allclose(unit_vector(theta, phi), axis, atol=VECTOR)
+    np.testing.assert_allclose(unit_vector(np.pi, 0.3), [0, 0, -1], atol=VECTOR)
+
+
+def test_unit_vectors_have_length_one_and_give_their_angles_back() -> None:
+    theta, phi = drawn_directions()
+    w = unit_vector(theta, phi)
+    assert w.shape == (500, 3)
+    np.testing.assert_allclose(np.linalg.norm(w, axis=-1), 1.0, atol=VECTOR)
+    theta_back, phi_back = spherical_angles(w)
+    np.testing.assert_allclose(theta_back, theta, atol=1e-15)
+    np.testing.assert_allclose(phi_back, phi, atol=1e-14)
+    np.testing.assert_allclose(spherical_angles(7.0 * w)[0], theta, atol=1e-15)  # of any length
+
+
+def test_unit_vector_broadcasts() -> None:
+    assert unit_vector(np.zeros((4, 1)), np.zeros(5)).shape == (4, 5, 3)
+    assert unit_vector(0.0, 0.0).shape == (3,)
+
+
+def test_angles_at_the_pole_and_in_every_quadrant() -> None:
+    assert spherical_angles([0.0, 0.0, 2.0]) == (0.0, 0.0)
+    for x, y, phi in ((1, 1, 0.25), (-1, 1, 0.75), (-1, -1, -0.75), (1, -1, -0.25), (-1, 0, 1.0)):
+        assert spherical_angles([x, y, 0.0])[1] == phi * np.pi
+
+
+def test_fold_is_the_angle_between_two_azimuths() -> None:
+    delta_phi = np.linspace(-20.0, 20.0, 4001)
+    folded = fold_delta_phi(delta_phi)
+    assert folded.min() >= 0.0
+    assert folded.max() <= np.pi
+    np.testing.assert_allclose(folded, np.arccos(np.cos(delta_phi)), atol=2e-8)  # arccos is blind near 0 and pi
+    np.testing.assert_allclose(np.cos(folded), np.cos(delta_phi), atol=5e-15)
+
+
+def test_fold_keeps_its_ends() -> None:
+    assert fold_delta_phi(0.0) == 0.0
+    assert fold_delta_phi(np.pi) == np.pi
+    assert fold_delta_phi(-np.pi) == np.pi
+    assert fold_delta_phi(2.0 * np.pi) == 0.0
+    assert np.isnan(fold_delta_phi(np.nan))
+
+
+@given(delta_phi=st.floats(-1e3, 1e3), turns=st.integers(-5, 5))
+def test_fold_has_the_period_and_the_mirror_symmetry(delta_phi: float, turns: int) -> None:
+    folded = fold_delta_phi(delta_phi)
+    assert fold_delta_phi(-delta_phi) == pytest.approx(folded, abs=1e-12)
+    assert fold_delta_phi(delta_phi + turns * 2.0 * np.pi) == pytest.approx(folded, abs=1e-12)
+
+
+# Half and difference angles
+
+
+def test_half_vector_is_the_bisector_and_theta_d_half_the_angle_between() -> None:
+    rng = np.random.default_rng(3)
+    theta_h, theta_d = rng.uniform(0.0, HALF_PI, (2, 500))
+    phi_h, phi_d = rng.uniform(-np.pi, np.pi, (2, 500))
+    theta_i, phi_i, theta_r, phi_r = directions_from_half_difference(theta_h, phi_h, theta_d, phi_d)
+    light, viewer = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+    half = unit_vector(theta_h, phi_h)
+    np.testing.assert_allclose(light + viewer, 2.0 * np.cos(theta_d)[:, None] * half, atol=2e-15)
+    np.testing.assert_allclose(np.sum(light * half, axis=-1), np.cos(theta_d), atol=2e-15)
+
+
+def test_half_difference_frame_is_that_of_rusinkiewicz() -> None:
+    # the light in the frame turned back by -phi_h about z, then by -theta_h about y, is at (theta_d, phi_d)
+    rng = np.random.default_rng(4)
+    for theta_h, phi_h, theta_d, phi_d in rng.uniform(0.0, HALF_PI, (50, 4)):
+        theta_i, phi_i, _, _ = directions_from_half_difference(theta_h, phi_h, theta_d, phi_d)
+        x, y, z = unit_vector(theta_i, phi_i - phi_h)
+        turned = [x * np.cos(theta_h) - z * np.sin(theta_h), y, x * np.sin(theta_h) + z * np.cos(theta_h)]
+        np.testing.assert_allclose(turned, unit_vector(theta_d, phi_d), atol=2e-15)
+
+
+def test_half_a_turn_of_phi_d_exchanges_light_and_viewer() -> None:
+    theta_i, phi_i, theta_r, phi_r = directions_from_half_difference(0.4, 0.3, 0.7, 1.1)
+    swapped = directions_from_half_difference(0.4, 0.3, 0.7, 1.1 + np.pi)
+    np.testing.assert_allclose(swapped, [theta_r, phi_r, theta_i, phi_i], atol=2e-15)
+
+
+def test_half_difference_corners() -> None:
+    # theta_h = 0 is the mirror direction, theta_d = 0 backscatter
+    theta_i, phi_i, theta_r, phi_r = directions_from_half_difference(0.0, 0.0, 0.6, 0.2)
+    assert theta_i == pytest.approx(theta_r, abs=1e-15)
+    assert fold_delta_phi(phi_r - phi_i) == pytest.approx(np.pi, abs=1e-15)
+    theta_i, phi_i, theta_r, phi_r = directions_from_half_difference(0.6, 0.2, 0.0, 0.0)
+    np.testing.assert_allclose([theta_i, phi_i, theta_r, phi_r], [0.6, 0.2, 0.6, 0.2], atol=1e-15)
+    # far from the normal one of the two passes below the horizon
+    theta_i, _, theta_r, _ = directions_from_half_difference(1.2, 0.0, 0.8, 0.0)
+    assert theta_i == pytest.approx(2.0)
+    assert theta_r == pytest.approx(0.4)
+
+
+def test_half_difference_broadcasts() -> None:
+    angles = directions_from_half_difference(np.zeros((4, 1)), 0.0, np.zeros(5), np.zeros((3, 1, 1)))
+    assert {np.shape(angle) for angle in angles} <= {(3, 4, 5)}
