@@ -66,6 +66,8 @@ def show(root: Path, name: str) -> None:
         print(f"    {axis:<16}{nodes.size} nodes, {nodes[0]:g} to {nodes[-1]:g} degrees")
     if table.wavelength_nm is None:
         print(f"    {'wavelength':<16}none, the table is grey")
+    elif table.wavelength_nm.size == 1:
+        print(f"    {'wavelength':<16}{table.wavelength_nm[0]:g} nm only")
     else:
         wavelength = table.wavelength_nm
         print(f"    {'wavelength':<16}{wavelength.size} nodes, {wavelength[0]:g} to {wavelength[-1]:g} nm")
