@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
+from brdfdb.models import MODELS
 from brdfdb.parameters import Floats
 
 Verdict = Literal["passes", "known published excess", "violates"]
@@ -74,7 +76,7 @@ class Values(BaseModel):
     model_config = _STRICT
 
     count: int
-    smallest: float | None = Field(description="null: no value is finite")
+    smallest: float | None = Field(description="of f_r; null: no value is finite")
     negative: int
     not_finite: int
     positivity: Verdict
@@ -107,7 +109,7 @@ class AuditReport(BaseModel):
 
 
 def audit(table: Table) -> MaterialAudit:
-    """Audit one table.
+    """Audit one table: what it says of energy, positivity and finiteness holds for its stored values, interpolated.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ def audit(table: Table) -> MaterialAudit:
     -------
     MaterialAudit
         The findings. The verdict on energy is "known published excess" where the albedo exceeds 1 no further than
-        the material's attribute ``known_excess`` says, and "violates" where it exceeds 1 otherwise.
+        the material's attribute ``known_excess``, or its model, says, and "violates" where it exceeds 1 otherwise.
     """
     energy = _energy(table)
     reciprocity = _reciprocity(table)
@@ -206,7 +208,7 @@ def _energy(table: Table) -> Energy:
     worst_theta, worst_wavelength = np.unravel_index(np.argmax(finite), finite.shape)
     largest = float(finite[worst_theta, worst_wavelength])
     exceeding = theta_i[np.any(finite > 1.0 + ENERGY_TOLERANCE, axis=1)]
-    known = table.attrs.get("known_excess") or {}
+    known: Mapping[str, Any] = table.attrs.get("known_excess") or MODELS[str(table.attrs["model"])].known_excess or {}
     verdict: Verdict
     if exceeding.size == 0:
         verdict, reason = "passes", ""
@@ -297,7 +299,7 @@ def _values(table: Table) -> Values:
     not_finite = sum(int(good.size - np.count_nonzero(good)) for good in finite)
     return Values(
         count=sum(array.size for array in stored),
-        smallest=float(min(array.min() for array in kept)) if kept else None,
+        smallest=float(np.min(table.brdf[finite[0]])) if finite[0].any() else None,
         negative=negative,
         not_finite=not_finite,
         positivity="violates" if negative else "passes",

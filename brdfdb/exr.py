@@ -228,6 +228,11 @@ def export(table: Table, directory: str | os.PathLike[str], *, half: bool = Fals
     return paths
 
 
+def _dirac(specular: NDArray[np.float32]) -> str:
+    """What an image leaves out of a table with a Dirac part."""
+    return f"not in this image: up to {specular.max():.4g} of the light leaves in the exact mirror direction"
+
+
 def write(path: str | os.PathLike[str], image: Slice, table: Table, half: bool = False) -> None:
     """Write a slice as an OpenEXR file, ZIP compressed: whole, or not at all.
 
@@ -309,6 +314,7 @@ def _attributes(image: Slice, table: Table) -> dict[str, Any]:
         "brdf:title": str(table.attrs["title"]),
         "brdf:quantity": QUANTITY,
         "brdf:unit": UNIT,
+        "brdf:dirac": "none" if table.specular is None else _dirac(table.specular),
         "brdf:slice": image.kind,
         "brdf:description": image.description,
     }

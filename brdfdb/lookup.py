@@ -136,7 +136,10 @@ class Table:
         if wavelength_nm is None:
             count = 1 if stored is None else stored.size
             return np.arange(count), np.zeros(count), () if stored is None else (count,)
-        wanted = np.asarray(wavelength_nm, dtype=np.float64)
+        given = np.asarray(wavelength_nm)
+        if given.size and given.dtype.kind not in "iuf":
+            raise ValueError(f"wavelength_nm: {wavelength_nm!r} is not a number of nanometres")
+        wanted = given.astype(np.float64)
         if wanted.ndim > 1:
             raise ValueError(f"wavelength_nm: {wanted.ndim} axes; allowed are a number and a list of numbers")
         flat = wanted.reshape(-1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +52,8 @@ class ModelSpec:
     ``f(theta_i, *, parameters)`` of the parameters named in `specular_parameters`. `spectral` models take
     ``wavelength_nm, n, k`` beside their own parameters.
     `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees.
+    `known_excess`, for a model whose equations as published reflect more than they receive, says how much at most, from
+    which angle on and where that is known, in the keys of `brdfdb.materials.KnownExcess`.
     `lobe_axes` names the two parameters that make the model anisotropic when they differ.
     """
 
@@ -67,6 +69,7 @@ class ModelSpec:
     spectral: bool = False
     grazing_pole: bool = False
     lobe_axes: tuple[str, str] | None = None
+    known_excess: Mapping[str, float | str] | None = None
 
     def parameter(self, name: str) -> Parameter:
         """The parameter called `name`; KeyError if the model has none."""

@@ -185,7 +185,7 @@ def _decode(name: str, path: Path) -> Table:
     try:
         arrays = {key: np.asarray(array[...]) for key, array in group.arrays()}
     except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
-        raise StoreError(f"{name} {path.name} is damaged: {error}") from error
+        raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
     brdf_metadata: Any = group["brdf"].metadata
     dimensions = [d for d in brdf_metadata.dimension_names if d != "wavelength"]
     specular = arrays.get("specular_reflectance")

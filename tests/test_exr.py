@@ -42,6 +42,7 @@ class FakeTable:
     name = "fake-brass"
     revision = "r000003"
     anisotropic = False
+    specular: Floats | None = None
 
     def __init__(self, lobe: Lobe, wavelength_nm: Floats | None, spectrum: Floats | None) -> None:
         self.attrs: dict[str, Any] = {"model": "ward", "title": "Fake brass"}
@@ -361,6 +362,7 @@ def test_export_writes_three_files_with_their_attributes(tmp_path: Path) -> None
             "title": "Fake brass",
             "quantity": "f_r",
             "unit": "1/sr",
+            "dirac": "none",
             "slice": kind,
             "rgb": "linear sRGB, D65",
             "wavelength_nm": " ".join(f"{wavelength:.1f}" for wavelength in VISIBLE_NM),
@@ -368,6 +370,14 @@ def test_export_writes_three_files_with_their_attributes(tmp_path: Path) -> None
         }
         assert header["spectralLayoutVersion"] == "1.0"
         assert len(channels) == 44
+
+
+def test_an_image_says_what_it_leaves_out_of_a_table_with_a_dirac_part(tmp_path: Path) -> None:
+    source = table(ward_like)
+    cast(Any, source).specular = np.array([0.25, 0.5], dtype=np.float32)
+    exr.write(tmp_path / "lobe.exr", exr.lobe_map(source), source)
+    header, _ = read(tmp_path / "lobe.exr")
+    assert header["brdf:dirac"] == "not in this image: up to 0.5 of the light leaves in the exact mirror direction"
 
 
 def test_export_in_half_replaces_the_files(tmp_path: Path) -> None:

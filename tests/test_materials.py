@@ -82,7 +82,7 @@ HE_TORRANCE = {
 }
 HE_IDEAL_DIFFUSE = "aluminum-cylinder-13c"
 ASSUMED = {
-    **{name: {"interreflection"} for name in SURFACE_TERM_RATIOS},
+    **{name: {"interreflection"} for name in OREN_NAYAR},
     **{name: {"rho", "interreflection"} for name in OREN_NAYAR if name.startswith(("rendered-", "scene-"))},
     "sandpaper-220-grit": {"sigma_0_um", "tau_um", "refractive_index"},
     "blue-plastic": {"tau_um", "refractive_index"},

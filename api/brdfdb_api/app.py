@@ -161,6 +161,8 @@ def serve(store_dir: Path, host: str, port: int) -> None:
             listener.listen()
         except OSError as error:
             raise OSError(f"cannot listen on {host}, port {port}: {error.strerror}") from error
+        port = listener.getsockname()[1]
+        print(f"serving {store_dir} at http://{f'[{host}]' if ':' in host else host}:{port}/v1/materials", flush=True)
         with contextlib.suppress(KeyboardInterrupt):
             uvicorn.Server(uvicorn.Config(app, host=host, port=port)).run(sockets=[listener])
 

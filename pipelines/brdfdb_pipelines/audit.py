@@ -35,9 +35,9 @@ def run(root: Path, names: list[str], report_path: Path) -> AuditReport:
             audits.append(audit(store[name]))
     found = report(audits)
     report_path.write_text(found.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    numbers = ("albedo up to", "model", "table", "smallest")
+    numbers = ("albedo up to", "model", "table", "smallest f_r")
     terminal.print_table(
-        f"Audit of {root} (model, table: largest asymmetry under exchange of light and viewer)",
+        f"Audit of {root}, the tables as interpolated (model, table: largest asymmetry under exchange of directions)",
         ("material", "verdict", *numbers),
         [_row(a) for a in audits],
         numbers=numbers,

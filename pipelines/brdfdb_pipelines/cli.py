@@ -21,7 +21,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     run: Callable[[argparse.Namespace], int] = options.run
     try:
-        return run(options)
+        code = run(options)
+        sys.stdout.flush()  # a reader that left shows here, not at exit
+        return code
     except KeyboardInterrupt:
         print("brdfdb: interrupted; what was published before stays", file=sys.stderr)
         return 130
@@ -77,7 +79,12 @@ def _parser() -> argparse.ArgumentParser:
 
     audit = command("audit", _audit, "Audit energy, reciprocity, positivity and finiteness; exit 1 on a new violation.")
     audit.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
-    audit.add_argument("--report", type=Path, metavar="FILE", help="JSON report (default: DIR/audit.json)")
+    audit.add_argument(
+        "--report",
+        type=Path,
+        metavar="FILE",
+        help="JSON report (default: DIR/audit.json, or DIR/audit-part.json with names)",
+    )
 
     text = "Write slices of tables as image files."
     # a command a format: argparse takes no NAME after an option that follows another positional argument
@@ -126,7 +133,8 @@ def _build(options: argparse.Namespace) -> int:
 def _audit(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import audit
 
-    report = audit.run(options.store, options.names, options.report or options.store / "audit.json")
+    default = options.store / ("audit-part.json" if options.names else "audit.json")
+    report = audit.run(options.store, options.names, options.report or default)
     return VIOLATED if report.violations else 0
 
 

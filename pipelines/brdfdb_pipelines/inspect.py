@@ -83,7 +83,7 @@ def _print_albedo(table: Table) -> None:
     wavelength = table.wavelength_nm
     columns = sorted({0, diffuse.shape[1] // 2, diffuse.shape[1] - 1})
     print(
-        "  albedo      "
+        "  albedo, as tabulated "
         + "".join(f"{f'{angle:g}°':>9}" for angle in ALBEDO_ANGLES_DEG)
         + "  (theta_i; with the Dirac part)"
     )

@@ -37,7 +37,9 @@ class Range(BaseModel):
     def nodes(self, name: str) -> Axis:
         """The numbers; RecipeError if the step does not lead from start to stop."""
         count = (self.stop - self.start) / self.step
-        if not 0.0 <= count < _MOST_NODES or abs(count - round(count)) > 1e-6:
+        if count >= _MOST_NODES:
+            raise RecipeError(f"{name}: steps of {self.step:g} make more than the {_MOST_NODES} nodes an axis may have")
+        if not count >= 0.0 or abs(count - round(count)) > 1e-6:
             raise RecipeError(f"{name}: steps of {self.step:g} from {self.start:g} do not end at {self.stop:g}")
         return np.linspace(self.start, self.stop, round(count) + 1)
 
