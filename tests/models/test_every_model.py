@@ -1,11 +1,8 @@
 """What every model of the registry promises: a model is held to all of it from the day it is registered."""
 
-import doctest
 import inspect
 import itertools
 import re
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -522,7 +519,7 @@ def test_takes_both_ends_of_a_range(spec: ModelSpec, parameter: Parameter) -> No
         assert 0.0 <= value < np.inf
 
 
-# Signatures and documents
+# Signatures
 
 
 @every_model
@@ -574,50 +571,3 @@ def test_a_default_may_be_left_out(spec: ModelSpec) -> None:
     defaults = {p.name: p.default for p in spec.parameters if p.default is not None}
     without = {name: value for name, value in parameters.items() if name not in defaults}
     assert spec.evaluate(0.1, 0.2, 0.3, 0.4, **without) == spec.evaluate(0.1, 0.2, 0.3, 0.4, **without | defaults)
-
-
-FUNCTIONS = [getattr(models, name) for name in models.__all__ if name != "MODELS"]
-
-
-@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
-def test_the_examples_of_the_docstring_run(function: Callable[..., Any]) -> None:
-    runner = doctest.DocTestRunner()
-    found = doctest.DocTestFinder(recurse=False).find(function, globs=dict(vars(inspect.getmodule(function))))
-    for example in found:
-        runner.run(example)
-    assert runner.summarize(verbose=False).failed == 0
-    assert runner.tries >= 1
-
-
-@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
-def test_the_docstring_has_its_sections(function: Callable[..., Any]) -> None:
-    document = inspect.getdoc(function)
-    assert document is not None
-    for section in ("Parameters", "Returns", "Raises", "References", "Examples"):
-        assert f"\n{section}\n{'-' * len(section)}\n" in document, section
-    for name in inspect.signature(function).parameters:
-        assert re.search(rf"\b{name}\b", document), name
-
-
-@every_model
-def test_the_docstring_states_the_range_of_every_parameter(spec: ModelSpec) -> None:
-    document = inspect.getdoc(spec.evaluate) or ""
-    for parameter in parameters_of(spec):
-        if parameter.high == HALF_PI:
-            assert "[0, pi/2]" in document
-        elif not isinstance(parameter.default, bool):
-            ends = rf"\[{re.escape(written(parameter.low))}, {re.escape(written(parameter.high))}\]"
-            assert re.search(ends, document), parameter.name
-
-
-def written(end: float) -> str:
-    """A bound as the docstrings write it: 1e7, 1e-3."""
-    if end and not 0.01 <= end < 1e4:
-        return f"1e{round(np.log10(end))}"
-    return f"{end:g}"
-
-
-@every_model
-def test_the_reference_is_in_the_bibliography(spec: ModelSpec) -> None:
-    bibliography = (Path(__file__).parents[2] / "references.bib").read_text(encoding="utf-8")
-    assert f"{{{spec.reference}," in bibliography
