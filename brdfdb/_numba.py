@@ -1,14 +1,17 @@
 """The only file that calls numba: how kernels are compiled.
 
-A kernel calls kernels of its own file only. numba keeps compiled code under the digest of the file that holds the
-kernel: one that calls into another file would go on running the old code when that file changes.
+A kernel calls kernels of its own file, and of the files in `SHARED`. numba keeps compiled code under the digest of the
+file that holds the kernel, to which `_stamp` adds those of the shared ones: a kernel that calls into any other file
+would go on running the old code when that file changes.
 """
 
 from __future__ import annotations
 
 import functools
+import hashlib
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -16,6 +19,8 @@ import numpy as np
 from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+SHARED = ("_elementary.py", "fresnel.py")
 
 
 def kernel(function: F) -> F:
@@ -25,7 +30,23 @@ def kernel(function: F) -> F:
     which costs a factor of 5 to 7 on Ward's model, and the limits want inf from 1/0. Of fastmath only "contract", fused
     multiply-add: it rounds less, and nan and inf keep their meaning. cache: 0.2 s instead of seconds next time.
     """
-    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})(function))
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, forceinline=True)(
+        function
+    )
+    if not config.DISABLE_JIT:  # type: ignore[attr-defined]  # numba makes its settings at run time
+        _stamp(compiled._cache)  # type: ignore[attr-defined]  # numba keeps it to itself
+    return cast(F, compiled)
+
+
+@functools.cache
+def _shared_digest() -> bytes:
+    return hashlib.sha256(b"".join(Path(__file__).with_name(name).read_bytes() for name in SHARED)).digest()
+
+
+def _stamp(cache: Any) -> None:
+    """Let compiled code in numba's cache count as old when a file of `SHARED` has changed, too."""
+    file = cache._cache_file
+    file._source_stamp += _shared_digest()
 
 
 def elementwise(function: F) -> Callable[..., Any]:
@@ -53,6 +74,8 @@ def elementwise(function: F) -> Callable[..., Any]:
 def _ufunc(function: Callable[..., Any], arity: int) -> Callable[..., Any]:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]  # numba makes its settings at run time
         return np.vectorize(function, otypes=[np.float64])  # numba would compile, and fail on kernels that are Python
-    signature = numba.float64(*[numba.float64] * arity)
-    vectorize = numba.vectorize([signature], cache=True)  # type: ignore[no-untyped-call]  # numba leaves it untyped
-    return cast(Callable[..., Any], vectorize(function))
+    ufunc = numba.vectorize(cache=True)(function)  # type: ignore[no-untyped-call]  # numba leaves it untyped
+    _stamp(ufunc._dispatcher.cache)
+    ufunc.add(numba.float64(*[numba.float64] * arity))
+    ufunc.disable_compile()
+    return cast(Callable[..., Any], ufunc)

@@ -8,15 +8,19 @@ and file boundaries, and `degrees` / `radians` below are where they are converte
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import functools
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb._elementary import COS_HORIZON
 from brdfdb.parameters import Floats
 
 HALF_PI = np.pi / 2
 PHI_MAX = 1e15  # beyond, neighbouring float64 are more than a tenth of a radian apart
+UNIT_LENGTH = 1e-5  # how far from 1 the length of a unit vector may be; float32 is off by 1e-7
 
 
 def radians(angle_deg: ArrayLike) -> NDArray[np.float64]:
@@ -60,8 +64,12 @@ def _float_array(name: str, angle: ArrayLike) -> Floats:
     return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
 
 
-class Angles(NamedTuple):
-    """Checked angles [rad] as float64, thetas held at the horizon, and what `finished` needs to know of the input."""
+@dataclass(frozen=True)
+class Angles:
+    """Directions of light and viewer by angles [rad], checked: float64, thetas held at the horizon.
+
+    What depends on one angle is computed when a model asks for it, and stays on the axis of that angle.
+    """
 
     theta_i: NDArray[np.float64]
     phi_i: NDArray[np.float64]
@@ -69,6 +77,23 @@ class Angles(NamedTuple):
     phi_r: NDArray[np.float64]
     below: NDArray[np.bool_]
     dtype: np.dtype[Any]
+
+    @property
+    def given(self) -> tuple[Floats, ...]:
+        """The arrays whose shapes broadcast to that of the result."""
+        return self.theta_i, self.phi_i, self.theta_r, self.phi_r
+
+    sin_i = functools.cached_property(lambda self: np.sin(self.theta_i))
+    cos_i = functools.cached_property(lambda self: np.cos(self.theta_i))
+    sin_r = functools.cached_property(lambda self: np.sin(self.theta_r))
+    cos_r = functools.cached_property(lambda self: np.cos(self.theta_r))
+    x_i = functools.cached_property(lambda self: self.sin_i * np.cos(self.phi_i))
+    y_i = functools.cached_property(lambda self: self.sin_i * np.sin(self.phi_i))
+    x_r = functools.cached_property(lambda self: self.sin_r * np.cos(self.phi_r))
+    y_r = functools.cached_property(lambda self: self.sin_r * np.sin(self.phi_r))
+    cos_dphi = functools.cached_property(lambda self: np.cos(self.phi_r - self.phi_i))
+    sin_dphi = functools.cached_property(lambda self: np.sin(self.phi_r - self.phi_i))
+    one_plus_cos_dphi = functools.cached_property(lambda self: 2.0 * np.cos((self.phi_r - self.phi_i) / 2.0) ** 2)
 
 
 def checked_angles(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike) -> Angles:
@@ -79,39 +104,129 @@ def checked_angles(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi
     """
     t_i, t_r = check_theta("theta_i", theta_i), check_theta("theta_r", theta_r)
     p_i, p_r = check_phi("phi_i", phi_i), check_phi("phi_r", phi_r)
-    below = (t_i > t_i.dtype.type(HALF_PI)) | (t_r > t_r.dtype.type(HALF_PI))
-    arrays = [a for a in (theta_i, phi_i, theta_r, phi_r) if isinstance(a, np.ndarray | np.generic)]
-    single = bool(arrays) and np.result_type(*arrays) == np.float32
     return Angles(
         np.minimum(t_i.astype(np.float64), HALF_PI),
         p_i.astype(np.float64),
         np.minimum(t_r.astype(np.float64), HALF_PI),
         p_r.astype(np.float64),
-        below,
-        np.dtype(np.float32 if single else np.float64),
+        (t_i > t_i.dtype.type(HALF_PI)) | (t_r > t_r.dtype.type(HALF_PI)),
+        _asked_for(theta_i, phi_i, theta_r, phi_r),
     )
 
 
-def finished(values: Floats, angles: Angles, *, trailing: int = 0) -> Floats:
-    """Broadcast to all four angles; 0 below the horizon, nan where an angle is nan, in the dtype asked for.
+@dataclass(frozen=True)
+class Vectors:
+    """Directions of light and viewer as unit vectors, checked: the properties of `Angles` without trigonometry.
 
-    `trailing` axes of `values`, such as wavelengths, come after those of the angles.
+    At a pole, where an azimuth means nothing, the difference of azimuths is 0.
+    """
+
+    w_i: Floats
+    w_r: Floats
+    dtype: np.dtype[Any]
+
+    @property
+    def below(self) -> NDArray[np.bool_]:
+        """Which directions lie below the horizon."""
+        return (self.w_i[..., 2] < 0.0) | (self.w_r[..., 2] < 0.0)
+
+    @property
+    def given(self) -> tuple[Floats, ...]:
+        """The arrays whose shapes broadcast to that of the result, nan where a vector is nan."""
+        return self.w_i.sum(axis=-1), self.w_r.sum(axis=-1)
+
+    x_i = functools.cached_property(lambda self: self.w_i[..., 0].astype(np.float64))
+    y_i = functools.cached_property(lambda self: self.w_i[..., 1].astype(np.float64))
+    cos_i = functools.cached_property(lambda self: np.maximum(self.w_i[..., 2].astype(np.float64), COS_HORIZON))
+    sin_i = functools.cached_property(lambda self: np.hypot(self.x_i, self.y_i))
+    x_r = functools.cached_property(lambda self: self.w_r[..., 0].astype(np.float64))
+    y_r = functools.cached_property(lambda self: self.w_r[..., 1].astype(np.float64))
+    cos_r = functools.cached_property(lambda self: np.maximum(self.w_r[..., 2].astype(np.float64), COS_HORIZON))
+    sin_r = functools.cached_property(lambda self: np.hypot(self.x_r, self.y_r))
+
+    @functools.cached_property
+    def cos_dphi(self) -> NDArray[np.float64]:
+        """cos(phi_r - phi_i)."""
+        product = self.sin_i * self.sin_r
+        along = self.x_i * self.x_r + self.y_i * self.y_r
+        cos: NDArray[np.float64] = np.divide(along, product, where=product > 0.0, out=np.ones_like(along))
+        return np.clip(cos, -1.0, 1.0)
+
+    @functools.cached_property
+    def one_plus_cos_dphi(self) -> NDArray[np.float64]:
+        """1 + cos(phi_r - phi_i) with all its digits next to the mirror half plane."""
+        cos = self.cos_dphi
+        return np.where(cos < 0.0, self.sin_dphi**2 / (1.0 - cos), 1.0 + cos)
+
+    @functools.cached_property
+    def sin_dphi(self) -> NDArray[np.float64]:
+        """sin(phi_r - phi_i)."""
+        product = self.sin_i * self.sin_r
+        across = self.x_i * self.y_r - self.y_i * self.x_r
+        sin: NDArray[np.float64] = np.divide(across, product, where=product > 0.0, out=np.zeros_like(across))
+        return np.clip(sin, -1.0, 1.0)
+
+
+def checked_vectors(wi: ArrayLike, wr: ArrayLike) -> Vectors:
+    """Check the unit vectors of light and viewer, each of shape (..., 3); nan passes through to the result.
+
+    float32 arrays in give float32 out; the arithmetic is float64. Below the horizon, z < 0, every model is 0; at z = 0
+    it has its limit from above. Of long arrays the length is checked for a thousand vectors, evenly spread: the rest
+    is the caller's word.
+
+    Raises
+    ------
+    ValueError
+        If an array has no last axis of 3, does not hold numbers, or holds vectors that are not of length 1.
+    """
+    return Vectors(_unit_vectors("wi", wi), _unit_vectors("wr", wr), _asked_for(wi, wr))
+
+
+Directions = Angles | Vectors
+
+
+def _unit_vectors(name: str, w: ArrayLike) -> Floats:
+    array = np.asarray(w)
+    if array.dtype.kind not in "iuf" or array.ndim == 0 or array.shape[-1] != 3:
+        raise ValueError(f"{name}: {array.dtype} of shape {array.shape} is not an array of vectors, shape (..., 3)")
+    if array.dtype not in (np.float32, np.float64):
+        array = array.astype(np.float64)
+    count = array.size // 3
+    some = array.reshape(-1, 3)[:: max(1, count // 1000)].astype(np.float64)  # a view of contiguous arrays
+    length = np.sqrt(np.sum(some * some, axis=-1))
+    bad = np.abs(length - 1.0) > UNIT_LENGTH
+    if np.any(bad):
+        x, y, z = some[bad][0]
+        raise ValueError(f"{name}: ({x:.9g}, {y:.9g}, {z:.9g}) has the length {length[bad][0]:.9g}, not 1")
+    return array
+
+
+def _asked_for(*directions: ArrayLike) -> np.dtype[Any]:
+    """float32 if the arrays among the directions are, else float64."""
+    arrays = [each for each in directions if isinstance(each, np.ndarray | np.generic)]
+    single = bool(arrays) and np.result_type(*arrays) == np.float32
+    return np.dtype(np.float32 if single else np.float64)
+
+
+def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Floats:
+    """Broadcast to all directions; 0 below the horizon, nan where a direction is nan, in the dtype asked for.
+
+    `trailing` axes of `values`, such as wavelengths, come after those of the directions.
     """
     own = np.shape(values)[np.ndim(values) - trailing :]
 
     def aligned(array: NDArray[Any]) -> NDArray[Any]:
         return array.reshape(array.shape + (1,) * trailing)
 
-    four = angles[:4]
-    shape = np.broadcast_shapes(np.shape(values), *(aligned(angle).shape for angle in four), own)
+    shape = np.broadcast_shapes(np.shape(values), *(aligned(each).shape for each in directions.given), own)
     result: Floats = np.broadcast_to(values, shape)
-    if np.any(angles.below):
-        result = np.where(aligned(angles.below), 0.0, result)
-    for angle in four:
-        if np.any(np.isnan(angle)):
-            result = np.where(aligned(np.isnan(angle)), np.nan, result)
-    if result.dtype != angles.dtype or not result.flags.writeable:
-        result = result.astype(angles.dtype)
+    if np.any(directions.below):
+        result = np.where(aligned(directions.below), 0.0, result)
+    for each in directions.given:
+        if np.any(np.isnan(each)):
+            result = np.where(aligned(np.isnan(each)), np.nan, result)
+    if result.dtype != directions.dtype or not result.flags.writeable:
+        result = result.astype(directions.dtype)
     return result[()]
 
 

@@ -48,9 +48,9 @@ class ModelSpec:
     """A model as the rest of the library sees it.
 
     `version` is written into every table and is raised whenever a tabulated value moves. `evaluate` has the call
-    shape ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``; `specular`, where there is a Dirac part, is
-    ``f(theta_i, *, parameters)`` of the parameters named in `specular_parameters`. `spectral` models take
-    ``wavelength_nm, n, k`` beside their own parameters.
+    shape ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``, `vectors`, its twin, ``f(wi, wr, *, parameters)``;
+    `specular`, where there is a Dirac part, is ``f(theta_i, *, parameters)`` of the parameters named in
+    `specular_parameters`. `spectral` models take ``wavelength_nm, n, k`` beside their own parameters.
     `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees.
     `known_excess`, for a model whose equations as published reflect more than they receive, says how much at most, from
     which angle on and where that is known, in the keys of `brdfdb.materials.KnownExcess`.
@@ -64,6 +64,7 @@ class ModelSpec:
     reference: str
     parameters: tuple[Parameter, ...]
     evaluate: Callable[..., Floats]
+    vectors: Callable[..., Floats]
     specular: Callable[..., Floats] | None = None
     specular_parameters: tuple[str, ...] = ()
     spectral: bool = False

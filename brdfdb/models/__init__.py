@@ -7,11 +7,16 @@ broadcasting over angles and parameters, the cosine never folded in.
 from brdfdb.models import he_torrance_1991, oren_nayar_1994, ward_1992
 from brdfdb.models import lambert as _lambert
 from brdfdb.models import minnaert as _minnaert
-from brdfdb.models.he_torrance_1991 import he_torrance, he_torrance_specular
-from brdfdb.models.lambert import lambert
-from brdfdb.models.minnaert import minnaert
-from brdfdb.models.oren_nayar_1994 import oren_nayar, oren_nayar_qualitative
-from brdfdb.models.ward_1992 import ward
+from brdfdb.models.he_torrance_1991 import he_torrance, he_torrance_specular, he_torrance_vectors
+from brdfdb.models.lambert import lambert, lambert_vectors
+from brdfdb.models.minnaert import minnaert, minnaert_vectors
+from brdfdb.models.oren_nayar_1994 import (
+    oren_nayar,
+    oren_nayar_qualitative,
+    oren_nayar_qualitative_vectors,
+    oren_nayar_vectors,
+)
+from brdfdb.models.ward_1992 import ward, ward_vectors
 from brdfdb.parameters import ModelSpec
 
 MODELS: dict[str, ModelSpec] = {
@@ -30,9 +35,15 @@ __all__ = [
     "MODELS",
     "he_torrance",
     "he_torrance_specular",
+    "he_torrance_vectors",
     "lambert",
+    "lambert_vectors",
     "minnaert",
+    "minnaert_vectors",
     "oren_nayar",
     "oren_nayar_qualitative",
+    "oren_nayar_qualitative_vectors",
+    "oren_nayar_vectors",
     "ward",
+    "ward_vectors",
 ]

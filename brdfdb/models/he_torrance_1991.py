@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
 from brdfdb._numba import elementwise, kernel
-from brdfdb.geometry import checked_angles, finished
+from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._he_torrance_series import diffraction_series
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
@@ -141,15 +141,32 @@ def he_torrance(
     >>> round(float(he_torrance(0.5, 0.0, 0.6, 3.0, wavelength_nm=500.0, **surface)), 3)
     5.388
     """
-    angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     surface = _surface(wavelength_nm, sigma_0_um, tau_um, n, k)
-    albedo = A.check(a)
-    sin_i, cos_i = np.sin(angles.theta_i), np.cos(angles.theta_i)
-    sin_r, cos_r = np.sin(angles.theta_r), np.cos(angles.theta_r)
+    return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, A.check(a))
+
+
+def he_torrance_vectors(
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+) -> Floats:
+    """`he_torrance` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    surface = _surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    return _f_r(checked_vectors(wi, wr), surface, A.check(a))
+
+
+def _f_r(directions: Directions, surface: _Surface, albedo: Floats) -> Floats:
+    sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
     slope = surface.slope
     # Eq. (84), unit vectors: v_xy^2 in the form that keeps its digits near the mirror direction
     v_z2 = (cos_i + cos_r) ** 2
-    v_xy2 = (sin_i - sin_r) ** 2 + (4.0 * sin_i * sin_r) * np.cos((angles.phi_r - angles.phi_i) / 2.0) ** 2
+    v_xy2 = (sin_i - sin_r) ** 2 + (2.0 * sin_i * sin_r) * directions.one_plus_cos_dphi
     # Eqs (23)-(25)
     S_over_cos_cos = _shadowing(sin_i, cos_i, slope) * _shadowing(sin_r, cos_r, slope)
     # Eqs (79)-(83)
@@ -165,7 +182,7 @@ def he_torrance(
     pair = correlation / (4.0 * np.pi) * S_over_cos_cos * g_over_vz2
     directional_diffuse = F2 * D_over_g * v2**2 * pair
     # Eq. (72)
-    return finished(directional_diffuse + albedo / np.pi, angles)
+    return finished(directional_diffuse + albedo / np.pi, directions)
 
 
 def he_torrance_specular(
@@ -229,6 +246,7 @@ SPEC = ModelSpec(
     reference="he1991",
     parameters=(SIGMA_0_UM, TAU_UM, A),
     evaluate=he_torrance,
+    vectors=he_torrance_vectors,
     specular=he_torrance_specular,
     specular_parameters=("wavelength_nm", "sigma_0_um", "tau_um", "n", "k"),
     spectral=True,

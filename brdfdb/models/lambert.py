@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brdfdb.geometry import checked_angles, finished
+from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo")
@@ -44,6 +44,11 @@ def lambert(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: Arr
     return finished(RHO.check(rho) / np.pi, angles)
 
 
+def lambert_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike) -> Floats:
+    """`lambert` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    return finished(RHO.check(rho) / np.pi, checked_vectors(wi, wr))
+
+
 SPEC = ModelSpec(
     name="lambert",
     version=1,
@@ -52,4 +57,5 @@ SPEC = ModelSpec(
     reference="lambert1760",
     parameters=(RHO,),
     evaluate=lambert,
+    vectors=lambert_vectors,
 )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brdfdb._numba import elementwise, kernel
-from brdfdb.geometry import checked_angles, finished
+from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 K = Parameter("k", "k", "1", 0.0, 1.0, "limb darkening exponent; 1 is Lambert")
@@ -67,9 +67,16 @@ def minnaert(
     >>> round(float(minnaert(0.3, 0.0, 0.4, 0.0, k=1.0)), 6)
     0.31831
     """
-    angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    values = _evaluate(np.cos(angles.theta_i), np.cos(angles.theta_r), K.check(k), RHO.check(rho))
-    return finished(values, angles)
+    return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), k, rho)
+
+
+def minnaert_vectors(wi: ArrayLike, wr: ArrayLike, *, k: ArrayLike, rho: ArrayLike = 1.0) -> Floats:
+    """`minnaert` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    return _f_r(checked_vectors(wi, wr), k, rho)
+
+
+def _f_r(directions: Directions, k: ArrayLike, rho: ArrayLike) -> Floats:
+    return finished(_evaluate(directions.cos_i, directions.cos_r, K.check(k), RHO.check(rho)), directions)
 
 
 SPEC = ModelSpec(
@@ -80,5 +87,6 @@ SPEC = ModelSpec(
     reference="minnaert1941",
     parameters=(K, RHO),
     evaluate=minnaert,
+    vectors=minnaert_vectors,
     grazing_pole=True,
 )

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
+import math
 
-from brdfdb._numba import elementwise, kernel
-from brdfdb.geometry import HALF_PI, Angles, checked_angles, finished
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb._elementary import BLOCK, arcsin, by_component, cosine
+from brdfdb._numba import kernel
+from brdfdb.geometry import HALF_PI, checked_angles, checked_vectors, finished
+from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a facet")
@@ -17,6 +21,7 @@ OFFSET = Parameter(
 )
 
 _HALF_PI_REST = 6.123233995736766e-17  # pi/2 less the float64 nearest to it
+_NO_AZIMUTH = 1e-300  # smaller products of two sines: an azimuth means nothing
 
 # Measured at rho = 1 over sigma: the albedo reaches 1.0499 (sigma of 18 degrees, theta_i of 89.9) and exceeds 1 from 50
 # degrees on, the qualitative model 1.015 or, with an offset of 0.57, 1.044
@@ -29,55 +34,168 @@ _KNOWN_EXCESS: dict[str, float | str] = {
 
 
 @kernel
+def _angle(sin_theta: float, cos_theta: float) -> tuple[float, float]:
+    """A polar angle and what is left of it to pi/2, each with all its digits."""
+    steep = sin_theta > cos_theta
+    small = arcsin(cos_theta if steep else sin_theta)
+    large = HALF_PI - small + _HALF_PI_REST
+    theta = large if steep else small
+    rest = small if steep else large
+    return theta, rest
+
+
+@kernel
 def _functional(
     alpha: float,
     beta: float,
+    beta_rest: float,
     sin_alpha: float,
-    versine_alpha: float,
+    versine_rest: float,
     tan_beta: float,
     tan_mean: float,
-    cos_delta_phi: float,
-    one_less_cos: float,
+    rho: float,
+    sigma: float,
+    interreflection: float,
+) -> tuple[float, float, float, float]:
+    """Eq. (29) as f_r = c_0 + c_1 cos(dphi) + c_2 (1 - abs(cos(dphi))): c_0, c_1 backward and forward, c_2.
+
+    beta_rest is pi/2 - beta, versine_rest is 1 - sin(alpha): near the horizon neither may be a difference.
+    """
+    sigma2 = sigma * sigma
+    # Eq. (27), coefficients
+    C1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33)
+    ratio = sigma2 / (sigma2 + 0.09)
+    C2_backward = 0.45 * ratio * sin_alpha
+    # sin(alpha) - (2 beta / pi)^3: both near 1 at the horizon, where tan(beta) magnifies what is left
+    x = beta_rest * (2.0 / np.pi)
+    C2_forward = 0.45 * ratio * (x * (3.0 - x * (3.0 - x)) - versine_rest)
+    C3 = 0.125 * ratio * (alpha * beta * (4.0 / np.pi**2)) ** 2
+    # Eq. (28)
+    bounced = interreflection * 0.17 * rho * sigma2 / (sigma2 + 0.13)
+    bounced_cos = bounced * (beta * (2.0 / np.pi)) ** 2
+    # Eqs (27) and (29)
+    scale = rho / np.pi
+    return (
+        scale * (C1 + bounced),
+        scale * (C2_backward * tan_beta - bounced_cos),
+        scale * (C2_forward * tan_beta - bounced_cos),
+        scale * C3 * tan_mean,
+    )
+
+
+@kernel
+def _f_r(c_0: float, backward: float, forward: float, c_2: float, cos_dphi: float, one_less_cos: float) -> float:
+    f_r = c_0 + (backward if cos_dphi >= 0.0 else forward) * cos_dphi + c_2 * one_less_cos
+    return 0.0 if f_r < 0.0 else f_r
+
+
+@kernel
+def _functional_angle_rows(
+    cos_dphi: NDArray[np.float64],
+    one_less_cos: NDArray[np.float64],
+    scalars: NDArray[np.float64],
+    f_r: NDArray[np.float64],
+) -> None:
+    for row in range(f_r.shape[0]):
+        s, f = scalars[row], f_r[row]
+        c_0, backward, forward, c_2 = _functional(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9])
+        shared = min(row, cos_dphi.shape[0] - 1)
+        cos, rest = cos_dphi[shared], one_less_cos[shared]
+        for j in range(f.shape[0]):
+            f[j] = _f_r(c_0, backward, forward, c_2, cos[j], rest[j])
+
+
+@kernel
+def _functional_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
+    i, r = np.empty((3, BLOCK)), np.empty((3, BLOCK))
+    for row in range(f_r.shape[0]):
+        f = f_r[row]
+        rho, sigma, interreflection = scalars[row, 0], scalars[row, 1], scalars[row, 2]
+        lights, viewers = w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)]
+        for start in range(0, f.shape[0], BLOCK):
+            count = by_component(lights, start, i)
+            by_component(viewers, start, r)
+            for j in range(count):
+                f[start + j] = _functional_of_vectors(
+                    i[0, j], i[1, j], i[2, j], r[0, j], r[1, j], r[2, j], rho, sigma, interreflection
+                )
+
+
+@kernel
+def _functional_of_vectors(
+    x_i: float,
+    y_i: float,
+    z_i: float,
+    x_r: float,
+    y_r: float,
+    z_r: float,
     rho: float,
     sigma: float,
     interreflection: float,
 ) -> float:
-    sigma2 = sigma * sigma
-    # Eq. (27), coefficients
-    C1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33)
-    C2 = 0.45 * sigma2 / (sigma2 + 0.09) * sin_alpha
-    if cos_delta_phi < 0.0:
-        # sin(alpha) - (2 beta / pi)^3: both near 1 at the horizon, where tan(beta) magnifies what is left
-        x = (HALF_PI - beta + _HALF_PI_REST) * (2.0 / np.pi)
-        C2 = 0.45 * sigma2 / (sigma2 + 0.09) * (x * (3.0 - x * (3.0 - x)) - versine_alpha)
-    C3 = 0.125 * sigma2 / (sigma2 + 0.09) * (4.0 * alpha * beta / np.pi**2) ** 2
-    # Eq. (27)
-    direct = C1 + cos_delta_phi * C2 * tan_beta + one_less_cos * C3 * tan_mean
-    # Eq. (28)
-    bounced = 0.17 * rho * sigma2 / (sigma2 + 0.13) * (1.0 - cos_delta_phi * (2.0 * beta / np.pi) ** 2)
-    # Eq. (29)
-    f_r = rho / np.pi * (direct + interreflection * bounced)
-    return f_r if f_r > 0.0 else 0.0
+    sin2_i, sin2_r = x_i * x_i + y_i * y_i, x_r * x_r + y_r * y_r
+    cos_i, cos_r = cosine(z_i), cosine(z_r)
+    sin_i, sin_r = math.sqrt(sin2_i), math.sqrt(sin2_r)
+    theta_i, rest_i = _angle(sin_i, cos_i)
+    theta_r, rest_r = _angle(sin_r, cos_r)
+    lower_light = cos_i < cos_r
+    alpha = theta_i if lower_light else theta_r
+    beta = theta_r if lower_light else theta_i
+    beta_rest = rest_r if lower_light else rest_i
+    sin_alpha = sin_i if lower_light else sin_r
+    cos_alpha = cos_i if lower_light else cos_r
+    tan_beta = (sin_r if lower_light else sin_i) / (cos_r if lower_light else cos_i)
+    versine_rest = cos_alpha * cos_alpha / (1.0 + sin_alpha)
+    tan_mean = (sin_i + sin_r) / (cos_i + cos_r)
+    c_0, backward, forward, c_2 = _functional(
+        alpha, beta, beta_rest, sin_alpha, versine_rest, tan_beta, tan_mean, rho, sigma, interreflection
+    )
+    product = sin_i * sin_r
+    inverse = 1.0 / (_NO_AZIMUTH if product < _NO_AZIMUTH else product)
+    cos_dphi = (x_i * x_r + y_i * y_r) * inverse
+    sin_dphi = (x_i * y_r - y_i * x_r) * inverse
+    f_r = _f_r(c_0, backward, forward, c_2, cos_dphi, sin_dphi * sin_dphi / (1.0 + abs(cos_dphi)))
+    return 0.0 if z_i < 0.0 or z_r < 0.0 else f_r
 
 
 @kernel
-def _qualitative(
-    sin_alpha: float, tan_beta: float, cos_delta_phi: float, rho: float, sigma: float, offset: float
-) -> float:
+def _qualitative(sin_alpha: float, tan_beta: float, rho: float, sigma: float, offset: float) -> tuple[float, float]:
+    """Eq. (30) as f_r = c_0 + c_1 max(0, cos(dphi)): c_0 and c_1."""
     sigma2 = sigma * sigma
     # Eq. (30)
     A = 1.0 - 0.5 * sigma2 / (sigma2 + offset) if sigma2 > 0.0 else 1.0
     B = 0.45 * sigma2 / (sigma2 + 0.09)
-    return rho / np.pi * (A + B * max(0.0, cos_delta_phi) * sin_alpha * tan_beta)
+    return rho / np.pi * A, rho / np.pi * B * sin_alpha * tan_beta
 
 
-_evaluate_functional = elementwise(_functional)
-_evaluate_qualitative = elementwise(_qualitative)
+@kernel
+def _qualitative_angle_rows(
+    cos_dphi: NDArray[np.float64], scalars: NDArray[np.float64], f_r: NDArray[np.float64]
+) -> None:
+    for row in range(f_r.shape[0]):
+        s, f = scalars[row], f_r[row]
+        c_0, c_1 = _qualitative(s[0], s[1], s[2], s[3], s[4])
+        cos = cos_dphi[min(row, cos_dphi.shape[0] - 1)]
+        for j in range(f.shape[0]):
+            f[j] = c_0 + c_1 * max(0.0, cos[j])
 
 
-def _alpha_beta(angles: Angles) -> tuple[Floats, Floats]:
-    """The larger and the smaller of theta_i and theta_r."""
-    return np.maximum(angles.theta_i, angles.theta_r), np.minimum(angles.theta_i, angles.theta_r)
+@kernel
+def _qualitative_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
+    i, r = np.empty((3, BLOCK)), np.empty((3, BLOCK))
+    for row in range(f_r.shape[0]):
+        f = f_r[row]
+        # sin(alpha) tan(beta) cos(dphi) is x_i x_r + y_i y_r over the larger cosine: no angle is left
+        A, B = _qualitative(1.0, 1.0, scalars[row, 0], scalars[row, 1], scalars[row, 2])
+        lights, viewers = w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)]
+        for start in range(0, f.shape[0], BLOCK):
+            count = by_component(lights, start, i)
+            by_component(viewers, start, r)
+            for j in range(count):
+                z_i, z_r = i[2, j], r[2, j]
+                along = i[0, j] * r[0, j] + i[1, j] * r[1, j]
+                value = A + B * (0.0 if along < 0.0 else along) / cosine(z_i if z_i > z_r else z_r)
+                f[start + j] = 0.0 if z_i < 0.0 or z_r < 0.0 else value
 
 
 def oren_nayar(
@@ -131,24 +249,29 @@ def oren_nayar(
     0.2639
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    alpha, beta = _alpha_beta(angles)
-    delta_phi = angles.phi_r - angles.phi_i
-    cos_delta_phi = np.cos(delta_phi)
-    sin_alpha, sin_beta = np.sin(alpha), np.sin(beta)
-    values = _evaluate_functional(
+    alpha, beta = np.maximum(angles.theta_i, angles.theta_r), np.minimum(angles.theta_i, angles.theta_r)
+    sin_alpha = np.maximum(angles.sin_i, angles.sin_r)
+    pair = (
         alpha,
         beta,
+        HALF_PI - beta + _HALF_PI_REST,
         sin_alpha,
         2.0 * np.sin((HALF_PI - alpha + _HALF_PI_REST) / 2.0) ** 2,
         np.tan(beta),
-        (sin_alpha + sin_beta) / (np.cos(alpha) + np.cos(beta)),  # the mean of two angles would round
-        cos_delta_phi,
-        np.sin(delta_phi) ** 2 / (1.0 + np.abs(cos_delta_phi)),  # 1 - |cos|: tan_mean magnifies it near grazing
-        RHO.check(rho),
-        SIGMA.check(sigma),
-        INTERREFLECTION.check(interreflection),
+        (angles.sin_i + angles.sin_r) / (angles.cos_i + angles.cos_r),  # the mean of two angles would round
     )
-    return finished(values, angles)
+    cos_dphi = angles.cos_dphi
+    one_less_cos = angles.sin_dphi**2 / (1.0 + np.abs(cos_dphi))  # 1 - |cos|: tan_mean magnifies it near grazing
+    parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
+    return finished(by_rows(_functional_angle_rows, (cos_dphi, one_less_cos), (*pair, *parameters)), angles)
+
+
+def oren_nayar_vectors(
+    wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, interreflection: ArrayLike = True
+) -> Floats:
+    """`oren_nayar` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
+    return by_rows_of_vectors(_functional_vector_rows, checked_vectors(wi, wr), parameters)
 
 
 def oren_nayar_qualitative(
@@ -198,16 +321,17 @@ def oren_nayar_qualitative(
     0.2362
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    alpha, beta = _alpha_beta(angles)
-    values = _evaluate_qualitative(
-        np.sin(alpha),
-        np.tan(beta),
-        np.cos(angles.phi_r - angles.phi_i),
-        RHO.check(rho),
-        SIGMA.check(sigma),
-        OFFSET.check(offset),
-    )
-    return finished(values, angles)
+    pair = np.maximum(angles.sin_i, angles.sin_r), np.tan(np.minimum(angles.theta_i, angles.theta_r))
+    parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
+    return finished(by_rows(_qualitative_angle_rows, (angles.cos_dphi,), (*pair, *parameters)), angles)
+
+
+def oren_nayar_qualitative_vectors(
+    wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, offset: ArrayLike = 0.33
+) -> Floats:
+    """`oren_nayar_qualitative` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
+    return by_rows_of_vectors(_qualitative_vector_rows, checked_vectors(wi, wr), parameters)
 
 
 SPEC = ModelSpec(
@@ -218,6 +342,7 @@ SPEC = ModelSpec(
     reference="orennayar1994",
     parameters=(RHO, SIGMA, INTERREFLECTION),
     evaluate=oren_nayar,
+    vectors=oren_nayar_vectors,
     grazing_pole=True,
     known_excess=_KNOWN_EXCESS,
 )
@@ -229,6 +354,7 @@ QUALITATIVE_SPEC = ModelSpec(
     reference="orennayar1994",
     parameters=(RHO, SIGMA, OFFSET),
     evaluate=oren_nayar_qualitative,
+    vectors=oren_nayar_qualitative_vectors,
     grazing_pole=True,
     known_excess=_KNOWN_EXCESS,
 )

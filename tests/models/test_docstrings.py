@@ -14,7 +14,8 @@ from brdfdb.models import MODELS, he_torrance_1991
 from brdfdb.parameters import ModelSpec, Parameter
 
 HALF_PI = np.pi / 2
-FUNCTIONS = [getattr(models, name) for name in models.__all__ if name != "MODELS"]
+TWINS = [name for name in models.__all__ if name.endswith("_vectors")]
+FUNCTIONS = [getattr(models, name) for name in models.__all__ if name not in ("MODELS", *TWINS)]
 
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
@@ -35,6 +36,15 @@ def test_the_docstring_has_its_sections(function: Callable[..., Any]) -> None:
         assert f"\n{section}\n{'-' * len(section)}\n" in document, section
     for name in inspect.signature(function).parameters:
         assert re.search(rf"\b{name}\b", document), name
+
+
+@pytest.mark.parametrize("name", TWINS)
+def test_the_docstring_of_a_twin_names_the_function_that_documents_its_parameters(name: str) -> None:
+    original, twin = getattr(models, name.removesuffix("_vectors")), getattr(models, name)
+    assert (inspect.getdoc(twin) or "").startswith(f"`{original.__name__}` for unit vectors `wi`")
+    by_angles, by_vectors = inspect.signature(original).parameters, inspect.signature(twin).parameters
+    assert [*by_vectors] == ["wi", "wr", *[*by_angles][4:]]
+    assert [by_vectors[each] for each in [*by_vectors][2:]] == [by_angles[each] for each in [*by_angles][4:]]
 
 
 @pytest.mark.parametrize("spec", MODELS.values(), ids=MODELS)

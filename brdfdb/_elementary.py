@@ -1,0 +1,118 @@
+"""What the inside of kernels is made of: exp, log and arcsin without branches, so that loops over them vectorise.
+
+libm's do not vectorise without SVML, which pip wheels do not ship. Kernels of any file may call these: `_numba.kernel`
+knows this file, and compiles its callers anew when it changes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb._numba import kernel
+
+_LOG2_E = 1.4426950408889634
+_LN2_HIGH, _LN2_LOW = (
+    0.6931471805598903,
+    5.497923018708371e-14,
+)  # the high part has 20 bits to spare: n times it is exact
+COS_HORIZON = 6.123233995736766e-17  # of the float64 nearest pi/2: where a model has a pole, its value there is finite
+BLOCK = 256  # directions that a loop takes at a time: their intermediate values stay in a core's first cache
+
+_ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it leaves the nearest integer in the low bits of the float
+_EXP_UNDERFLOW = -708.0  # below is 0: no subnormal numbers
+_SQRT_HALF = np.int64(0x3FE6A09E667F3BCD)
+
+
+@kernel
+def exp(x: float) -> float:
+    """e**x for x <= 700, within 3e-16 relative; 0 below -708; nan for nan."""
+    shifted = x * _LOG2_E + _ROUND
+    n = shifted - _ROUND
+    r = (x - n * _LN2_HIGH) - n * _LN2_LOW
+    # Taylor series, |r| <= ln(2) / 2: the first term left out is below 2e-16
+    p = 1.0 / 479001600.0
+    p = p * r + 1.0 / 39916800.0
+    p = p * r + 1.0 / 3628800.0
+    p = p * r + 1.0 / 362880.0
+    p = p * r + 1.0 / 40320.0
+    p = p * r + 1.0 / 5040.0
+    p = p * r + 1.0 / 720.0
+    p = p * r + 1.0 / 120.0
+    p = p * r + 1.0 / 24.0
+    p = p * r + 1.0 / 6.0
+    p = p * r + 0.5
+    p = p * r + 1.0
+    p = p * r + 1.0
+    bits = (np.float64(shifted).view(np.int64) + np.int64(1023)) << np.int64(52)
+    return 0.0 if x < _EXP_UNDERFLOW else p * np.int64(bits).view(np.float64)
+
+
+@kernel
+def log(x: float) -> float:
+    """ln(x) of a positive normal float64, within 4e-16 relative or, next to 1, absolute."""
+    bits = np.float64(x).view(np.int64)
+    # x = 2**n m with m in [sqrt(1/2), sqrt(2))
+    n = (bits - _SQRT_HALF) >> np.int64(52)
+    m = np.int64(bits - (n << np.int64(52))).view(np.float64)
+    s = (m - 1.0) / (m + 1.0)
+    u = s * s
+    # atanh(s) / s, Chebyshev's series to 2e-18
+    p = 0.0740685858736141
+    p = p * u + 0.07656069851116819
+    p = p * u + 0.09091823207002378
+    p = p * u + 0.11111098390453225
+    p = p * u + 0.14285714381638953
+    p = p * u + 0.19999999999645207
+    p = p * u + 0.3333333333333383
+    e = float(n)
+    return (2.0 * s + e * _LN2_HIGH) + (2.0 * s * u * p + e * _LN2_LOW)
+
+
+@kernel
+def arcsin(x: float) -> float:
+    """The angle [rad] whose sine is x, for abs(x) <= sqrt(1/2), within 3e-16 relative."""
+    u = x * x
+    # arcsin(x) / x, Chebyshev's series to 5e-18
+    p = 1.155747740211758
+    p = p * u - 4.57753981739816
+    p = p * u + 8.627094660168458
+    p = p * u - 10.071307779732635
+    p = p * u + 8.132568272401969
+    p = p * u - 4.774714752785926
+    p = p * u + 2.1185503218296082
+    p = p * u - 0.7076550142614058
+    p = p * u + 0.19339500225015105
+    p = p * u - 0.029050122587066223
+    p = p * u + 0.015552297027080917
+    p = p * u + 0.01087048835022181
+    p = p * u + 0.014024786117637567
+    p = p * u + 0.017348920740304967
+    p = p * u + 0.022372332125967096
+    p = p * u + 0.030381939269829593
+    p = p * u + 0.04464285723723301
+    p = p * u + 0.0749999999990911
+    p = p * u + 0.16666666666667013
+    return x + x * u * p
+
+
+@kernel
+def cosine(z: float) -> float:
+    """The cosine of a direction, from its z, at the horizon or above; nan for nan."""
+    return COS_HORIZON if z < COS_HORIZON else z
+
+
+@kernel
+def by_component(w: NDArray[Any], start: int, components: NDArray[np.float64]) -> int:
+    """Write the vectors of w, shape (N, 3), from `start` on, as rows x, y, z; return how many had room.
+
+    Loops over rows vectorise well, those over vectors side by side do not.
+    """
+    count: int = min(w.shape[0] - start, components.shape[1])
+    for j in range(count):
+        components[0, j] = w[start + j, 0]
+        components[1, j] = w[start + j, 1]
+        components[2, j] = w[start + j, 2]
+    return count

@@ -1,0 +1,80 @@
+"""How arguments fall into rows: scalars that a row shares, columns that vary along it. One loop serves all shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import Vectors
+from brdfdb.parameters import Floats
+
+Loop = Callable[..., None]
+
+
+def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats]) -> NDArray[np.float64]:
+    """Broadcast, and call ``loop(*columns, scalars, values)``.
+
+    Parameters
+    ----------
+    loop : kernel
+        Of columns of shape (rows, length), or (1, length) where all rows share them; scalars of shape (rows, count) in
+        the order given; and values of shape (rows, length), which it fills.
+    columns, scalars : sequences of arrays
+        They broadcast together. A row runs along the last axis if no scalar varies along it; if one does, each value
+        is a row of its own: slower, never wrong.
+
+    Returns
+    -------
+    array
+        In the broadcast shape.
+    """
+    shape = np.broadcast_shapes(*(np.shape(each) for each in (*columns, *scalars)))
+    rows, length, leading = _split(shape, scalars)
+    values: NDArray[np.float64] = np.empty((rows, length))
+    if values.size:
+        loop(*(_column(each, shape, rows, length) for each in columns), _packed(scalars, leading, rows), values)
+    return values.reshape(shape)[()]
+
+
+def by_rows_of_vectors(loop: Loop, directions: Vectors, scalars: Sequence[Floats]) -> Floats:
+    """As `by_rows`, of unit vectors: ``loop(w_i, w_r, scalars, values)`` with vectors of shape (rows or 1, length, 3).
+
+    The loop itself writes 0 below the horizon and nan where a vector is nan; values have the dtype asked for.
+    """
+    w_i, w_r = directions.w_i, directions.w_r
+    shape = np.broadcast_shapes(w_i.shape[:-1], w_r.shape[:-1], *(np.shape(each) for each in scalars))
+    rows, length, leading = _split(shape, scalars)
+    values: Floats = np.empty((rows, length), dtype=directions.dtype)
+    if values.size:
+        loop(*(_vectors(w, shape, rows, length) for w in (w_i, w_r)), _packed(scalars, leading, rows), values)
+    return values.reshape(shape)[()]
+
+
+def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int, tuple[int, ...]]:
+    """Rows, their length, and the shape that scalars broadcast to."""
+    along = bool(shape) and all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in scalars)
+    leading = (*shape[:-1], 1) if along else shape
+    length = shape[-1] if along else 1
+    return int(np.prod(leading)), length, leading
+
+
+def _column(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> NDArray[np.float64]:
+    if np.ndim(array) and np.size(array) == np.shape(array)[-1] == length:  # along the row only: the same for all rows
+        return np.ascontiguousarray(array, dtype=np.float64).reshape(1, length)
+    return np.ascontiguousarray(np.broadcast_to(array, shape), dtype=np.float64).reshape(rows, length)
+
+
+def _vectors(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> NDArray[Any]:
+    shared = array.ndim > 1 and array.size == 3 * array.shape[-2] == 3 * length
+    wide = array if shared else np.broadcast_to(array, (*shape, 3))
+    return np.ascontiguousarray(wide).reshape(1 if shared else rows, length, 3)
+
+
+def _packed(scalars: Sequence[Floats], leading: tuple[int, ...], rows: int) -> NDArray[np.float64]:
+    packed = np.empty((*leading, len(scalars)))
+    for i, scalar in enumerate(scalars):
+        packed[..., i] = scalar
+    return packed.reshape(rows, len(scalars))
