@@ -56,7 +56,7 @@ _hidden = elementwise(_hidden_slope)
 _variance = elementwise(_effective_variance)
 
 
-class _Surface(NamedTuple):
+class Surface(NamedTuple):
     """The checked parameters that describe the surface and the light, as arrays that broadcast with the angles."""
 
     wavelength_um: NDArray[np.floating]
@@ -70,10 +70,10 @@ class _Surface(NamedTuple):
         return self.sigma_0 / self.tau
 
 
-def _surface(
+def checked_surface(
     wavelength_nm: ArrayLike, sigma_0_um: ArrayLike, tau_um: ArrayLike, n: ArrayLike, k: ArrayLike
-) -> _Surface:
-    return _Surface(
+) -> Surface:
+    return Surface(
         WAVELENGTH_NM.check(wavelength_nm) / 1000.0,
         SIGMA_0_UM.check(sigma_0_um),
         TAU_UM.check(tau_um),
@@ -141,7 +141,7 @@ def he_torrance(
     >>> round(float(he_torrance(0.5, 0.0, 0.6, 3.0, wavelength_nm=500.0, **surface)), 3)
     5.388
     """
-    surface = _surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, A.check(a))
 
 
@@ -157,16 +157,36 @@ def he_torrance_vectors(
     a: ArrayLike = 0.0,
 ) -> Floats:
     """`he_torrance` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
-    surface = _surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     return _f_r(checked_vectors(wi, wr), surface, A.check(a))
 
 
-def _f_r(directions: Directions, surface: _Surface, albedo: Floats) -> Floats:
+def _f_r(directions: Directions, surface: Surface, albedo: Floats) -> Floats:
+    # Eq. (75), at the bisecting angle
+    F2 = fresnel.unpolarised(cos_bisecting(directions), surface.n, surface.k)
+    # Eqs (71) and (72)
+    return finished(F2 * directional_diffuse(directions, surface) + albedo / np.pi, directions)
+
+
+def cos_bisecting(directions: Directions) -> Floats:
+    """Cosine of half the angle between light and viewer: of the incidence on a facet that mirrors one to the other."""
+    v_xy2, v_z2 = _v2(directions)
+    return np.minimum(0.5 * np.sqrt(v_xy2 + v_z2), 1.0)
+
+
+def _v2(directions: Directions) -> tuple[Floats, Floats]:
+    """v_xy^2 and v_z^2 of eq. 84, k_r - k_i; v_xy^2 in the form that keeps its digits near the mirror direction."""
+    sin_i, sin_r = directions.sin_i, directions.sin_r
+    v_xy2 = (sin_i - sin_r) ** 2 + (2.0 * sin_i * sin_r) * directions.one_plus_cos_dphi
+    return v_xy2, (directions.cos_i + directions.cos_r) ** 2
+
+
+def directional_diffuse(directions: Directions, surface: Surface) -> Floats:
+    """f_r [1/sr] of the directional diffuse part, eq. 71, over |F|^2: what the roughness does, in any polarisation."""
     sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
     slope = surface.slope
-    # Eq. (84), unit vectors: v_xy^2 in the form that keeps its digits near the mirror direction
-    v_z2 = (cos_i + cos_r) ** 2
-    v_xy2 = (sin_i - sin_r) ** 2 + (2.0 * sin_i * sin_r) * directions.one_plus_cos_dphi
+    # Eq. (84)
+    v_xy2, v_z2 = _v2(directions)
     # Eqs (23)-(25)
     S_over_cos_cos = _shadowing(sin_i, cos_i, slope) * _shadowing(sin_r, cos_r, slope)
     # Eqs (79)-(83)
@@ -175,14 +195,8 @@ def _f_r(directions: Directions, surface: _Surface, albedo: Floats) -> Floats:
     # Eq. (78), with V = (2 pi / lambda)^2 v_xy^2 tau^2 / 4
     correlation = (np.pi * surface.tau / surface.wavelength_um) ** 2
     D_over_g = diffraction_series(g_over_vz2 * v_z2, correlation * v_xy2)
-    # Eq. (75), at the bisecting angle
-    v2 = v_xy2 + v_z2
-    F2 = fresnel.unpolarised(np.minimum(0.5 * np.sqrt(v2), 1.0), surface.n, surface.k)
     # Eqs (71) and (76)
-    pair = correlation / (4.0 * np.pi) * S_over_cos_cos * g_over_vz2
-    directional_diffuse = F2 * D_over_g * v2**2 * pair
-    # Eq. (72)
-    return finished(directional_diffuse + albedo / np.pi, directions)
+    return D_over_g * (v_xy2 + v_z2) ** 2 * (correlation / (4.0 * np.pi) * S_over_cos_cos * g_over_vz2)
 
 
 def he_torrance_specular(
@@ -228,7 +242,7 @@ def he_torrance_specular(
     0.04
     """
     angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
-    surface = _surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     sin_i, cos_i = np.sin(angles.theta_i), np.cos(angles.theta_i)
     S = (_shadowing(sin_i, cos_i, surface.slope) * cos_i) ** 2
     variance = _variance(2.0 * _hidden(sin_i, cos_i, surface.slope))
