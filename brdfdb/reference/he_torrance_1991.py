@@ -1,12 +1,13 @@
-"""He, Torrance, Sillion and Greenberg 1991 at 40 digits: the BRDF for unpolarised light (Appendix B), in three parts.
+"""He, Torrance, Sillion and Greenberg 1991 at 40 digits: three parts for unpolarised light, polarisation, two limits.
 
 Our directions point away from the surface; the paper's k_i travels towards it, so k_i = -(direction of the light).
 Lengths of the surface are micrometres, wavelengths nanometres. Departures from print: Eq. (25) has the Gaussian of
 Smith 1967, v in Eq. (78) carries the wave number, Eq. (76) is written without its factor that is exactly 1, the root of
-Eq. (81) is taken by Lambert's W, and Eq. (72) is a/pi.
+Eq. (81) is taken by Lambert's W, Eq. (72) is a/pi, and M_ps of Eq. (64) has the minus sign that M_sp of Eq. (62) has.
 """
 
 from collections.abc import Iterator
+from typing import Any
 
 from brdfdb.reference import Number, mp
 
@@ -29,24 +30,91 @@ def directional_diffuse(
 ) -> Number:
     """f_r [1/sr] of the directional diffuse part, Eq. (71), for the refractive index n + i k."""
     theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
-    wavelength = mp.mpf(wavelength_nm) / 1000
-    sigma_0, tau = mp.mpf(sigma_0_um), mp.mpf(tau_um)
+    # Eq. (75), at the bisecting angle arccos(|v|/2)
+    fresnel = fresnel_unpolarised(_cos_bisecting(theta_i, theta_r, delta_phi), n, k)
+    # Eq. (71)
+    return fresnel * _directional_diffuse_of_a_mirror(theta_i, theta_r, delta_phi, wavelength_nm, sigma_0_um, tau_um)
 
+
+def jones(theta_i: Number, theta_r: Number, delta_phi: Number, n: Number, k: Number) -> Any:
+    """The complex 2x2 matrix [1] of Eqs. (61)-(64) over |k_r x k_i|^2, for the refractive index n + i k.
+
+    The field E_r = J E_i of the reflected wave, in the order (s, p): J[0, 1] is s reflected from p incident, the M_sp
+    of the paper. The fields vary as exp(i k.r - i omega t), and F_s and F_p have the signs of `_fresnel`.
+
+    The bases: for a direction w away from the surface, at azimuth phi, s = (-sin phi, cos phi, 0), which is z x w over
+    its length and at w = z the limit along that azimuth; p = s x k with the unit vector k of propagation (k_i = -w_i,
+    k_r = w_r), so (p, s, k) is right-handed. The light is at azimuth 0, the viewer at delta_phi. The paper's s_i and
+    p_i are these; its s_r and p_r are minus these, and its M, divided by |k_r x k_i|^2, is minus the matrix between
+    its own bases: between ours it is that matrix itself, once M_ps has its sign.
+
+    Where k_r and k_i are parallel the plane of reflection is any plane through them: exactly backscattered (F_p = -F_s)
+    and exactly forward at grazing (F_p = F_s) the result is the same for all of them.
+    """
+    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
+    with mp.workdps(3 * mp.dps):  # next to backscattering the division loses digits
+        matrix = _jones(theta_i, theta_r, delta_phi, n, k)
+    return matrix * mp.one  # rounded to the 40 digits
+
+
+def mueller(
+    theta_i: Number,
+    theta_r: Number,
+    delta_phi: Number,
+    wavelength_nm: Number,
+    sigma_0_um: Number,
+    tau_um: Number,
+    n: Number,
+    k: Number,
+) -> Any:
+    """The real 4x4 matrix [1/sr] that takes incident to reflected Stokes vectors, for the directional diffuse part.
+
+    I = |E_s|^2 + |E_p|^2, Q = |E_s|^2 - |E_p|^2, U + i V = 2 E_s conj(E_p), in the bases and with the time factor of
+    `jones`: a wave with V > 0 has positive helicity. The first element is `directional_diffuse`. The matrix does not
+    change when s and p of a direction turn their signs together, so it is also that between the paper's bases.
+    """
+    value = _directional_diffuse_of_a_mirror(theta_i, theta_r, delta_phi, wavelength_nm, sigma_0_um, tau_um)
+    field = jones(theta_i, theta_r, delta_phi, n, k)
+    # from (E_s conj E_s, E_s conj E_p, E_p conj E_s, E_p conj E_p) to (I, Q, U, V), and back
+    stokes = mp.matrix([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -mp.j, mp.j, 0]])
+    coherency = stokes.transpose_conj() / 2
+    kronecker = mp.matrix(4, 4)
+    for row in range(4):
+        for column in range(4):
+            one, other = field[row // 2, column // 2], field[row % 2, column % 2]
+            kronecker[row, column] = one * mp.conj(other)
+    # Eqs. (7), (59), (60), (68)
+    return value * (stokes * kronecker * coherency).apply(mp.re)
+
+
+def very_rough(theta_i: Number, theta_r: Number, delta_phi: Number, slope: Number, n: Number, k: Number) -> Number:
+    """f_r [1/sr] in the limit of wavelength 0: `directional_diffuse` with Beckmann's exp(-V/g) / g for the sum.
+
+    The paper gives it in words (section 4 on sandpaper, and Figure 13 a): the wavelength drops out of V / g and of
+    tau^2 / (wavelength^2 g), and only `slope` = sigma_0 / tau [1] is left, in the effective roughness and in S too.
+    """
+    theta_i, theta_r, delta_phi, slope = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi), mp.mpf(slope)
     v_x, v_y, v_z = _wave_vector_change(theta_i, theta_r, delta_phi)
     v_squared = v_x**2 + v_y**2 + v_z**2
-    # Eq. (76)
-    geometry = (v_squared / v_z) ** 2
     # Eq. (75), at the bisecting angle arccos(|v|/2)
     fresnel = fresnel_unpolarised(mp.sqrt(v_squared) / 2, n, k)
+    # Eq. (76)
+    geometry = (v_squared / v_z) ** 2
     # Eqs. (23), (77)
-    shadow = shadowing(theta_i, sigma_0, tau) * shadowing(theta_r, sigma_0, tau)
-    # Eq. (79)
-    g = surface_roughness(theta_i, theta_r, wavelength, sigma_0, tau)
-    # Eq. (78)
-    V = lateral_phase(theta_i, theta_r, delta_phi, wavelength, tau)
-    distribution = mp.pi**2 * tau**2 / (4 * wavelength**2) * series(g, V)
+    shadow = shadowing(theta_i, slope, 1) * shadowing(theta_r, slope, 1)
+    # Eq. (80), over tau
+    effective_slope = effective_roughness(theta_i, theta_r, slope, 1)
+    # Eqs. (78), (79): V / g, and pi^2 tau^2 / (4 lambda^2 g)
+    ratio = (v_x**2 + v_y**2) / (4 * (effective_slope * v_z) ** 2)
+    distribution = mp.exp(-ratio) / (4 * effective_slope * v_z) ** 2
     # Eq. (71)
     return fresnel / mp.pi * geometry * shadow * distribution / (mp.cos(theta_i) * mp.cos(theta_r))
+
+
+def smooth(theta_i: Number, n: Number, k: Number) -> Number:
+    """The specular reflectivity [1] of a smooth surface, the factor |F|^2 of Eq. (10)."""
+    # Eq. (10)
+    return fresnel_unpolarised(mp.cos(mp.mpf(theta_i)), n, k)
 
 
 def specular_reflectance(
@@ -66,12 +134,7 @@ def specular_reflectance(
 
 def fresnel_unpolarised(cos_theta: Number, n: Number, k: Number) -> Number:
     """|F|^2 [1], Eq. (75): the reflectance of a plane interface to n + i k at incidence arccos(`cos_theta`)."""
-    cos_theta = mp.mpf(cos_theta)
-    index = mp.mpc(n, k)
-    # Snell's law: index * cos of the (complex) angle of refraction
-    refracted = mp.sqrt(index**2 - (1 - cos_theta**2))
-    f_s = (cos_theta - refracted) / (cos_theta + refracted)
-    f_p = (index**2 * cos_theta - refracted) / (index**2 * cos_theta + refracted)
+    f_s, f_p = _fresnel(cos_theta, n, k)
     # Eq. (75)
     return (abs(f_s) ** 2 + abs(f_p) ** 2) / 2
 
@@ -139,6 +202,71 @@ def series(g: Number, V: Number) -> Number:
     return +total  # rounded to the 40 digits
 
 
+def _fresnel(cos_theta: Number, n: Number, k: Number) -> tuple[Number, Number]:
+    """F_s and F_p [1] of Eq. (44): F_p = -F_s = (index - 1) / (index + 1) at normal incidence, both -1 at grazing."""
+    cos_theta = mp.mpf(cos_theta)
+    index = mp.mpc(n, k)
+    # Snell's law: index * cos of the (complex) angle of refraction
+    refracted = mp.sqrt(index**2 - (1 - cos_theta**2))
+    f_s = (cos_theta - refracted) / (cos_theta + refracted)
+    f_p = (index**2 * cos_theta - refracted) / (index**2 * cos_theta + refracted)
+    return f_s, f_p
+
+
+def _jones(theta_i: Number, theta_r: Number, delta_phi: Number, n: Number, k: Number) -> Any:
+    """`jones` at the precision that is set."""
+    k_i = (-mp.sin(theta_i), mp.zero, -mp.cos(theta_i))
+    k_r = (mp.sin(theta_r) * mp.cos(delta_phi), mp.sin(theta_r) * mp.sin(delta_phi), mp.cos(theta_r))
+    f_s, f_p = _fresnel(_cos_bisecting(theta_i, theta_r, delta_phi), n, k)
+    # Eqs. (35), (14)
+    s_i, s_r = (mp.zero, mp.one, mp.zero), (mp.sin(delta_phi), -mp.cos(delta_phi), mp.zero)
+    p_i, p_r = _cross(s_i, k_i), _cross(s_r, k_r)
+    across = _cross(k_r, k_i)
+    squared = mp.fdot(across, across)
+    if squared < mp.mpf(10) ** -mp.dps:
+        sign = mp.one if mp.fdot(k_i, k_r) < 0 else -mp.one
+        # Eq. (46) with s_i^n = s_r^n = s_i, and p_r^n = -p_i^n (back) or p_i^n (forward)
+        return mp.matrix(
+            [
+                [-f_s * mp.fdot(s_r, s_i), sign * f_p * mp.fdot(s_r, p_i)],
+                [-f_s * mp.fdot(p_r, s_i), sign * f_p * mp.fdot(p_r, p_i)],
+            ]
+        )
+    pi_kr, si_kr = mp.fdot(p_i, k_r), mp.fdot(s_i, k_r)
+    pr_ki, sr_ki = mp.fdot(p_r, k_i), mp.fdot(s_r, k_i)
+    # Eq. (61)
+    m_ss = f_s * pi_kr * pr_ki + f_p * si_kr * sr_ki
+    # Eq. (62)
+    m_sp = -(f_s * si_kr * pr_ki - f_p * pi_kr * sr_ki)
+    # Eq. (63)
+    m_pp = f_s * si_kr * sr_ki + f_p * pi_kr * pr_ki
+    # Eq. (64), with the minus sign
+    m_ps = -(f_s * pi_kr * sr_ki - f_p * si_kr * pr_ki)
+    return mp.matrix([[m_ss, m_sp], [m_ps, m_pp]]) / squared
+
+
+def _directional_diffuse_of_a_mirror(
+    theta_i: Number, theta_r: Number, delta_phi: Number, wavelength_nm: Number, sigma_0_um: Number, tau_um: Number
+) -> Number:
+    """Eq. (71) [1/sr] with |F|^2 = 1."""
+    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
+    wavelength = mp.mpf(wavelength_nm) / 1000
+    sigma_0, tau = mp.mpf(sigma_0_um), mp.mpf(tau_um)
+
+    v_x, v_y, v_z = _wave_vector_change(theta_i, theta_r, delta_phi)
+    # Eq. (76)
+    geometry = ((v_x**2 + v_y**2 + v_z**2) / v_z) ** 2
+    # Eqs. (23), (77)
+    shadow = shadowing(theta_i, sigma_0, tau) * shadowing(theta_r, sigma_0, tau)
+    # Eq. (79)
+    g = surface_roughness(theta_i, theta_r, wavelength, sigma_0, tau)
+    # Eq. (78)
+    V = lateral_phase(theta_i, theta_r, delta_phi, wavelength, tau)
+    distribution = mp.pi**2 * tau**2 / (4 * wavelength**2) * series(g, V)
+    # Eq. (71)
+    return geometry / mp.pi * shadow * distribution / (mp.cos(theta_i) * mp.cos(theta_r))
+
+
 def _terms(g: Number, V: Number, start: int, step: int) -> Iterator[Number]:
     """The terms of Eq. (78) from m = `start`: upwards without an end (step 1) or downwards to m = 1 (step -1)."""
     m = start
@@ -184,3 +312,13 @@ def _wave_vector_change(theta_i: Number, theta_r: Number, delta_phi: Number) -> 
     v_y = mp.sin(theta_r) * mp.sin(delta_phi)
     v_z = mp.cos(theta_r) + mp.cos(theta_i)
     return v_x, v_y, v_z
+
+
+def _cos_bisecting(theta_i: Number, theta_r: Number, delta_phi: Number) -> Number:
+    """|v|/2 [1], the cosine of the bisecting angle."""
+    v = _wave_vector_change(theta_i, theta_r, delta_phi)
+    return mp.sqrt(mp.fdot(v, v)) / 2
+
+
+def _cross(a: tuple[Number, Number, Number], b: tuple[Number, Number, Number]) -> tuple[Number, Number, Number]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -1,0 +1,22 @@
+"""Fujii 2012 at 40 digits: the proposed form of "A tiny improvement of Oren-Nayar reflectance model"."""
+
+from brdfdb.reference import Number, mp
+
+
+def fujii(theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, sigma: Number) -> Number:
+    """f_r [1/sr] for the albedo `rho` [1] and the roughness `sigma` [1], from 0 (Lambert) to 1; not a slope deviation.
+
+    `sigma` is the ratio of the amplitudes B and A, which are normalised where a surface seen along its normal reflects
+    most. The article does not number its equations.
+    """
+    theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
+    rho, sigma = mp.mpf(rho), mp.mpf(sigma)
+    cos_i, cos_r = mp.cos(theta_i), mp.cos(theta_r)
+    # s: the cosine between the directions less the product of their cosines to the normal
+    s = mp.sin(theta_i) * mp.sin(theta_r) * mp.cos(mp.mpf(delta_phi))
+    # t
+    t = mp.one if s <= 0 else max(cos_i, cos_r)
+    # A and B
+    a = 1 / (mp.pi + (mp.pi / 2 - mp.mpf(2) / 3) * sigma)
+    b = sigma * a
+    return rho * (a + b * s / t)

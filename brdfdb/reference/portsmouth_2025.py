@@ -1,0 +1,44 @@
+"""Portsmouth, Kutz and Hill 2025 at 40 digits: the energy-preserving Oren-Nayar model (EON), with exact albedos."""
+
+from brdfdb.reference import Number, mp
+from brdfdb.reference.fujii_2012 import fujii
+
+
+def energy_preserving(
+    theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, roughness: Number
+) -> tuple[Number, Number]:
+    """Single and multiple scattering part of f_r [1/sr] for `rho` and `roughness` [1], each in [0, 1]; the sum is EON.
+
+    The single scattering is Fujii's lobe (there called FON). What it loses at rho = 1 comes back in the multiple
+    scattering, tinted by rho: with rho = 1 the albedo is 1 for every direction and roughness.
+    """
+    rho, roughness = mp.mpf(rho), mp.mpf(roughness)
+    single = fujii(theta_i, theta_r, delta_phi, rho, roughness)
+    if roughness == 0:
+        return single, mp.zero  # nothing is lost, and the multiple scattering is 0/0
+    albedo_i, albedo_r = fujii_albedo(theta_i, roughness), fujii_albedo(theta_r, roughness)
+    mean = fujii_mean_albedo(roughness)
+    rho_ms = rho**2 * mean / (1 - rho * (1 - mean))
+    multiple = rho_ms / mp.pi * (1 - albedo_i) * (1 - albedo_r) / (1 - mean)
+    return single, multiple
+
+
+def fujii_albedo(theta: Number, roughness: Number) -> Number:
+    """The directional albedo [1] of Fujii's lobe at rho = 1, for light or viewer at `theta` [rad]."""
+    theta, roughness = mp.mpf(theta), mp.mpf(roughness)
+    sin, cos = mp.sin(theta), mp.cos(theta)
+    # tan(theta) (1 - sin(theta)^3), with 1 - sin = cos^2 / (1 + sin): finite at grazing
+    tangent_term = sin * cos * (1 + sin + sin**2) / (1 + sin)
+    g = sin * (theta - sin * cos) + mp.mpf(2) / 3 * (tangent_term - sin)
+    return _amplitude(roughness) * (1 + roughness * g / mp.pi)
+
+
+def fujii_mean_albedo(roughness: Number) -> Number:
+    """The mean of `fujii_albedo` [1] over all directions, weighted by the cosine."""
+    roughness = mp.mpf(roughness)
+    return _amplitude(roughness) * (1 + (mp.mpf(2) / 3 - 28 / (15 * mp.pi)) * roughness)
+
+
+def _amplitude(roughness: Number) -> Number:
+    """A_F [1]."""
+    return 1 / (1 + (mp.mpf(1) / 2 - 2 / (3 * mp.pi)) * roughness)
