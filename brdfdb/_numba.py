@@ -20,7 +20,7 @@ from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-SHARED = ("_elementary.py", "fresnel.py")
+SHARED = ("_elementary.py", "fresnel.py", "models/_he_torrance_series.py")
 
 
 def kernel(function: F) -> F:
@@ -29,10 +29,19 @@ def kernel(function: F) -> F:
     nogil: the batch layer runs kernels on threads. error_model="numpy": the Python model checks every division,
     which costs a factor of 5 to 7 on Ward's model, and the limits want inf from 1/0. Of fastmath only "contract", fused
     multiply-add: it rounds less, and nan and inf keep their meaning. cache: 0.2 s instead of seconds next time.
+    forceinline: a loop vectorises only if all that it calls is part of it.
     """
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, forceinline=True)(
-        function
-    )
+    return _compiled(function, forceinline=True)
+
+
+def loop(function: F) -> F:
+    """As `kernel`, for a loop over arrays that several kernels call: compiled once, not once inside of each."""
+    return _compiled(function, forceinline=False)
+
+
+def _compiled(function: F, **options: bool) -> F:
+    options |= {"cache": True, "nogil": True}
+    compiled = numba.njit(error_model="numpy", fastmath={"contract"}, **options)(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]  # numba makes its settings at run time
         _stamp(compiled._cache)  # type: ignore[attr-defined]  # numba keeps it to itself
     return cast(F, compiled)
@@ -40,7 +49,7 @@ def kernel(function: F) -> F:
 
 @functools.cache
 def _shared_digest() -> bytes:
-    return hashlib.sha256(b"".join(Path(__file__).with_name(name).read_bytes() for name in SHARED)).digest()
+    return hashlib.sha256(b"".join((Path(__file__).parent / name).read_bytes() for name in SHARED)).digest()
 
 
 def _stamp(cache: Any) -> None:

@@ -1,21 +1,22 @@
-"""Fresnel reflection of unpolarised light at a plane interface."""
+"""Fresnel reflection at a plane interface: reflectance of unpolarised light, complex amplitudes of s and p."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._numba import elementwise, kernel
 
 
 @kernel
-def _unpolarised(cos_theta: float, n: float, k: float) -> float:
-    """|F|^2 = (|F_s|^2 + |F_p|^2) / 2 at a vacuum interface of complex index n + ik.
+def _interface(cos_theta: float, n: float, k: float) -> tuple[float, float, float, float, float]:
+    """Real and imaginary part of w = (n + ik)^2 - 1, real part of 1 + w, and both of q = sqrt(cos^2 + w).
 
-    With w = (n + ik)^2 - 1 and q = sqrt(cos^2 + w),
-    F_s = -w / (cos + q)^2 and F_p = w (cos^2 (1 + w) - sin^2) / ((1 + w) cos + q)^2:
-    the same as the textbook quotients, but the difference that cancels as n -> 1 is taken once, in w.
+    Of the two roots q has the parts that are not negative: the wave in the substance goes and decays away from the
+    surface, with the time factor exp(-i omega t). The difference that cancels as n -> 1 is taken once, in w.
     """
     cos2 = cos_theta * cos_theta
     sin2 = (1.0 - cos_theta) * (1.0 + cos_theta)
@@ -27,15 +28,24 @@ def _unpolarised(cos_theta: float, n: float, k: float) -> float:
     # q = a + ib, the root with a, b >= 0; each of the two is formed where it does not cancel
     q2_re = cos2 + w_re if cos2 < 0.5 else e_re - sin2
     modulus = math.sqrt(q2_re * q2_re + w_im * w_im)
-    if q2_re >= 0.0:
-        a = math.sqrt(0.5 * (modulus + q2_re))
-        b = w_im / (2.0 * a) if a > 0.0 else 0.0
-    else:
-        b = math.sqrt(0.5 * (modulus - q2_re))
-        a = w_im / (2.0 * b)
+    large = math.sqrt(0.5 * (modulus + abs(q2_re)))
+    small = w_im / (2.0 * (large if large > 0.0 else 1.0))
+    a = large if q2_re >= 0.0 else small
+    b = small if q2_re >= 0.0 else large
+    return w_re, w_im, e_re, a, b
+
+
+@kernel
+def reflectance(cos_theta: float, n: float, k: float) -> float:
+    """|F|^2 = (|F_s|^2 + |F_p|^2) / 2 at a vacuum interface of complex index n + ik.
+
+    With w and q of `_interface`, F_s = -w / (cos + q)^2 and F_p = w (cos^2 (1 + w) - sin^2) / ((1 + w) cos + q)^2: the
+    same as the textbook quotients without their cancellation as n -> 1.
+    """
+    w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
+    cos2 = cos_theta * cos_theta
+    sin2 = (1.0 - cos_theta) * (1.0 + cos_theta)
     w_abs2 = w_re * w_re + w_im * w_im
-    if w_abs2 == 0.0:  # n = 1, k = 0: no interface, and 0 / 0 at grazing
-        return 0.0
     # F_s
     d_s = (cos_theta + a) * (cos_theta + a) + b * b
     F_s2 = w_abs2 / (d_s * d_s)
@@ -46,7 +56,85 @@ def _unpolarised(cos_theta: float, n: float, k: float) -> float:
     den_im = w_im * cos_theta + b
     d_p = den_re * den_re + den_im * den_im
     F_p2 = w_abs2 * (num_re * num_re + num_im * num_im) / (d_p * d_p)
-    return min(0.5 * (F_s2 + F_p2), 1.0)  # rounding passes 1 by 4e-16 in total reflection
+    both = 0.5 * (F_s2 + F_p2)
+    # n = 1, k = 0 is no interface, and 0 / 0 at grazing; rounding passes 1 by 4e-16 in total reflection
+    return 0.0 if w_abs2 == 0.0 else 1.0 if both > 1.0 else both
 
 
-unpolarised = elementwise(_unpolarised)
+@kernel
+def _half_sum_and_difference(cos_theta: float, n: float, k: float) -> tuple[complex, complex]:
+    """(F_s + F_p) / 2 = T sin^2 and (F_s - F_p) / 2 = T q cos, with T = -w / ((cos + q) ((1 + w) cos + q)).
+
+    One is 0 at normal incidence, the other at grazing: written like this, neither is a difference that cancels.
+    """
+    w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
+    if w_re == 0.0 and w_im == 0.0:  # no interface, and 0 / 0 at grazing
+        return complex(0.0, 0.0), complex(0.0, 0.0)
+    sin2 = (1.0 - cos_theta) * (1.0 + cos_theta)
+    T = -complex(w_re, w_im) / (complex(cos_theta + a, b) * complex(e_re * cos_theta + a, w_im * cos_theta + b))
+    return T * sin2, T * complex(a * cos_theta, b * cos_theta)
+
+
+@kernel
+def _amplitudes(cos_theta: float, n: float, k: float) -> tuple[complex, complex]:
+    """F_s and F_p as in `reflectance`."""
+    w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
+    if w_re == 0.0 and w_im == 0.0:  # no interface, and 0 / 0 at grazing
+        return complex(0.0, 0.0), complex(0.0, 0.0)
+    w = complex(w_re, w_im)
+    cos2 = cos_theta * cos_theta
+    sin2 = (1.0 - cos_theta) * (1.0 + cos_theta)
+    d_s = complex(cos_theta + a, b)
+    d_p = complex(e_re * cos_theta + a, w_im * cos_theta + b)
+    return -w / (d_s * d_s), w * complex(cos2 * e_re - sin2, cos2 * w_im) / (d_p * d_p)
+
+
+@kernel
+def _fill_amplitudes(
+    cos_theta: NDArray[np.float64],
+    n: NDArray[np.float64],
+    k: NDArray[np.float64],
+    first: NDArray[np.complex128],
+    second: NDArray[np.complex128],
+) -> None:
+    for j in range(cos_theta.shape[0]):
+        first[j], second[j] = _amplitudes(cos_theta[j], n[j], k[j])
+
+
+@kernel
+def _fill_half_sum_and_difference(
+    cos_theta: NDArray[np.float64],
+    n: NDArray[np.float64],
+    k: NDArray[np.float64],
+    first: NDArray[np.complex128],
+    second: NDArray[np.complex128],
+) -> None:
+    for j in range(cos_theta.shape[0]):
+        first[j], second[j] = _half_sum_and_difference(cos_theta[j], n[j], k[j])
+
+
+unpolarised = elementwise(reflectance)
+
+Complexes = NDArray[np.complexfloating]
+
+
+def amplitudes(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
+    """Complex F_s and F_p, reflected over incident electric field, for the index n + ik and the time exp(-i omega t).
+
+    At normal incidence F_p = -F_s = (n + ik - 1) / (n + ik + 1), since p = s x (direction of propagation) turns over
+    on reflection; at grazing both are -1.
+    """
+    return _pair(_fill_amplitudes, cos_theta, n, k)
+
+
+def half_sum_and_difference(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
+    """(F_s + F_p) / 2 and (F_s - F_p) / 2 of `amplitudes`, with all their digits where one of them is nearly 0."""
+    return _pair(_fill_half_sum_and_difference, cos_theta, n, k)
+
+
+def _pair(fill: Callable[..., None], cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
+    arrays = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (cos_theta, n, k)))
+    first, second = np.empty((2, arrays[0].size), dtype=np.complex128)
+    fill(*(np.ravel(each) for each in arrays), first, second)
+    shape = arrays[0].shape
+    return first.reshape(shape)[()], second.reshape(shape)[()]

@@ -156,7 +156,7 @@ class Vectors:
     def one_plus_cos_dphi(self) -> NDArray[np.float64]:
         """1 + cos(phi_r - phi_i) with all its digits next to the mirror half plane."""
         cos = self.cos_dphi
-        return np.where(cos < 0.0, self.sin_dphi**2 / (1.0 - cos), 1.0 + cos)
+        return np.where(cos < 0.0, self.sin_dphi**2 / (1.0 + np.abs(cos)), 1.0 + cos)
 
     @functools.cached_property
     def sin_dphi(self) -> NDArray[np.float64]:

@@ -95,7 +95,7 @@ def test_a_kernel_calls_kernels_of_its_own_file_or_of_the_shared_ones() -> None:
     # numba's cache knows the file of a kernel, not the files of what it calls: those would stay as they were
     found = kernels()
     assert len(found) > 10
-    shared = [f"brdfdb.{name.removesuffix('.py')}" for name in _numba.SHARED]
+    shared = [f"brdfdb.{name.removesuffix('.py').replace('/', '.')}" for name in _numba.SHARED]
     for kernel in found:
         function = kernel.py_func
         names = {name: function.__globals__.get(name) for name in function.__code__.co_names}

@@ -12,12 +12,10 @@ import numba
 import numpy as np
 import pytest
 
+from brdfdb import _numba
 from brdfdb._numba import elementwise, kernel
-from brdfdb.models._he_torrance_series import _exp2
-from brdfdb.reference import mp
 
 COMPILED_AGAINST_PYTHON = 1e-13  # worst measured: 2.2e-16; a kernel may fuse a product and a sum, Python never does
-EXP2 = 1e-14  # worst measured: 8.7e-15, from the first term that its series leaves out
 
 # Every model and every specular part at a handful of points; to a process of its own, so that it starts uncompiled
 EVALUATE_ALL = """
@@ -127,19 +125,6 @@ print(json.dumps([len(at_import.buffer), len(at_call.buffer)]))
     assert at_call > 0
 
 
-def test_exp2_keeps_its_promise_and_is_0_below_the_normal_numbers() -> None:
-    rng = np.random.default_rng(2)
-    for x in (*rng.uniform(-1022.0, 1000.0, 3000), -1021.999, -0.5, 0.5, 0.0, -1.0, 1.0, 1000.0):
-        assert abs(mp.mpf(_exp2(x)) / mp.mpf(2) ** mp.mpf(x) - 1) < EXP2, x
-    for x in (-1022.0, -1023.0, -1e6, -1e300, -np.inf):
-        assert _exp2(x) == 0.0
-
-
-def test_exp2_of_whole_numbers_is_exact() -> None:
-    for x in range(-1021, 1001):
-        assert _exp2(float(x)) == math.ldexp(1.0, x)
-
-
 def square(x: float, y: float) -> float:
     return x * x / y
 
@@ -161,3 +146,25 @@ def test_kernels_divide_as_numpy_does_and_keep_nan_and_infinity() -> None:
     assert math.isnan(compiled(0.0, 0.0))
     assert math.isnan(compiled(math.nan, 1.0))
     assert compiled(math.inf, 1.0) == math.inf
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is cached")
+def test_compiled_code_is_old_when_a_shared_file_has_changed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def stamp() -> bytes:
+        compiled: Any = kernel(square)
+        result: bytes = compiled._cache._cache_file._source_stamp
+        return result
+
+    before = stamp()
+    assert stamp() == before
+    home = Path(_numba.__file__).parent
+    for name in _numba.SHARED:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes((home / name).read_bytes())
+    (tmp_path / _numba.SHARED[-1]).write_text("changed")
+    monkeypatch.setattr(_numba, "__file__", str(tmp_path / "_numba.py"))
+    _numba._shared_digest.cache_clear()
+    try:
+        assert stamp() != before
+    finally:
+        _numba._shared_digest.cache_clear()

@@ -1,4 +1,4 @@
-"""The sum over m of He et al. 1991, eq. 78, divided by g: stable and of bounded cost for every g and V."""
+"""The sum over m of He et al. 1991, eq. 78, in logarithms: stable and of bounded cost for every g and V."""
 
 from __future__ import annotations
 
@@ -7,185 +7,213 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._numba import kernel
+from brdfdb._elementary import BLOCK, exp, log
+from brdfdb._numba import kernel, loop
 from brdfdb.parameters import Floats
 
-_BLOCK = 32  # values of V that share one set of nodes
-_LANES = 16  # a block is padded to whole vectors of the processor
-_TABLE = 512  # terms whose ln(m! m) is tabulated; also the most nodes of one block
-_SUM_BELOW = 40.0  # a peak at smaller m is summed term by term, at larger m by the trapezoid rule
-_BECKMANN_ABOVE = 1e12  # from here on the corrected limit of large g is exact to 4e-14 wherever exp(-V / g) is normal
-_V_MAX = 1e200  # the sum is 0 long before
-# Nodes reach from _LEFT standard deviations of the summand below the peak to _RIGHT above it and _MARGIN more (the
-# tail of a Poisson distribution is longer), _STEP apart. Measured against the whole sum over 1e-4 < g < 1e5,
-# V < 2e4: within 5e-12.
-_LEFT, _RIGHT, _MARGIN, _STEP = 7.0, 7.2, 7.0, 0.7
+ROWS_OF_WORK = 13  # of BLOCK numbers each, that `log_series` writes over
 
-_LOG2_E = math.log2(math.e)
-_LOG_FACTORIAL_TIMES_M = np.array([0.0] + [math.lgamma(m + 1.0) + math.log(m) for m in range(1, _TABLE)])
-_ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it leaves the nearest integer in the low bits of the float
-_UNDERFLOW = -1022.0
+_SUM_BELOW = 40.0  # a summand that peaks at smaller m is summed term by term, at larger m by the trapezoid rule
+_TERMS = 96  # at most: m* + 7.2 sqrt(m*) + 7
+_LOG_FACTORIAL_TIMES_M = np.array([0.0] + [math.lgamma(m + 1.0) + math.log(m) for m in range(1, _TERMS)])
+_G_MIN, _V_MIN, _V_MAX = 1e-290, 1e-300, 1e30  # beyond, the sum is its limit: the first term, V = 0, or 0
+# The trapezoid rule in ln(m): nodes _STEP standard deviations of the summand apart, less where the summand is skew, as
+# it is for small m*; they reach _REACH deviations to both sides of the peak, more into the left tail
+_STEP, _STEP_SKEW, _REACH, _LEFT_SKEW = 0.82, 2.1, 7.1, 47.0
+_TAYLOR_ABOVE = 1e6  # nodes of larger m* lie so close together that a short series is exact
+_SQRT_TWO_PI = 2.5066282746310002
 
 
 @kernel
-def _exp2(x: float) -> float:
-    """2**x for x <= 1000, within 1e-13 relative (measured 8e-15 for x > -10); 0 below the normal float64.
-
-    Branch-free, so that loops over it vectorise; those over libm's exp do not.
-    """
-    shifted = x + _ROUND
-    r = x - (shifted - _ROUND)
-    # Taylor series, coefficients ln(2)^k / k!: |r| <= 1/2, the first term left out is below 7e-15
-    p = 4.44553827187081e-10
-    p = p * r + 7.054911620801121e-09
-    p = p * r + 1.0178086009239696e-07
-    p = p * r + 1.3215486790144305e-06
-    p = p * r + 1.5252733804059838e-05
-    p = p * r + 0.00015403530393381606
-    p = p * r + 0.0013333558146428441
-    p = p * r + 0.009618129107628477
-    p = p * r + 0.055504108664821576
-    p = p * r + 0.2402265069591007
-    p = p * r + 0.6931471805599453
-    p = p * r + 1.0
-    bits = (np.float64(shifted).view(np.int64) + np.int64(1023)) << np.int64(52)
-    return p * np.int64(bits).view(np.float64) if x > _UNDERFLOW else 0.0
+def roughly_lambert_w(y: float, log_y: float) -> float:
+    """W_0(y), the root of w e^w = y, to about a percent, for y > 1e-4 (Iacono and Boyd)."""
+    log_1p_y = log_y if log_y > 40.0 else log(1.0 + (0.0 if log_y > 40.0 else y))  # log_y says enough of inf
+    return log_1p_y * (1.0 - log(1.0 + log_1p_y) / (2.0 + log_1p_y))
 
 
 @kernel
-def _stirling_error(m: float) -> float:
-    """ln m! minus Stirling's formula for it (Loader 2000), m >= 16."""
-    m2 = m * m
-    return (1 / 12 - (1 / 360 - (1 / 1260 - (1 / 1680 - 1 / 1188 / m2) / m2) / m2) / m2) / m
+def nearer_lambert_w(w: float, log_y: float) -> float:
+    """A step of fourth order towards W_0(y) (Fritsch, Shafer and Crowley): 3e-9 of it after one, rounding after two."""
+    z = log_y - log(w) - w
+    v = 1.0 + w
+    q = 2.0 * v * (v + z * (2.0 / 3.0))
+    return w * (1.0 + z * (q - z) / (v * (q - 2.0 * z)))
 
 
 @kernel
-def _deviance(m: float, g: float) -> float:
-    """m ln(m / g) + g - m without its cancellation at m near g (bd0 of Loader 2000)."""
-    difference = m - g
-    v = difference / (m + g)
-    if abs(v) > 0.1:
-        return m * math.log(m / g) + g - m
-    total = difference * v
-    power = 2.0 * m * v
-    for j in range(1, 10):  # v^2 <= 0.01: ten terms are exact to rounding
-        power *= v * v
-        total += power / (2 * j + 1)
-    return total
-
-
-@kernel
-def _log_coefficient(m: float, g: float) -> float:
-    """ln of g^(m - 1) e^-g / (m! m); m >= 1 need not be whole."""
-    if m < 16.0:
-        return (m - 1.0) * math.log(g) - g - math.lgamma(m + 1.0) - math.log(m)
-    poisson = -_deviance(m, g) - _stirling_error(m) - 0.5 * math.log(2.0 * np.pi * m)
-    return poisson - math.log(m) - math.log(g)
-
-
-@kernel
-def _peak(g: float, V: float) -> tuple[float, float]:
-    """Where the summand peaks, ln(g / m) + V / m^2 = 0, and its standard deviation there.
-
-    With u = 2 ln(m / g) the condition is u e^u = 2 V / g^2: u = W_0(2 V / g^2), m = g e^(u / 2), and the second
-    derivative gives the variance m / (1 + u). Nodes need the peak to a few percent of the deviation, no better.
-    """
+def _peak(g: float, log_g: float, V: float) -> float:
+    """u = W_0(2 V / g^2): the summand peaks at m* = g e^(u / 2), where ln(g / m) + V / m^2 = 0."""
     y = 2.0 * V / g / g
-    if y < 1e-8:
-        return g, math.sqrt(g)
-    log_y = math.log(2.0 * V) - 2.0 * math.log(g)
-    log_1p_y = math.log1p(y) if log_y < 300.0 else log_y
-    u = log_1p_y * (1.0 - math.log1p(log_1p_y) / (2.0 + log_1p_y))
-    u = u / (1.0 + u) * (1.0 + log_y - math.log(u))
-    u = u / (1.0 + u) * (1.0 + log_y - math.log(u))
-    m = math.sqrt(2.0 * V / u)  # g e^(u / 2), without its overflow
-    return m, math.sqrt(m / (1.0 + u))
+    log_y = log(2.0 * V) - 2.0 * log_g
+    log_y = -9.0 if log_y < -9.0 else log_y
+    u = nearer_lambert_w(roughly_lambert_w(y, log_y), log_y)
+    return y * (1.0 - y * (1.0 - 1.5 * y)) if y < 1e-3 else u
 
 
 @kernel
-def _add_terms(
-    log_c: NDArray[np.float64],
-    first: float,
-    step: float,
-    count: int,
+def _exponent_at_peak(u: float) -> float:
+    """e^(u / 2) (1 - u) - 1 with all its digits."""
+    # Its Taylor series, coefficients 2^-k / k! - 2^(1 - k) / (k - 1)!
+    p = -4.900831249030034e-13
+    p = p * u - 1.172278834767984e-11
+    p = p * u - 2.5688197074915823e-10
+    p = p * u - 5.113174465388007e-09
+    p = p * u - 9.149891148589066e-08
+    p = p * u - 1.4532180059523809e-06
+    p = p * u - 2.0151289682539682e-05
+    p = p * u - 0.00023871527777777777
+    p = p * u - 0.00234375
+    p = p * u - 0.018229166666666664
+    p = p * u - 0.10416666666666667
+    p = p * u - 0.375
+    p = p * u - 0.5
+    return p * u if u < 0.25 else exp(0.5 * u) * (1.0 - u) - 1.0
+
+
+@loop
+def log_series(
+    g: NDArray[np.float64],
     V: NDArray[np.float64],
-    total: NDArray[np.float64],
+    count: int,
+    log_sum: NDArray[np.float64],
+    work: NDArray[np.float64],
+    index: NDArray[np.int64],
 ) -> None:
-    """total = step * sum over m = first, first + step, ... of exp(log_c - V / m), for a block of V at once."""
-    for i in range(V.shape[0]):
+    """log_sum[:count] = ln of `diffraction_series` of g and V, of at most BLOCK values each; the rest is work space."""
+    log_g, u, m_star = work[0], work[1], work[2]
+    for i in range(count):
+        g_i = max(g[i], _G_MIN)
+        log_g[i] = log(g_i)
+        u[i] = _peak(g_i, log_g[i], min(max(V[i], _V_MIN), _V_MAX))
+        m_star[i] = g_i * exp(0.5 * u[i])
+    numbers = np.zeros(3, np.int64)
+    for i in range(count):
+        kind = 0 if m_star[i] < _SUM_BELOW else 2 if m_star[i] > _TAYLOR_ABOVE else 1  # nan: 1
+        index[kind, numbers[kind]] = i
+        numbers[kind] += 1
+    rest = work[3:]
+    if numbers[0]:
+        _term_by_term(g, V, log_g, u, m_star, index[0, : numbers[0]], log_sum, rest)
+    for kind in range(1, 3):
+        if numbers[kind]:
+            _trapezoid(g, V, log_g, u, m_star, index[kind, : numbers[kind]], kind == 2, log_sum, rest)
+
+
+@loop
+def _term_by_term(
+    all_g: NDArray[np.float64],
+    all_V: NDArray[np.float64],
+    all_log_g: NDArray[np.float64],
+    u: NDArray[np.float64],
+    m_star: NDArray[np.float64],
+    index: NDArray[np.int64],
+    log_sum: NDArray[np.float64],
+    work: NDArray[np.float64],
+) -> None:
+    V, log_g, shift, total = work[0], work[1], work[2], work[3]
+    count = index.shape[0]
+    lowest, highest = float(_TERMS), 1.0
+    for i in range(count):
+        at = index[i]
+        m = m_star[at]
+        deviation = math.sqrt(m / (1.0 + u[at]))
+        lowest, highest = min(lowest, m - 7.0 * deviation), max(highest, m + 7.2 * deviation + 7.0)
+        V[i], log_g[i] = min(all_V[at], _V_MAX), all_log_g[at]
+        # The largest term, roughly: it is taken out of the exponentials, which then neither overflow nor underflow
+        near = max(1.0, np.floor(m + 0.5))
+        shift[i] = (near - 1.0) * log_g[i] - _LOG_FACTORIAL_TIMES_M[int(near)] - V[i] / near
         total[i] = 0.0
-    for j in range(count):
-        log2_c = log_c[j] * _LOG2_E
-        inverse_m = _LOG2_E / (first + j * step)
-        for i in range(V.shape[0]):
-            total[i] += _exp2(log2_c - inverse_m * V[i])
-    for i in range(V.shape[0]):
-        total[i] *= step
+    for m in range(max(1, int(lowest)), min(int(highest) + 1, _TERMS)):
+        constant, inverse, power = _LOG_FACTORIAL_TIMES_M[m], 1.0 / m, m - 1.0
+        for i in range(count):
+            total[i] += exp(power * log_g[i] - constant - V[i] * inverse - shift[i])
+    for i in range(count):
+        log_sum[index[i]] = log(total[i]) + shift[i] - all_g[index[i]]
+
+
+@loop
+def _trapezoid(
+    all_g: NDArray[np.float64],
+    all_V: NDArray[np.float64],
+    all_log_g: NDArray[np.float64],
+    all_u: NDArray[np.float64],
+    all_m_star: NDArray[np.float64],
+    index: NDArray[np.int64],
+    close: bool,
+    log_sum: NDArray[np.float64],
+    work: NDArray[np.float64],
+) -> None:
+    """Around m*, with m = m* e^t, Stirling's formula gives the summand as m^(-3/2) exp(m* phi(t) - stirling_error(m)).
+
+    phi(t) = e^t (1 - t) - 1 - u / 2 (e^t + e^-t - 2) - miss (e^-t - 1), with what `_peak` left, miss = V / m*^2 - u / 2.
+    Nodes are equally far apart in t, so that e^t needs no exponential; d = e^t - 1 keeps its digits next to the peak.
+    """
+    m_star, a, b, step, m_inverse = work[0], work[1], work[2], work[3], work[4]
+    ratio, ratio_inverse, d, inverse, total = work[5], work[6], work[7], work[8], work[9]
+    count = index.shape[0]
+    right, left = 0.0, 0.0
+    for i in range(count):
+        at = index[i]
+        m_star[i] = all_m_star[at]
+        m_inverse[i] = 1.0 / m_star[i]
+        a[i] = 0.5 * m_star[i] * all_u[at]
+        b[i] = min(all_V[at], _V_MAX) * m_inverse[i] - a[i]  # m* times miss
+        deviations = math.sqrt(m_star[i] * (1.0 + all_u[at]))  # 1 / deviation in t
+        h = _STEP - _STEP_SKEW / deviations
+        step[i] = h / deviations
+        right, left = max(right, _REACH / h), max(left, (_REACH + _LEFT_SKEW / deviations) / h)
+        total[i] = 0.0
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        nodes = int(right if side == 0 else left) + 2
+        for i in range(count):
+            t = sign * step[i]
+            # e^t - 1, abs(t) < 0.12
+            p = t * (1 / 720 + t * (1 / 5040 + t * (1 / 40320)))
+            ratio[i] = t * (1 + t * (1 / 2 + t * (1 / 6 + t * (1 / 24 + t * (1 / 120 + p)))))
+            ratio_inverse[i] = 1.0 / (1.0 + ratio[i])
+            d[i] = 0.0
+            inverse[i] = 1.0
+        for j in range(side, nodes):
+            if j > 0:
+                for i in range(count):
+                    d[i] += ratio[i] * (1.0 + d[i])
+                for i in range(count):
+                    inverse[i] *= ratio_inverse[i]
+            distance = sign * j
+            if close:
+                for i in range(count):
+                    t = distance * step[i]
+                    bend = -0.5 * t * t * (1 + t * (2 / 3 + t * (1 / 4 + t * (1 / 15 + t * (1 / 72)))))
+                    total[i] += exp(m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i]) - 0.5 * t)
+            else:
+                for i in range(count):
+                    t = distance * step[i]
+                    bend = (d[i] - t) - t * d[i]
+                    m_i = inverse[i] * m_inverse[i]
+                    m_i2 = m_i * m_i
+                    stirling_error = m_i * (1 / 12 - m_i2 * (1 / 360 - m_i2 * (1 / 1260)))
+                    exponent = m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i])
+                    total[i] += exp(exponent - 0.5 * t - stirling_error)
+    for i in range(count):
+        at = index[i]
+        # The exponent at the peak, m* (1 - u / 2 - V / m*^2) - g, without its cancellation
+        peak = all_g[at] * _exponent_at_peak(all_u[at]) - b[i]
+        if close:
+            peak -= m_inverse[i] / 12
+        log_sum[at] = peak + log(total[i] * step[i] / (_SQRT_TWO_PI * math.sqrt(m_star[i]))) - all_log_g[at]
 
 
 @kernel
-def _sum_row(g: float, V: NDArray[np.float64], total: NDArray[np.float64], work: NDArray[np.float64]) -> None:
-    """The sum for one g and a row of V; `work` is four rows of work space."""
-    if g < 1e-290:  # g -> 0 leaves the first term
-        total[:] = np.exp(-V)
-        return
-    if g > _BECKMANN_ABOVE:
-        for i in range(V.shape[0]):
-            b = min(V[i] / g, 1e3)  # exp(-1e3) is 0, and b^2 stays finite
-            total[i] = math.exp(-b) / g / g * (1.0 + (0.5 * b * b - 2.0 * b + 1.0) / g)
-        return
-    whole, node, V_block, sum_block = work[0], work[1], work[2], work[3]
-    log_g = math.log(g)
-    tabulated = 1  # whole[m] is valid for 1 <= m < tabulated
-    width = _BLOCK
-    start = 0
-    while start < V.shape[0]:
-        stop = min(start + width, V.shape[0])
-        V_low, V_high = V[start:stop].min(), V[start:stop].max()
-        if not V_high < _V_MAX:  # or nan: only that value is lost, not its block
-            if stop - start > 1:
-                width = 1
-                continue
-            total[start] = 0.0 if V_high >= _V_MAX else np.nan
-            width = _BLOCK
-            start = stop
-            continue
-        m_low, s_low = _peak(g, V_low)
-        m_high, s_high = _peak(g, V_high)
-        first = max(1.0, np.floor(m_low - _LEFT * s_low))  # math.floor is an int64, which a large m overflows
-        last = np.ceil(m_high + _RIGHT * s_high) + _MARGIN
-        term_by_term = m_low < _SUM_BELOW
-        step = 1.0 if term_by_term else max(1.0, _STEP * min(s_low, s_high))
-        if step > 1e3:  # whole nodes: near m = 1e12 the rounding of others shows in the tenth digit
-            step = np.floor(step)
-        nodes = (last - first) / step + 1.0
-        if (last if term_by_term else nodes) >= _TABLE:  # the peaks of a block lie too far apart for common nodes
-            width = 1
-            continue
-        count = int(nodes)
-        width = _BLOCK
-        # Whole vectors: a block is padded with copies of its last value, a lone value stays alone
-        lanes = 1 if stop - start == 1 else -(-(stop - start) // _LANES) * _LANES
-        for i in range(lanes):
-            V_block[i] = V[min(start + i, stop - 1)]
-        if term_by_term:
-            for m in range(tabulated, int(last) + 1):
-                whole[m] = (m - 1) * log_g - g - _LOG_FACTORIAL_TIMES_M[m]
-            tabulated = max(tabulated, int(last) + 1)
-            _add_terms(whole[int(first) :], first, step, count, V_block[:lanes], sum_block[:lanes])
-        else:
-            for j in range(count):
-                node[j] = _log_coefficient(first + j * step, g)
-            _add_terms(node, first, step, count, V_block[:lanes], sum_block[:lanes])
-        total[start:stop] = sum_block[: stop - start]
-        start = stop
-
-
-@kernel
-def _sum_rows(g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64]) -> None:
-    work = np.empty((4, _TABLE))
-    for row in range(g.shape[0]):
-        _sum_row(g[row], V[row], total[row], work)
+def _all(g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64]) -> None:
+    work = np.empty((ROWS_OF_WORK, BLOCK))
+    index = np.empty((3, BLOCK), np.int64)
+    for start in range(0, total.shape[0], BLOCK):
+        count = min(BLOCK, total.shape[0] - start)
+        block = total[start : start + count]
+        log_series(g[start : start + count], V[start : start + count], count, block, work, index)
+        for i in range(count):
+            block[i] = exp(block[i])
 
 
 def diffraction_series(g: Floats, V: Floats) -> Floats:
@@ -194,7 +222,7 @@ def diffraction_series(g: Floats, V: Floats) -> Floats:
     Parameters
     ----------
     g : array [1]
-        Roughness function, eq. 79, g >= 0. Work is shared along the last axis where g has length 1 there.
+        Roughness function, eq. 79, g >= 0.
     V : array [1]
         v_xy^2 tau^2 / 4, V >= 0.
 
@@ -207,19 +235,13 @@ def diffraction_series(g: Floats, V: Floats) -> Floats:
     -----
     The weight sits near the m* of `_peak`, not near g when V >> g. Small m* are summed term by term; beyond, the
     summand is smooth over its own width and the trapezoid rule converges exponentially, so the cost does not grow
-    with g. Values of V in a row share their nodes in blocks, and the exponentials of a block vectorise.
+    with g. Values are taken in blocks, the index of the term outermost, so that the exponentials vectorise.
 
     References
     ----------
     he1991, loader2000, corless1996
     """
-    g_array: NDArray[np.float64] = np.atleast_1d(np.asarray(g, dtype=np.float64))
-    V_array: NDArray[np.float64] = np.atleast_1d(np.asarray(V, dtype=np.float64))
-    shape = np.broadcast_shapes(g_array.shape, V_array.shape)
-    length = max(shape[-1], 1) if g_array.shape[-1] == 1 else 1
-    rows: NDArray[np.float64] = np.ascontiguousarray(np.broadcast_to(V_array, shape)).reshape(-1, length)
-    row_shape = (*shape[:-1], shape[-1] // length)
-    total: NDArray[np.float64] = np.empty_like(rows)
-    with np.errstate(all="ignore"):  # uncompiled, NumPy flags the overflow of V / g^2 that `_peak` is made for
-        _sum_rows(np.ravel(np.broadcast_to(g_array, row_shape)), rows, total)
-    return total.reshape(np.broadcast_shapes(np.shape(g), np.shape(V)))
+    g_all, V_all = np.broadcast_arrays(np.asarray(g, dtype=np.float64), np.asarray(V, dtype=np.float64))
+    total: NDArray[np.float64] = np.empty(g_all.size)
+    _all(np.ravel(g_all), np.ravel(V_all), total)
+    return total.reshape(g_all.shape)[()]

@@ -155,7 +155,7 @@ def _functional_of_vectors(
     cos_dphi = (x_i * x_r + y_i * y_r) * inverse
     sin_dphi = (x_i * y_r - y_i * x_r) * inverse
     f_r = _f_r(c_0, backward, forward, c_2, cos_dphi, sin_dphi * sin_dphi / (1.0 + abs(cos_dphi)))
-    return 0.0 if z_i < 0.0 or z_r < 0.0 else f_r
+    return f_r * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
 @kernel
@@ -195,7 +195,7 @@ def _qualitative_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float
                 z_i, z_r = i[2, j], r[2, j]
                 along = i[0, j] * r[0, j] + i[1, j] * r[1, j]
                 value = A + B * (0.0 if along < 0.0 else along) / cosine(z_i if z_i > z_r else z_r)
-                f[start + j] = 0.0 if z_i < 0.0 or z_r < 0.0 else value
+                f[start + j] = value if z_i >= 0.0 and z_r >= 0.0 else 0.0 * (z_i + z_r)  # 0, or nan
 
 
 def oren_nayar(

@@ -1,0 +1,60 @@
+"""The functions that kernels are made of, against 40 digits: what their docstrings promise, and their ends."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb._elementary import COS_HORIZON, arcsin, by_component, cosine, erfcx, exp, log
+from brdfdb.reference import mp
+
+RNG = np.random.default_rng(22)
+
+
+@pytest.mark.parametrize(
+    ("function", "exact", "arguments", "promise"),
+    [  # the worst measured stands behind
+        (exp, mp.exp, RNG.uniform(-708.0, 700.0, 3000), 4e-16),  # 3.1e-16
+        (exp, mp.exp, RNG.uniform(-1.0, 1.0, 3000), 4e-16),  # 2.6e-16
+        (log, mp.log, 10.0 ** RNG.uniform(-307.0, 308.0, 3000), 4e-16),  # 2.3e-16
+        (arcsin, mp.asin, RNG.uniform(-np.sqrt(0.5), np.sqrt(0.5), 3000), 3e-16),  # 2.3e-16
+        (arcsin, mp.asin, 10.0 ** RNG.uniform(-300.0, -0.2, 3000), 3e-16),  # 1.5e-16
+        (erfcx, lambda x: mp.exp(x * x) * mp.erfc(x), RNG.uniform(0.0, 30.0, 2000), 2e-15),  # 1.6e-15
+        (erfcx, lambda x: mp.exp(x * x) * mp.erfc(x), 10.0 ** RNG.uniform(-20.0, 0.0, 1000), 2e-15),  # 5e-16
+    ],
+)
+def test_keeps_its_promise(function: Callable[[float], float], exact: Any, arguments: Any, promise: float) -> None:
+    for x in map(float, arguments):
+        expected = exact(mp.mpf(x))
+        assert abs(function(x) - expected) <= promise * abs(expected), x
+
+
+def test_log_next_to_1_is_good_to_rounding() -> None:
+    for x in 1.0 + RNG.uniform(-0.3, 0.4, 2000):
+        assert abs(log(x) - mp.log(mp.mpf(x))) <= 4e-16, x
+    assert log(1.0) == 0.0
+
+
+def test_exp_is_0_where_the_normal_numbers_end_and_nan_for_nan() -> None:
+    assert exp(0.0) == 1.0
+    for x in (-708.5, -1e6, -1e300, -np.inf):
+        assert exp(x) == 0.0
+    assert np.isnan(exp(np.nan))
+    assert np.isnan(erfcx(np.nan))
+    assert np.isnan(arcsin(np.nan))
+
+
+def test_cosine_is_held_at_the_horizon() -> None:
+    assert cosine(0.3) == 0.3
+    assert cosine(0.0) == cosine(-0.5) == COS_HORIZON == np.cos(np.pi / 2)
+    assert np.isnan(cosine(np.nan))
+
+
+def test_by_component_takes_what_has_room() -> None:
+    w = RNG.normal(size=(7, 3))
+    rows = np.zeros((3, 4))
+    assert by_component(w, 0, rows) == 4
+    np.testing.assert_array_equal(rows, w[:4].T)
+    assert by_component(w, 4, rows) == 3
+    np.testing.assert_array_equal(rows[:, :3], w[4:].T)
