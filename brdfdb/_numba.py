@@ -39,11 +39,12 @@ def loop(function: F) -> F:
     return _compiled(function, forceinline=False)
 
 
-def _compiled(function: F, **options: bool) -> F:
-    options |= {"cache": True, "nogil": True}
-    compiled = numba.njit(error_model="numpy", fastmath={"contract"}, **options)(function)
+def _compiled(function: F, *, forceinline: bool) -> F:
+    compiled: Any = numba.njit(
+        cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, forceinline=forceinline
+    )(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]  # numba makes its settings at run time
-        _stamp(compiled._cache)  # type: ignore[attr-defined]  # numba keeps it to itself
+        _stamp(compiled._cache)
     return cast(F, compiled)
 
 

@@ -211,7 +211,8 @@ def _asked_for(*directions: ArrayLike) -> np.dtype[Any]:
 def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Floats:
     """Broadcast to all directions; 0 below the horizon, nan where a direction is nan, in the dtype asked for.
 
-    `trailing` axes of `values`, such as wavelengths, come after those of the directions.
+    `trailing` axes of `values`, such as wavelengths, come after those of the directions. Values that nothing is to be
+    changed of are given back as they are, not copied.
     """
     own = np.shape(values)[np.ndim(values) - trailing :]
 
@@ -219,7 +220,7 @@ def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Fl
         return array.reshape(array.shape + (1,) * trailing)
 
     shape = np.broadcast_shapes(np.shape(values), *(aligned(each).shape for each in directions.given), own)
-    result: Floats = np.broadcast_to(values, shape)
+    result: Floats = values if np.shape(values) == shape else np.broadcast_to(values, shape)
     if np.any(directions.below):
         result = np.where(aligned(directions.below), 0.0, result)
     for each in directions.given:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,6 +43,19 @@ class Parameter:
         return array
 
 
+class Lobe(NamedTuple):
+    """Where a model has its lobe: what samplers and quadratures look for, not a part of the model's value.
+
+    `share` [1], in [0, 1], is about what part of the reflected light lies in the lobe around the mirror direction,
+    whose half vectors have slopes distributed about as exp(-(s_x / alpha_x)^2 - (s_y / alpha_y)^2). The rest is looked
+    for all over the hemisphere: a model with wider tails than this Gaussian leaves a tenth to that, or more.
+    """
+
+    share: Floats
+    alpha_x: Floats
+    alpha_y: Floats
+
+
 @dataclass(frozen=True)
 class ModelSpec:
     """A model as the rest of the library sees it.
@@ -54,7 +67,9 @@ class ModelSpec:
     `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees.
     `known_excess`, for a model whose equations as published reflect more than they receive, says how much at most, from
     which angle on and where that is known, in the keys of `brdfdb.materials.KnownExcess`.
-    `lobe_axes` names the two parameters that make the model anisotropic when they differ.
+    `lobe_axes` names the two parameters that make the model anisotropic when they differ; `anisotropic`, of models that
+    are so in another way, says of their parameters whether they make it so.
+    `lobe`, of models that have one, is called as ``lobe(cos_i, **parameters)`` and says where; None: a diffuse model.
     """
 
     name: str
@@ -70,6 +85,8 @@ class ModelSpec:
     spectral: bool = False
     grazing_pole: bool = False
     lobe_axes: tuple[str, str] | None = None
+    anisotropic: Callable[[Mapping[str, Any]], bool] | None = None
+    lobe: Callable[..., Lobe] | None = None
     known_excess: Mapping[str, float | str] | None = None
 
     def parameter(self, name: str) -> Parameter:

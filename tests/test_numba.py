@@ -26,7 +26,10 @@ from brdfdb.models import MODELS
 def values():
     theta, phi = np.array([0.0, 0.3, 1.2, np.pi / 2]), np.array([0.0, 1.0, np.pi])
     result = {}
+    every = theta, phi
     for name, spec in MODELS.items():
+        # an integral: a tenth of a second a value in Python
+        theta, phi = (each[1:3] for each in every) if name == "oren_nayar_gaussian" else every
         for share in (0.02, 0.5, 1.0):
             arguments = {p.name: p.low + share * (min(p.high, 1.0) - p.low) for p in spec.parameters}
             if spec.spectral:

@@ -161,6 +161,8 @@ class Material(BaseModel):
     @property
     def anisotropic(self) -> bool:
         """Whether the BRDF changes when the surface is turned about its normal."""
+        if self.spec.anisotropic is not None:
+            return self.spec.anisotropic(self.parameters)
         axes = self.spec.lobe_axes
         return axes is not None and self.parameters[axes[0]] != self.parameters[axes[1]]
 

@@ -10,11 +10,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
-from brdfdb._elementary import BLOCK, by_component, cosine, erfcx, exp, log
+from brdfdb._elementary import BLOCK, cosine, erfcx, exp, log
 from brdfdb._numba import elementwise, kernel, loop
 from brdfdb.fresnel import reflectance
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
-from brdfdb.models._he_torrance_series import ROWS_OF_WORK, log_series, nearer_lambert_w, roughly_lambert_w
+from brdfdb.models._he_torrance_series import (
+    G_HIGH,
+    G_LOW,
+    Q_PATCHES,
+    ROWS_OF_WORK,
+    TERMS,
+    TERMS_OF_FLOAT32,
+    log_series,
+    log_series_of_row,
+    nearer_lambert_w,
+    roughly_lambert_w,
+    series_table,
+)
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
 
@@ -30,11 +42,7 @@ _STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # what `lobe` says is held in here
 
 _X_MAX = 30.0  # where erfc(x) and exp(-x^2) have long been 0
 _INVERSE_SQRT_PI = 0.5641895835477563
-_WORTH_INTERPOLATING = 48  # values in a row
-_NODES = 16  # of a piece of a row
-_PIECES = 32
-_CONVERGED = 3e-12  # the last coefficients of ln(f_r)
-_CHEBYSHEV = np.cos(np.pi * np.outer(np.arange(_NODES), (np.arange(_NODES) + 0.5) / _NODES))  # T_k at the nodes
+_WORTH_THE_TABLE = 16  # values in a row
 _NO_FRESNEL = np.zeros(())  # as refractive index: |F|^2 is left out
 
 
@@ -80,18 +88,16 @@ _variance = elementwise(_effective_variance)
 
 
 @loop
-def _evaluate(
+def _roughness(
     geometry: NDArray[np.float64],
     surface: NDArray[np.float64],
-    count: int,
-    f_r: NDArray[np.float64],
-    work: NDArray[np.float64],
-    index: NDArray[np.int64],
+    g_over_vz2: NDArray[np.float64],
+    shadow: NDArray[np.float64],
 ) -> None:
-    """f_r[:count] of at most BLOCK pairs of directions; geometry and surface hold the rows named below."""
-    sin_i, cos_i, sin_r, cos_r, v_xy2 = geometry[0], geometry[1], geometry[2], geometry[3], geometry[4]
-    wave, correlation, slope, n, k, uniform = surface[0], surface[1], surface[2], surface[3], surface[4], surface[5]
-    g_over_vz2, g, V, shadow = work[0], work[1], work[2], work[3]
+    """g / v_z^2, and S / (cos theta_i cos theta_r): what eq. 71 needs of a pair of polar angles."""
+    sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
+    wave, slope = surface[0], surface[2]
+    count = shadow.shape[0]
     for j in range(count):
         # Eqs (79)-(83)
         K = _hidden_slope(sin_i[j], cos_i[j], slope[j]) + _hidden_slope(sin_r[j], cos_r[j], slope[j])
@@ -100,11 +106,27 @@ def _evaluate(
         # Eqs (23)-(25)
         light = _shadowing_over_cos(sin_i[j], cos_i[j], slope[j])
         shadow[j] = light * _shadowing_over_cos(sin_r[j], cos_r[j], slope[j])
+
+
+@loop
+def _evaluate(
+    geometry: NDArray[np.float64],
+    surface: NDArray[np.float64],
+    f_r: NDArray[np.float64],
+    work: NDArray[np.float64],
+    index: NDArray[np.int64],
+) -> None:
+    """f_r of at most BLOCK pairs of directions; geometry and surface hold the rows named below."""
+    cos_i, cos_r, v_xy2 = geometry[1], geometry[3], geometry[4]
+    correlation, n, k, uniform = surface[1], surface[3], surface[4], surface[5]
+    count = f_r.shape[0]
+    g_over_vz2, g, V, shadow = work[0, :count], work[1, :count], work[2, :count], work[3, :count]
+    _roughness(geometry, surface, g_over_vz2, shadow)
     for j in range(count):
         g[j] = g_over_vz2[j] * (cos_i[j] + cos_r[j]) ** 2
         V[j] = correlation[j] * v_xy2[j]
     # Eq. (78)
-    log_series(g, V, count, f_r, work[4:], index)
+    log_series(g, V, f_r, work[4:], index)
     for j in range(count):
         v2 = v_xy2[j] + (cos_i[j] + cos_r[j]) ** 2
         # Eqs (71) and (76)
@@ -121,17 +143,30 @@ def _evaluate(
 
 
 @kernel
+def _specular(scalars: NDArray[np.float64], rho_s: NDArray[np.float64]) -> None:
+    for row in range(rho_s.shape[0]):
+        sin_i, cos_i, wave, slope = scalars[row, 0], scalars[row, 1], scalars[row, 2], scalars[row, 3]
+        S = (_shadowing_over_cos(sin_i, cos_i, slope) * cos_i) ** 2
+        # Eq. (79)
+        g = 4.0 * cos_i * cos_i * wave * _effective_variance(2.0 * _hidden_slope(sin_i, cos_i, slope))
+        # Eq. (73)
+        rho_s[row] = reflectance(cos_i, scalars[row, 4], scalars[row, 5]) * exp(-g) * S
+
+
+@kernel
 def _scattered(features: NDArray[np.float64], surface: NDArray[np.float64], f_r: NDArray[np.float64]) -> None:
     """Pairs of directions one by one: features of shape (5, N) as in `_evaluate`, surface (6, 1) or (6, N)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((3, BLOCK), np.int64)
-    lanes, values = np.empty((6, BLOCK)), np.empty(BLOCK)
-    lanes[:] = surface[:, :1]
+    lanes, geometry, width = np.empty((6, BLOCK)), np.empty((5, BLOCK)), surface.shape[1]
     for start in range(0, f_r.shape[0], BLOCK):
         count = min(BLOCK, f_r.shape[0] - start)
-        if surface.shape[1] > 1:
-            lanes[:, :count] = surface[:, start : start + count]
-        _evaluate(features[:, start : start + count], lanes, count, values, work, index)
-        f_r[start : start + count] = values[:count]
+        for each in range(5):
+            for j in range(count):
+                geometry[each, j] = features[each, start + j]
+        for each in range(6):
+            for j in range(count):
+                lanes[each, j] = surface[each, min(start + j, width - 1)]
+        _evaluate(geometry, lanes, f_r[start : start + count], work, index)
 
 
 @loop
@@ -139,23 +174,26 @@ def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], f_r: Floats
     """As `_scattered`, of unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((3, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
-    i, r = np.empty((3, BLOCK)), np.empty((3, BLOCK))
-    lanes[:] = surface
+    for each in range(6):
+        for j in range(BLOCK):
+            lanes[each, j] = surface[each, 0]
     for start in range(0, f_r.shape[0], BLOCK):
-        count = by_component(w_i, start, i)
-        by_component(w_r, start, r)
+        count = min(BLOCK, f_r.shape[0] - start)
+        i, r = w_i[start : start + count].reshape(-1), w_r[start : start + count].reshape(-1)
+        f = f_r[start : start + count]
         for j in range(count):
-            geometry[0, j] = math.sqrt(i[0, j] * i[0, j] + i[1, j] * i[1, j])
-            geometry[1, j] = cosine(i[2, j])
+            geometry[0, j] = math.sqrt(np.float64(i[3 * j]) ** 2 + np.float64(i[3 * j + 1]) ** 2)
+            geometry[1, j] = cosine(np.float64(i[3 * j + 2]))
         for j in range(count):
-            geometry[2, j] = math.sqrt(r[0, j] * r[0, j] + r[1, j] * r[1, j])
-            geometry[3, j] = cosine(r[2, j])
+            geometry[2, j] = math.sqrt(np.float64(r[3 * j]) ** 2 + np.float64(r[3 * j + 1]) ** 2)
+            geometry[3, j] = cosine(np.float64(r[3 * j + 2]))
         for j in range(count):
             # Eq. (84): k_r - k_i is the sum of our directions
-            geometry[4, j] = (i[0, j] + r[0, j]) ** 2 + (i[1, j] + r[1, j]) ** 2
-        _evaluate(geometry, lanes, count, values, work, index)
+            v_x, v_y = np.float64(i[3 * j]) + r[3 * j], np.float64(i[3 * j + 1]) + r[3 * j + 1]
+            geometry[4, j] = v_x * v_x + v_y * v_y
+        _evaluate(geometry, lanes, values[:count], work, index)
         for j in range(count):
-            f_r[start + j] = values[j] * (0.0 if i[2, j] < 0.0 or r[2, j] < 0.0 else 1.0)  # nan stays nan
+            f[j] = values[j] * (0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0)  # nan stays nan
 
 
 @kernel
@@ -166,101 +204,61 @@ def _vectors_of_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r
 
 
 @kernel
-def _rows(one_plus_cos: NDArray[np.float64], scalars: NDArray[np.float64], f_r: NDArray[np.float64]) -> None:
-    """Rows along the azimuth, which share polar angles and surface: one of eq. 71 after the other."""
+def _rows(
+    one_plus_cos: NDArray[np.float64],
+    table: NDArray[np.float64],
+    scalars: NDArray[np.float64],
+    f_r: NDArray[np.float64],
+) -> None:
+    """Rows along the azimuth, which share polar angles and surface: what eq. 71 needs of these is computed once."""
     length = f_r.shape[1]
-    work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((3, BLOCK), np.int64)
-    lanes, geometry = np.empty((6, BLOCK)), np.empty((5, BLOCK))
-    v_xy2, along = np.empty(length), np.empty(length)
+    work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((3, BLOCK), np.int64)
+    lanes, g_over_vz2, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
+    g_row, v2, V = np.empty(BLOCK), np.empty(length), np.empty(length)
+    polynomials = np.empty((Q_PATCHES, table.shape[3]))
     for row in range(f_r.shape[0]):
+        lane = row % BLOCK
+        if lane == 0:
+            rows = min(BLOCK, f_r.shape[0] - row)
+            for i in range(rows):
+                for each in range(10):
+                    lanes[each, i] = scalars[row + i, each]
+            _roughness(lanes[:4], lanes[4:], g_over_vz2[:rows], shadow[:rows])
         s, f, turned = scalars[row], f_r[row], one_plus_cos[min(row, one_plus_cos.shape[0] - 1)]
+        correlation, n, k, uniform = s[5], s[7], s[8], s[9]
+        v_z2 = (s[1] + s[3]) ** 2
+        g = g_over_vz2[lane] * v_z2
+        if g == 0.0:
+            for j in range(length):
+                f[j] = uniform
+            continue
         # Eq. (84): v_xy^2 in the form that keeps its digits near the mirror direction
         difference2, product = (s[0] - s[2]) ** 2, 2.0 * s[0] * s[2]
         for j in range(length):
-            v_xy2[j] = difference2 + product * turned[j]
-        if length >= _WORTH_INTERPOLATING and _interpolate(v_xy2, s, f, along, geometry[:3], work, index):
-            continue
-        for each in range(4):
-            geometry[each] = s[each]
-        for each in range(6):
-            lanes[each] = s[4 + each]
-        for start in range(0, length, BLOCK):
-            count = min(BLOCK, length - start)
-            geometry[4, :count] = v_xy2[start : start + count]
-            _evaluate(geometry, lanes, count, f[start : start + count], work, index)
-
-
-@loop
-def _interpolate(
-    v_xy2: NDArray[np.float64],
-    scalars: NDArray[np.float64],
-    f_r: NDArray[np.float64],
-    t: NDArray[np.float64],
-    nodes: NDArray[np.float64],
-    work: NDArray[np.float64],
-    index: NDArray[np.int64],
-) -> bool:
-    """A row by interpolation, or False where that would be more work than every value by itself.
-
-    Within a row ln(|F|^2 D) is a smooth function of t = ln(1 + g^2 / 5 + V) or, where g^2 is far above V, of V. It is computed at Chebyshev's nodes of a
-    piece of the row, and interpolated if the series has converged; if it has not, the piece is halved.
-    """
-    sin_i, cos_i, sin_r, cos_r = scalars[0], scalars[1], scalars[2], scalars[3]
-    wave, correlation, slope, n, k, uniform = scalars[4], scalars[5], scalars[6], scalars[7], scalars[8], scalars[9]
-    variance = _effective_variance(_hidden_slope(sin_i, cos_i, slope) + _hidden_slope(sin_r, cos_r, slope))
-    shadow = _shadowing_over_cos(sin_i, cos_i, slope) * _shadowing_over_cos(sin_r, cos_r, slope)
-    v_z2 = (cos_i + cos_r) ** 2
-    g = wave * variance * v_z2
-    pair = correlation * (0.25 / np.pi) * shadow * wave * variance
-    if pair == 0.0:
-        f_r[:] = uniform
-        return True
-    # As far as V reaches: a larger offset would cost digits of V, and the logarithm is straight by then
-    offset = 1.0 + min(0.2 * g * g, 8.0 * correlation * v_xy2.max())
-    for j in range(t.shape[0]):
-        t[j] = log(offset + correlation * v_xy2[j])
-    low, high = np.empty(_PIECES), np.empty(_PIECES)
-    low[0], high[0] = t.min(), t.max()
-    waiting, evaluated = 1, 0
-    coefficients = np.empty(_NODES)
-    while waiting:
-        waiting -= 1
-        bottom, top = low[waiting], high[waiting]
-        middle, half = 0.5 * (bottom + top), 0.5 * (top - bottom)
-        evaluated += _NODES
-        if 2 * evaluated > t.shape[0]:
-            return False
-        for i in range(_NODES):
-            nodes[0, i] = g
-            nodes[1, i] = max(exp(middle + half * _CHEBYSHEV[1, i]) - offset, 0.0)
-        log_series(nodes[0], nodes[1], _NODES, nodes[2], work, index)
+            v_xy2 = difference2 + product * turned[j]
+            v2[j] = v_xy2 + v_z2
+            V[j] = correlation * v_xy2
+        # Eq. (78)
+        if length >= _WORTH_THE_TABLE and G_LOW <= g < G_HIGH:
+            log_series_of_row(table, g, V, f, polynomials)
+        else:
+            for i in range(min(length, BLOCK)):
+                g_row[i] = g
+            for start in range(0, length, BLOCK):
+                stop = min(start + BLOCK, length)
+                log_series(g_row[: stop - start], V[start:stop], f[start:stop], work, index)
+        # Eqs (71) and (76)
+        pair = correlation * (0.25 / np.pi) * shadow[lane] * g_over_vz2[lane]
+        for j in range(length):
+            f[j] = pair * v2[j] * v2[j] * exp(f[j])
         if n > 0.0:
-            for i in range(_NODES):
-                cos = 0.5 * math.sqrt(nodes[1, i] / correlation + v_z2)
-                nodes[2, i] += log(reflectance(1.0 if cos > 1.0 else cos, n, k))
-        for degree in range(_NODES):
-            total = 0.0
-            for i in range(_NODES):
-                total += nodes[2, i] * _CHEBYSHEV[degree, i]
-            coefficients[degree] = total * (1.0 if degree == 0 else 2.0) / _NODES
-        tail = max(abs(coefficients[_NODES - 1]), abs(coefficients[_NODES - 2]), abs(coefficients[_NODES - 3]))
-        if not tail < _CONVERGED + 4e-16 * abs(coefficients[0]):
-            if waiting + 2 > _PIECES:
-                return False
-            low[waiting], high[waiting] = bottom, middle
-            low[waiting + 1], high[waiting + 1] = middle, top
-            waiting += 2
-            continue
-        scale = 1.0 / max(half, 1e-300)
-        for j in range(t.shape[0]):
-            x = 2.0 * scale * (t[j] - middle)
-            above, here = 0.0, 0.0
-            for degree in range(_NODES - 1, 0, -1):  # Clenshaw
-                above, here = here, coefficients[degree] + x * here - above
-            v2 = v_xy2[j] + v_z2
-            value = uniform + pair * v2 * v2 * exp(coefficients[0] + 0.5 * x * here - above)
-            f_r[j] = value if bottom <= t[j] <= top else f_r[j]
-    return True
+            for j in range(length):
+                # Eq. (75), at the bisecting angle
+                cos = 0.5 * math.sqrt(v2[j])
+                f[j] *= reflectance(1.0 if cos > 1.0 else cos, n, k)
+        for j in range(length):
+            # Eq. (72)
+            f[j] += uniform
 
 
 class Surface(NamedTuple):
@@ -391,7 +389,15 @@ def _evaluated(directions: Directions, surface: Sequence[Floats]) -> Floats:
         return by_rows_of_vectors(_vectors_of_rows, directions, surface)
     pair = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
     if shape and shape[-1] > 1 and all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in (*pair, *surface)):
-        return finished(by_rows(_rows, (directions.one_plus_cos_dphi,), (*pair, *surface)), directions)
+        terms = TERMS_OF_FLOAT32 if directions.dtype == np.float32 else TERMS
+        table = series_table(terms) if shape[-1] >= _WORTH_THE_TABLE else np.empty((1, 1, 1, terms))
+
+        def tabulated_rows(
+            columns: NDArray[np.float64], scalars: NDArray[np.float64], values: NDArray[np.float64]
+        ) -> None:
+            _rows(columns, table, scalars, values)
+
+        return finished(by_rows(tabulated_rows, (directions.one_plus_cos_dphi,), (*pair, *surface)), directions)
     v_xy2, _ = _v2(directions)
     features = np.empty((5, *shape))
     for i, each in enumerate((*pair, v_xy2)):
@@ -463,13 +469,8 @@ def he_torrance_specular(
     """
     angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
     surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
-    sin_i, cos_i = np.sin(angles.theta_i), np.cos(angles.theta_i)
-    S = (_shadowing(sin_i, cos_i, surface.slope) * cos_i) ** 2
-    variance = _variance(2.0 * _hidden(sin_i, cos_i, surface.slope))
-    # Eq. (79)
-    g = (4.0 * np.pi * surface.sigma_0 / surface.wavelength_um * cos_i) ** 2 * variance
-    # Eq. (73)
-    return finished(fresnel.unpolarised(cos_i, surface.n, surface.k) * np.exp(-g) * S, angles)
+    wave, _, slope = surface.features
+    return finished(by_rows(_specular, (), (angles.sin_i, angles.cos_i, wave, slope, surface.n, surface.k)), angles)
 
 
 def lobe(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb._elementary import BLOCK, arcsin, by_component, cosine
+from brdfdb._elementary import arcsin, cosine
 from brdfdb._numba import kernel
 from brdfdb.geometry import HALF_PI, checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
@@ -19,6 +20,14 @@ INTERREFLECTION = Parameter("interreflection", "L²", "1", 0.0, 1.0, "add the se
 OFFSET = Parameter(
     "offset", "", "1", 0.0, 10.0, "constant in A; 0.57 stands in for interreflection (note 7)", default=0.33
 )
+
+
+class Parts(NamedTuple):
+    """A BRDF [1/sr] of Lambertian facets in its two parts: light that met one facet, and light that met two."""
+
+    direct: Floats
+    interreflected: Floats
+
 
 _HALF_PI_REST = 6.123233995736766e-17  # pi/2 less the float64 nearest to it
 _NO_AZIMUTH = 1e-300  # smaller products of two sines: an azimuth means nothing
@@ -107,18 +116,13 @@ def _functional_angle_rows(
 
 @kernel
 def _functional_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
-    i, r = np.empty((3, BLOCK)), np.empty((3, BLOCK))
     for row in range(f_r.shape[0]):
         f = f_r[row]
         rho, sigma, interreflection = scalars[row, 0], scalars[row, 1], scalars[row, 2]
-        lights, viewers = w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)]
-        for start in range(0, f.shape[0], BLOCK):
-            count = by_component(lights, start, i)
-            by_component(viewers, start, r)
-            for j in range(count):
-                f[start + j] = _functional_of_vectors(
-                    i[0, j], i[1, j], i[2, j], r[0, j], r[1, j], r[2, j], rho, sigma, interreflection
-                )
+        i, r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
+        for j in range(f.shape[0]):
+            x, y, z = 3 * j, 3 * j + 1, 3 * j + 2
+            f[j] = _functional_of_vectors(i[x], i[y], i[z], r[x], r[y], r[z], rho, sigma, interreflection)
 
 
 @kernel
@@ -133,6 +137,8 @@ def _functional_of_vectors(
     sigma: float,
     interreflection: float,
 ) -> float:
+    x_i, y_i, x_r, y_r = np.float64(x_i), np.float64(y_i), np.float64(x_r), np.float64(y_r)
+    z_i, z_r = np.float64(z_i), np.float64(z_r)
     sin2_i, sin2_r = x_i * x_i + y_i * y_i, x_r * x_r + y_r * y_r
     cos_i, cos_r = cosine(z_i), cosine(z_r)
     sin_i, sin_r = math.sqrt(sin2_i), math.sqrt(sin2_r)
@@ -182,20 +188,16 @@ def _qualitative_angle_rows(
 
 @kernel
 def _qualitative_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
-    i, r = np.empty((3, BLOCK)), np.empty((3, BLOCK))
     for row in range(f_r.shape[0]):
         f = f_r[row]
         # sin(alpha) tan(beta) cos(dphi) is x_i x_r + y_i y_r over the larger cosine: no angle is left
         A, B = _qualitative(1.0, 1.0, scalars[row, 0], scalars[row, 1], scalars[row, 2])
-        lights, viewers = w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)]
-        for start in range(0, f.shape[0], BLOCK):
-            count = by_component(lights, start, i)
-            by_component(viewers, start, r)
-            for j in range(count):
-                z_i, z_r = i[2, j], r[2, j]
-                along = i[0, j] * r[0, j] + i[1, j] * r[1, j]
-                value = A + B * (0.0 if along < 0.0 else along) / cosine(z_i if z_i > z_r else z_r)
-                f[start + j] = value if z_i >= 0.0 and z_r >= 0.0 else 0.0 * (z_i + z_r)  # 0, or nan
+        i, r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
+        for j in range(f.shape[0]):
+            z_i, z_r = np.float64(i[3 * j + 2]), np.float64(r[3 * j + 2])
+            along = np.float64(i[3 * j]) * r[3 * j] + np.float64(i[3 * j + 1]) * r[3 * j + 1]
+            value = A + B * (0.0 if along < 0.0 else along) / cosine(z_i if z_i > z_r else z_r)
+            f[j] = value if z_i >= 0.0 and z_r >= 0.0 else 0.0 * (z_i + z_r + along)  # 0, or nan
 
 
 def oren_nayar(
@@ -272,6 +274,53 @@ def oren_nayar_vectors(
     """`oren_nayar` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
     parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
     return by_rows_of_vectors(_functional_vector_rows, checked_vectors(wi, wr), parameters)
+
+
+def oren_nayar_parts(
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    theta_r: ArrayLike,
+    phi_r: ArrayLike,
+    *,
+    rho: ArrayLike,
+    sigma: ArrayLike,
+) -> Parts:
+    """`oren_nayar` in its parts, direct light (eq. 27) and the second bounce (eq. 28).
+
+    Parameters
+    ----------
+    theta_i, phi_i, theta_r, phi_r, rho, sigma : array_like
+        As `oren_nayar` takes them.
+
+    Returns
+    -------
+    Parts [1/sr]
+        The arrays `direct` and `interreflected`, which add up to `oren_nayar`: where eq. (27) falls below 0 the direct
+        part is 0, and what eq. (28) has left over is the other one.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    References
+    ----------
+    orennayar1994
+
+    Examples
+    --------
+    >>> parts = oren_nayar_parts(0.3, 0.0, 0.4, 0.0, rho=0.9, sigma=0.5)
+    >>> round(float(parts.direct), 4), round(float(parts.interreflected), 4)
+    (0.2362, 0.0278)
+    """
+    angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
+    parameters = {"rho": RHO.check(rho), "sigma": SIGMA.check(sigma)}
+    direct = oren_nayar(*angles.given, **parameters, interreflection=False)
+    total = oren_nayar(*angles.given, **parameters, interreflection=True)
+    variance, x = parameters["sigma"] ** 2, np.minimum(angles.theta_i, angles.theta_r) * (2.0 / np.pi)
+    # Eq. (28)
+    bounce = 0.17 * parameters["rho"] ** 2 / np.pi * variance / (variance + 0.13) * (1.0 - angles.cos_dphi * x * x)
+    return Parts(finished(direct, angles), finished(np.where(direct > 0.0, bounce, total), angles))
 
 
 def oren_nayar_qualitative(

@@ -52,6 +52,14 @@ def single_slope(
     The paper's closed forms: between the plane of incidence and the one across it weighted by Eq. (44), and with the
     interreflection factor of Eq. (48). `single_slope_integral` has neither approximation.
     """
+    with mp.workdps(4 * mp.dps):  # at the horizon the tangents cancel
+        direct, interreflected = _single_slope(theta_i, theta_r, delta_phi, rho, theta_a)
+    return +direct, +interreflected
+
+
+def _single_slope(
+    theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, theta_a: Number
+) -> tuple[Number, Number]:
     theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
     rho, theta_a = mp.mpf(rho), mp.mpf(theta_a)
     cos_phi, tan_a = mp.cos(delta_phi), mp.tan(theta_a)

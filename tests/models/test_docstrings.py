@@ -51,8 +51,8 @@ def test_the_docstring_of_a_twin_names_the_function_that_documents_its_parameter
 def test_the_docstring_states_the_range_of_every_parameter(spec: ModelSpec) -> None:
     document = inspect.getdoc(spec.evaluate) or ""
     for parameter in spec.parameters:
-        if parameter.high == HALF_PI:
-            assert "[0, pi/2]" in document
+        if parameter.high in (HALF_PI, np.pi):
+            assert ("[0, pi/2]" if parameter.high == HALF_PI else "[0, pi]") in document
         elif not isinstance(parameter.default, bool):
             ends = rf"\[{re.escape(written(parameter.low))}, {re.escape(written(parameter.high))}\]"
             assert re.search(ends, document), parameter.name

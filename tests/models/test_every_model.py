@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from brdfdb import models
+from brdfdb.geometry import unit_vector
 from brdfdb.models import MODELS, he_torrance_1991
 from brdfdb.parameters import ModelSpec, Parameter
 
@@ -21,10 +22,14 @@ TINY = 1e-280
 
 # Relative differences, each just above the worst measured, which stands behind it
 RECIPROCITY = 1e-12  # 0: each formula is symmetric to the last bit; the rest is room for other vector units
-AZIMUTH = 1e-13  # 3.0e-14 (Ward): what the rounding of phi + 2 pi does
+AZIMUTH = 1e-13  # 8.6e-14 (parallel cavities): what the rounding of phi + 2 pi does
+AZIMUTH_OF = {"torrance_sparrow": 6e-12}  # 5.3e-12, where its lobe is down to 1e-142
 ROWS = 1e-11  # 1e-12 here; rows of He-Torrance share nodes, see test_he_torrance_series
+TWIN = 1e-14  # 6.0e-15 (He-Torrance), beside what rounding the angles does: unit vectors against angles
+TWIN_ROUNDING = 3e-16  # [rad] the rounding of an angle, of which a narrow lobe makes much
 LIGHT = (he_torrance_1991.WAVELENGTH_NM, he_torrance_1991.N, he_torrance_1991.K)  # of every spectral model
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
+SLOW = ("oren_nayar_gaussian",)  # an integral, 30 us a value
 
 every_model = pytest.mark.parametrize("spec", MODELS.values(), ids=MODELS.keys())
 every_specular = pytest.mark.parametrize("spec", [s for s in MODELS.values() if s.specular], ids=lambda s: s.name)
@@ -108,10 +113,10 @@ def test_is_finite_and_not_negative_in_every_corner(spec: ModelSpec, dtype: type
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_is_finite_and_not_negative_at_every_degree(spec: ModelSpec, dtype: type) -> None:
     rng = np.random.default_rng(90)
-    theta = np.deg2rad(np.arange(91.0)).astype(dtype)
+    theta = np.deg2rad(np.arange(0.0, 91.0, 5.0 if spec.name in SLOW else 1.0)).astype(dtype)
     phi = np.deg2rad(np.arange(0.0, 181.0, 15.0)).astype(dtype)
     assert theta[-1] == dtype(HALF_PI)
-    for _ in range(10):
+    for _ in range(3 if spec.name in SLOW else 10):
         parameters = drawn(spec, rng)
         values = spec.evaluate(theta[:, None, None], dtype(0.0), theta[:, None], phi, **parameters)
         assert np.isfinite(values).all(), parameters
@@ -212,7 +217,7 @@ def test_has_the_period_of_the_azimuth(spec: ModelSpec) -> None:
     value = spec.evaluate(theta_i, phi_i, theta_r, phi_r, **parameters)
     for turns_i, turns_r in ((1, 0), (0, 1), (-1, 2)):
         turned = spec.evaluate(theta_i, phi_i + turns_i * 2 * np.pi, theta_r, phi_r + turns_r * 2 * np.pi, **parameters)
-        np.testing.assert_allclose(turned, value, rtol=AZIMUTH, atol=TINY)
+        np.testing.assert_allclose(turned, value, rtol=AZIMUTH_OF.get(spec.name, AZIMUTH), atol=TINY)
 
 
 @every_model
@@ -221,11 +226,13 @@ def test_turns_with_the_surface_and_is_its_own_mirror_image(spec: ModelSpec) -> 
     theta_i, phi_i, theta_r, phi_r = drawn_angles(rng, 4000)
     parameters = drawn(spec, rng, 4000)
     value = spec.evaluate(theta_i, phi_i, theta_r, phi_r, **parameters)
-    turn = rng.uniform(-np.pi, np.pi, 4000) if spec.lobe_axes is None else np.pi
+    anisotropic = spec.lobe_axes is not None or spec.anisotropic is not None
+    turn = np.pi if anisotropic else rng.uniform(-np.pi, np.pi, 4000)
     turned = spec.evaluate(theta_i, phi_i + turn, theta_r, phi_r + turn, **parameters)
-    np.testing.assert_allclose(turned, value, rtol=AZIMUTH, atol=TINY)
-    mirrored = spec.evaluate(theta_i, -phi_i, theta_r, -phi_r, **parameters)
-    np.testing.assert_allclose(mirrored, value, rtol=AZIMUTH, atol=TINY)
+    np.testing.assert_allclose(turned, value, rtol=AZIMUTH_OF.get(spec.name, AZIMUTH), atol=TINY)
+    if spec.anisotropic is None:
+        mirrored = spec.evaluate(theta_i, -phi_i, theta_r, -phi_r, **parameters)
+        np.testing.assert_allclose(mirrored, value, rtol=AZIMUTH_OF.get(spec.name, AZIMUTH), atol=TINY)
 
 
 @pytest.mark.parametrize("spec", [s for s in MODELS.values() if s.lobe_axes], ids=lambda s: s.name)
@@ -438,6 +445,131 @@ def test_non_contiguous_angles_give_the_same_values(spec: ModelSpec) -> None:
     np.testing.assert_allclose(spec.evaluate(*backwards, **parameters)[::-1], expected, rtol=ROWS)
 
 
+# Unit vectors
+
+
+def drawn_vectors(rng: np.random.Generator, *shape: int) -> NDArray[np.float64]:
+    """Random unit vectors above the horizon, of shape (*shape, 3)."""
+    return unit_vector(rng.uniform(0.0, HALF_PI, shape), rng.uniform(-np.pi, np.pi, shape))
+
+
+@every_model
+def test_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(23)
+    angles = drawn_angles(rng, 4000)
+    parameters = drawn(spec, rng, 4000)
+    wi, wr = unit_vector(*angles[:2]), unit_vector(*angles[2:])
+    expected = spec.evaluate(*angles, **parameters)
+    step = 1e-9
+    moved = [spec.evaluate(*angles[:i], angles[i] - step, *angles[i + 1 :], **parameters) for i in range(4)]
+    conditioning = sum(np.abs(each - expected) for each in moved) / step
+    error = np.abs(spec.vectors(wi, wr, **parameters) - expected)
+    assert np.mean(expected > TINY) > 0.5
+    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, TINY))
+    assert worst <= TWIN, f"off by {worst:.3g}"
+
+
+@every_model
+def test_float32_vectors_give_float32_and_the_arithmetic_is_float64(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(24)
+    parameters = drawn(spec, rng)
+    wi, wr = drawn_vectors(rng, 50).astype(np.float32), drawn_vectors(rng, 50).astype(np.float32)
+    values = spec.vectors(wi, wr, **parameters)
+    assert values.dtype == np.float32
+    double = spec.vectors(wi.astype(np.float64), wr.astype(np.float64), **parameters)
+    assert double.dtype == np.float64
+    np.testing.assert_allclose(values, double, rtol=2.0**-23, atol=2.0**-126)  # one rounding, next to a tie
+    assert spec.vectors(wi, wr.astype(np.float64), **parameters).dtype == np.float64
+    assert isinstance(spec.vectors(wi[0], wr[0], **parameters), np.float32)
+    assert isinstance(spec.vectors([0, 0, 1], [0.0, 0.6, 0.8], **parameters), np.float64)
+
+
+@every_model
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_vectors_in_every_corner_give_finite_values_above_the_horizon_and_0_below(spec: ModelSpec, dtype: type) -> None:
+    corners = np.array(
+        [
+            *([0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0.8, 0.6]),
+            *([1, 0, 1e-30], [-1, 0, 1e-30], [1e-30, 0, 1], [1, 1e-20, 1e-20], [-0.6, 0.8, 0.0]),
+        ],
+        dtype=dtype,
+    )
+    parameters = {name: values.reshape(-1, 1, 1) for name, values in corner_parameters(spec).items()}
+    values = spec.vectors(corners[:, None], corners, **parameters)
+    assert values.dtype == dtype
+    assert np.isfinite(values).all()
+    assert (values >= 0.0).all()
+    under = corners * np.array([1.0, 1.0, -1.0], dtype=dtype)
+    under = under[under[:, 2] < 0.0]
+    for wi, wr in ((under[:, None], corners), (corners[:, None], under), (under[:, None], under)):
+        assert (spec.vectors(wi, wr, **parameters) == 0.0).all()
+
+
+@every_model
+def test_a_nan_in_a_vector_goes_through_and_leaves_its_neighbours_alone(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(25)
+    parameters = drawn(spec, rng)
+    wi, wr = drawn_vectors(rng, 70), drawn_vectors(rng, 70)
+    wr[5] *= -1.0
+    expected = spec.vectors(wi, wr, **parameters)
+    for row, axis in ((0, 0), (5, 1), (69, 2)):
+        dirty_i, dirty_r = wi.copy(), wr.copy()
+        dirty_i[row, axis] = dirty_r[row, axis] = np.nan
+        for values in (spec.vectors(dirty_i, wr, **parameters), spec.vectors(wi, dirty_r, **parameters)):
+            np.testing.assert_array_equal(np.isnan(values), np.arange(70) == row)
+            np.testing.assert_allclose(np.delete(values, row), np.delete(expected, row), rtol=ROWS)
+
+
+@every_model
+def test_broadcasts_over_vectors(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(26)
+    parameters = drawn(spec, rng)
+    wi, wr = drawn_vectors(rng, 5), drawn_vectors(rng, 7)
+    values = spec.vectors(wi[:, None], wr, **parameters)
+    assert values.shape == (5, 7)
+    for row, one in zip(values, wi, strict=True):
+        np.testing.assert_allclose(spec.vectors(one, wr, **parameters), row, rtol=ROWS)
+    np.testing.assert_allclose(spec.vectors(wi, wr[0], **parameters), values[:, 0], rtol=ROWS)
+    assert np.shape(spec.vectors(wi[0], wr[0], **parameters)) == ()
+    assert spec.vectors(wi[:0], wr[0], **parameters).shape == (0,)
+    assert spec.vectors(wi[:0, None], wr, **parameters).shape == (0, 7)
+    several = {name: value[:, None] for name, value in drawn(spec, rng, 3).items()}
+    rows = spec.vectors(wi[0], wr, **several)
+    assert rows.shape == (3, 7)
+    for index, row in enumerate(rows):
+        alone = {name: value[index, 0] for name, value in several.items()}
+        np.testing.assert_allclose(spec.vectors(wi[0], wr, **alone), row, rtol=ROWS)
+
+
+@every_model
+@pytest.mark.parametrize("position", [0, 1], ids=["wi", "wr"])
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ([0.0, 0.0, 1.1], r"\(0, 0, 1\.1\) has the length 1\.1, not 1"),
+        ([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], r"\(0, 0, 0\) has the length 0, not 1"),
+        ([np.inf, 0.0, 0.0], r"\(inf, 0, 0\) has the length inf, not 1"),
+        ([0.0, 1.0], r"float64 of shape \(2,\) is not an array of vectors"),
+        (1.0, r"float64 of shape \(\) is not an array of vectors"),
+        ([True, False, False], r"bool of shape \(3,\) is not an array of vectors"),
+        (["a", "b", "c"], r"<U1 of shape \(3,\) is not an array of vectors"),
+        ([0.0, 0.0, 1j], r"complex128 of shape \(3,\) is not an array of vectors"),
+    ],
+)
+def test_refuses_what_is_no_unit_vector(spec: ModelSpec, position: int, wrong: Any, message: str) -> None:
+    vectors: list[Any] = [[0.0, 0.6, 0.8], [0.0, 0.6, 0.8]]
+    vectors[position] = wrong
+    with pytest.raises(ValueError, match=rf"^{('wi', 'wr')[position]}: {message}"):
+        spec.vectors(*vectors, **drawn(spec, np.random.default_rng(27)))
+
+
+@every_parameter
+def test_vectors_refuse_a_parameter_in_the_words_of_the_angles(spec: ModelSpec, parameter: Parameter) -> None:
+    parameters = drawn(spec, np.random.default_rng(28)) | {parameter.name: parameter.high * 1.5}
+    with pytest.raises(ValueError, match=f"^{re.escape(refused(spec, parameter, parameter.high * 1.5))}$"):
+        spec.vectors([0.0, 0.6, 0.8], [0.0, 0.6, 0.8], **parameters)
+
+
 # Refusals
 
 
@@ -542,7 +674,9 @@ def test_parameters_match_the_signature(spec: ModelSpec) -> None:
     for name in ANGLES:
         assert arguments[name].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
         assert arguments[name].default is inspect.Parameter.empty
-    assert sorted(tuple(arguments)[4:]) == sorted(parameter.name for parameter in parameters_of(spec))
+    # what may be None, such as a refractive index, is no parameter of a material
+    own = [name for name in tuple(arguments)[4:] if arguments[name].default is not None]
+    assert sorted(own) == sorted(parameter.name for parameter in parameters_of(spec))
     for parameter in parameters_of(spec):
         argument = arguments[parameter.name]
         assert argument.kind is inspect.Parameter.KEYWORD_ONLY

@@ -1,0 +1,439 @@
+"""He et al. 1991 in its limits, term by term, and as instruments of finite aperture measure it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb import fresnel
+from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
+from brdfdb.models import he_torrance_1991 as full
+from brdfdb.models.he_torrance_1991_polarised import unit_azimuth
+from brdfdb.parameters import Floats, Parameter
+
+SLOPE = Parameter("slope", "σ_0/τ", "1", 1e-6, 1e6, "rms roughness over autocorrelation length")
+INCIDENT = Parameter("incident_solid_angle_sr", "ω_i", "sr", 1e-12, 1.0, "solid angle of the cone of light")
+RECEIVED = Parameter("received_solid_angle_sr", "ω_r", "sr", 1e-12, 1.0, "solid angle of the cone that is received")
+RINGS = 8  # at most, of the nodes in a cone
+
+
+def he_torrance_very_rough(
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    theta_r: ArrayLike,
+    phi_r: ArrayLike,
+    *,
+    slope: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+) -> Floats:
+    """BRDF of a very rough surface: the limit of `he_torrance` for g -> infinity, geometrical optics.
+
+    Parameters
+    ----------
+    theta_i, phi_i, theta_r, phi_r : array_like [rad]
+        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
+    slope : array_like [1]
+        sigma_0 / tau, in [1e-6, 1e6]. The wavelength enters by way of n and k only.
+    n, k : array_like [1]
+        Complex refractive index n + ik; n in [1e-3, 100], k in [0, 1e4].
+    a : array_like [1]
+        Albedo of the uniform diffuse part, in [0, 1].
+
+    Returns
+    -------
+    array [1/sr]
+        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan. There is no Dirac part.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    Section 4: "For very rough surfaces, only the ratio is required"; cylinder (a) of Fig. 13. The sum of eq. (78) tends
+    to e^-b / g with b = v_xy^2 tau^2 / (4 g) (Beckmann and Spizzichino 1963), in which the wave number cancels; the
+    first term left out is the share (b^2 / 2 - 2 b + 1) / g of the whole. Shadowing and effective roughness are those
+    of `he_torrance`. At grazing g falls with cos^2, and the limit is reached later.
+
+    References
+    ----------
+    he1991, smith1967, corless1996
+
+    Examples
+    --------
+    >>> round(float(he_torrance_very_rough(0.5, 0.0, 0.6, 3.0, slope=0.16, n=0.769, k=6.08)), 3)
+    0.957
+    """
+    directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
+    return _very_rough(directions, SLOPE.check(slope), full.N.check(n), full.K.check(k), full.A.check(a))
+
+
+def he_torrance_very_rough_vectors(
+    wi: ArrayLike, wr: ArrayLike, *, slope: ArrayLike, n: ArrayLike, k: ArrayLike, a: ArrayLike = 0.0
+) -> Floats:
+    """`he_torrance_very_rough` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    directions = checked_vectors(wi, wr)
+    return _very_rough(directions, SLOPE.check(slope), full.N.check(n), full.K.check(k), full.A.check(a))
+
+
+def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
+    """Specular reflectance of a smooth surface: the limit of `he_torrance_specular` for sigma_0 / wavelength -> 0.
+
+    Parameters
+    ----------
+    theta_i : array_like [rad]
+        Angle of incidence, in [0, pi].
+    n, k : array_like [1]
+        Complex refractive index n + ik; n in [1e-3, 100], k in [0, 1e4].
+
+    Returns
+    -------
+    array [1]
+        |F|^2, in [0, 1], in the broadcast shape of all arguments; 0 below the horizon, nan where theta_i is nan. The
+        directional diffuse part is 0 in this limit.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    Eq. (10) over its 1 / (cos theta_i d omega_i).
+
+    References
+    ----------
+    he1991
+
+    Examples
+    --------
+    >>> round(float(he_torrance_smooth(0.0, n=1.5, k=0.0)), 4)
+    0.04
+    """
+    angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
+    return finished(fresnel.unpolarised(angles.cos_i, full.N.check(n), full.K.check(k)), angles)
+
+
+class HeTorranceParts(NamedTuple):
+    """The two parts of `he_torrance` that are functions, f_r [1/sr] each; the third is `he_torrance_specular`."""
+
+    directional_diffuse: Floats
+    uniform_diffuse: Floats
+
+
+def he_torrance_parts(
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    theta_r: ArrayLike,
+    phi_r: ArrayLike,
+    *,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+) -> HeTorranceParts:
+    """The directional diffuse and the uniform diffuse part of `he_torrance`, apart.
+
+    The third part of eq. (5) is a Dirac delta in direction: `he_torrance_specular` gives its reflectance.
+
+    Parameters
+    ----------
+    theta_i, phi_i, theta_r, phi_r : array_like [rad]
+        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
+    wavelength_nm, sigma_0_um, tau_um, n, k, a : array_like
+        As in `he_torrance`.
+
+    Returns
+    -------
+    HeTorranceParts [1/sr]
+        (directional_diffuse, uniform_diffuse), each in the broadcast shape of all arguments; 0 below the horizon, nan
+        where an angle is nan. Their sum is `he_torrance`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    Eqs (71) and (72).
+
+    References
+    ----------
+    he1991
+
+    Examples
+    --------
+    >>> surface = dict(wavelength_nm=500.0, sigma_0_um=1.45, tau_um=13.2, n=1.745, k=0.0, a=0.9)
+    >>> parts = he_torrance_parts(1.0, 0.0, 1.0, 3.14, **surface)
+    >>> round(float(parts.directional_diffuse), 2), round(float(parts.uniform_diffuse), 2)
+    (0.65, 0.29)
+    """
+    surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    return _parts(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, full.A.check(a))
+
+
+def he_torrance_parts_vectors(
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+) -> HeTorranceParts:
+    """`he_torrance_parts` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    return _parts(checked_vectors(wi, wr), surface, full.A.check(a))
+
+
+def he_torrance_aperture(
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    theta_r: ArrayLike,
+    phi_r: ArrayLike,
+    *,
+    incident_solid_angle_sr: ArrayLike,
+    received_solid_angle_sr: ArrayLike,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+    rings: int = 2,
+) -> Floats:
+    """BRDF as light from a cone and a receiver of a cone measure it: all three parts, the specular one spread.
+
+    Parameters
+    ----------
+    theta_i, phi_i, theta_r, phi_r : array_like [rad]
+        Axes of the cones of light (i) and of the receiver (r), pointing away from the surface; theta in [0, pi].
+    incident_solid_angle_sr, received_solid_angle_sr : array_like [sr]
+        Each in [1e-12, 1]: pi sin^2 of half the angle of the circular cone, the area of a round aperture over the
+        square of the distance to its rim. The paper's experiments have pi / 1024, half an angle of 1.79 degrees.
+    wavelength_nm, sigma_0_um, tau_um, n, k, a : array_like
+        As in `he_torrance`.
+    rings : int
+        How many rings of 4 rings nodes each the diffuse parts are averaged over in each cone, in [0, 8]; 0 takes the
+        axes alone. Work grows with its fourth power; 2 is enough where the diffuse lobe is as wide as the cones.
+
+    Returns
+    -------
+    array [1/sr]
+        In the broadcast shape of all arguments; 0 where an axis is below the horizon, nan where an angle is nan.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    Section 4, on Fig. 7: "The angular width of the measured specular peak is determined by the solid angles of incident
+    and received light in the experiments (d omega_i = d omega_r = pi / 1024). To allow comparisons, the theoretical
+    peaks have been averaged over the same solid angles." What is averaged here:
+
+    The specular part, eq. (70), is rho_s(theta_i) / (cos theta_i omega_i) times the share of the received cone that the
+    mirror image of the cone of light covers: the area that both have in common on the unit sphere over omega_r. rho_s
+    and cos theta_i are those of the axis of the cone of light, as in eq. (70), which this is for omega_r -> 0. Its
+    integral over all axes of the receiver, weighted by cos theta_r, is rho_s.
+
+    The diffuse parts are averaged over both cones, by equal solid angles; a part of a cone below the horizon has 0.
+    The figures show this over its value at theta_r = theta_i, eq. (11).
+
+    References
+    ----------
+    he1991
+
+    Examples
+    --------
+    >>> cones = dict(incident_solid_angle_sr=np.pi / 1024, received_solid_angle_sr=np.pi / 1024)
+    >>> aluminum = dict(wavelength_nm=2000.0, sigma_0_um=0.28, tau_um=1.77, n=2.15, k=20.7)
+    >>> around = np.deg2rad([5.0, 8.0, 10.0, 12.0, 15.0])
+    >>> he_torrance_aperture(np.deg2rad(10.0), 0.0, around, np.pi, **cones, **aluminum).round(2).tolist()
+    [0.95, 6.27, 17.12, 6.28, 0.97]
+    """
+    apertures = _checked_apertures(incident_solid_angle_sr, received_solid_angle_sr, rings)
+    surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    return _aperture(checked_angles(theta_i, phi_i, theta_r, phi_r), apertures, surface, full.A.check(a))
+
+
+def he_torrance_aperture_vectors(
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    incident_solid_angle_sr: ArrayLike,
+    received_solid_angle_sr: ArrayLike,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+    rings: int = 2,
+) -> Floats:
+    """`he_torrance_aperture` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    apertures = _checked_apertures(incident_solid_angle_sr, received_solid_angle_sr, rings)
+    surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    return _aperture(checked_vectors(wi, wr), apertures, surface, full.A.check(a))
+
+
+def _very_rough(directions: Directions, slope: Floats, n: Floats, k: Floats, albedo: Floats) -> Floats:
+    sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
+    # Eqs (23)-(25)
+    S_over_cos_cos = full._shadowing(sin_i, cos_i, slope) * full._shadowing(sin_r, cos_r, slope)
+    # Eqs (79)-(83)
+    slope2 = slope**2 * full._variance(full._hidden(sin_i, cos_i, slope) + full._hidden(sin_r, cos_r, slope))
+    # Eq. (84): tan^2 of the inclination of the facet
+    tan2 = _v_xy2(directions) / (cos_i + cos_r) ** 2
+    # Eq. (78) with e^-b / g for its sum, b = tan^2 / (4 slope^2)
+    lobe = np.exp(-tan2 / (4.0 * slope2)) / (16.0 * np.pi * slope2)
+    # Eq. (75), at the bisecting angle
+    F2 = fresnel.unpolarised(full.cos_bisecting(directions), n, k)
+    # Eqs (71), (76) and (72)
+    return finished(F2 * lobe * (1.0 + tan2) ** 2 * S_over_cos_cos + albedo / np.pi, directions)
+
+
+def _v_xy2(directions: Directions) -> Floats:
+    sin_i, sin_r = directions.sin_i, directions.sin_r
+    with np.errstate(all="ignore"):  # of vectors: the branch not taken divides by zero
+        v_xy2: Floats = (sin_i - sin_r) ** 2 + (2.0 * sin_i * sin_r) * directions.one_plus_cos_dphi
+    return v_xy2
+
+
+def _parts(directions: Directions, surface: full.Surface, albedo: Floats) -> HeTorranceParts:
+    with np.errstate(all="ignore"):
+        F2 = fresnel.unpolarised(full.cos_bisecting(directions), surface.n, surface.k)
+        directional = F2 * full.directional_diffuse(directions, surface)
+    uniform = albedo / np.pi + np.zeros(np.shape(directional))
+    return HeTorranceParts(
+        finished(directional + np.zeros(np.shape(albedo)), directions), finished(uniform, directions)
+    )
+
+
+class _Apertures(NamedTuple):
+    """Solid angles [sr] of the two cones, and the number of rings of nodes in each."""
+
+    incident: Floats
+    received: Floats
+    rings: int
+
+
+def _checked_apertures(incident: ArrayLike, received: ArrayLike, rings: int) -> _Apertures:
+    if isinstance(rings, bool) or not isinstance(rings, int | np.integer) or not 0 <= rings <= RINGS:
+        raise ValueError(f"rings: {rings!r} is not a whole number in [0, {RINGS}]")
+    return _Apertures(INCIDENT.check(incident), RECEIVED.check(received), int(rings))
+
+
+def _aperture(directions: Directions, apertures: _Apertures, surface: full.Surface, albedo: Floats) -> Floats:
+    # Eq. (70), with the share of the received cone in the cone of reflection for its Delta
+    rho_s = full.he_torrance_specular(
+        np.arctan2(directions.sin_i, directions.cos_i),
+        wavelength_nm=surface.wavelength_um * 1000.0,
+        sigma_0_um=surface.sigma_0,
+        tau_um=surface.tau,
+        n=surface.n,
+        k=surface.k,
+    )
+    # the angle between the viewer and the mirror image of the light
+    chord2 = _v_xy2(directions) + (directions.cos_i - directions.cos_r) ** 2
+    apart = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt(chord2), 1.0))
+    incident, received = (np.arcsin(np.sqrt(omega / np.pi)) for omega in apertures[:2])
+    common = _common_area(incident, received, apart) / (apertures.incident * apertures.received)
+    return finished(rho_s * common / directions.cos_i + _averaged(directions, apertures, surface, albedo), directions)
+
+
+def _common_area(first: Floats, second: Floats, apart: Floats) -> Floats:
+    """Solid angle [sr] common to two circular cones of the half angles `first` and `second` [rad], axes `apart`.
+
+    Two sectors, less twice the triangle of both axes and a point where the circles cross: L'Huilier's formula for its
+    area, half-angle formulas for its angles, so that small cones keep their digits.
+    """
+    half = 0.5 * (first + second + apart)
+    # half less each of the three sides
+    to_first = np.maximum(0.5 * ((second - first) + apart), 0.0)
+    to_second = np.maximum(0.5 * ((first - second) + apart), 0.0)
+    to_apart = np.maximum(0.5 * ((first + second) - apart), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # cones that do not cross: replaced below
+        angle_first = 2.0 * np.arctan(np.sqrt(np.sin(to_first) * np.sin(to_apart) / (np.sin(half) * np.sin(to_second))))
+        angle_second = 2.0 * np.arctan(
+            np.sqrt(np.sin(to_second) * np.sin(to_apart) / (np.sin(half) * np.sin(to_first)))
+        )
+        tangents = np.tan(0.5 * half) * np.tan(0.5 * to_first) * np.tan(0.5 * to_second) * np.tan(0.5 * to_apart)
+        triangle = 4.0 * np.arctan(np.sqrt(np.maximum(tangents, 0.0)))
+        crossing = 2.0 * (angle_first * _versine(first) + angle_second * _versine(second) - triangle)
+    inside = 2.0 * np.pi * _versine(np.minimum(first, second))
+    crossing = np.where(apart <= np.abs(first - second), inside, crossing)
+    return np.where(apart >= first + second, 0.0, crossing)
+
+
+def _versine(angle: Floats) -> Floats:
+    """1 - cos."""
+    versine: Floats = 2.0 * np.sin(0.5 * angle) ** 2
+    return versine
+
+
+def _averaged(directions: Directions, apertures: _Apertures, surface: full.Surface, albedo: Floats) -> Floats:
+    """The diffuse parts [1/sr], averaged over both cones."""
+    light, weights = _nodes(_frame(directions, "i"), apertures.incident, apertures.rings)
+    viewers, _ = _nodes(_frame(directions, "r"), apertures.received, apertures.rings)
+    total: Any = 0.0
+    for j, weight in enumerate(weights):
+        with np.errstate(all="ignore"):
+            f_r = full.he_torrance_vectors(
+                light[..., j : j + 1, :],
+                viewers,
+                wavelength_nm=surface.wavelength_um[..., None] * 1000.0,
+                sigma_0_um=surface.sigma_0[..., None],
+                tau_um=surface.tau[..., None],
+                n=surface.n[..., None],
+                k=surface.k[..., None],
+                a=albedo[..., None],
+            )
+        total = total + weight * (f_r @ weights)
+    return np.asarray(total, dtype=np.float64)
+
+
+def _frame(directions: Directions, which: str) -> tuple[Floats, Floats, Floats]:
+    """The axis of a cone, and the unit vectors of growing theta and phi there."""
+    x, y, z, sin = (getattr(directions, f"{name}_{which}") for name in ("x", "y", "cos", "sin"))
+    if isinstance(directions, Vectors):
+        z = getattr(directions, f"w_{which}")[..., 2].astype(np.float64)  # below the horizon cos is not its cosine
+        cos_phi, sin_phi = unit_azimuth(x, y, sin)
+    else:
+        phi = getattr(directions, f"phi_{which}")
+        cos_phi, sin_phi = np.cos(phi), np.sin(phi)
+    axis, along, across = (
+        np.stack(np.broadcast_arrays(*vector, x)[:3], axis=-1)
+        for vector in ((x, y, z), (z * cos_phi, z * sin_phi, -sin), (-sin_phi, cos_phi, np.zeros_like(x)))
+    )
+    return axis, along, across
+
+
+def _nodes(frame: tuple[Floats, Floats, Floats], solid_angle: Floats, rings: int) -> tuple[Floats, NDArray[np.float64]]:
+    """Unit vectors (..., nodes, 3) in a cone, and their weights, which add up to 1."""
+    axis, along, across = (vector[..., None, :] for vector in frame)
+    if rings == 0:
+        return axis, np.ones(1)
+    # Gauss in the versine, in which solid angle is uniform, and equal steps around: exact up to the degree 4 rings - 1
+    x, weight = np.polynomial.legendre.leggauss(rings)
+    turn = 2.0 * np.pi * np.arange(4 * rings) / (4 * rings)
+    versine = _versine(np.arcsin(np.sqrt(solid_angle / np.pi)))[..., None] * np.repeat(0.5 * (1.0 + x), turn.size)
+    sin_off = np.sqrt(versine * (2.0 - versine))
+    turns = np.tile(turn, rings)
+    w = (
+        (1.0 - versine)[..., None] * axis
+        + (sin_off * np.cos(turns))[..., None] * along
+        + (sin_off * np.sin(turns))[..., None] * across
+    )
+    return w, np.repeat(0.5 * weight, turn.size) / turn.size

@@ -1,0 +1,314 @@
+"""He et al. 1991, polarised light: Jones matrices of the facet reflection, eqs 59-65, and Mueller matrices.
+
+The convention, here and nowhere else:
+
+* Directions w_i (light) and w_r (viewer) point away from the surface; the light travels along k_i = -w_i before and
+  along k_r = w_r after reflection. z is the normal of the mean surface.
+* s = z x w / abs(z x w) for either direction: for the azimuth phi s = (-sin phi, cos phi, 0), which at the pole w = z
+  is its limit along that azimuth. In the twins of unit vectors the azimuth of the pole itself is 0. p = s x k with the
+  direction k in which the light travels, so that (p, s, k) is right-handed: p_i = -(cos theta cos phi,
+  cos theta sin phi, -sin theta) for the light and p_r = +(the same of theta_r, phi_r) for the viewer. The paper's
+  bases (eqs 14, 35) are these, its s_r and p_r with the opposite sign; no Mueller matrix depends on that sign.
+* Fields vary as exp(i k.r - i omega t), the index is n + ik. Complex amplitudes are those of the electric field.
+* Stokes vector (I, Q, U, V): I = abs(E_s)^2 + abs(E_p)^2, Q = abs(E_s)^2 - abs(E_p)^2, U + iV = 2 E_s conj(E_p).
+  Q > 0 is s-polarised; U > 0 is linear along s + p; V > 0 has positive helicity, E_s = i E_p: at a fixed point the
+  field turns from p to s, counter-clockwise for whoever looks towards the incoming light.
+* Matrices act on columns from the left: row = reflected, column = incident; index 0 is s and 1 is p.
+* Reciprocity, of light and viewer exchanged: J' = Z J^T Z with Z = diag(1, -1), M' = D M^T D with
+  D = diag(1, 1, -1, 1). The sign comes with p = s x k: the same wave travelling back has the other p.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb import fresnel
+from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
+from brdfdb.models import he_torrance_1991 as unpolarised
+from brdfdb.parameters import Floats
+
+Complexes = NDArray[np.complexfloating[Any, Any]]
+
+
+def he_torrance_jones(
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    theta_r: ArrayLike,
+    phi_r: ArrayLike,
+    *,
+    n: ArrayLike,
+    k: ArrayLike,
+) -> Complexes:
+    """Jones matrix of the facet that mirrors light to viewer, between the s and p of the mean surface.
+
+    Parameters
+    ----------
+    theta_i, phi_i, theta_r, phi_r : array_like [rad]
+        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
+    n, k : array_like [1]
+        Complex refractive index n + ik; n in [1e-3, 100], k in [0, 1e4].
+
+    Returns
+    -------
+    complex array [1]
+        In the broadcast shape of all arguments and (2, 2): [row of the reflected, column of the incident field], in the
+        order s, p. 0 below the horizon, nan where an angle is nan. Sum of abs(J)^2 / 2 is the |F|^2 of eq. 75.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    Eqs (61)-(64) over |k_r x k_i|^2, which is 0 / 0 at backscatter. With the angles A and B that the great circle from
+    light to viewer makes with the meridians through w_i and w_r, the facet's own s and p are the surface's turned by
+    -A and pi - B, and J = (F_s + F_p) / 2 times a rotation by A - B, plus (F_s - F_p) / 2 times a reflection by A + B.
+    Gauss's and Delambre's formulas give both without a quotient by |k_r x k_i|: A + B where light and viewer coincide
+    (A - B has no limit there, but F_s + F_p is 0) and A - B where they are opposite at grazing (A + B has none, but
+    F_s - F_p is 0). So J is continuous everywhere but at the poles, where s and p themselves turn with phi.
+
+    Departure from the paper: M_ps of eq. (64) is -(F_s .. - F_p ..), with the sign that M_sp of eq. (62) has. As
+    printed, a perfect mirror would reflect light polarised at 45 degrees with a factor between 0 and 2. Intensities
+    of incident s, p and unpolarised light are the same either way.
+
+    References
+    ----------
+    he1991 (eqs 41-46, 59-65)
+
+    Examples
+    --------
+    >>> abs(he_torrance_jones(0.0, 0.0, 0.0, 0.0, n=1.5, k=0.0)).round(3).tolist()
+    [[0.2, 0.0], [0.0, 0.2]]
+    """
+    directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
+    return _finished_jones(directions, unpolarised.N.check(n), unpolarised.K.check(k))
+
+
+def he_torrance_jones_vectors(wi: ArrayLike, wr: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Complexes:
+    """`he_torrance_jones` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
+
+    At the pole itself s and p are those of phi = 0.
+    """
+    return _finished_jones(checked_vectors(wi, wr), unpolarised.N.check(n), unpolarised.K.check(k))
+
+
+def he_torrance_mueller(
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    theta_r: ArrayLike,
+    phi_r: ArrayLike,
+    *,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+) -> Floats:
+    """Mueller BRDF of a Gaussian rough surface: directional diffuse and uniform diffuse part, for any polarisation.
+
+    Parameters
+    ----------
+    theta_i, phi_i, theta_r, phi_r : array_like [rad]
+        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
+    wavelength_nm, sigma_0_um, tau_um, n, k, a : array_like
+        As in `he_torrance`.
+
+    Returns
+    -------
+    array [1/sr]
+        In the broadcast shape of all arguments and (4, 4): Stokes vector (I, Q, U, V) of the reflected radiance from
+        that of the irradiance; Q > 0 is s-polarised, the rest of the convention is in the docstring of the module. 0
+        below the horizon, nan where an angle is nan. Element [0, 0] is `he_torrance`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    Eqs (7), (59), (60) and (68): the directional diffuse part over |F|^2 times the Mueller matrix of
+    `he_torrance_jones`. The uniform diffuse part, eq. 72, is taken as an ideal depolariser: the paper treats the light
+    that comes from below the surface or from several reflections as uniform, and says nothing of its polarisation.
+
+    References
+    ----------
+    he1991
+
+    Examples
+    --------
+    >>> surface = dict(wavelength_nm=500.0, sigma_0_um=0.18, tau_um=3.0, n=1.5, k=0.0)
+    >>> M = he_torrance_mueller(0.98, 0.0, 0.98, np.pi, **surface)
+    >>> round(float(M[0, 1] / M[0, 0]), 2)  # s alone is reflected near Brewster's angle
+    1.0
+    """
+    surface = unpolarised.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    return _finished_mueller(checked_angles(theta_i, phi_i, theta_r, phi_r), surface, unpolarised.A.check(a))
+
+
+def he_torrance_mueller_vectors(
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+) -> Floats:
+    """`he_torrance_mueller` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
+
+    At the pole itself s and p are those of phi = 0.
+    """
+    surface = unpolarised.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    return _finished_mueller(checked_vectors(wi, wr), surface, unpolarised.A.check(a))
+
+
+def he_torrance_specular_mueller(
+    theta_i: ArrayLike,
+    *,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+) -> Floats:
+    """Mueller matrix of the specular part: what leaves in the exact mirror direction.
+
+    Parameters
+    ----------
+    theta_i : array_like [rad]
+        Angle of incidence, in [0, pi].
+    wavelength_nm, sigma_0_um, tau_um, n, k : array_like
+        As in `he_torrance`.
+
+    Returns
+    -------
+    array [1]
+        In the broadcast shape of all arguments and (4, 4), between the s and p of the light and those of the mirror
+        direction, at the azimuth phi_i + pi. Element [0, 0] is `he_torrance_specular`. 0 below the horizon, nan where
+        theta_i is nan.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    Eq. (73) with F_s and F_p in place of |F|^2: roughness and shadowing act on all polarisations alike.
+
+    References
+    ----------
+    he1991
+
+    Examples
+    --------
+    >>> mirror = dict(wavelength_nm=550.0, sigma_0_um=0.0, tau_um=2.0, n=1.5, k=0.0)
+    >>> he_torrance_specular_mueller(0.0, **mirror).diagonal().round(3).tolist()
+    [0.04, 0.04, -0.04, -0.04]
+    """
+    angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
+    surface = unpolarised.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    rho_s = unpolarised.he_torrance_specular(
+        angles.theta_i, wavelength_nm=wavelength_nm, sigma_0_um=sigma_0_um, tau_um=tau_um, n=n, k=k
+    )
+    half_sum, half_difference = fresnel.half_sum_and_difference(np.cos(angles.theta_i), surface.n, surface.k)
+    F_s, F_p = half_sum + half_difference, half_sum - half_difference
+    M = _mueller(F_s, np.zeros_like(F_s), np.zeros_like(F_s), F_p)
+    reflectance = M[..., :1, :1]
+    relative = np.divide(M, reflectance, out=np.zeros_like(M), where=reflectance > 0.0)
+    return finished(rho_s[..., None, None] * relative, angles, trailing=2)
+
+
+def _finished_jones(directions: Directions, n: Floats, k: Floats) -> Complexes:
+    J = np.stack(_jones(directions, n, k), axis=-1)
+    parts = J.view(np.float64).reshape(*J.shape[:-1], 2, 2, 2)
+    done: Floats = np.ascontiguousarray(finished(parts, directions, trailing=3))
+    result: Complexes = done.view(np.result_type(done.dtype, np.complex64))[..., 0]
+    return result
+
+
+def _finished_mueller(directions: Directions, surface: unpolarised.Surface, albedo: Floats) -> Floats:
+    # Eqs (7), (59), (60), (68)
+    M = _mueller(*_jones(directions, surface.n, surface.k))
+    with np.errstate(all="ignore"):
+        of_a_mirror = unpolarised.directional_diffuse(directions, surface)
+    f_r = of_a_mirror[..., None, None] * M
+    # Eq. (72)
+    depolariser = np.zeros((4, 4))
+    depolariser[0, 0] = 1.0 / np.pi
+    return finished(f_r + np.asarray(albedo)[..., None, None] * depolariser, directions, trailing=2)
+
+
+def _jones(directions: Directions, n: Floats, k: Floats) -> tuple[Complexes, Complexes, Complexes, Complexes]:
+    """J_ss, J_sp, J_ps, J_pp in the broadcast shape; A and B as in the notes of `he_torrance_jones`."""
+    sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
+    sin_dphi, cos2_half, sin2_half = _azimuth(directions)
+    # cos^2 and sin^2 of (theta_i - theta_r) / 2 and of (theta_i + theta_r) / 2, none by a difference that cancels
+    cos2_minus = 0.5 * (1.0 + cos_i * cos_r + sin_i * sin_r)
+    cos2_plus = (cos_i + cos_r) ** 2 / (4.0 * cos2_minus)
+    sin2_minus = 0.25 * ((sin_i - sin_r) ** 2 + (cos_i - cos_r) ** 2)
+    sin2_plus = 0.25 * ((sin_i + sin_r) ** 2 + (cos_i - cos_r) ** 2)
+    # Gauss and Delambre: cos and sin of pi - (A + B); the denominator is cos^2 of the bisecting angle, never 0
+    denominator = cos2_minus * cos2_half + cos2_plus * sin2_half
+    cos_sum = (cos2_minus * cos2_half - cos2_plus * sin2_half) / denominator
+    sin_sum = 0.5 * (cos_i + cos_r) * sin_dphi / denominator
+    # The same of A - B over sin^2 of the bisecting angle: 0 / 0 at backscatter, where F_s + F_p = 0
+    denominator = sin2_plus * sin2_half + sin2_minus * cos2_half
+    apart = denominator > 0.0
+    safe = np.where(apart, denominator, 1.0)
+    cos_difference = np.where(apart, (sin2_plus * sin2_half - sin2_minus * cos2_half) / safe, 1.0)
+    sin_difference = 0.5 * (cos_i - cos_r) * sin_dphi / safe
+    # Eqs (61)-(64) over |k_r x k_i|^2
+    with np.errstate(all="ignore"):  # of vectors: the branch not taken divides by zero
+        cos_bisecting = unpolarised.cos_bisecting(directions)
+    half_sum, half_difference = fresnel.half_sum_and_difference(cos_bisecting, n, k)
+    J_ss = half_difference * cos_sum - half_sum * cos_difference
+    J_sp = half_difference * sin_sum + half_sum * sin_difference
+    J_ps = half_difference * sin_sum - half_sum * sin_difference
+    J_pp = -half_difference * cos_sum - half_sum * cos_difference
+    return J_ss, J_sp, J_ps, J_pp
+
+
+def _azimuth(directions: Directions) -> tuple[Floats, Floats, Floats]:
+    """sin(delta_phi), cos^2 and sin^2 of delta_phi / 2, the azimuth of a pole taken as 0 for unit vectors."""
+    if isinstance(directions, Vectors):
+        cos_phi_i, sin_phi_i = unit_azimuth(directions.x_i, directions.y_i, directions.sin_i)
+        cos_phi_r, sin_phi_r = unit_azimuth(directions.x_r, directions.y_r, directions.sin_r)
+        sin_dphi = cos_phi_i * sin_phi_r - sin_phi_i * cos_phi_r
+        cos_dphi = cos_phi_i * cos_phi_r + sin_phi_i * sin_phi_r
+        cos2_half = np.where(cos_dphi < 0.0, sin_dphi**2 / (2.0 * (1.0 + np.abs(cos_dphi))), 0.5 * (1.0 + cos_dphi))
+    else:
+        sin_dphi, cos2_half = directions.sin_dphi, 0.5 * directions.one_plus_cos_dphi
+    # the one that is below 1/2 has all its digits
+    sin2_half = np.where(cos2_half > 0.5, sin_dphi**2 / (4.0 * np.maximum(cos2_half, 0.5)), 1.0 - cos2_half)
+    return sin_dphi, cos2_half, sin2_half
+
+
+def unit_azimuth(x: Floats, y: Floats, sin_theta: Floats) -> tuple[Floats, Floats]:
+    """cos(phi) and sin(phi) of unit vectors; phi = 0 at the pole."""
+    away = sin_theta != 0.0  # nan too
+    safe = np.where(away, sin_theta, 1.0)
+    return np.where(away, x / safe, 1.0), y / safe
+
+
+def _mueller(J_ss: Complexes, J_sp: Complexes, J_ps: Complexes, J_pp: Complexes) -> NDArray[np.float64]:
+    """The Mueller matrix of a Jones matrix, (..., 4, 4)."""
+    ss, sp, ps, pp = (z.real**2 + z.imag**2 for z in (J_ss, J_sp, J_ps, J_pp))
+    rows_s, rows_p = J_ss * J_sp.conj(), J_ps * J_pp.conj()
+    columns_s, columns_p = J_ss * J_ps.conj(), J_sp * J_pp.conj()
+    direct, crossed = J_ss * J_pp.conj(), J_sp * J_ps.conj()
+    elements = [
+        [0.5 * (ss + sp + ps + pp), 0.5 * (ss - sp + ps - pp), (rows_s + rows_p).real, -(rows_s + rows_p).imag],
+        [0.5 * (ss + sp - ps - pp), 0.5 * (ss - sp - ps + pp), (rows_s - rows_p).real, -(rows_s - rows_p).imag],
+        [(columns_s + columns_p).real, (columns_s - columns_p).real, (direct + crossed).real, (crossed - direct).imag],
+        [(columns_s + columns_p).imag, (columns_s - columns_p).imag, (direct + crossed).imag, (direct - crossed).real],
+    ]
+    return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in elements], axis=-2)

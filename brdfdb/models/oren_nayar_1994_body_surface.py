@@ -1,0 +1,136 @@
+"""Oren and Nayar 1994, eq. 32: their functional fit for the body plus Torrance and Sparrow's lobe for the surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.models import torrance_sparrow_1967
+from brdfdb.models.oren_nayar_1994 import INTERREFLECTION, RHO, SIGMA, oren_nayar, oren_nayar_vectors
+from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow, torrance_sparrow_vectors
+from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
+
+K_B = Parameter("k_b", "k_b", "1", 0.0, 1.0, "weight of the body's reflection", default=1.0)
+K_S = Parameter("k_s", "k_s", "1", 0.0, 1.0, "weight of the surface's reflection")
+WITH_INTERREFLECTION = replace(INTERREFLECTION, default=False)
+
+
+def oren_nayar_body_surface(
+    theta_i: ArrayLike,
+    phi_i: ArrayLike,
+    theta_r: ArrayLike,
+    phi_r: ArrayLike,
+    *,
+    rho: ArrayLike,
+    sigma: ArrayLike,
+    k_s: ArrayLike,
+    k_b: ArrayLike = 1.0,
+    interreflection: ArrayLike = False,
+    n: ArrayLike | None = None,
+    k: ArrayLike | None = None,
+) -> Floats:
+    """BRDF of a rough body with a glossy surface, k_b times `oren_nayar` plus k_s times `torrance_sparrow`.
+
+    Parameters
+    ----------
+    theta_i, phi_i, theta_r, phi_r : array_like [rad]
+        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
+    rho : array_like [1]
+        Albedo of a facet of the body, in [0, 1].
+    sigma : array_like [rad]
+        Standard deviation of the slope angle, in [0, pi/2]: the same facets for body and surface.
+    k_b, k_s : array_like [1]
+        Weights of body and surface, each in [0, 1]. The paper prints k_s / k_b: 0.019 foam, 0.085 cotton towel, 0.043
+        wood shavings.
+    interreflection : bool
+        Add the body's second bounce (eq. 28); section 5 of the paper leaves it out.
+    n, k : array_like [1], optional
+        Refractive index n + ik of the surface, n in [1e-3, 100] and k in [0, 1e4]. Without n the Fresnel coefficient is
+        1, as in the paper.
+
+    Returns
+    -------
+    array [1/sr]
+        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range, or k is given without n.
+
+    Notes
+    -----
+    Eq. (32) with eqs (27) and (31), divided by E_0 cos(theta_i), E_0 = 1. Weights are fitted, not derived: nothing
+    holds the sum to the light received (see `torrance_sparrow`).
+
+    References
+    ----------
+    orennayar1994, torrancesparrow1967
+
+    Examples
+    --------
+    >>> round(float(oren_nayar_body_surface(0.3, 0.0, 0.4, np.pi, rho=0.8, sigma=0.35, k_s=0.019)), 4)
+    0.2338
+    """
+    directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
+    angles = directions.given
+    body = oren_nayar(*angles, rho=rho, sigma=sigma, interreflection=interreflection)
+    return _sum(body, torrance_sparrow(*angles, sigma=sigma, n=n, k=k), k_b, k_s, directions)
+
+
+def oren_nayar_body_surface_vectors(
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    rho: ArrayLike,
+    sigma: ArrayLike,
+    k_s: ArrayLike,
+    k_b: ArrayLike = 1.0,
+    interreflection: ArrayLike = False,
+    n: ArrayLike | None = None,
+    k: ArrayLike | None = None,
+) -> Floats:
+    """`oren_nayar_body_surface` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    directions = checked_vectors(wi, wr)
+    w_i, w_r = directions.w_i.astype(np.float64), directions.w_r.astype(np.float64)
+    body = oren_nayar_vectors(w_i, w_r, rho=rho, sigma=sigma, interreflection=interreflection)
+    return _sum(body, torrance_sparrow_vectors(w_i, w_r, sigma=sigma, n=n, k=k), k_b, k_s, directions)
+
+
+def _sum(body: Floats, surface: Floats, k_b: ArrayLike, k_s: ArrayLike, directions: Directions) -> Floats:
+    # Eq. (32), of values in float64
+    return finished(K_B.check(k_b) * body + K_S.check(k_s) * surface, directions)
+
+
+def lobe(cos_i: Floats, *, rho: ArrayLike, sigma: ArrayLike, k_s: ArrayLike, k_b: ArrayLike, **_: ArrayLike) -> Lobe:
+    """Where to look for the lobe of the surface: share by the albedos, slopes by sigma."""
+    whole = torrance_sparrow_1967.lobe(cos_i, sigma=sigma)
+    surface = np.asarray(k_s) * 4.0 * np.pi * whole.alpha_x**2  # the albedo of a narrow lobe with F = 1
+    body = np.asarray(k_b) * np.asarray(rho)
+    total = surface + body
+    return whole._replace(share=np.divide(surface, total, where=total > 0.0, out=np.zeros(np.shape(total))))
+
+
+# The sum of those of the two models, at rho = k_b = k_s = 1
+_KNOWN_EXCESS: dict[str, float | str] = {
+    "max_albedo": 21.2,
+    "from_theta_i_deg": 0.0,
+    "citation": "Oren and Nayar 1994, eq. 32: a fitted sum of two radiances, of which that of eq. 31 is not normalised",
+}
+
+SPEC = ModelSpec(
+    name="oren_nayar_body_surface",
+    version=1,
+    title="Oren-Nayar body with a Torrance-Sparrow surface",
+    equation="eq. 32",
+    reference="orennayar1994",
+    parameters=(RHO, SIGMA, K_S, K_B, WITH_INTERREFLECTION),
+    evaluate=oren_nayar_body_surface,
+    vectors=oren_nayar_body_surface_vectors,
+    grazing_pole=True,
+    lobe=lobe,
+    known_excess=_KNOWN_EXCESS,
+)

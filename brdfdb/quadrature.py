@@ -1,0 +1,258 @@
+"""The directional albedo of a model, by quadrature that follows its lobe, with an estimate of its error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.geometry import HALF_PI, check_phi, check_theta, unit_vector
+from brdfdb.models import MODELS
+from brdfdb.parameters import Floats, Lobe, ModelSpec
+
+Array = NDArray[np.float64]
+Integrand = Callable[[Array, Array], Array]
+
+# Gauss's rule of 7 nodes and Kronrod's of 15 that extends it, on [-1, 1]: the nodes from 0 on, with their weights
+_NODES = np.array(
+    [
+        0.0,
+        0.207784955007898467600689403773245,
+        0.405845151377397166906606412076961,
+        0.586087235467691130294144691693013,
+        0.741531185599394439863864773280788,
+        0.864864423359769072789712788640926,
+        0.949107912342758524526189684047851,
+        0.991455371120812639206854697526329,
+    ]
+)
+_KRONROD = np.array(
+    [
+        0.209482141084727828012999174891714,
+        0.204432940075298892414161999234649,
+        0.190350578064785409913256402421014,
+        0.169004726639267902826583426598550,
+        0.140653259715525918745189590510238,
+        0.104790010322250183839876322541518,
+        0.063092092629978553290700663189204,
+        0.022935322010529224963732008058970,
+    ]
+)
+_GAUSS = np.array(
+    [
+        0.417959183673469387755102040816327,
+        0.0,
+        0.381830050505118944950369775488975,
+        0.0,
+        0.279705391489276667901467771423780,
+        0.0,
+        0.129484966168869693270611432679082,
+        0.0,
+    ]
+)
+_X = np.concatenate([-_NODES[:0:-1], _NODES])
+_W_KRONROD = np.concatenate([_KRONROD[:0:-1], _KRONROD])
+_W_GAUSS = np.concatenate([_GAUSS[:0:-1], _GAUSS])
+
+_SAFETY = 4.0  # an edge inside a panel may hide from the difference of two rules: up to 1.6 times that was measured
+_BATCH = 2000  # panels that are evaluated at a time, of 225 points each
+MOST_PANELS = 40_000  # where the quadrature gives up, with the error that it has
+
+
+class Albedo(NamedTuple):
+    """Directional albedo [1] and estimate of its absolute error: four times what two rules differ on all panels."""
+
+    albedo: Floats
+    error: Floats
+
+
+def directional_albedo(
+    model: ModelSpec | str,
+    theta_i: ArrayLike,
+    phi_i: ArrayLike = 0.0,
+    *,
+    tolerance: float = 1e-8,
+    specular: bool = False,
+    **parameters: ArrayLike,
+) -> Albedo:
+    """The share that a model reflects of the light from one direction: f_r cos theta_r integrated over all viewers.
+
+    Parameters
+    ----------
+    model : ModelSpec or str
+        A model, or its name in `brdfdb.models.MODELS`.
+    theta_i, phi_i : array_like [rad]
+        Direction of the light; theta in [0, pi], 0 reflected below the horizon. phi matters to anisotropic models.
+    tolerance : float
+        The absolute error to stay below, in [1e-13, 1].
+    specular : bool
+        Add the reflectance of the Dirac part, for models that have one.
+    **parameters : array_like
+        Those of the model; they broadcast with the angles.
+
+    Returns
+    -------
+    Albedo
+        (albedo, error), each in the broadcast shape of all arguments. The error is above the tolerance only where
+        the quadrature gave up, as at 90 degrees exactly of a model with a pole.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range, or there is no such model.
+
+    Notes
+    -----
+    Models without a lobe are integrated over (theta_r, phi_r), from which Oren and Nayar's edges, at theta_r = theta_i
+    and 90 degrees from the light, are left out. Those with a lobe are integrated over the slopes of the half vector, on
+    ellipses t (alpha_x cos psi, alpha_y sin psi): the lobe is a function of t, and viewers are above the horizon up to
+    one t for each psi. t is stretched, so that near t = 0 the unit is the lobe and beyond it the octave. Panels of
+    15 x 15 nodes of Gauss and Kronrod are halved until their errors add up to less than the tolerance. Ward's models at
+    89.9 degrees take about 20 ms with an alpha of 0.01, and 1 s with 1e-6, where directions themselves are too coarse.
+
+    Examples
+    --------
+    >>> albedo, error = directional_albedo("lambert", 1.0, rho=0.5)
+    >>> round(float(albedo), 12), bool(error < 1e-8)
+    (0.5, True)
+    """
+    spec = spec_of(model)
+    if not 1e-13 <= tolerance <= 1.0:
+        raise ValueError(f"tolerance: {tolerance:.9g} is outside [1e-13, 1]")
+    thetas, phis = check_theta("theta_i", theta_i), check_phi("phi_i", phi_i)
+    arrays = np.broadcast_arrays(thetas, phis, *(np.asarray(value) for value in parameters.values()))
+    albedo, error = np.empty(arrays[0].shape), np.empty(arrays[0].shape)
+    for index in np.ndindex(arrays[0].shape):
+        theta, phi, *values = (array[index] for array in arrays)
+        one = dict(zip(parameters, values, strict=True))
+        albedo[index], error[index] = _albedo(spec, float(theta), float(phi), one, tolerance)
+    if specular and spec.specular is not None:
+        albedo = albedo + spec.specular(thetas, **{name: parameters[name] for name in spec.specular_parameters})
+    return Albedo(albedo[()], error[()])
+
+
+def spec_of(model: ModelSpec | str) -> ModelSpec:
+    """A model by its name, or itself."""
+    if isinstance(model, ModelSpec):
+        return model
+    if model not in MODELS:
+        raise ValueError(f"model: {model!r} is not one of {', '.join(MODELS)}")
+    return MODELS[model]
+
+
+def _albedo(
+    spec: ModelSpec, theta_i: float, phi_i: float, parameters: dict[str, Any], tolerance: float
+) -> tuple[float, float]:
+    wi = unit_vector(min(theta_i, HALF_PI), phi_i)
+    if np.isnan(wi).any():
+        return np.nan, np.nan
+    if theta_i > HALF_PI:
+        return 0.0, 0.0
+
+    def reflected(wr: Array) -> Array:
+        with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
+            f_r = spec.vectors(wi, wr, **parameters)
+        return np.asarray(f_r * np.maximum(wr[..., 2], 0.0), dtype=np.float64)
+
+    if spec.lobe is None:
+        return _adaptive(*_over_the_hemisphere(reflected, theta_i, phi_i), tolerance)
+    return _adaptive(*_over_the_slopes(reflected, wi, spec.lobe(wi[2], **parameters)), tolerance)
+
+
+def _over_the_hemisphere(reflected: Callable[[Array], Array], theta_i: float, phi_i: float) -> tuple[Integrand, Array]:
+    """The integrand over theta_r and phi_r, and panels with edges where Oren and Nayar's model has its own."""
+
+    def integrand(theta: Array, phi: Array) -> Array:
+        return reflected(unit_vector(theta, phi)) * np.sin(theta)
+
+    thetas = [0.0, theta_i, HALF_PI] if 0.0 < theta_i < HALF_PI else [0.0, HALF_PI / 2.0, HALF_PI]
+    return integrand, _panels(np.array(thetas), phi_i + HALF_PI * np.arange(5))
+
+
+def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe) -> tuple[Integrand, Array]:
+    """The integrand over x in [0, 1], how far out on a ray, and psi, the azimuth on the ellipse of the lobe."""
+    x_i, y_i, cos_i = wi
+    sin2_i = x_i**2 + y_i**2
+    alpha_x, alpha_y = (float(np.clip(alpha, 1e-9, 10.0)) for alpha in (lobe.alpha_x, lobe.alpha_y))
+
+    def integrand(x: Array, psi: Array) -> Array:
+        s_x, s_y = alpha_x * np.cos(psi), alpha_y * np.sin(psi)  # the slopes of the half vector, over t
+        s2 = s_x**2 + s_y**2
+        # cos theta_r = 0 at cos_i s2 t^2 - 2 p t - cos_i = 0
+        p = x_i * s_x + y_i * s_y
+        root = np.sqrt(p * p + cos_i * cos_i * s2)
+        t_horizon = np.where(p > 0.0, (p + root) / (cos_i * s2), cos_i / np.where(p > 0.0, 1.0, root - p))
+        stretch = np.arcsinh(t_horizon)
+        t = np.sinh(x * stretch)
+        # dt / dx
+        jacobian = np.sqrt(1.0 + t * t) * stretch
+        cos_h = 1.0 / np.sqrt(1.0 + t * t * s2)
+        h = np.stack([t * s_x * cos_h, t * s_y * cos_h, cos_h], axis=-1)
+        h_i = (cos_i + t * p) * cos_h
+        wr = 2.0 * h_i[..., np.newaxis] * h - wi
+        # d omega_r = 4 (h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
+        return np.asarray(reflected(wr) * 4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian)
+
+    # a quarter turn away from the light, at grazing, the horizon leaps: an edge of panels
+    across = np.arctan2(alpha_x * x_i, -alpha_y * y_i) if sin2_i > 0.0 else HALF_PI  # p = 0
+    return integrand, _panels(np.linspace(0.0, 1.0, 5), across + HALF_PI * np.arange(5))
+
+
+def _panels(first: Floats, second: Floats) -> Array:
+    """Rectangles between edges: rows of the centre and half the width in the first, and in the second variable."""
+    centres = [(edges[:-1] + edges[1:]) / 2.0 for edges in (first, second)]
+    halves = [np.diff(edges) / 2.0 for edges in (first, second)]
+    return np.stack(
+        [
+            *(grid.ravel() for grid in np.meshgrid(centres[0], centres[1], indexing="ij")),
+            *(grid.ravel() for grid in np.meshgrid(halves[0], halves[1], indexing="ij")),
+        ],
+        axis=-1,
+    )
+
+
+def _adaptive(integrand: Integrand, panels: Array, tolerance: float) -> tuple[float, float]:
+    """The integral over rectangles, halved where the error is large until it is below the tolerance in all."""
+    values, errors = _rules(integrand, panels)
+    done = 0
+    while errors.sum() > tolerance and done < MOST_PANELS:
+        # the largest errors, as many as stand for all but a part of the tolerance
+        total = errors.sum(axis=1)
+        order = np.argsort(total)[::-1]
+        rest = total.sum() - np.cumsum(total[order])
+        chosen = order[: 1 + int(np.count_nonzero(rest > 0.5 * tolerance))]
+        kept = np.setdiff1d(np.arange(total.size), chosen)
+        halved = _halved(panels[chosen], errors[chosen])
+        new_values, new_errors = _rules(integrand, halved)
+        panels = np.concatenate([panels[kept], halved])
+        values, errors = np.concatenate([values[kept], new_values]), np.concatenate([errors[kept], new_errors])
+        done += len(halved)
+    return float(values.sum()), float(errors.sum())
+
+
+def _halved(panels: Array, errors: Array) -> Array:
+    """Each panel cut in two, across the variable in which its rules differ most."""
+    axis = np.argmax(errors, axis=1)
+    row = np.arange(len(panels))
+    low, high = panels.copy(), panels.copy()
+    half = panels[row, 2 + axis] / 2.0
+    for child, sign in ((low, -1.0), (high, 1.0)):
+        child[row, axis] += sign * half
+        child[row, 2 + axis] = half
+    return np.concatenate([low, high])
+
+
+def _rules(integrand: Integrand, panels: Array) -> tuple[Array, Array]:
+    """Integral over each panel, and by how much it changes with Gauss's rule in the first or the second variable."""
+    values, errors = np.empty(len(panels)), np.empty((len(panels), 2))
+    for start in range(0, len(panels), _BATCH):
+        batch = slice(start, start + _BATCH)
+        c_1, c_2, h_1, h_2 = (column[:, np.newaxis, np.newaxis] for column in panels[batch].T)
+        f = integrand(*np.broadcast_arrays(c_1 + h_1 * _X[:, np.newaxis], c_2 + h_2 * _X)) * (h_1 * h_2)
+        by_first, by_second = f @ _W_KRONROD, _W_KRONROD @ f
+        values[batch] = by_first @ _W_KRONROD
+        errors[batch, 0] = _SAFETY * np.abs(values[batch] - by_first @ _W_GAUSS)
+        errors[batch, 1] = _SAFETY * np.abs(values[batch] - by_second @ _W_GAUSS)
+    return values, errors

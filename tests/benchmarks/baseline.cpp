@@ -1,0 +1,352 @@
+// The models as one would write them in C++: what tests/benchmarks/against_cpp.py measures our kernels against.
+//
+// A process of its own, because -ffast-math makes whoever loads it flush subnormal numbers. It reads from the folder
+// that is its argument, then answers requests, one a line:
+//   time KERNEL SECONDS PARAMETERS...   run KERNEL for that long: median and least seconds of a pass
+//   dump KERNEL FILE PARAMETERS...      run it once and write its values
+
+#include <sys/mman.h>
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace {
+
+constexpr double PI = 3.14159265358979323846;
+using Parameters = std::vector<double>;
+
+// Huge pages for large arrays, as NumPy asks for them
+struct Array {
+    double* data = nullptr;
+    std::size_t size = 0;
+    explicit Array(std::size_t count) : size(count) {
+        constexpr std::size_t page = 1 << 21;
+        const std::size_t bytes = (count * sizeof(double) + page - 1) / page * page;
+        data = static_cast<double*>(std::aligned_alloc(page, bytes));
+        madvise(data, bytes, MADV_HUGEPAGE);
+        std::fill(data, data + count, 0.0);
+    }
+};
+
+Array read(const std::string& path) {
+    std::ifstream file(path, std::ios::binary | std::ios::ate);
+    const std::size_t count = file.tellg() / sizeof(double);
+    Array array(count);
+    file.seekg(0);
+    file.read(reinterpret_cast<char*>(array.data), count * sizeof(double));
+    return array;
+}
+
+// ---- Ward, eq. (5a)
+
+inline double ward(double xi, double yi, double zi, double xr, double yr, double zr, double diffuse, double peak,
+                   double ux, double uy) {
+    const double hx = (xi + xr) * ux, hy = (yi + yr) * uy, hz = zi + zr;
+    const double f = diffuse + peak / std::sqrt(zi * zr) * std::exp(-(hx * hx + hy * hy) / (hz * hz));
+    return zi < 0.0 || zr < 0.0 ? 0.0 : f;
+}
+
+struct WardSurface {
+    double diffuse, peak, ux, uy;
+    explicit WardSurface(const Parameters& p)
+        : diffuse(p[0] / PI), peak(p[1] / (4.0 * PI * p[2] * p[3])), ux(1.0 / p[2]), uy(1.0 / p[3]) {}
+};
+
+// ---- Oren-Nayar, eqs (27) and (28)
+
+struct OrenNayarSurface {
+    double scale, c1, ratio45, ratio125, bounced;
+    explicit OrenNayarSurface(const Parameters& p) {
+        const double rho = p[0], s2 = p[1] * p[1], ratio = s2 / (s2 + 0.09);
+        scale = rho / PI;
+        c1 = 1.0 - 0.5 * s2 / (s2 + 0.33);
+        ratio45 = 0.45 * ratio;
+        ratio125 = 0.125 * ratio;
+        bounced = p[2] * 0.17 * rho * s2 / (s2 + 0.13);
+    }
+};
+
+inline double oren_nayar(double xi, double yi, double zi, double xr, double yr, double zr, const OrenNayarSurface& s) {
+    const double sin_i = std::sqrt(xi * xi + yi * yi), sin_r = std::sqrt(xr * xr + yr * yr);
+    const double z_low = std::min(zi, zr), z_high = std::max(zi, zr);
+    const double alpha = std::acos(z_low), beta = std::acos(z_high);
+    const double sin_alpha = std::max(sin_i, sin_r), sin_beta = std::min(sin_i, sin_r);
+    const double cos_dphi = (xi * xr + yi * yr) / (sin_i * sin_r);
+    const double b = beta * (2.0 / PI), ab = alpha * beta * (4.0 / (PI * PI));
+    const double c2 = s.ratio45 * (sin_alpha - (cos_dphi >= 0.0 ? 0.0 : b * b * b));
+    const double direct = s.c1 + cos_dphi * c2 * (sin_beta / z_high) +
+                          (1.0 - std::abs(cos_dphi)) * s.ratio125 * ab * ab * (sin_i + sin_r) / (zi + zr);
+    const double f = s.scale * (direct + s.bounced * (1.0 - cos_dphi * b * b));
+    return zi < 0.0 || zr < 0.0 || f < 0.0 ? 0.0 : f;
+}
+
+// ---- Oren-Nayar, eq. (30)
+
+struct QualitativeSurface {
+    double a, b;
+    explicit QualitativeSurface(const Parameters& p) {
+        const double s2 = p[1] * p[1];
+        a = p[0] / PI * (1.0 - 0.5 * s2 / (s2 + p[2]));
+        b = p[0] / PI * 0.45 * s2 / (s2 + 0.09);
+    }
+};
+
+// sin(alpha) tan(beta) cos(dphi) is the product of the horizontal parts over the larger cosine
+inline double qualitative(double xi, double yi, double zi, double xr, double yr, double zr,
+                          const QualitativeSurface& s) {
+    const double f = s.a + s.b * std::max(0.0, xi * xr + yi * yr) / std::max(zi, zr);
+    return zi < 0.0 || zr < 0.0 ? 0.0 : f;
+}
+
+// ---- He-Torrance, eqs (71), (72), (75)-(84); the sum of (78) direction by direction until it has converged
+
+struct Logs {
+    std::vector<double> of;
+    explicit Logs(int count) : of(count) {
+        for (int m = 1; m < count; ++m) of[m] = std::log(double(m));
+    }
+};
+
+// e^-g times the sum over m of g^m / (m! m) exp(-V / m); the coefficient by recurrence of its logarithm
+double series(double g, double V, double tolerance) {
+    static const Logs logs(1 << 20);
+    const double log_g = std::log(g);
+    double log_weight = log_g - g, sum = 0.0, previous = -1e308;
+    for (int m = 1; m + 1 < (1 << 20); ++m) {
+        const double log_term = log_weight - logs.of[m] - V / m;
+        const double term = std::exp(log_term);
+        sum += term;
+        if (log_term < previous && term <= tolerance * sum) break;
+        previous = log_term;
+        log_weight += log_g - logs.of[m + 1];
+    }
+    return sum;
+}
+
+double shadowing(double sin, double cos, double slope) {
+    const double x = cos / (2.0 * slope * sin), q = 1.0 - 0.5 * std::erfc(x);
+    return q / (q + slope / std::sqrt(PI) * sin / cos * std::exp(-x * x));
+}
+
+double hidden(double sin, double cos, double slope) { return sin / cos * std::erfc(cos / (2.0 * slope * sin)); }
+
+// W_0(y) by Halley's iteration
+double lambert_w(double y) {
+    double w = std::log1p(y);
+    for (int i = 0; i < 20; ++i) {
+        const double e = std::exp(w), f = w * e - y;
+        const double step = f / (e * (w + 1.0) - (w + 2.0) * f / (2.0 * w + 2.0));
+        w -= step;
+        if (std::abs(step) <= 1e-13 * w) break;
+    }
+    return w;
+}
+
+double fresnel(double cos, double n, double k) {
+    const double cos2 = cos * cos, sin2 = 1.0 - cos2, re = n * n - k * k - sin2, im = 2.0 * n * k;
+    const double modulus = std::sqrt(re * re + im * im);
+    const double a2 = 0.5 * (modulus + re), b2 = 0.5 * (modulus - re), a = std::sqrt(a2);
+    const double s = ((a - cos) * (a - cos) + b2) / ((a + cos) * (a + cos) + b2), t = sin2 / cos;
+    return 0.5 * s * (1.0 + ((a - t) * (a - t) + b2) / ((a + t) * (a + t) + b2));
+}
+
+// p: wavelength [um], sigma_0, tau [um], n, k, a, tolerance
+double he_torrance(const double* wi, const double* wr, const Parameters& p) {
+    const double wave_number = 2.0 * PI / p[0], slope = p[1] / p[2];
+    const double ci = wi[2], cr = wr[2];
+    const double si = std::sqrt(wi[0] * wi[0] + wi[1] * wi[1]), sr = std::sqrt(wr[0] * wr[0] + wr[1] * wr[1]);
+    const double hx = wi[0] + wr[0], hy = wi[1] + wr[1], hz = ci + cr;
+    const double v_xy2 = hx * hx + hy * hy, v_z2 = hz * hz;
+    const double K = hidden(si, ci, slope) + hidden(sr, cr, slope);
+    const double sigma2 = p[1] * p[1] / (1.0 + lambert_w(K * K / (8.0 * PI)));
+    const double g = wave_number * wave_number * sigma2 * v_z2;
+    const double V = 0.25 * wave_number * wave_number * v_xy2 * p[2] * p[2];
+    const double D = wave_number * wave_number * p[2] * p[2] / 16.0 * series(g, V, p[6]);
+    const double G = (v_xy2 + v_z2) * (v_xy2 + v_z2) / v_z2;
+    const double S = shadowing(si, ci, slope) * shadowing(sr, cr, slope);
+    const double F2 = fresnel(0.5 * std::sqrt(v_xy2 + v_z2), p[3], p[4]);
+    return F2 * G * S * D / (PI * ci * cr) + p[5] / PI;
+}
+
+// ---- Loops
+
+struct Inputs {
+    Array w_i, w_r, theta, phi;
+    std::vector<Array> parts;  // x_i y_i z_i x_r y_r z_r
+    explicit Inputs(const std::string& folder)
+        : w_i(read(folder + "/w_i")),
+          w_r(read(folder + "/w_r")),
+          theta(read(folder + "/theta")),
+          phi(read(folder + "/phi")) {
+        for (const Array* w : {&w_i, &w_r})
+            for (int c = 0; c < 3; ++c) {
+                parts.emplace_back(w->size / 3);
+                for (std::size_t j = 0; j < w->size / 3; ++j) parts.back().data[j] = w->data[3 * j + c];
+            }
+    }
+};
+
+template <class Surface, class F>
+void interleaved(const Inputs& in, const Surface& s, double* __restrict f, F value) {
+    const double *__restrict a = in.w_i.data, *__restrict b = in.w_r.data;
+    const std::size_t count = in.w_i.size / 3;
+    for (std::size_t j = 0; j < count; ++j)
+        f[j] = value(a[3 * j], a[3 * j + 1], a[3 * j + 2], b[3 * j], b[3 * j + 1], b[3 * j + 2], s);
+}
+
+template <class Surface, class F>
+void six(const Inputs& in, const Surface& s, double* __restrict f, F value) {
+    const double *__restrict xi = in.parts[0].data, *__restrict yi = in.parts[1].data,
+                             *__restrict zi = in.parts[2].data, *__restrict xr = in.parts[3].data,
+                             *__restrict yr = in.parts[4].data, *__restrict zr = in.parts[5].data;
+    const std::size_t count = in.w_i.size / 3;
+    for (std::size_t j = 0; j < count; ++j) f[j] = value(xi[j], yi[j], zi[j], xr[j], yr[j], zr[j], s);
+}
+
+const auto ward_value = [](double xi, double yi, double zi, double xr, double yr, double zr, const WardSurface& s) {
+    return ward(xi, yi, zi, xr, yr, zr, s.diffuse, s.peak, s.ux, s.uy);
+};
+const auto oren_nayar_value = [](double xi, double yi, double zi, double xr, double yr, double zr,
+                                 const OrenNayarSurface& s) { return oren_nayar(xi, yi, zi, xr, yr, zr, s); };
+const auto qualitative_value = [](double xi, double yi, double zi, double xr, double yr, double zr,
+                                  const QualitativeSurface& s) { return qualitative(xi, yi, zi, xr, yr, zr, s); };
+
+// theta_i x theta_r x delta_phi from axes; what does not depend on the azimuth is outside the innermost loop
+struct Axes {
+    std::size_t polar, azimuths;
+    std::vector<double> sin, cos, cos_phi, sin_phi;
+    explicit Axes(const Inputs& in)
+        : polar(in.theta.size), azimuths(in.phi.size), sin(polar), cos(polar), cos_phi(azimuths), sin_phi(azimuths) {
+        for (std::size_t i = 0; i < polar; ++i) sin[i] = std::sin(in.theta.data[i]), cos[i] = std::cos(in.theta.data[i]);
+        for (std::size_t j = 0; j < azimuths; ++j)
+            cos_phi[j] = std::cos(in.phi.data[j]), sin_phi[j] = std::sin(in.phi.data[j]);
+    }
+};
+
+void ward_grid(const Inputs& in, const Parameters& p, double* __restrict f) {
+    const Axes axes(in);
+    const WardSurface s(p);
+    const double *__restrict c = axes.cos_phi.data(), *__restrict d = axes.sin_phi.data();
+    for (std::size_t i = 0; i < axes.polar; ++i)
+        for (std::size_t r = 0; r < axes.polar; ++r, f += axes.azimuths) {
+            const double hz = axes.cos[i] + axes.cos[r], inverse = 1.0 / hz;
+            const double fixed = axes.sin[i] * s.ux * inverse;
+            const double x = axes.sin[r] * s.ux * inverse, y = axes.sin[r] * s.uy * inverse;
+            const double peak = s.peak / std::sqrt(axes.cos[i] * axes.cos[r]);
+            for (std::size_t j = 0; j < axes.azimuths; ++j) {
+                const double hx = fixed + x * c[j], hy = y * d[j];
+                f[j] = s.diffuse + peak * std::exp(-(hx * hx + hy * hy));
+            }
+        }
+}
+
+void oren_nayar_grid(const Inputs& in, const Parameters& p, double* __restrict f) {
+    const Axes axes(in);
+    const OrenNayarSurface s(p);
+    const double* __restrict c = axes.cos_phi.data();
+    for (std::size_t i = 0; i < axes.polar; ++i)
+        for (std::size_t r = 0; r < axes.polar; ++r, f += axes.azimuths) {
+            const double alpha = std::max(in.theta.data[i], in.theta.data[r]);
+            const double beta = std::min(in.theta.data[i], in.theta.data[r]);
+            const double b = beta * (2.0 / PI), ab = alpha * beta * (4.0 / (PI * PI)), tan_beta = std::tan(beta);
+            const double sin_alpha = std::max(axes.sin[i], axes.sin[r]), bounced = s.scale * s.bounced;
+            const double level = s.scale * s.c1 + bounced;
+            const double backward = s.scale * s.ratio45 * sin_alpha * tan_beta - bounced * b * b;
+            const double forward = backward - s.scale * s.ratio45 * b * b * b * tan_beta;
+            const double third = s.scale * s.ratio125 * ab * ab * std::tan(0.5 * (alpha + beta));
+            for (std::size_t j = 0; j < axes.azimuths; ++j) {
+                const double value =
+                    level + (c[j] >= 0.0 ? backward : forward) * c[j] + third * (1.0 - std::abs(c[j]));
+                f[j] = std::max(0.0, value);
+            }
+        }
+}
+
+void qualitative_grid(const Inputs& in, const Parameters& p, double* __restrict f) {
+    const Axes axes(in);
+    const QualitativeSurface s(p);
+    const double* __restrict c = axes.cos_phi.data();
+    for (std::size_t i = 0; i < axes.polar; ++i)
+        for (std::size_t r = 0; r < axes.polar; ++r, f += axes.azimuths) {
+            const double b = s.b * std::max(axes.sin[i], axes.sin[r]) *
+                             std::tan(std::min(in.theta.data[i], in.theta.data[r]));
+            for (std::size_t j = 0; j < axes.azimuths; ++j) f[j] = s.a + b * std::max(0.0, c[j]);
+        }
+}
+
+double processor_seconds() {
+    timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return now.tv_sec + 1e-9 * now.tv_nsec;
+}
+
+using Kernel = std::function<void(const Inputs&, const Parameters&, double*)>;
+
+const std::map<std::string, Kernel> kernels = {
+    {"ward", [](const Inputs& in, const Parameters& p, double* f) { interleaved(in, WardSurface(p), f, ward_value); }},
+    {"ward_six", [](const Inputs& in, const Parameters& p, double* f) { six(in, WardSurface(p), f, ward_value); }},
+    {"ward_grid", ward_grid},
+    {"oren_nayar",
+     [](const Inputs& in, const Parameters& p, double* f) {
+         interleaved(in, OrenNayarSurface(p), f, oren_nayar_value);
+     }},
+    {"oren_nayar_six",
+     [](const Inputs& in, const Parameters& p, double* f) { six(in, OrenNayarSurface(p), f, oren_nayar_value); }},
+    {"oren_nayar_grid", oren_nayar_grid},
+    {"oren_nayar_qualitative",
+     [](const Inputs& in, const Parameters& p, double* f) {
+         interleaved(in, QualitativeSurface(p), f, qualitative_value);
+     }},
+    {"oren_nayar_qualitative_six",
+     [](const Inputs& in, const Parameters& p, double* f) { six(in, QualitativeSurface(p), f, qualitative_value); }},
+    {"oren_nayar_qualitative_grid", qualitative_grid},
+    // the first p.back() directions only
+    {"he_torrance",
+     [](const Inputs& in, const Parameters& p, double* f) {
+         for (std::size_t j = 0; j < std::size_t(p.back()); ++j)
+             f[j] = he_torrance(in.w_i.data + 3 * j, in.w_r.data + 3 * j, p);
+     }},
+};
+
+}  // namespace
+
+int main(int, char** arguments) {
+    using Clock = std::chrono::steady_clock;
+    const Inputs inputs(arguments[1]);
+    Array values(std::max(inputs.w_i.size / 3, inputs.theta.size * inputs.theta.size * inputs.phi.size));
+    for (std::string line; std::getline(std::cin, line);) {
+        std::istringstream words(line);
+        std::string verb, name, argument;
+        words >> verb >> name >> argument;
+        Parameters p;
+        for (double value; words >> value;) p.push_back(value);
+        const Kernel& kernel = kernels.at(name);
+        kernel(inputs, p, values.data);  // the first pass warms the caches
+        if (verb == "dump") {
+            std::ofstream(argument, std::ios::binary)
+                .write(reinterpret_cast<const char*>(values.data), values.size * sizeof(double));
+            std::cout << "done" << std::endl;
+            continue;
+        }
+        std::vector<double> seconds;
+        for (const auto start = Clock::now();
+             seconds.size() < 3 || std::chrono::duration<double>(Clock::now() - start).count() < std::stod(argument);) {
+            const double before = processor_seconds();
+            kernel(inputs, p, values.data);
+            seconds.push_back(processor_seconds() - before);
+        }
+        std::sort(seconds.begin(), seconds.end());
+        std::cout << seconds[seconds.size() / 2] << " " << seconds[0] << std::endl;
+    }
+}

@@ -1,0 +1,395 @@
+"""He et al. 1991 in its limits, part by part, through apertures, and under the bound of energy conservation."""
+
+import doctest
+import itertools
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brdfdb import energy, fresnel, models
+from brdfdb.geometry import unit_vector
+from brdfdb.models import (
+    he_torrance,
+    he_torrance_aperture,
+    he_torrance_parts,
+    he_torrance_smooth,
+    he_torrance_specular,
+    he_torrance_very_rough,
+)
+from brdfdb.models.he_torrance_1991_limits import _common_area
+from brdfdb.quadrature import directional_albedo
+from brdfdb.reference import he_torrance_1991
+
+HALF_PI = np.pi / 2
+ALUMINUM: dict[str, float] = {"sigma_0_um": 0.28, "tau_um": 1.77, "n": 0.769, "k": 6.08}
+CERAMIC: dict[str, float] = {"wavelength_nm": 500.0, "sigma_0_um": 1.45, "tau_um": 13.2, "n": 1.74555, "k": 0.0}
+CONE = np.pi / 1024  # of light and receiver, in the experiments of Figs 7 to 9
+CONES = {"incident_solid_angle_sr": CONE, "received_solid_angle_sr": CONE}
+
+# Relative differences, each just above the worst measured, which stands behind it
+VERY_ROUGH = 1e-12  # 2.1e-13, where exp has a large exponent
+RECIPROCITY = 1e-14  # 0: the formula is symmetric to the last bit
+EXCHANGE = 2e-12  # 3.5e-13: the nodes in exchanged cones are summed in another order
+VECTORS = 2e-14  # 3.4e-15
+PARTS = 5e-15  # 8.2e-16
+AREA = 2e-13  # 5.5e-14
+SPREAD = 2e-14  # 4.8e-15, rho_s from the integral of the spread peak
+
+Floats = NDArray[np.float64]
+
+
+def directions(rng: np.random.Generator, count: int) -> Any:
+    return rng.uniform([0.0, -3.0, 0.0, -3.0], [HALF_PI, 3.0, HALF_PI, 3.0], (count, 4)).T
+
+
+# Very rough
+
+
+def test_very_rough_against_the_reference() -> None:
+    rng = np.random.default_rng(13)
+    for _ in range(200):
+        theta_i, theta_r, delta_phi = rng.uniform([0.0, 0.0, -3.0], [1.55, 1.55, 3.0])
+        slope, n, k = 10.0 ** rng.uniform(-2.0, 1.0), rng.uniform(0.2, 3.0), rng.uniform(0.0, 5.0)
+        expected = float(he_torrance_1991.very_rough(theta_i, theta_r, delta_phi, slope, n, k))
+        value = he_torrance_very_rough(theta_i, 0.3, theta_r, 0.3 + delta_phi, slope=slope, n=n, k=k)
+        assert value == pytest.approx(expected, rel=VERY_ROUGH, abs=1e-250)
+
+
+@pytest.mark.parametrize("wavelength_nm", [20.0, 5.0, 1.0])
+def test_he_torrance_converges_to_the_very_rough_limit(wavelength_nm: float) -> None:
+    """He et al. 1991, section 4 and Fig. 13 (a); the first term left out is the share (b^2 / 2 - 2 b + 1) / g."""
+    rng = np.random.default_rng(5)
+    theta_i, theta_r = rng.uniform(0.0, 1.2, (2, 400))
+    phi_r = np.pi + rng.uniform(-0.8, 0.8, 400)
+    optics, slope = {"n": 0.769, "k": 6.08}, 0.16
+    value = he_torrance(
+        theta_i, 0.0, theta_r, phi_r, wavelength_nm=wavelength_nm, sigma_0_um=0.48, tau_um=3.0, **optics
+    )
+    limit = he_torrance_very_rough(theta_i, 0.0, theta_r, phi_r, slope=slope, **optics)
+    sigma = [
+        float(he_torrance_1991.effective_roughness(*pair, slope, 1)) for pair in zip(theta_i, theta_r, strict=True)
+    ]
+    wi, wr = unit_vector(theta_i, 0.0), unit_vector(theta_r, phi_r)
+    v = wi + wr
+    g = (2000.0 * np.pi / wavelength_nm * 3.0 * np.array(sigma) * v[:, 2]) ** 2
+    b = (v[:, 0] ** 2 + v[:, 1] ** 2) / (2.0 * np.array(sigma) * v[:, 2]) ** 2
+    likely = b < 4.0  # where the next term is of the order 1 / g^2, and not b^4 / g^2
+    assert likely.sum() > 100
+    first = (b**2 / 2.0 - 2.0 * b + 1.0) / g
+    np.testing.assert_array_less(abs(value / limit - 1.0 - first)[likely], (20.0 / g**2 + 1e-11)[likely])
+    assert abs(value / limit - 1.0)[likely].max() < 10.0 / g.min()
+
+
+def test_very_rough_is_reciprocal_finite_and_not_negative() -> None:
+    rng = np.random.default_rng(8)
+    theta_i, phi_i, theta_r, phi_r = directions(rng, 3000)
+    theta_i[:20], theta_r[10:30], theta_i[30:40] = HALF_PI, HALF_PI, 0.0
+    phi_r[:5] = phi_i[:5] + np.pi
+    arguments = {"slope": 10.0 ** rng.uniform(-6.0, 6.0, 3000), "n": rng.uniform(0.2, 3.0, 3000), "k": 0.5, "a": 0.1}
+    value = he_torrance_very_rough(theta_i, phi_i, theta_r, phi_r, **arguments)
+    assert np.isfinite(value).all()
+    assert (value >= 0.1 / np.pi * (1.0 - 1e-15)).all()
+    swapped = he_torrance_very_rough(theta_r, phi_r, theta_i, phi_i, **arguments)
+    np.testing.assert_allclose(swapped, value, rtol=RECIPROCITY)
+
+
+# Smooth
+
+
+def test_smooth_is_fresnels_reflectance() -> None:
+    theta_i = np.linspace(0.0, HALF_PI, 19)
+    for n, k in ((1.5, 0.0), (0.769, 6.08)):
+        value = he_torrance_smooth(theta_i, n=n, k=k)
+        np.testing.assert_allclose(value, [float(he_torrance_1991.smooth(t, n, k)) for t in theta_i], rtol=1e-14)
+        mirror = he_torrance_specular(theta_i, wavelength_nm=500.0, sigma_0_um=0.0, tau_um=1.0, n=n, k=k)
+        np.testing.assert_allclose(mirror, value, rtol=1e-15)
+
+
+@pytest.mark.parametrize("sigma_0_um", [1e-3, 1e-5, 1e-7])
+def test_he_torrance_converges_to_the_smooth_limit(sigma_0_um: float) -> None:
+    theta, surface = np.linspace(0.0, 1.5, 16), {"wavelength_nm": 500.0, "tau_um": 3.0, "n": 0.769, "k": 6.08}
+    g = (4000.0 * np.pi / 500.0 * sigma_0_um) ** 2  # the largest, at normal incidence
+    left = he_torrance_specular(theta, sigma_0_um=sigma_0_um, **surface) / he_torrance_smooth(theta, n=0.769, k=6.08)
+    assert ((left <= 1.0 + 1e-15) & (left >= 1.0 - g - 1e-15)).all()
+    diffuse = he_torrance(
+        theta[:, None, None], 0.0, theta[:, None], np.linspace(0.0, np.pi, 9), sigma_0_um=sigma_0_um, **surface
+    )
+    # eqs 71 and 78: v^4 tau^2 / (16 pi) (2 pi sigma)^2 / lambda^4 at most, with v = 2, over cos^2
+    assert diffuse.max() <= (2.0 * np.pi * 3.0 / 0.5) ** 2 * g / np.pi
+
+
+# Part by part
+
+
+def test_parts_add_up() -> None:
+    rng = np.random.default_rng(69)
+    angles = directions(rng, 500)
+    surface = ALUMINUM | {"wavelength_nm": 500.0}
+    parts = he_torrance_parts(*angles, a=0.3, **surface)
+    np.testing.assert_allclose(sum(parts), he_torrance(*angles, a=0.3, **surface), rtol=PARTS)
+    np.testing.assert_allclose(parts.directional_diffuse, he_torrance(*angles, **surface), rtol=PARTS)
+    np.testing.assert_allclose(parts.uniform_diffuse, 0.3 / np.pi, rtol=1e-15)
+    assert parts.uniform_diffuse.shape == (500,)
+    below = he_torrance_parts(0.3, 0.0, [2.0, np.nan], 0.0, a=0.3, **surface)
+    np.testing.assert_array_equal(below, [[0.0, np.nan]] * 2)
+
+
+# Through apertures
+
+
+def area_by_quadrature(first: float, second: float, apart: float) -> float:
+    """The common area of two circles on the sphere, as arcs of the one integrated over the other."""
+    x, weight = np.polynomial.legendre.leggauss(100)
+    edges = sorted({0.0, *np.clip([abs(second - apart), second + apart], 0.0, first), first})
+    area = 0.0
+    for low, high in itertools.pairwise(edges):
+        turn = (x + 1.0) * HALF_PI  # the ends of an arc open like square roots
+        off = low + (high - low) * (1.0 - np.cos(turn)) / 2.0
+        cos_arc = (np.cos(second) - np.cos(off) * np.cos(apart)) / (np.sin(off) * np.sin(apart))
+        arc = 2.0 * np.arccos(np.clip(cos_arc, -1.0, 1.0))
+        area += float(weight @ (arc * np.sin(off) * np.sin(turn))) * HALF_PI * (high - low) / 2.0
+    return area
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "apart"),
+    [(0.5, 0.5, 0.3), (0.5, 0.2, 0.6), (0.5, 0.2, 0.4), (0.5, 0.2, 0.31), (0.6, 0.59, 0.05), (0.03, 0.03, 0.01)],
+)
+def test_common_area_of_two_cones(first: float, second: float, apart: float) -> None:
+    expected = area_by_quadrature(first, second, apart)
+    assert _common_area(first, second, apart) == pytest.approx(expected, rel=AREA)
+    assert _common_area(second, first, apart) == pytest.approx(_common_area(first, second, apart), rel=1e-12)
+
+
+def test_common_area_has_its_closed_forms() -> None:
+    assert _common_area(0.3, 0.2, 0.05) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.2)), rel=1e-14)
+    assert _common_area(0.3, 0.3, 0.0) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.3)), rel=1e-14)
+    assert _common_area(0.3, 0.3, 1e-24) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.3)), rel=1e-14)
+    assert _common_area(0.3, 0.2, 0.5) == 0.0
+    assert _common_area(0.3, 0.2, np.pi) == 0.0
+    # small circles of one size lie in a plane
+    radius, half = 1e-6, 0.5
+    lens = 2.0 * (np.arccos(half) - half * np.sqrt(1.0 - half**2)) * radius**2
+    assert _common_area(radius, radius, 2.0 * half * radius) == pytest.approx(lens, rel=AREA)
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 10.0, 60.0])
+@pytest.mark.parametrize("received", [CONE, 0.2 * CONE])
+def test_the_spread_specular_part_integrates_to_rho_s(theta_deg: float, received: float) -> None:
+    theta_i, n, k = np.deg2rad(theta_deg), 2.15, 20.7
+    arguments = {"incident_solid_angle_sr": CONE, "received_solid_angle_sr": received, "rings": 0}
+    smooth = {"wavelength_nm": 2000.0, "sigma_0_um": 0.0, "tau_um": 1.77, "n": n, "k": k}
+    # around the mirror direction, in rings whose edges are those of the cones
+    radii = np.arcsin(np.sqrt(np.array([received, CONE]) / np.pi))
+    x, weight = np.polynomial.legendre.leggauss(48)
+    total = 0.0
+    for low, high in ((0.0, radii[1] - radii[0]), (radii[1] - radii[0], radii.sum())):
+        turn = (x + 1.0) * HALF_PI
+        off = (low + (high - low) * (1.0 - np.cos(turn)) / 2.0)[:, None]
+        around = 2.0 * np.pi * np.arange(12) / 12.0
+        mirror, along = unit_vector(theta_i, np.pi), unit_vector(theta_i + HALF_PI, np.pi)
+        across = np.cross(mirror, along)
+        wr = (
+            np.cos(off)[..., None] * mirror
+            + (np.sin(off) * np.cos(around))[..., None] * along
+            + (np.sin(off) * np.sin(around))[..., None] * across
+        )
+        f_r = models.he_torrance_aperture_vectors(unit_vector(theta_i, 0.0), wr, **arguments, **smooth)
+        ring = (f_r * wr[..., 2]).mean(axis=1) * 2.0 * np.pi * np.sin(off[:, 0])
+        total += float(weight @ (ring * np.sin(turn))) * HALF_PI * (high - low) / 2.0
+    assert total == pytest.approx(he_torrance_smooth(theta_i, n=n, k=k), rel=SPREAD)
+
+
+def test_a_small_receiver_sees_eq_70_and_both_diffuse_parts() -> None:
+    surface, theta = ALUMINUM | {"wavelength_nm": 2000.0}, 0.3
+    arguments = {"incident_solid_angle_sr": CONE, "received_solid_angle_sr": 1e-10}
+    value = he_torrance_aperture(theta, 0.0, theta, np.pi, a=0.2, rings=0, **arguments, **surface)
+    peak = he_torrance_specular(theta, **surface) / (np.cos(theta) * CONE)
+    assert value == pytest.approx(peak + he_torrance(theta, 0.0, theta, np.pi, a=0.2, **surface), rel=1e-10)
+    outside = he_torrance_aperture(theta, 0.0, theta + 0.04, np.pi, a=0.2, rings=0, **arguments, **surface)
+    assert outside == pytest.approx(he_torrance(theta, 0.0, theta + 0.04, np.pi, a=0.2, **surface), rel=1e-12)
+
+
+def test_the_width_of_the_peak_is_that_of_both_cones() -> None:
+    """Fig. 7: the specular peak of aluminum at 2 micrometres is as wide as light and receiver together."""
+    surface = ALUMINUM | {"wavelength_nm": 2000.0}
+    theta_r = np.deg2rad(np.linspace(0.0, 20.0, 81))
+    theta_i, reach = np.deg2rad(10.0), 2.0 * np.arcsin(1.0 / 32.0)
+    value = he_torrance_aperture(theta_i, 0.0, theta_r, np.pi, **CONES, **surface)
+    diffuse = he_torrance(theta_i, 0.0, theta_r, np.pi, **surface)
+    inside = abs(theta_r - theta_i) < reach
+    assert (value > diffuse)[inside & (abs(theta_r - theta_i) < 0.95 * reach)].all()
+    assert value[~inside] == pytest.approx(diffuse[~inside], rel=0.02)
+    assert theta_r[np.argmax(value)] == pytest.approx(theta_i)
+    assert value.max() > 10.0 * diffuse.max()
+
+
+def test_diffuse_parts_are_averaged_over_both_cones() -> None:
+    theta_i, theta_r = np.deg2rad(75.0), np.deg2rad(78.0)
+    rough = CERAMIC | {"a": 0.2}
+
+    def averaged(rings: int) -> float:
+        value = he_torrance_aperture(theta_i, 0.0, theta_r, np.pi, rings=rings, **CONES, **rough)
+        return float(value - he_torrance_aperture(theta_i, 0.0, theta_r, np.pi, rings=0, **CONES, **rough))
+
+    on_axis = he_torrance(theta_i, 0.0, theta_r, np.pi, **rough)
+    # by chance: pairs of directions, evenly spread over both cones
+    rng, alpha = np.random.default_rng(7), np.arcsin(1.0 / 32.0)
+    w = []
+    for theta, phi in ((theta_i, 0.0), (theta_r, np.pi)):
+        versine, turn = rng.uniform(0.0, 1.0 - np.cos(alpha), 20_000), rng.uniform(0.0, 2.0 * np.pi, 20_000)
+        sin = np.sqrt(versine * (2.0 - versine))
+        axis, along = unit_vector(theta, phi), unit_vector(theta + HALF_PI, phi)
+        around = np.cos(turn)[:, None] * along + np.sin(turn)[:, None] * np.cross(axis, along)
+        w.append((1.0 - versine)[:, None] * axis + sin[:, None] * around)
+    by_chance = models.he_torrance_vectors(*w, **rough)
+    noise = by_chance.std() / np.sqrt(by_chance.size)
+    assert abs(averaged(3) + on_axis - by_chance.mean()) < 4.0 * noise
+    assert abs(averaged(3)) > 10.0 * noise
+    assert averaged(2) == pytest.approx(averaged(5), abs=1e-5 * on_axis)  # 2.5e-7
+    assert averaged(3) == pytest.approx(averaged(5), abs=1e-8 * on_axis)  # 6e-11
+
+
+def test_an_ideal_diffuser_looks_the_same_through_any_aperture() -> None:
+    nothing = {"wavelength_nm": 500.0, "sigma_0_um": 0.3, "tau_um": 2.0, "n": 1.0, "k": 0.0}
+    theta = np.linspace(0.0, 1.3, 7)
+    value = he_torrance_aperture(theta, 0.0, theta[:, None], 1.0, a=0.7, **CONES, **nothing)
+    np.testing.assert_allclose(value, 0.7 / np.pi, rtol=1e-14)
+
+
+def test_light_and_receiver_exchange_with_their_cones() -> None:
+    rng = np.random.default_rng(3)
+    theta_i, phi_i, theta_r, phi_r = directions(rng, 50)
+    surface = ALUMINUM | {"wavelength_nm": 500.0}
+    one = he_torrance_aperture(
+        theta_i, phi_i, theta_r, phi_r, incident_solid_angle_sr=CONE, received_solid_angle_sr=0.1, **surface
+    )
+    other = he_torrance_aperture(
+        theta_r, phi_r, theta_i, phi_i, incident_solid_angle_sr=0.1, received_solid_angle_sr=CONE, **surface
+    )
+    away = np.linalg.norm(unit_vector(theta_i, phi_i + np.pi) - unit_vector(theta_r, phi_r), axis=-1) > 0.3
+    assert away.sum() > 30
+    np.testing.assert_allclose(one[away], other[away], rtol=EXCHANGE)
+
+
+# Shapes, types and corners
+
+OPTICS = {"n": 0.769, "k": 6.08}
+SURFACE = {"wavelength_nm": 2000.0, "sigma_0_um": 0.28, "tau_um": 1.77, **OPTICS}
+CASES = {
+    "he_torrance_very_rough": {"slope": 0.2, **OPTICS},
+    "he_torrance_parts": SURFACE,
+    "he_torrance_aperture": CONES | SURFACE | {"rings": 1},
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_vectors_give_what_angles_give(name: str) -> None:
+    rng = np.random.default_rng(9)
+    theta_i, phi_i, theta_r, phi_r = directions(rng, 60)
+    expected = getattr(models, name)(theta_i, phi_i, theta_r, phi_r, a=0.1, **CASES[name])
+    twin = getattr(models, f"{name}_vectors")
+    value = twin(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), a=0.1, **CASES[name])
+    np.testing.assert_allclose(value, expected, rtol=VECTORS, atol=1e-200)
+    assert np.max(twin([0.0, 0.0, 1.0], [[0.6, 0.0, -0.8], [0.0, 0.0, -1.0]], **CASES[name])) == 0.0
+    assert np.isnan(twin([0.0, 0.0, 1.0], [np.nan, 0.0, 1.0], **CASES[name])).all()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_nan_horizon_shape_type_and_corners(name: str) -> None:
+    function, arguments = getattr(models, name), CASES[name]
+
+    def first(*angles: Any, **more: Any) -> Any:
+        value = function(*angles, **arguments | more)
+        return value[0] if isinstance(value, tuple) else value
+
+    values = first(np.array([0.3, np.nan, 2.0]), 0.0, 0.4, 3.0)
+    assert values[0] > 0.0
+    assert np.isnan(values[1])
+    assert values[2] == 0.0
+    assert first(0.3, 0.0, 2.0, 3.0) == 0.0
+    assert isinstance(first(0.3, 0.0, 0.4, 3.0), np.float64)
+    single = first(*np.float32([0.3, 0.0, 0.4, 3.0]))
+    assert single.dtype == np.float32
+    assert single == pytest.approx(first(0.3, 0.0, 0.4, 3.0), rel=1e-5)
+    several = first([[0.3], [0.4]], 0.0, [0.4, 0.5, 0.6], 3.0, n=np.array([1.3, 1.5]).reshape(2, 1, 1))
+    assert several.shape == (2, 2, 3)
+    assert several[1, 0, 2] == pytest.approx(first(0.3, 0.0, 0.6, 3.0, n=1.5), rel=1e-10)
+    theta = np.array([0.0, 5e-324, 1e-8, 0.7, np.nextafter(HALF_PI, 0.0), HALF_PI])
+    phi = np.array([0.0, np.pi, -HALF_PI, 1e15])
+    corners = first(theta[:, None, None], 0.0, theta[:, None], phi)
+    assert np.isfinite(corners).all()
+    assert (corners >= 0.0).all()
+    with pytest.raises(ValueError, match=r"n: 0 is outside \[0.001, 100\]"):
+        first(0.3, 0.0, 0.4, 3.0, n=0.0)
+
+
+def test_smooth_below_the_horizon_and_nan() -> None:
+    np.testing.assert_array_equal(he_torrance_smooth([2.0, np.nan], n=1.5, k=0.0), [0.0, np.nan])
+    assert he_torrance_smooth(np.float32(0.3), n=1.5, k=0.0).dtype == np.float32
+    with pytest.raises(ValueError, match="k: -1 is outside"):
+        he_torrance_smooth(0.3, n=1.5, k=-1.0)
+
+
+def test_arguments_out_of_range() -> None:
+    with pytest.raises(ValueError, match="slope: 0 is outside"):
+        he_torrance_very_rough(0.1, 0.0, 0.1, 0.0, slope=0.0, **OPTICS)
+    for name in CONES:
+        with pytest.raises(ValueError, match=f"{name}: 2 is outside"):
+            he_torrance_aperture(0.1, 0.0, 0.1, 0.0, **CONES | {name: 2.0}, **SURFACE)
+    for rings in (-1, 9, 2.5, True):
+        with pytest.raises(ValueError, match=r"rings: .* is not a whole number in"):
+            he_torrance_aperture(0.1, 0.0, 0.1, 0.0, rings=rings, **CONES, **SURFACE)
+
+
+# The bound of energy conservation: a million directions, too many for kernels that are not compiled
+
+compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
+
+
+@compiled
+def test_the_ceramic_of_the_paper_reflects_more_than_it_receives() -> None:
+    """He et al. 1991, Fig. 9, a = 0.9: 1 is passed beyond 54 degrees."""
+    for theta_deg, total in ((30.0, 0.977), (60.0, 1.016), (85.0, 1.116)):
+        albedo, _ = directional_albedo(
+            "he_torrance", np.deg2rad(theta_deg), tolerance=1e-5, specular=True, a=0.9, **CERAMIC
+        )
+        assert albedo == pytest.approx(total, abs=6e-4)
+
+
+@compiled
+def test_a_max_is_where_the_worst_angle_reflects_all() -> None:
+    bound = energy.he_torrance_a_max(**CERAMIC, tolerance=1e-5)
+    theta_i = np.deg2rad(np.linspace(82.0, 85.0, 13))
+    albedo, _ = directional_albedo("he_torrance", theta_i, tolerance=1e-6, specular=True, a=float(bound), **CERAMIC)
+    assert albedo.max() == pytest.approx(1.0, abs=1e-4)
+    assert albedo.max() <= 1.0 + 1e-5
+    assert bound < 0.9  # what the paper takes
+
+
+@compiled
+def test_a_max_of_a_smooth_surface_is_nothing() -> None:
+    smooth = {"wavelength_nm": 460.0, "tau_um": 1.0, "n": 1.5, "k": 0.0}
+    bound = energy.he_torrance_a_max(sigma_0_um=[0.0, 1e-3], **smooth, tolerance=1e-4)
+    assert bound.shape == (2,)
+    assert bound[0] == pytest.approx(0.0, abs=1e-14)
+    assert 0.0 < bound[1] < 0.1
+    with pytest.raises(ValueError, match="n: 0 is outside"):
+        energy.he_torrance_a_max(sigma_0_um=0.0, **smooth | {"n": 0.0})
+
+
+@compiled
+def test_the_example_of_a_max_runs() -> None:
+    results = doctest.testmod(energy)
+    assert results.failed == 0
+    assert results.attempted == 2
+
+
+@compiled
+def test_without_an_interface_a_may_be_one() -> None:
+    nothing = {"wavelength_nm": 500.0, "sigma_0_um": 0.3, "tau_um": 2.0, "n": 1.0, "k": 0.0}
+    assert fresnel.unpolarised(0.5, 1.0, 0.0) == 0.0
+    assert energy.he_torrance_a_max(**nothing, tolerance=1e-3) == 1.0
