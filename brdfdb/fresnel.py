@@ -46,17 +46,18 @@ def reflectance(cos_theta: float, n: float, k: float) -> float:
     cos2 = cos_theta * cos_theta
     sin2 = (1.0 - cos_theta) * (1.0 + cos_theta)
     w_abs2 = w_re * w_re + w_im * w_im
-    # F_s
+    # F_s^2 = w_abs2 / d_s2
     d_s = (cos_theta + a) * (cos_theta + a) + b * b
-    F_s2 = w_abs2 / (d_s * d_s)
-    # F_p
+    d_s2 = d_s * d_s
+    # F_p^2 = w_abs2 num2 / d_p2
     num_re = cos2 * e_re - sin2
     num_im = cos2 * w_im
+    num2 = num_re * num_re + num_im * num_im
     den_re = e_re * cos_theta + a
     den_im = w_im * cos_theta + b
     d_p = den_re * den_re + den_im * den_im
-    F_p2 = w_abs2 * (num_re * num_re + num_im * num_im) / (d_p * d_p)
-    both = 0.5 * (F_s2 + F_p2)
+    d_p2 = d_p * d_p
+    both = 0.5 * w_abs2 * (d_p2 + num2 * d_s2) / (d_s2 * d_p2)
     # n = 1, k = 0 is no interface, and 0 / 0 at grazing; rounding passes 1 by 4e-16 in total reflection
     return 0.0 if w_abs2 == 0.0 else 1.0 if both > 1.0 else both
 

@@ -274,42 +274,47 @@ def series_table(terms: int) -> NDArray[np.float64]:
     _series(np.ravel(np.broadcast_to(g, V.shape)), np.ravel(V), values)
     series = np.einsum("kx,pxqy,ly->pkql", to_series, values.reshape(V.shape), to_series, optimize=True)
     powers = [np.polynomial.chebyshev.cheb2poly(each) for each in np.eye(terms)]
-    table: NDArray[np.float64] = series @ np.array([np.pad(each, (0, terms - each.size)) for each in powers])
-    return table
+    return np.ascontiguousarray(series @ np.array([np.pad(each, (0, terms - each.size)) for each in powers]))
 
 
 @loop
 def log_series_of_row(
-    table: NDArray[np.float64], g: float, V: NDArray[np.float64], log_sum: NDArray[np.float64], row: NDArray[np.float64]
+    table: NDArray[np.float64],
+    g: float,
+    V: NDArray[np.float64],
+    V_low: float,
+    V_high: float,
+    log_sum: NDArray[np.float64],
+    row: NDArray[np.float64],
 ) -> None:
-    """log_sum of one g, G_LOW <= g < G_HIGH, by the table; row, of shape (Q_PATCHES, terms), is written over."""
+    """log_sum of one g, G_LOW <= g < G_HIGH, by the table, of V within [V_low, V_high].
+
+    row, of shape (Q_PATCHES, terms), is written over.
+    """
     terms = row.shape[1]
     p = (log(g) - _LOG_G_LOW) * (1.0 / _P_SIZE)
     patch = min(max(int(p), 0), _P_PATCHES - 1)
     x = 2.0 * (p - patch) - 1.0
     inverse = 1.0 / (5.0 + g)
-    low, high = np.inf, -np.inf
-    for j in range(V.shape[0]):
-        low, high = min(low, V[j]), max(high, V[j])
-    first = max(int(log(1.0 + low * inverse) * (1.0 / _Q_SIZE)), 0)
-    last = min(int(log(1.0 + high * inverse) * (1.0 / _Q_SIZE)), Q_PATCHES - 1)
-    # The polynomials in q at this g
-    for i in range(first, last + 1):
-        along = row[i]
-        for k in range(terms):
-            along[k] = table[patch, 0, i, k]
+    first = min(max(int(log(1.0 + V_low * inverse) * (1.0 / _Q_SIZE)), 0), Q_PATCHES - 1)
+    last = min(max(int(log(1.0 + V_high * inverse) * (1.0 / _Q_SIZE)), first), Q_PATCHES - 1)
+    # The polynomials in q at this g: those of neighbouring patches lie side by side
+    begin, end = first * terms, (last + 1) * terms
+    polynomials = row.reshape(-1)[begin:end]
+    coefficients = table[patch, 0].reshape(-1)[begin:end]
+    for k in range(polynomials.shape[0]):
+        polynomials[k] = coefficients[k]
     before, now = 1.0, x
     for degree in range(1, terms):
-        for i in range(first, last + 1):
-            along, coefficients = row[i], table[patch, degree, i]
-            for k in range(terms):
-                along[k] += now * coefficients[k]
+        coefficients = table[patch, degree].reshape(-1)[begin:end]
+        for k in range(polynomials.shape[0]):
+            polynomials[k] += now * coefficients[k]
         before, now = now, 2.0 * x * now - before
     for j in range(V.shape[0]):
         log_sum[j] = log(1.0 + V[j] * inverse) * (1.0 / _Q_SIZE)
     for j in range(V.shape[0]):
         q = log_sum[j]
-        i = min(max(int(q), 0), Q_PATCHES - 1)
+        i = min(max(int(q), first), last)  # the ends may round across the edge of a patch
         y = 2.0 * (q - i) - 1.0
         along = row[i]
         value = along[terms - 1]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from brdfdb.geometry import Vectors
 from brdfdb.parameters import Floats
@@ -14,7 +14,7 @@ from brdfdb.parameters import Floats
 Loop = Callable[..., None]
 
 
-def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats]) -> NDArray[np.float64]:
+def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dtype: DTypeLike = np.float64) -> Floats:
     """Broadcast, and call ``loop(*columns, scalars, values)``.
 
     Parameters
@@ -26,6 +26,9 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats]) ->
         They broadcast together. A row runs along the last axis if no scalar varies along it; if one does, each value
         is a row of its own: slower, never wrong.
 
+    dtype
+        Of the values.
+
     Returns
     -------
     array
@@ -33,7 +36,7 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats]) ->
     """
     shape = np.broadcast_shapes(*(np.shape(each) for each in (*columns, *scalars)))
     rows, length, leading = _split(shape, scalars)
-    values: NDArray[np.float64] = np.empty((rows, length))
+    values: Floats = np.empty((rows, length), dtype=dtype)
     if values.size:
         loop(*(_column(each, shape, rows, length) for each in columns), _packed(scalars, leading, rows), values)
     return values.reshape(shape)[()]

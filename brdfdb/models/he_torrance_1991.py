@@ -208,15 +208,21 @@ def _rows(
     one_plus_cos: NDArray[np.float64],
     table: NDArray[np.float64],
     scalars: NDArray[np.float64],
-    f_r: NDArray[np.float64],
+    f_r: Floats,
 ) -> None:
     """Rows along the azimuth, which share polar angles and surface: what eq. 71 needs of these is computed once."""
     length = f_r.shape[1]
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((3, BLOCK), np.int64)
     lanes, g_over_vz2, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
-    g_row, v2, V = np.empty(BLOCK), np.empty(length), np.empty(length)
+    g_row, v2, V, log_D = np.empty(BLOCK), np.empty(length), np.empty(length), np.empty(length)
     polynomials = np.empty((Q_PATCHES, table.shape[3]))
+    least, most = 0.0, 2.0
     for row in range(f_r.shape[0]):
+        if row < one_plus_cos.shape[0]:
+            least, most = 2.0, 0.0
+            for j in range(length):  # past nan
+                turn = one_plus_cos[row, j]
+                least, most = turn if turn < least else least, turn if turn > most else most
         lane = row % BLOCK
         if lane == 0:
             rows = min(BLOCK, f_r.shape[0] - row)
@@ -240,25 +246,22 @@ def _rows(
             V[j] = correlation * v_xy2
         # Eq. (78)
         if length >= _WORTH_THE_TABLE and G_LOW <= g < G_HIGH:
-            log_series_of_row(table, g, V, f, polynomials)
+            low, high = correlation * (difference2 + product * least), correlation * (difference2 + product * most)
+            log_series_of_row(table, g, V, low, high, log_D, polynomials)
         else:
             for i in range(min(length, BLOCK)):
                 g_row[i] = g
             for start in range(0, length, BLOCK):
                 stop = min(start + BLOCK, length)
-                log_series(g_row[: stop - start], V[start:stop], f[start:stop], work, index)
+                log_series(g_row[: stop - start], V[start:stop], log_D[start:stop], work, index)
         # Eqs (71) and (76)
         pair = correlation * (0.25 / np.pi) * shadow[lane] * g_over_vz2[lane]
         for j in range(length):
-            f[j] = pair * v2[j] * v2[j] * exp(f[j])
-        if n > 0.0:
-            for j in range(length):
-                # Eq. (75), at the bisecting angle
-                cos = 0.5 * math.sqrt(v2[j])
-                f[j] *= reflectance(1.0 if cos > 1.0 else cos, n, k)
-        for j in range(length):
+            # Eq. (75), at the bisecting angle
+            cos = 0.5 * math.sqrt(v2[j])
+            F2 = reflectance(1.0 if cos > 1.0 else cos, n, k) if n > 0.0 else 1.0
             # Eq. (72)
-            f[j] += uniform
+            f[j] = uniform + pair * v2[j] * v2[j] * exp(log_D[j]) * F2
 
 
 class Surface(NamedTuple):
@@ -383,21 +386,21 @@ def directional_diffuse(directions: Directions, surface: Surface) -> Floats:
 
 
 def _evaluated(directions: Directions, surface: Sequence[Floats]) -> Floats:
-    shape = np.broadcast_shapes(*(np.shape(each) for each in (*directions.given, *surface)))
     uniform = all(np.size(each) == 1 for each in surface)
     if isinstance(directions, Vectors) and uniform:
         return by_rows_of_vectors(_vectors_of_rows, directions, surface)
+    shape = np.broadcast_shapes(*(np.shape(each) for each in (*directions.given, *surface)))
     pair = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
     if shape and shape[-1] > 1 and all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in (*pair, *surface)):
         terms = TERMS_OF_FLOAT32 if directions.dtype == np.float32 else TERMS
         table = series_table(terms) if shape[-1] >= _WORTH_THE_TABLE else np.empty((1, 1, 1, terms))
 
-        def tabulated_rows(
-            columns: NDArray[np.float64], scalars: NDArray[np.float64], values: NDArray[np.float64]
-        ) -> None:
+        def tabulated_rows(columns: NDArray[np.float64], scalars: NDArray[np.float64], values: Floats) -> None:
             _rows(columns, table, scalars, values)
 
-        return finished(by_rows(tabulated_rows, (directions.one_plus_cos_dphi,), (*pair, *surface)), directions)
+        return finished(
+            by_rows(tabulated_rows, (directions.one_plus_cos_dphi,), (*pair, *surface), directions.dtype), directions
+        )
     v_xy2, _ = _v2(directions)
     features = np.empty((5, *shape))
     for i, each in enumerate((*pair, v_xy2)):
@@ -501,7 +504,7 @@ def lobe(
 
 SPEC = ModelSpec(
     name="he_torrance",
-    version=1,
+    version=2,
     title="He-Torrance, unpolarised",
     equation="eqs 71-84",
     reference="he1991",

@@ -385,7 +385,7 @@ def oren_nayar_qualitative_vectors(
 
 SPEC = ModelSpec(
     name="oren_nayar",
-    version=1,
+    version=2,
     title="Oren-Nayar, functional approximation",
     equation="eqs 27-29",
     reference="orennayar1994",
@@ -397,7 +397,7 @@ SPEC = ModelSpec(
 )
 QUALITATIVE_SPEC = ModelSpec(
     name="oren_nayar_qualitative",
-    version=1,
+    version=2,
     title="Oren-Nayar, qualitative model",
     equation="eq. 30",
     reference="orennayar1994",

@@ -155,7 +155,7 @@ _HALF_VECTOR_KNOWN_EXCESS: dict[str, float | str] = {
 
 SPEC = ModelSpec(
     name="ward",
-    version=1,
+    version=2,
     title="Ward, elliptical Gaussian",
     equation="eq. 5a",
     reference="ward1992",

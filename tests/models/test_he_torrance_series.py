@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from brdfdb import models
 from brdfdb.models import _he_torrance_series as series
 from brdfdb.models._he_torrance_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
@@ -174,3 +175,33 @@ def test_broadcasts(g_shape: tuple[int, ...], V_shape: tuple[int, ...], shape: t
         for a, b in np.nditer(np.broadcast_arrays(g, V), ["zerosize_ok"])
     ]
     np.testing.assert_allclose(np.ravel(values), each, rtol=TOGETHER)
+
+
+@pytest.mark.parametrize(
+    ("terms", "promise"),
+    [(series.TERMS, 1e-11), (series.TERMS_OF_FLOAT32, 2e-6)],  # 7.3e-12, at ln(sum) near -600; 3.2e-7
+)
+def test_the_table_keeps_its_promise_all_over_its_domain(terms: int, promise: float) -> None:
+    rng = np.random.default_rng(terms)
+    table, row = series.series_table(terms), np.empty((series.Q_PATCHES, terms))
+    ends = [series.G_LOW, np.nextafter(series.G_HIGH, 0.0)]
+    for g in (*ends, *np.exp(rng.uniform(*np.log(ends), 1500))):
+        V = (5.0 + g) * np.expm1(np.append(rng.uniform(0.0, 8.7, 60), [0.0, 8.8]))
+        exact, tabulated = np.empty(V.size), np.empty(V.size)
+        series._series(np.full(V.size, g), V, exact)
+        series.log_series_of_row(table, g, V, V.min(), V.max(), tabulated, row)
+        above = exact > -708.0
+        np.testing.assert_allclose(tabulated[above], exact[above], rtol=0.0, atol=promise)
+        assert (tabulated[~above] < -707.9).all()
+
+
+def test_rows_by_the_table_meet_rows_without_it_where_its_domain_ends() -> None:
+    # a row of 15 values is computed without the table
+    phi = np.linspace(0.0, np.pi, 15)
+    surface = {"tau_um": 2.0, "wavelength_nm": 500.0, "n": 1.5, "k": 0.2}
+    for g in (series.G_LOW * 0.999, series.G_LOW * 1.001, 1.0, series.G_HIGH * 0.999, series.G_HIGH * 1.001):
+        sigma_0_um = np.sqrt(g) * 0.5 / (2.0 * np.pi * 2.0 * np.cos(0.3))
+        light = {"sigma_0_um": sigma_0_um, **surface, "tau_um": max(2.0, 20.0 * sigma_0_um)}
+        few = models.he_torrance(0.3, 0.0, 0.3, phi, **light)
+        many = models.he_torrance(0.3, 0.0, 0.3, np.append(phi, phi), **light)
+        np.testing.assert_allclose(many[:15], few, rtol=2e-11, atol=TINY)

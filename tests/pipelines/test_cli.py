@@ -98,7 +98,7 @@ def test_build_shows_progress_on_stderr_and_a_table_on_stdout(
     assert lines[0].startswith("5 tables, 0.0 million values, in ")
     assert lines[1].split() == ["material", "model", "grid", "wavelengths", "revision", "stored"]
     assert [line.split()[0] for line in lines[2:7]] == names
-    assert lines[2].split()[:9] == ["foam", "oren_nayar", "11", "x", "11", "x", "13", "grey", "r000001"]
+    assert lines[2].split()[:9] == ["foam", "oren_nayar_body_surface", "11", "x", "11", "x", "13", "grey", "r000001"]
     assert lines[4].split()[1:8] == ["he_torrance", "6", "x", "6", "x", "7", "16"]
     assert lines[7].startswith("stored ")
     assert lines[7].endswith(f" in {tmp_path / 'store'}")
