@@ -20,6 +20,7 @@ from brdfdb.parameters import Floats
 
 HALF_PI = np.pi / 2
 PHI_MAX = 1e15  # beyond, neighbouring float64 are more than a tenth of a radian apart
+NO_AZIMUTH = 1e-290  # smaller products of two sines carry too few digits: an azimuth means nothing
 UNIT_LENGTH = 1e-5  # how far from 1 the length of a unit vector may be; float32 is off by 1e-7
 
 
@@ -149,7 +150,7 @@ class Vectors:
         """cos(phi_r - phi_i)."""
         product = self.sin_i * self.sin_r
         along = self.x_i * self.x_r + self.y_i * self.y_r
-        cos: NDArray[np.float64] = np.divide(along, product, where=product > 0.0, out=np.ones_like(along))
+        cos: NDArray[np.float64] = np.divide(along, product, where=product > NO_AZIMUTH, out=np.ones_like(along))
         return np.clip(cos, -1.0, 1.0)
 
     @functools.cached_property
@@ -163,7 +164,7 @@ class Vectors:
         """sin(phi_r - phi_i)."""
         product = self.sin_i * self.sin_r
         across = self.x_i * self.y_r - self.y_i * self.x_r
-        sin: NDArray[np.float64] = np.divide(across, product, where=product > 0.0, out=np.zeros_like(across))
+        sin: NDArray[np.float64] = np.divide(across, product, where=product > NO_AZIMUTH, out=np.zeros_like(across))
         return np.clip(sin, -1.0, 1.0)
 
 

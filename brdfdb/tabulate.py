@@ -16,7 +16,8 @@ from brdfdb.parameters import Floats
 
 TABLE_VERSION = 1  # of the variables, dimensions and attributes below
 
-_SLAB = 1 << 15  # values evaluated at a time: their temporaries stay in a core's cache
+_SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
+_BANDS = 6  # at least, of a reciprocal grid: the squares on the diagonal are computed whole
 
 
 def tabulate(
@@ -97,6 +98,8 @@ def _blocks(grid: Grid) -> Iterator[tuple[tuple[slice, ...], tuple[NDArray[np.fl
     """Blocks of rows of the first axis, and their directions of light and viewer; of a reciprocal grid one half."""
     axes = [radians(nodes) for nodes in grid.axes.values()]
     rows = max(1, _SLAB // int(np.prod(grid.shape[1:])))
+    if grid.reciprocal:
+        rows = min(rows, -(-grid.shape[0] // _BANDS))
     for start in range(0, grid.shape[0], rows):
         here = slice(start, min(start + rows, grid.shape[0]))
         if grid.anisotropic:

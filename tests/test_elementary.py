@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb._elementary import COS_HORIZON, arcsin, cosine, erfcx, exp, log
+from brdfdb._elementary import COS_HORIZON, arcsin, cosine, erfcx, exp, log, summand_exp
 from brdfdb.reference import mp
 
 RNG = np.random.default_rng(22)
@@ -49,3 +49,11 @@ def test_cosine_is_held_at_the_horizon() -> None:
     assert cosine(0.3) == 0.3
     assert cosine(0.0) == cosine(-0.5) == COS_HORIZON == np.cos(np.pi / 2)
     assert np.isnan(cosine(np.nan))
+
+
+def test_exp_of_a_summand_keeps_its_promise() -> None:
+    for x in (*RNG.uniform(-100.0, 100.0, 3000), 0.0):  # worst measured: 2.8e-13
+        expected = mp.exp(mp.mpf(float(x)))
+        assert abs(summand_exp(float(x)) - expected) <= 3e-13 * expected, x
+    for x in (-701.0, -708.5, -1e6, -1e300, -np.inf):
+        assert 0.0 <= summand_exp(x) <= 1e-300

@@ -8,11 +8,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import BLOCK, exp, log
+from brdfdb._elementary import BLOCK, exp, log, summand_exp
 from brdfdb._numba import kernel, loop
 from brdfdb.parameters import Floats
 
-ROWS_OF_WORK = 13  # of BLOCK numbers each, for `log_series`
+ROWS_OF_WORK, GROUPS = 13, 5  # of BLOCK numbers each, for `log_series`
 
 _SUM_BELOW = 40.0  # a summand that peaks at smaller m is summed term by term, at larger m by the trapezoid rule
 _TERMS = 96  # at most: m* + 7.2 sqrt(m*) + 7
@@ -81,7 +81,7 @@ def log_series(
 ) -> None:
     """log_sum = ln of `diffraction_series` of g and V, of at most BLOCK values each.
 
-    work, of shape (ROWS_OF_WORK, BLOCK), and index, (3, BLOCK), are written over.
+    work, of shape (ROWS_OF_WORK, BLOCK), and index, (GROUPS, BLOCK), are written over.
     """
     count = log_sum.shape[0]
     log_g, u, m_star = work[0], work[1], work[2]
@@ -90,17 +90,22 @@ def log_series(
         log_g[i] = log(g_i)
         u[i] = _peak(g_i, log_g[i], min(max(V[i], _V_MIN), _V_MAX))
         m_star[i] = g_i * exp(0.5 * u[i])
-    numbers = np.zeros(3, np.int64)
+    # Alike values together: a group takes as many terms as the neediest of it
+    numbers = np.zeros(GROUPS, np.int64)
     for i in range(count):
-        kind = 0 if m_star[i] < _SUM_BELOW else 2 if m_star[i] > _TAYLOR_ABOVE else 1  # nan: 1
-        index[kind, numbers[kind]] = i
-        numbers[kind] += 1
+        m = m_star[i]  # nan falls to the trapezoid rule
+        group = 0 if m < 6.0 else 1 if m < 16.0 else 2 if m < _SUM_BELOW else 4 if m > _TAYLOR_ABOVE else 3
+        index[group, numbers[group]] = i
+        numbers[group] += 1
     rest = work[3:]
-    if numbers[0]:
-        _term_by_term(g, V, log_g, u, m_star, index[0, : numbers[0]], log_sum, rest)
-    for kind in range(1, 3):
-        if numbers[kind]:
-            _trapezoid(g, V, log_g, u, m_star, index[kind, : numbers[kind]], kind == 2, log_sum, rest)
+    for group in range(GROUPS):
+        members = index[group, : numbers[group]]
+        if members.shape[0] == 0:
+            continue
+        if group < 3:
+            _term_by_term(g, V, log_g, u, m_star, members, log_sum, rest)
+        else:
+            _trapezoid(g, V, log_g, u, m_star, members, group == 4, log_sum, rest)
 
 
 @loop
@@ -130,7 +135,7 @@ def _term_by_term(
     for m in range(max(1, int(lowest)), min(int(highest) + 1, _TERMS)):
         constant, inverse, power = _LOG_FACTORIAL_TIMES_M[m], 1.0 / m, m - 1.0
         for i in range(count):
-            total[i] += exp(power * log_g[i] - constant - V[i] * inverse - shift[i])
+            total[i] += summand_exp(power * log_g[i] - constant - V[i] * inverse - shift[i])
     for i in range(count):
         log_sum[index[i]] = log(total[i]) + shift[i] - all_g[index[i]]
 
@@ -189,7 +194,7 @@ def _trapezoid(
                 for i in range(count):
                     t = distance * step[i]
                     bend = -0.5 * t * t * (1 + t * (2 / 3 + t * (1 / 4 + t * (1 / 15 + t * (1 / 72)))))
-                    total[i] += exp(m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i]) - 0.5 * t)
+                    total[i] += summand_exp(m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i]) - 0.5 * t)
             else:
                 for i in range(count):
                     t = distance * step[i]
@@ -198,7 +203,7 @@ def _trapezoid(
                     m_i2 = m_i * m_i
                     stirling_error = m_i * (1 / 12 - m_i2 * (1 / 360 - m_i2 * (1 / 1260)))
                     exponent = m_star[i] * bend - d[i] * inverse[i] * (a[i] * d[i] - b[i])
-                    total[i] += exp(exponent - 0.5 * t - stirling_error)
+                    total[i] += summand_exp(exponent - 0.5 * t - stirling_error)
     for i in range(count):
         at = index[i]
         # The exponent at the peak, m* (1 - u / 2 - V / m*^2) - g, without its cancellation
@@ -210,7 +215,7 @@ def _trapezoid(
 
 @loop
 def _series(g: NDArray[np.float64], V: NDArray[np.float64], log_sum: NDArray[np.float64]) -> None:
-    work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((3, BLOCK), np.int64)
+    work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     for start in range(0, log_sum.shape[0], BLOCK):
         stop = min(start + BLOCK, log_sum.shape[0])
         log_series(g[start:stop], V[start:stop], log_sum[start:stop], work, index)

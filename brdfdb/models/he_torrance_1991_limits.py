@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb import fresnel
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
 from brdfdb.models import he_torrance_1991 as full
+from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991_polarised import unit_azimuth
 from brdfdb.parameters import Floats, Parameter
 
@@ -115,8 +116,12 @@ def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Flo
     >>> round(float(he_torrance_smooth(0.0, n=1.5, k=0.0)), 4)
     0.04
     """
-    angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
-    return finished(fresnel.unpolarised(angles.cos_i, full.N.check(n), full.K.check(k)), angles)
+    return _smooth(checked_angles(theta_i, 0.0, 0.0, 0.0), full.N.check(n), full.K.check(k))
+
+
+def he_torrance_smooth_vectors(wi: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
+    """`he_torrance_smooth` for unit vectors `wi` of the light, of shape (..., 3)."""
+    return _smooth(checked_vectors(wi, wi), full.N.check(n), full.K.check(k))
 
 
 class HeTorranceParts(NamedTuple):
@@ -291,11 +296,12 @@ def he_torrance_aperture_vectors(
 def _very_rough(directions: Directions, slope: Floats, n: Floats, k: Floats, albedo: Floats) -> Floats:
     sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
     # Eqs (23)-(25)
-    S_over_cos_cos = full._shadowing(sin_i, cos_i, slope) * full._shadowing(sin_r, cos_r, slope)
+    S_over_cos_cos = shadowing(sin_i, cos_i, slope) * shadowing(sin_r, cos_r, slope)
     # Eqs (79)-(83)
-    slope2 = slope**2 * full._variance(full._hidden(sin_i, cos_i, slope) + full._hidden(sin_r, cos_r, slope))
+    slope2 = slope**2 * variance(hidden(sin_i, cos_i, slope) + hidden(sin_r, cos_r, slope))
     # Eq. (84): tan^2 of the inclination of the facet
-    tan2 = _v_xy2(directions) / (cos_i + cos_r) ** 2
+    v_xy2, v_z2 = full.v_squared(directions)
+    tan2 = v_xy2 / v_z2
     # Eq. (78) with e^-b / g for its sum, b = tan^2 / (4 slope^2)
     lobe = np.exp(-tan2 / (4.0 * slope2)) / (16.0 * np.pi * slope2)
     # Eq. (75), at the bisecting angle
@@ -304,11 +310,9 @@ def _very_rough(directions: Directions, slope: Floats, n: Floats, k: Floats, alb
     return finished(F2 * lobe * (1.0 + tan2) ** 2 * S_over_cos_cos + albedo / np.pi, directions)
 
 
-def _v_xy2(directions: Directions) -> Floats:
-    sin_i, sin_r = directions.sin_i, directions.sin_r
-    with np.errstate(all="ignore"):  # of vectors: the branch not taken divides by zero
-        v_xy2: Floats = (sin_i - sin_r) ** 2 + (2.0 * sin_i * sin_r) * directions.one_plus_cos_dphi
-    return v_xy2
+def _smooth(directions: Directions, n: Floats, k: Floats) -> Floats:
+    # Eq. (10)
+    return finished(fresnel.unpolarised(directions.cos_i, n, k), directions)
 
 
 def _parts(directions: Directions, surface: full.Surface, albedo: Floats) -> HeTorranceParts:
@@ -337,16 +341,9 @@ def _checked_apertures(incident: ArrayLike, received: ArrayLike, rings: int) -> 
 
 def _aperture(directions: Directions, apertures: _Apertures, surface: full.Surface, albedo: Floats) -> Floats:
     # Eq. (70), with the share of the received cone in the cone of reflection for its Delta
-    rho_s = full.he_torrance_specular(
-        np.arctan2(directions.sin_i, directions.cos_i),
-        wavelength_nm=surface.wavelength_um * 1000.0,
-        sigma_0_um=surface.sigma_0,
-        tau_um=surface.tau,
-        n=surface.n,
-        k=surface.k,
-    )
+    rho_s = full.rho_s(directions, surface)
     # the angle between the viewer and the mirror image of the light
-    chord2 = _v_xy2(directions) + (directions.cos_i - directions.cos_r) ** 2
+    chord2 = full.v_squared(directions)[0] + (directions.cos_i - directions.cos_r) ** 2
     apart = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt(chord2), 1.0))
     incident, received = (np.arcsin(np.sqrt(omega / np.pi)) for omega in apertures[:2])
     common = _common_area(incident, received, apart) / (apertures.incident * apertures.received)

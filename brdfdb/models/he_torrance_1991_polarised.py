@@ -214,17 +214,26 @@ def he_torrance_specular_mueller(
     >>> he_torrance_specular_mueller(0.0, **mirror).diagonal().round(3).tolist()
     [0.04, 0.04, -0.04, -0.04]
     """
-    angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
     surface = unpolarised.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
-    rho_s = unpolarised.he_torrance_specular(
-        angles.theta_i, wavelength_nm=wavelength_nm, sigma_0_um=sigma_0_um, tau_um=tau_um, n=n, k=k
-    )
-    half_sum, half_difference = fresnel.half_sum_and_difference(np.cos(angles.theta_i), surface.n, surface.k)
+    return _finished_specular(checked_angles(theta_i, 0.0, 0.0, 0.0), surface)
+
+
+def he_torrance_specular_mueller_vectors(
+    wi: ArrayLike, *, wavelength_nm: ArrayLike, sigma_0_um: ArrayLike, tau_um: ArrayLike, n: ArrayLike, k: ArrayLike
+) -> Floats:
+    """`he_torrance_specular_mueller` for unit vectors `wi` of the light, of shape (..., 3)."""
+    surface = unpolarised.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    return _finished_specular(checked_vectors(wi, wi), surface)
+
+
+def _finished_specular(directions: Directions, surface: unpolarised.Surface) -> Floats:
+    rho_s = unpolarised.rho_s(directions, surface)
+    half_sum, half_difference = fresnel.half_sum_and_difference(directions.cos_i, surface.n, surface.k)
     F_s, F_p = half_sum + half_difference, half_sum - half_difference
     M = _mueller(F_s, np.zeros_like(F_s), np.zeros_like(F_s), F_p)
     reflectance = M[..., :1, :1]
     relative = np.divide(M, reflectance, out=np.zeros_like(M), where=reflectance > 0.0)
-    return finished(rho_s[..., None, None] * relative, angles, trailing=2)
+    return finished(rho_s[..., None, None] * relative, directions, trailing=2)
 
 
 def _finished_jones(directions: Directions, n: Floats, k: Floats) -> Complexes:
@@ -295,7 +304,9 @@ def _azimuth(directions: Directions) -> tuple[Floats, Floats, Floats]:
 def unit_azimuth(x: Floats, y: Floats, sin_theta: Floats) -> tuple[Floats, Floats]:
     """cos(phi) and sin(phi) of unit vectors; phi = 0 at the pole."""
     away = sin_theta != 0.0  # nan too
-    safe = np.where(away, sin_theta, 1.0)
+    lift = np.where(sin_theta < 1e-290, 2.0**600, 1.0)  # subnormal numbers carry too few digits
+    x, y = lift * x, lift * y
+    safe = np.where(away, np.hypot(x, y), 1.0)
     return np.where(away, x / safe, 1.0), y / safe
 
 

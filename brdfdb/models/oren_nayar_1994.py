@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import arcsin, cosine
-from brdfdb._numba import kernel
-from brdfdb.geometry import HALF_PI, checked_angles, checked_vectors, finished
+from brdfdb._numba import elementwise, kernel
+from brdfdb.geometry import HALF_PI, Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 
@@ -51,6 +51,14 @@ def _angle(sin_theta: float, cos_theta: float) -> tuple[float, float]:
     theta = large if steep else small
     rest = small if steep else large
     return theta, rest
+
+
+@kernel
+def _rest_of_angle(sin_theta: float, cos_theta: float) -> float:
+    return _angle(sin_theta, cos_theta)[1]
+
+
+_rest = elementwise(_rest_of_angle)
 
 
 @kernel
@@ -315,12 +323,28 @@ def oren_nayar_parts(
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     parameters = {"rho": RHO.check(rho), "sigma": SIGMA.check(sigma)}
-    direct = oren_nayar(*angles.given, **parameters, interreflection=False)
-    total = oren_nayar(*angles.given, **parameters, interreflection=True)
-    variance, x = parameters["sigma"] ** 2, np.minimum(angles.theta_i, angles.theta_r) * (2.0 / np.pi)
+    direct, total = (oren_nayar(*angles.given, **parameters, interreflection=each) for each in (False, True))
+    return _apart(angles, direct, total, **parameters)
+
+
+def oren_nayar_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Parts:
+    """`oren_nayar_parts` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    vectors = checked_vectors(wi, wr)
+    parameters = {"rho": RHO.check(rho), "sigma": SIGMA.check(sigma)}
+    direct, total = (oren_nayar_vectors(wi, wr, **parameters, interreflection=each) for each in (False, True))
+    return _apart(vectors, direct, total, **parameters)
+
+
+def _apart(directions: Directions, direct: Floats, total: Floats, rho: Floats, sigma: Floats) -> Parts:
+    variance, cos_dphi = sigma**2, directions.cos_dphi
+    # With x = 2 beta / pi: 1 - cos(dphi) x^2, without a difference where both are near 1
+    rest = _rest(np.minimum(directions.sin_i, directions.sin_r), np.maximum(directions.cos_i, directions.cos_r))
+    less = rest * (2.0 / np.pi) * (2.0 - rest * (2.0 / np.pi))  # 1 - x^2
+    near_1 = directions.sin_dphi**2 / (1.0 + np.abs(cos_dphi)) + cos_dphi * less
+    bracket = np.where(cos_dphi > 0.0, near_1, 1.0 - cos_dphi * (1.0 - less))
     # Eq. (28)
-    bounce = 0.17 * parameters["rho"] ** 2 / np.pi * variance / (variance + 0.13) * (1.0 - angles.cos_dphi * x * x)
-    return Parts(finished(direct, angles), finished(np.where(direct > 0.0, bounce, total), angles))
+    bounce = 0.17 * rho**2 / np.pi * variance / (variance + 0.13) * bracket
+    return Parts(finished(direct, directions), finished(np.where(direct > 0.0, bounce, total), directions))
 
 
 def oren_nayar_qualitative(

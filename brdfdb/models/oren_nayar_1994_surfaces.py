@@ -194,6 +194,13 @@ def oren_nayar_unidirectional_parts(
     return _parts(*_unidirectional(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, theta_a, phi_a))
 
 
+def oren_nayar_unidirectional_parts_vectors(
+    wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike, phi_a: ArrayLike
+) -> Parts:
+    """`oren_nayar_unidirectional_parts` for unit vectors `wi` of the light and `wr` of the viewer, each (..., 3)."""
+    return _parts(*_unidirectional(checked_vectors(wi, wr), rho, theta_a, phi_a))
+
+
 def _unidirectional(
     directions: Directions, rho: ArrayLike, theta_a: ArrayLike, phi_a: ArrayLike
 ) -> tuple[Floats, Floats, Directions]:
@@ -312,6 +319,11 @@ def oren_nayar_single_slope_parts(
     return _parts(*_single_slope(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, theta_a))
 
 
+def oren_nayar_single_slope_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike) -> Parts:
+    """`oren_nayar_single_slope_parts` for unit vectors `wi` of the light and `wr` of the viewer, each (..., 3)."""
+    return _parts(*_single_slope(checked_vectors(wi, wr), rho, theta_a))
+
+
 def _single_slope(directions: Directions, rho: ArrayLike, theta_a: ArrayLike) -> tuple[Floats, Floats, Directions]:
     albedo, slope = RHO.check(rho), THETA_A.check(theta_a)
     cos_dphi = directions.cos_dphi
@@ -414,6 +426,11 @@ def oren_nayar_gaussian_parts(
     (0.1552, 0.0522)
     """
     return _parts(*_gaussian(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, sigma))
+
+
+def oren_nayar_gaussian_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Parts:
+    """`oren_nayar_gaussian_parts` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    return _parts(*_gaussian(checked_vectors(wi, wr), rho, sigma))
 
 
 def _gaussian(directions: Directions, rho: ArrayLike, sigma: ArrayLike) -> tuple[Floats, Floats, Directions]:

@@ -14,6 +14,7 @@ from brdfdb.models import MODELS, he_torrance_1991
 from brdfdb.parameters import ModelSpec, Parameter
 
 HALF_PI = np.pi / 2
+ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 TWINS = [name for name in models.__all__ if name.endswith("_vectors")]
 FUNCTIONS = [getattr(models, name) for name in models.__all__ if name not in ("MODELS", *TWINS)]
 
@@ -38,13 +39,28 @@ def test_the_docstring_has_its_sections(function: Callable[..., Any]) -> None:
         assert re.search(rf"\b{name}\b", document), name
 
 
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
+def test_every_function_has_a_twin_of_unit_vectors(function: Callable[..., Any]) -> None:
+    assert f"{function.__name__}_vectors" in TWINS
+
+
 @pytest.mark.parametrize("name", TWINS)
 def test_the_docstring_of_a_twin_names_the_function_that_documents_its_parameters(name: str) -> None:
     original, twin = getattr(models, name.removesuffix("_vectors")), getattr(models, name)
-    assert (inspect.getdoc(twin) or "").startswith(f"`{original.__name__}` for unit vectors `wi`")
     by_angles, by_vectors = inspect.signature(original).parameters, inspect.signature(twin).parameters
-    assert [*by_vectors] == ["wi", "wr", *[*by_angles][4:]]
-    assert [by_vectors[each] for each in [*by_vectors][2:]] == [by_angles[each] for each in [*by_angles][4:]]
+    angles = [each for each in by_angles if each in ANGLES]
+    both = angles == [*ANGLES]
+    assert both or angles == ["theta_i"]
+    first = f"`{original.__name__}` for unit vectors `wi` of the light" + (
+        " and `wr` of the viewer, " if both else ", "
+    )
+    assert (inspect.getdoc(twin) or "").startswith(first)
+    vectors = ["wi", "wr"] if both else ["wi"]
+    assert [*by_vectors] == [*vectors, *[*by_angles][len(angles) :]]
+    assert [*by_vectors.values()][len(vectors) :] == [*by_angles.values()][len(angles) :]
+    for each in vectors:
+        assert by_vectors[each].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
+        assert by_vectors[each].default is inspect.Parameter.empty
 
 
 @pytest.mark.parametrize("spec", MODELS.values(), ids=MODELS)

@@ -1,7 +1,6 @@
 """What every model of the registry promises: a model is held to all of it from the day it is registered."""
 
 import inspect
-import itertools
 import re
 from typing import Any
 
@@ -9,85 +8,34 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from brdfdb import models
-from brdfdb.geometry import unit_vector
-from brdfdb.models import MODELS, he_torrance_1991
+from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec, Parameter
-
-HALF_PI = np.pi / 2
-HORIZON_32 = np.float32(HALF_PI)  # lies above pi/2, and is read as the horizon
-TINY = 1e-280
+from tests.models.draws import (
+    ANGLES,
+    HALF_PI,
+    HORIZON_32,
+    LIGHT,
+    ROWS,
+    SLOW,
+    TINY,
+    corner_angles,
+    corner_parameters,
+    drawn,
+    drawn_angles,
+    every_model,
+    every_parameter,
+    every_specular,
+    parameters_of,
+    refused,
+    specular,
+)
 
 # Relative differences, each just above the worst measured, which stands behind it
 RECIPROCITY = 1e-12  # 0: each formula is symmetric to the last bit; the rest is room for other vector units
 AZIMUTH = 1e-13  # 8.6e-14 (parallel cavities): what the rounding of phi + 2 pi does
 AZIMUTH_OF = {"torrance_sparrow": 6e-12}  # 5.3e-12, where its lobe is down to 1e-142
-ROWS = 1e-11  # 1e-12 here; rows of He-Torrance share nodes, see test_he_torrance_series
-TWIN = 1e-14  # 6.0e-15 (He-Torrance), beside what rounding the angles does: unit vectors against angles
-TWIN_ROUNDING = 3e-16  # [rad] the rounding of an angle, of which a narrow lobe makes much
-LIGHT = (he_torrance_1991.WAVELENGTH_NM, he_torrance_1991.N, he_torrance_1991.K)  # of every spectral model
-ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
-SLOW = ("oren_nayar_gaussian",)  # an integral, 30 us a value
-
-every_model = pytest.mark.parametrize("spec", MODELS.values(), ids=MODELS.keys())
-every_specular = pytest.mark.parametrize("spec", [s for s in MODELS.values() if s.specular], ids=lambda s: s.name)
-
-Arguments = dict[str, Any]
-
-
-def parameters_of(spec: ModelSpec) -> tuple[Parameter, ...]:
-    return (*spec.parameters, *LIGHT) if spec.spectral else spec.parameters
-
-
-every_parameter = pytest.mark.parametrize(
-    ("spec", "parameter"),
-    [
-        pytest.param(spec, parameter, id=f"{name}-{parameter.name}")
-        for name, spec in MODELS.items()
-        for parameter in parameters_of(spec)
-    ],
-)
-
-
-def drawn(spec: ModelSpec, rng: np.random.Generator, count: int | None = None) -> Arguments:
-    """Ordinary parameters, for any model: the part of each range below 1, and visible light."""
-    ranges = {parameter.name: (parameter.low, min(parameter.high, 1.0)) for parameter in spec.parameters}
-    if spec.spectral:
-        ranges |= {"wavelength_nm": (400.0, 800.0), "n": (0.2, 2.5), "k": (0.0, 7.0)}
-    return {name: rng.uniform(low, high, count) for name, (low, high) in ranges.items()}
-
-
-def drawn_angles(rng: np.random.Generator, count: int) -> tuple[NDArray[np.float64], ...]:
-    theta_i, theta_r = rng.uniform(0.0, HALF_PI, (2, count))
-    phi_i, phi_r = rng.uniform(-np.pi, np.pi, (2, count))
-    return theta_i, phi_i, theta_r, phi_r
-
-
-def corner_parameters(spec: ModelSpec) -> Arguments:
-    """Every combination of the lowest, the highest and the default value of the parameters, along one axis."""
-    ends = [
-        sorted(
-            {parameter.low, parameter.high, float(parameter.low if parameter.default is None else parameter.default)}
-        )
-        for parameter in parameters_of(spec)
-    ]
-    columns = zip(*itertools.product(*ends), strict=True)
-    return {parameter.name: np.array(column) for parameter, column in zip(parameters_of(spec), columns, strict=True)}
-
-
-def corner_angles() -> tuple[NDArray[np.float64], ...]:
-    """Every combination of the corners of the directions, on four axes."""
-    thetas = np.array([0.0, 5e-324, 1e-8, np.pi / 4, 1.3, np.nextafter(HALF_PI, 0.0), HALF_PI])
-    phis = np.array([0.0, np.pi, -HALF_PI, 2.0 * np.pi, 1e15])
-    theta_i, phi_i, theta_r, phi_r = np.meshgrid(thetas, phis, thetas, phis, indexing="ij", sparse=True)
-    return theta_i, phi_i, theta_r, phi_r
-
-
-def specular(spec: ModelSpec, theta_i: Any, parameters: Arguments) -> Any:
-    assert spec.specular is not None
-    return spec.specular(theta_i, **{name: parameters[name] for name in spec.specular_parameters})
 
 
 # Values
@@ -445,131 +393,6 @@ def test_non_contiguous_angles_give_the_same_values(spec: ModelSpec) -> None:
     np.testing.assert_allclose(spec.evaluate(*backwards, **parameters)[::-1], expected, rtol=ROWS)
 
 
-# Unit vectors
-
-
-def drawn_vectors(rng: np.random.Generator, *shape: int) -> NDArray[np.float64]:
-    """Random unit vectors above the horizon, of shape (*shape, 3)."""
-    return unit_vector(rng.uniform(0.0, HALF_PI, shape), rng.uniform(-np.pi, np.pi, shape))
-
-
-@every_model
-def test_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(23)
-    angles = drawn_angles(rng, 4000)
-    parameters = drawn(spec, rng, 4000)
-    wi, wr = unit_vector(*angles[:2]), unit_vector(*angles[2:])
-    expected = spec.evaluate(*angles, **parameters)
-    step = 1e-9
-    moved = [spec.evaluate(*angles[:i], angles[i] - step, *angles[i + 1 :], **parameters) for i in range(4)]
-    conditioning = sum(np.abs(each - expected) for each in moved) / step
-    error = np.abs(spec.vectors(wi, wr, **parameters) - expected)
-    assert np.mean(expected > TINY) > 0.5
-    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, TINY))
-    assert worst <= TWIN, f"off by {worst:.3g}"
-
-
-@every_model
-def test_float32_vectors_give_float32_and_the_arithmetic_is_float64(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(24)
-    parameters = drawn(spec, rng)
-    wi, wr = drawn_vectors(rng, 50).astype(np.float32), drawn_vectors(rng, 50).astype(np.float32)
-    values = spec.vectors(wi, wr, **parameters)
-    assert values.dtype == np.float32
-    double = spec.vectors(wi.astype(np.float64), wr.astype(np.float64), **parameters)
-    assert double.dtype == np.float64
-    np.testing.assert_allclose(values, double, rtol=2.0**-23, atol=2.0**-126)  # one rounding, next to a tie
-    assert spec.vectors(wi, wr.astype(np.float64), **parameters).dtype == np.float64
-    assert isinstance(spec.vectors(wi[0], wr[0], **parameters), np.float32)
-    assert isinstance(spec.vectors([0, 0, 1], [0.0, 0.6, 0.8], **parameters), np.float64)
-
-
-@every_model
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_vectors_in_every_corner_give_finite_values_above_the_horizon_and_0_below(spec: ModelSpec, dtype: type) -> None:
-    corners = np.array(
-        [
-            *([0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0.8, 0.6]),
-            *([1, 0, 1e-30], [-1, 0, 1e-30], [1e-30, 0, 1], [1, 1e-20, 1e-20], [-0.6, 0.8, 0.0]),
-        ],
-        dtype=dtype,
-    )
-    parameters = {name: values.reshape(-1, 1, 1) for name, values in corner_parameters(spec).items()}
-    values = spec.vectors(corners[:, None], corners, **parameters)
-    assert values.dtype == dtype
-    assert np.isfinite(values).all()
-    assert (values >= 0.0).all()
-    under = corners * np.array([1.0, 1.0, -1.0], dtype=dtype)
-    under = under[under[:, 2] < 0.0]
-    for wi, wr in ((under[:, None], corners), (corners[:, None], under), (under[:, None], under)):
-        assert (spec.vectors(wi, wr, **parameters) == 0.0).all()
-
-
-@every_model
-def test_a_nan_in_a_vector_goes_through_and_leaves_its_neighbours_alone(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(25)
-    parameters = drawn(spec, rng)
-    wi, wr = drawn_vectors(rng, 70), drawn_vectors(rng, 70)
-    wr[5] *= -1.0
-    expected = spec.vectors(wi, wr, **parameters)
-    for row, axis in ((0, 0), (5, 1), (69, 2)):
-        dirty_i, dirty_r = wi.copy(), wr.copy()
-        dirty_i[row, axis] = dirty_r[row, axis] = np.nan
-        for values in (spec.vectors(dirty_i, wr, **parameters), spec.vectors(wi, dirty_r, **parameters)):
-            np.testing.assert_array_equal(np.isnan(values), np.arange(70) == row)
-            np.testing.assert_allclose(np.delete(values, row), np.delete(expected, row), rtol=ROWS)
-
-
-@every_model
-def test_broadcasts_over_vectors(spec: ModelSpec) -> None:
-    rng = np.random.default_rng(26)
-    parameters = drawn(spec, rng)
-    wi, wr = drawn_vectors(rng, 5), drawn_vectors(rng, 7)
-    values = spec.vectors(wi[:, None], wr, **parameters)
-    assert values.shape == (5, 7)
-    for row, one in zip(values, wi, strict=True):
-        np.testing.assert_allclose(spec.vectors(one, wr, **parameters), row, rtol=ROWS)
-    np.testing.assert_allclose(spec.vectors(wi, wr[0], **parameters), values[:, 0], rtol=ROWS)
-    assert np.shape(spec.vectors(wi[0], wr[0], **parameters)) == ()
-    assert spec.vectors(wi[:0], wr[0], **parameters).shape == (0,)
-    assert spec.vectors(wi[:0, None], wr, **parameters).shape == (0, 7)
-    several = {name: value[:, None] for name, value in drawn(spec, rng, 3).items()}
-    rows = spec.vectors(wi[0], wr, **several)
-    assert rows.shape == (3, 7)
-    for index, row in enumerate(rows):
-        alone = {name: value[index, 0] for name, value in several.items()}
-        np.testing.assert_allclose(spec.vectors(wi[0], wr, **alone), row, rtol=ROWS)
-
-
-@every_model
-@pytest.mark.parametrize("position", [0, 1], ids=["wi", "wr"])
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ([0.0, 0.0, 1.1], r"\(0, 0, 1\.1\) has the length 1\.1, not 1"),
-        ([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], r"\(0, 0, 0\) has the length 0, not 1"),
-        ([np.inf, 0.0, 0.0], r"\(inf, 0, 0\) has the length inf, not 1"),
-        ([0.0, 1.0], r"float64 of shape \(2,\) is not an array of vectors"),
-        (1.0, r"float64 of shape \(\) is not an array of vectors"),
-        ([True, False, False], r"bool of shape \(3,\) is not an array of vectors"),
-        (["a", "b", "c"], r"<U1 of shape \(3,\) is not an array of vectors"),
-        ([0.0, 0.0, 1j], r"complex128 of shape \(3,\) is not an array of vectors"),
-    ],
-)
-def test_refuses_what_is_no_unit_vector(spec: ModelSpec, position: int, wrong: Any, message: str) -> None:
-    vectors: list[Any] = [[0.0, 0.6, 0.8], [0.0, 0.6, 0.8]]
-    vectors[position] = wrong
-    with pytest.raises(ValueError, match=rf"^{('wi', 'wr')[position]}: {message}"):
-        spec.vectors(*vectors, **drawn(spec, np.random.default_rng(27)))
-
-
-@every_parameter
-def test_vectors_refuse_a_parameter_in_the_words_of_the_angles(spec: ModelSpec, parameter: Parameter) -> None:
-    parameters = drawn(spec, np.random.default_rng(28)) | {parameter.name: parameter.high * 1.5}
-    with pytest.raises(ValueError, match=f"^{re.escape(refused(spec, parameter, parameter.high * 1.5))}$"):
-        spec.vectors([0.0, 0.6, 0.8], [0.0, 0.6, 0.8], **parameters)
-
-
 # Refusals
 
 
@@ -610,18 +433,6 @@ def test_refuses_a_phi_that_float64_does_not_resolve(spec: ModelSpec, position: 
         angles[position] = given_as
         with pytest.raises(ValueError, match=message):
             spec.evaluate(*angles, **parameters)
-
-
-def refused(spec: ModelSpec, parameter: Parameter, wrong: Any) -> str:
-    """What the model says to a wrong parameter, and its specular part in the same words."""
-    parameters = drawn(spec, np.random.default_rng(19)) | {parameter.name: wrong}
-    with pytest.raises(ValueError) as caught:  # noqa: PT011  # the callers look at the message
-        spec.evaluate(0.1, 0.2, 0.3, 0.4, **parameters)
-    message = str(caught.value)
-    if spec.specular and parameter.name in spec.specular_parameters:
-        with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
-            specular(spec, 0.1, parameters)
-    return message
 
 
 @every_parameter

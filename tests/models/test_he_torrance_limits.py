@@ -36,6 +36,9 @@ EXCHANGE = 2e-12  # 3.5e-13: the nodes in exchanged cones are summed in another 
 VECTORS = 2e-14  # 3.4e-15
 PARTS = 5e-15  # 8.2e-16
 AREA = 2e-13  # 5.5e-14
+SPREAD_REFERENCE = 5e-15  # 7.8e-16
+APERTURE = 2e-13  # 4.6e-14; of the reference through pinholes 6.2e-14
+TWO_RINGS = 2e-8  # 1.2e-8: the ceramic near grazing, whose lobe is steep there
 SPREAD = 2e-14  # 4.8e-15, rho_s from the integral of the spread peak
 
 Floats = NDArray[np.float64]
@@ -253,6 +256,59 @@ def test_diffuse_parts_are_averaged_over_both_cones() -> None:
     assert averaged(3) == pytest.approx(averaged(5), abs=1e-8 * on_axis)  # 6e-11
 
 
+@pytest.mark.parametrize(
+    ("theta_i", "theta_r", "delta_phi", "received"),
+    [
+        (0.3, 0.3, np.pi, CONE),
+        (0.3, 0.3, np.pi, 0.2 * CONE),
+        (0.3, 0.33, np.pi, CONE),
+        (1.2, 1.19, 3.12, 0.01),
+        (0.0, 0.04, 1.0, CONE),
+        (1.5, 1.5, 3.12, 1e-8),
+        (0.3, 0.4, np.pi, CONE),
+    ],
+)
+def test_the_spread_specular_part_against_the_reference(
+    theta_i: float, theta_r: float, delta_phi: float, received: float
+) -> None:
+    smooth = {"wavelength_nm": 2000.0, "sigma_0_um": 0.0, "tau_um": 1.77, "n": 2.15, "k": 20.7}
+    cones = {"incident_solid_angle_sr": CONE, "received_solid_angle_sr": received}
+    expected = float(he_torrance_1991.aperture_specular(theta_i, theta_r, delta_phi, **cones, **smooth))
+    value = he_torrance_aperture(theta_i, 0.3, theta_r, 0.3 + delta_phi, a=0.3, **cones, **smooth)
+    assert value - 0.3 / np.pi == pytest.approx(expected, rel=SPREAD_REFERENCE, abs=1e-15)
+    assert (expected > 0.0) == (theta_r < 0.4 or theta_i > 0.4)
+
+
+@pytest.mark.parametrize(
+    ("surface", "theta_i", "theta_r", "delta_phi", "received"),
+    [
+        (ALUMINUM | {"wavelength_nm": 2000.0}, 0.3, 0.32, 3.12, CONE),
+        (ALUMINUM | {"wavelength_nm": 500.0}, 1.2, 1.3, np.pi, 0.1 * CONE),
+        (ALUMINUM | {"wavelength_nm": 500.0}, 0.0, 0.2, 1.0, 0.02),
+        (CERAMIC, 0.4, 0.5, 2.9, CONE),
+        (CERAMIC, 1.2, 1.3, np.pi, CONE),
+    ],
+)
+def test_all_parts_through_apertures_against_the_reference(
+    surface: dict[str, float], theta_i: float, theta_r: float, delta_phi: float, received: float
+) -> None:
+    cones = {"incident_solid_angle_sr": CONE, "received_solid_angle_sr": received}
+    arguments = theta_i, theta_r, delta_phi, *cones.values()
+    expected = float(he_torrance_1991.aperture_specular(*arguments, **surface))
+    expected += he_torrance_1991.aperture_diffuse(*arguments, **surface) + 0.2 / np.pi
+    for rings, tolerance in ((4, APERTURE), (2, TWO_RINGS)):
+        value = he_torrance_aperture(theta_i, 0.0, theta_r, delta_phi, a=0.2, rings=rings, **cones, **surface)
+        assert value == pytest.approx(expected, rel=tolerance)
+
+
+def test_the_diffuse_reference_through_pinholes_is_the_one_of_40_digits() -> None:
+    for arguments in ((0.4, 0.5, 2.9), (0.0, 1.2, 1.0)):
+        value = he_torrance_1991.aperture_diffuse(*arguments, 1e-16, 1e-16, **CERAMIC)
+        exact = he_torrance_1991.directional_diffuse(*arguments, **CERAMIC)
+        assert value == pytest.approx(float(exact), rel=APERTURE)
+    assert he_torrance_1991.aperture_diffuse(0.4, 0.5, 2.9, CONE, CONE, **CERAMIC | {"sigma_0_um": 0.0}) == 0.0
+
+
 def test_an_ideal_diffuser_looks_the_same_through_any_aperture() -> None:
     nothing = {"wavelength_nm": 500.0, "sigma_0_um": 0.3, "tau_um": 2.0, "n": 1.0, "k": 0.0}
     theta = np.linspace(0.0, 1.3, 7)
@@ -332,6 +388,20 @@ def test_smooth_below_the_horizon_and_nan() -> None:
     assert he_torrance_smooth(np.float32(0.3), n=1.5, k=0.0).dtype == np.float32
     with pytest.raises(ValueError, match="k: -1 is outside"):
         he_torrance_smooth(0.3, n=1.5, k=-1.0)
+
+
+def test_smooth_of_vectors_is_smooth_of_their_angles() -> None:
+    theta_i, phi_i = np.append(directions(np.random.default_rng(10), 200)[:2], [[0.0, HALF_PI], [1.0, 1.0]], axis=1)
+    smooth, n = models.he_torrance_smooth_vectors, np.array([[1.5], [0.2]])
+    value = smooth(unit_vector(theta_i, phi_i), n=n, k=0.5)
+    assert value.shape == (2, 202)
+    np.testing.assert_allclose(value, he_torrance_smooth(theta_i, n=n, k=0.5), rtol=VECTORS)
+    under = np.array([[0.6, 0.0, -0.8], [0.0, np.nan, 1.0]])
+    np.testing.assert_array_equal(smooth(under, **OPTICS), [0.0, np.nan])
+    assert smooth(np.float32([0.6, 0.0, 0.8]), **OPTICS).dtype == np.float32
+    assert isinstance(smooth([0, 0, 1], **OPTICS), np.float64)
+    with pytest.raises(ValueError, match=r"^wi: \(0, 0, 2\) has the length 2, not 1$"):
+        smooth([0, 0, 2], **OPTICS)
 
 
 def test_arguments_out_of_range() -> None:

@@ -381,6 +381,24 @@ def test_vectors_give_what_angles_give() -> None:
     assert (abs(M - expected) / expected[:, :1, :1]).max() < VECTORS
 
 
+def test_specular_vectors_give_what_angles_give() -> None:
+    rng = np.random.default_rng(10)
+    theta_i, phi_i = rng.uniform([0.0, -3.0], [1.57, 3.0], (500, 2)).T
+    theta_i[:2] = 0.0, HALF_PI
+    index, twin = indices(rng, 500), models.he_torrance_specular_mueller_vectors
+    expected = he_torrance_specular_mueller(theta_i, **index, **ALUMINUM)
+    M = twin(unit_vector(theta_i, phi_i), **index, **ALUMINUM)
+    assert M.shape == (500, 4, 4)
+    assert (abs(M - expected) / expected[:, :1, :1]).max() < VECTORS
+    metal = {"n": 0.769, "k": 6.08, **ALUMINUM}
+    below, unknown = twin([[0.6, 0.0, -0.8], [0.0, np.nan, 1.0]], **metal)
+    assert (below == 0.0).all()
+    assert np.isnan(unknown).all()
+    assert twin(np.float32([0.6, 0.0, 0.8]), **metal).dtype == np.float32
+    with pytest.raises(ValueError, match=r"^wi: \(0, 0, 2\) has the length 2, not 1$"):
+        twin([0, 0, 2], **metal)
+
+
 @pytest.mark.parametrize("n", [1e-3, 1.0, 1.5, 100.0])
 @pytest.mark.parametrize("k", [0.0, 1e-3, 1e4])
 def test_is_finite_in_every_corner(n: float, k: float) -> None:

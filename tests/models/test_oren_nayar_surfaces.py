@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb import models
+from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
 from brdfdb.reference import fujii_2012, mp, oren_nayar_1994, portsmouth_2025, torrance_sparrow_1967
@@ -31,6 +32,8 @@ UNIDIRECTIONAL = 6e-14  # 5.0e-14, next to a facet that turns away; 1.2e-13 in 1
 TORRANCE_SPARROW = 2e-13  # 6.8e-14, where the lobe is down to 1e-132
 GAUSSIAN = 1.1e-6  # what the docstring promises; 3.1e-7 of 340 draws
 DIRECTIONS = 1e-12  # 3e-13: unit vectors against angles, away from the horizon
+TWIN_PARTS = 3e-13  # 8.8e-14 (Gaussian, second bounce): the same of the parts
+TWIN_SUM = 2e-15  # 4.4e-16: the parts of unit vectors against the whole
 FURNACE = 1e-9  # 2e-10 of the quadrature
 FIT = 0.07  # 0.066: "very accurate" in Fig. 12; 0.16 at sigma of 10 degrees
 INTEGRAL = 1e-6  # the mean of parallel cavities over azimuths and slopes
@@ -207,6 +210,40 @@ def test_the_parts_treat_nan_the_horizon_and_float32_as_the_models_do(name: str,
         assert part[0] > 0.0
         assert np.isnan(part[1])
         assert part[2] == 0.0
+
+
+@every_surface
+def test_the_parts_of_unit_vectors_are_those_of_their_angles(name: str, parameters: dict[str, float]) -> None:
+    twin = getattr(models, f"{name}_parts_vectors")
+    theta_i, phi_i, theta_r, phi_r = directions(50, 1.5)
+    theta_i[:2], theta_r[1:3] = 0.0, 0.0
+    wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+    several = {each: np.array([[0.5], [1.0]]) * value for each, value in parameters.items()}
+    expected = getattr(models, f"{name}_parts")(theta_i, phi_i, theta_r, phi_r, **several)
+    values = twin(wi, wr, **several)
+    for value, part in zip(values, expected, strict=True):
+        assert value.shape == (2, 50)
+        np.testing.assert_allclose(value, part, rtol=TWIN_PARTS, atol=1e-16)
+    whole = getattr(models, f"{name}_vectors")(wi, wr, **several)
+    np.testing.assert_allclose(sum(values), whole, rtol=TWIN_SUM)
+
+
+@every_surface
+def test_the_parts_treat_vectors_as_the_models_do(name: str, parameters: dict[str, float]) -> None:
+    twin = getattr(models, f"{name}_parts_vectors")
+    wi = np.array([[0.6, 0.0, 0.8], [np.nan, 0.0, 0.8], [0.6, 0.0, -0.8], [1.0, 0.0, 0.0]], dtype=np.float32)
+    wr = np.array([0.0, 0.8, 0.6], dtype=np.float32)
+    for exchanged in ((wi, wr), (wr, wi)):
+        for part in twin(*exchanged, **parameters):
+            assert part.dtype == np.float32
+            assert part[0] > 0.0
+            assert np.isnan(part[1])
+            assert part[2] == 0.0
+            assert 0.0 <= part[3] < np.inf
+    for part in twin([0, 0, 1], [0.0, 0.6, 0.8], **parameters):
+        assert isinstance(part, np.float64)
+    with pytest.raises(ValueError, match=r"^wr: \(0, 0, 2\) has the length 2, not 1$"):
+        twin([0, 0, 1], [0, 0, 2], **parameters)
 
 
 @every_surface

@@ -1,0 +1,255 @@
+"""The kernels of He et al. 1991: roughness, shadowing, and f_r of rows, of unit vectors and of scattered pairs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb._elementary import BLOCK, cosine, erfcx, exp, log
+from brdfdb._numba import elementwise, kernel, loop
+from brdfdb.fresnel import reflectance
+from brdfdb.models._he_torrance_series import (
+    G_HIGH,
+    G_LOW,
+    GROUPS,
+    Q_PATCHES,
+    ROWS_OF_WORK,
+    log_series,
+    log_series_of_row,
+    nearer_lambert_w,
+    roughly_lambert_w,
+)
+from brdfdb.parameters import Floats
+
+_X_MAX = 30.0  # where erfc(x) and exp(-x^2) have long been 0
+_INVERSE_SQRT_PI = 0.5641895835477563
+WORTH_THE_TABLE = 16  # values in a row
+
+
+@kernel
+def _shadowing_and_hidden(sin_theta: float, cos_theta: float, slope: float) -> tuple[float, float]:
+    """S_1(theta) / cos theta of eqs 23-25, and K of eqs 82-83, how much of the valleys a direction does not reach.
+
+    slope is sigma_0 / tau; the first is finite up to and including 90 degrees.
+    """
+    valley = 2.0 * slope * sin_theta
+    x = cos_theta / (valley if valley > 0.0 else 1.0)
+    x = _X_MAX if valley == 0.0 or x > _X_MAX else x  # there both exponentials are 0
+    gaussian = exp(-x * x)
+    erfc = gaussian * erfcx(x)
+    Q = 1.0 - 0.5 * erfc
+    return Q / (Q * cos_theta + slope * _INVERSE_SQRT_PI * sin_theta * gaussian), sin_theta / cos_theta * erfc
+
+
+@kernel
+def _shadowing_over_cos(sin_theta: float, cos_theta: float, slope: float) -> float:
+    return _shadowing_and_hidden(sin_theta, cos_theta, slope)[0]
+
+
+@kernel
+def _hidden_slope(sin_theta: float, cos_theta: float, slope: float) -> float:
+    return _shadowing_and_hidden(sin_theta, cos_theta, slope)[1]
+
+
+@kernel
+def _difference_of_sines(sin_i: float, cos_i: float, sin_r: float, cos_r: float) -> float:
+    """sin(theta_i) - sin(theta_r), without the difference of numbers near 1."""
+    sines, cosines = sin_i + sin_r, cos_i + cos_r
+    return sin_i - sin_r if sines < cosines else (cos_r - cos_i) * cosines / sines
+
+
+@kernel
+def _effective_variance(K: float) -> float:
+    """(sigma / sigma_0)^2 of eqs 80-81 for K = K_i + K_r: z_0^2 / sigma_0^2 = W_0(K^2 / (8 pi))."""
+    y = K * K * (0.125 / np.pi)
+    series = y * (1.0 - y * (1.0 - y * (1.5 - y * (8.0 / 3.0))))
+    large = 1e-4 if y < 1e-4 else y
+    log_y = log(large)
+    w = nearer_lambert_w(nearer_lambert_w(roughly_lambert_w(large, log_y), log_y), log_y)
+    return 1.0 / (1.0 + (series if y < 1e-4 else w))
+
+
+shadowing = elementwise(_shadowing_over_cos)
+hidden = elementwise(_hidden_slope)
+variance = elementwise(_effective_variance)
+difference_of_sines = elementwise(_difference_of_sines)
+
+
+@loop
+def _roughness(
+    geometry: NDArray[np.float64],
+    surface: NDArray[np.float64],
+    g_over_vz2: NDArray[np.float64],
+    shadow: NDArray[np.float64],
+) -> None:
+    """g / v_z^2, and S / (cos theta_i cos theta_r): what eq. 71 needs of a pair of polar angles."""
+    sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
+    wave, slope = surface[0], surface[2]
+    count = shadow.shape[0]
+    for j in range(count):
+        # Eqs (23)-(25)
+        light, K_i = _shadowing_and_hidden(sin_i[j], cos_i[j], slope[j])
+        viewer, K_r = _shadowing_and_hidden(sin_r[j], cos_r[j], slope[j])
+        shadow[j] = light * viewer
+        g_over_vz2[j] = K_i + K_r
+    for j in range(count):
+        # Eqs (79)-(83)
+        g_over_vz2[j] = wave[j] * _effective_variance(g_over_vz2[j])
+
+
+@loop
+def _evaluate(
+    geometry: NDArray[np.float64],
+    surface: NDArray[np.float64],
+    f_r: NDArray[np.float64],
+    work: NDArray[np.float64],
+    index: NDArray[np.int64],
+) -> None:
+    """f_r of at most BLOCK pairs of directions; geometry and surface hold the rows named below."""
+    cos_i, cos_r, v_xy2 = geometry[1], geometry[3], geometry[4]
+    correlation, n, k, uniform = surface[1], surface[3], surface[4], surface[5]
+    count = f_r.shape[0]
+    g_over_vz2, g, V, shadow = work[0, :count], work[1, :count], work[2, :count], work[3, :count]
+    _roughness(geometry, surface, g_over_vz2, shadow)
+    for j in range(count):
+        g[j] = g_over_vz2[j] * (cos_i[j] + cos_r[j]) ** 2
+        V[j] = correlation[j] * v_xy2[j]
+    # Eq. (78)
+    log_series(g, V, f_r, work[4:], index)
+    for j in range(count):
+        v2 = v_xy2[j] + (cos_i[j] + cos_r[j]) ** 2
+        # Eqs (71) and (76)
+        pair = correlation[j] * (0.25 / np.pi) * shadow[j] * g_over_vz2[j] * v2 * v2
+        f_r[j] = pair * exp(f_r[j])
+    if n[0] > 0.0:
+        for j in range(count):
+            # Eq. (75), at the bisecting angle
+            half = 0.5 * math.sqrt(v_xy2[j] + (cos_i[j] + cos_r[j]) ** 2)
+            f_r[j] *= reflectance(1.0 if half > 1.0 else half, n[j], k[j])
+    for j in range(count):
+        # Eq. (72)
+        f_r[j] += uniform[j]
+
+
+@kernel
+def specular_rows(scalars: NDArray[np.float64], rho_s: NDArray[np.float64]) -> None:
+    for row in range(rho_s.shape[0]):
+        sin_i, cos_i, wave, slope = scalars[row, 0], scalars[row, 1], scalars[row, 2], scalars[row, 3]
+        S_over_cos, K_i = _shadowing_and_hidden(sin_i, cos_i, slope)
+        # Eq. (79)
+        g = 4.0 * cos_i * cos_i * wave * _effective_variance(2.0 * K_i)
+        # Eq. (73)
+        rho_s[row] = reflectance(cos_i, scalars[row, 4], scalars[row, 5]) * exp(-g) * (S_over_cos * cos_i) ** 2
+
+
+@kernel
+def scattered(features: NDArray[np.float64], surface: NDArray[np.float64], f_r: NDArray[np.float64]) -> None:
+    """Pairs of directions one by one: features of shape (5, N) as in `_evaluate`, surface (6, 1) or (6, N)."""
+    work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
+    lanes, geometry, width = np.empty((6, BLOCK)), np.empty((5, BLOCK)), surface.shape[1]
+    for start in range(0, f_r.shape[0], BLOCK):
+        count = min(BLOCK, f_r.shape[0] - start)
+        for each in range(5):
+            for j in range(count):
+                geometry[each, j] = features[each, start + j]
+        for each in range(6):
+            for j in range(count):
+                lanes[each, j] = surface[each, min(start + j, width - 1)]
+        _evaluate(geometry, lanes, f_r[start : start + count], work, index)
+
+
+@loop
+def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], f_r: Floats) -> None:
+    """As `scattered`, of unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
+    work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
+    lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
+    for each in range(6):
+        for j in range(BLOCK):
+            lanes[each, j] = surface[each, 0]
+    for start in range(0, f_r.shape[0], BLOCK):
+        count = min(BLOCK, f_r.shape[0] - start)
+        i, r = w_i[start : start + count].reshape(-1), w_r[start : start + count].reshape(-1)
+        f = f_r[start : start + count]
+        for j in range(count):
+            geometry[0, j] = math.sqrt(np.float64(i[3 * j]) ** 2 + np.float64(i[3 * j + 1]) ** 2)
+            geometry[1, j] = cosine(np.float64(i[3 * j + 2]))
+        for j in range(count):
+            geometry[2, j] = math.sqrt(np.float64(r[3 * j]) ** 2 + np.float64(r[3 * j + 1]) ** 2)
+            geometry[3, j] = cosine(np.float64(r[3 * j + 2]))
+        for j in range(count):
+            # Eq. (84): k_r - k_i is the sum of our directions
+            v_x, v_y = np.float64(i[3 * j]) + r[3 * j], np.float64(i[3 * j + 1]) + r[3 * j + 1]
+            geometry[4, j] = v_x * v_x + v_y * v_y
+        _evaluate(geometry, lanes, values[:count], work, index)
+        for j in range(count):
+            f[j] = values[j] * (0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0)  # nan stays nan
+
+
+@kernel
+def vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
+    for row in range(f_r.shape[0]):
+        surface = scalars[row].reshape(6, 1)
+        _vectors(w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)], surface, f_r[row])
+
+
+@kernel
+def angle_rows(
+    one_plus_cos: NDArray[np.float64],
+    table: NDArray[np.float64],
+    scalars: NDArray[np.float64],
+    f_r: Floats,
+) -> None:
+    """Rows along the azimuth, which share polar angles and surface: what eq. 71 needs of these is computed once."""
+    length = f_r.shape[1]
+    work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
+    lanes, g_over_vz2, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
+    g_row, v2, V, log_D = np.empty(BLOCK), np.empty(length), np.empty(length), np.empty(length)
+    polynomials = np.empty((Q_PATCHES, table.shape[3]))
+    least, most = 0.0, 2.0
+    for row in range(f_r.shape[0]):
+        if row < one_plus_cos.shape[0]:
+            least, most = 2.0, 0.0
+            for j in range(length):  # past nan
+                turn = one_plus_cos[row, j]
+                least, most = turn if turn < least else least, turn if turn > most else most
+        lane = row % BLOCK
+        if lane == 0:
+            rows = min(BLOCK, f_r.shape[0] - row)
+            for i in range(rows):
+                for each in range(10):
+                    lanes[each, i] = scalars[row + i, each]
+            _roughness(lanes[:4], lanes[4:], g_over_vz2[:rows], shadow[:rows])
+        s, f, turned = scalars[row], f_r[row], one_plus_cos[min(row, one_plus_cos.shape[0] - 1)]
+        correlation, n, k, uniform = s[5], s[7], s[8], s[9]
+        v_z2 = (s[1] + s[3]) ** 2
+        g = g_over_vz2[lane] * v_z2
+        if g == 0.0:
+            for j in range(length):
+                f[j] = uniform
+            continue
+        # Eq. (84): v_xy^2 in the form that keeps its digits near the mirror direction
+        difference2, product = _difference_of_sines(s[0], s[1], s[2], s[3]) ** 2, 2.0 * s[0] * s[2]
+        for j in range(length):
+            v_xy2 = difference2 + product * turned[j]
+            v2[j] = v_xy2 + v_z2
+            V[j] = correlation * v_xy2
+        # Eq. (78)
+        if length >= WORTH_THE_TABLE and G_LOW <= g < G_HIGH:
+            low, high = correlation * (difference2 + product * least), correlation * (difference2 + product * most)
+            log_series_of_row(table, g, V, low, high, log_D, polynomials)
+        else:
+            for i in range(min(length, BLOCK)):
+                g_row[i] = g
+            for start in range(0, length, BLOCK):
+                stop = min(start + BLOCK, length)
+                log_series(g_row[: stop - start], V[start:stop], log_D[start:stop], work, index)
+        # Eqs (71) and (76)
+        pair = correlation * (0.25 / np.pi) * shadow[lane] * g_over_vz2[lane]
+        for j in range(length):
+            # Eq. (75), at the bisecting angle
+            cos = 0.5 * math.sqrt(v2[j])
+            F2 = reflectance(1.0 if cos > 1.0 else cos, n, k) if n > 0.0 else 1.0
+            # Eq. (72)
+            f[j] = uniform + pair * v2[j] * v2[j] * exp(log_D[j]) * F2

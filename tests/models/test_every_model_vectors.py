@@ -1,0 +1,191 @@
+"""What the unit-vector twin of every model promises: the values of its angles, and the same ends."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brdfdb import models
+from brdfdb.geometry import unit_vector
+from brdfdb.parameters import ModelSpec, Parameter
+from tests.models.draws import (
+    HALF_PI,
+    ROWS,
+    TINY,
+    Arguments,
+    corner_parameters,
+    drawn,
+    drawn_angles,
+    every_model,
+    every_parameter,
+    every_specular,
+    refused,
+    specular,
+)
+
+TWIN = 1e-14  # 6.0e-15 (He-Torrance), beside what rounding the angles does: unit vectors against angles
+TWIN_ROUNDING = 3e-16  # [rad] the rounding of an angle, of which a narrow lobe makes much
+
+
+def drawn_vectors(rng: np.random.Generator, *shape: int) -> NDArray[np.float64]:
+    """Random unit vectors above the horizon, of shape (*shape, 3)."""
+    return unit_vector(rng.uniform(0.0, HALF_PI, shape), rng.uniform(-np.pi, np.pi, shape))
+
+
+@every_model
+def test_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(23)
+    angles = drawn_angles(rng, 4000)
+    parameters = drawn(spec, rng, 4000)
+    wi, wr = unit_vector(*angles[:2]), unit_vector(*angles[2:])
+    expected = spec.evaluate(*angles, **parameters)
+    step = 1e-9
+    moved = [spec.evaluate(*angles[:i], angles[i] - step, *angles[i + 1 :], **parameters) for i in range(4)]
+    conditioning = sum(np.abs(each - expected) for each in moved) / step
+    error = np.abs(spec.vectors(wi, wr, **parameters) - expected)
+    assert np.mean(expected > TINY) > 0.5
+    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, TINY))
+    assert worst <= TWIN, f"off by {worst:.3g}"
+
+
+@every_model
+def test_float32_vectors_give_float32_and_the_arithmetic_is_float64(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(24)
+    parameters = drawn(spec, rng)
+    wi, wr = drawn_vectors(rng, 50).astype(np.float32), drawn_vectors(rng, 50).astype(np.float32)
+    values = spec.vectors(wi, wr, **parameters)
+    assert values.dtype == np.float32
+    double = spec.vectors(wi.astype(np.float64), wr.astype(np.float64), **parameters)
+    assert double.dtype == np.float64
+    np.testing.assert_allclose(values, double, rtol=2.0**-23, atol=2.0**-126)  # one rounding, next to a tie
+    assert spec.vectors(wi, wr.astype(np.float64), **parameters).dtype == np.float64
+    assert isinstance(spec.vectors(wi[0], wr[0], **parameters), np.float32)
+    assert isinstance(spec.vectors([0, 0, 1], [0.0, 0.6, 0.8], **parameters), np.float64)
+
+
+@every_model
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_vectors_in_every_corner_give_finite_values_above_the_horizon_and_0_below(spec: ModelSpec, dtype: type) -> None:
+    corners = np.array(
+        [
+            *([0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0.8, 0.6]),
+            *([1, 0, 1e-30], [-1, 0, 1e-30], [1e-30, 0, 1], [1, 1e-20, 1e-20], [-0.6, 0.8, 0.0]),
+        ],
+        dtype=dtype,
+    )
+    parameters = {name: values.reshape(-1, 1, 1) for name, values in corner_parameters(spec).items()}
+    values = spec.vectors(corners[:, None], corners, **parameters)
+    assert values.dtype == dtype
+    assert np.isfinite(values).all()
+    assert (values >= 0.0).all()
+    under = corners * np.array([1.0, 1.0, -1.0], dtype=dtype)
+    under = under[under[:, 2] < 0.0]
+    for wi, wr in ((under[:, None], corners), (corners[:, None], under), (under[:, None], under)):
+        assert (spec.vectors(wi, wr, **parameters) == 0.0).all()
+
+
+@every_model
+def test_a_nan_in_a_vector_goes_through_and_leaves_its_neighbours_alone(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(25)
+    parameters = drawn(spec, rng)
+    wi, wr = drawn_vectors(rng, 70), drawn_vectors(rng, 70)
+    wr[5] *= -1.0
+    expected = spec.vectors(wi, wr, **parameters)
+    for row, axis in ((0, 0), (5, 1), (69, 2)):
+        dirty_i, dirty_r = wi.copy(), wr.copy()
+        dirty_i[row, axis] = dirty_r[row, axis] = np.nan
+        for values in (spec.vectors(dirty_i, wr, **parameters), spec.vectors(wi, dirty_r, **parameters)):
+            np.testing.assert_array_equal(np.isnan(values), np.arange(70) == row)
+            np.testing.assert_allclose(np.delete(values, row), np.delete(expected, row), rtol=ROWS)
+
+
+@every_model
+def test_broadcasts_over_vectors(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(26)
+    parameters = drawn(spec, rng)
+    wi, wr = drawn_vectors(rng, 5), drawn_vectors(rng, 7)
+    values = spec.vectors(wi[:, None], wr, **parameters)
+    assert values.shape == (5, 7)
+    for row, one in zip(values, wi, strict=True):
+        np.testing.assert_allclose(spec.vectors(one, wr, **parameters), row, rtol=ROWS)
+    np.testing.assert_allclose(spec.vectors(wi, wr[0], **parameters), values[:, 0], rtol=ROWS)
+    assert np.shape(spec.vectors(wi[0], wr[0], **parameters)) == ()
+    assert spec.vectors(wi[:0], wr[0], **parameters).shape == (0,)
+    assert spec.vectors(wi[:0, None], wr, **parameters).shape == (0, 7)
+    several = {name: value[:, None] for name, value in drawn(spec, rng, 3).items()}
+    rows = spec.vectors(wi[0], wr, **several)
+    assert rows.shape == (3, 7)
+    for index, row in enumerate(rows):
+        alone = {name: value[index, 0] for name, value in several.items()}
+        np.testing.assert_allclose(spec.vectors(wi[0], wr, **alone), row, rtol=ROWS)
+
+
+@every_model
+@pytest.mark.parametrize("position", [0, 1], ids=["wi", "wr"])
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ([0.0, 0.0, 1.1], r"\(0, 0, 1\.1\) has the length 1\.1, not 1"),
+        ([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], r"\(0, 0, 0\) has the length 0, not 1"),
+        ([np.inf, 0.0, 0.0], r"\(inf, 0, 0\) has the length inf, not 1"),
+        ([0.0, 1.0], r"float64 of shape \(2,\) is not an array of vectors"),
+        (1.0, r"float64 of shape \(\) is not an array of vectors"),
+        ([True, False, False], r"bool of shape \(3,\) is not an array of vectors"),
+        (["a", "b", "c"], r"<U1 of shape \(3,\) is not an array of vectors"),
+        ([0.0, 0.0, 1j], r"complex128 of shape \(3,\) is not an array of vectors"),
+    ],
+)
+def test_refuses_what_is_no_unit_vector(spec: ModelSpec, position: int, wrong: Any, message: str) -> None:
+    vectors: list[Any] = [[0.0, 0.6, 0.8], [0.0, 0.6, 0.8]]
+    vectors[position] = wrong
+    with pytest.raises(ValueError, match=rf"^{('wi', 'wr')[position]}: {message}"):
+        spec.vectors(*vectors, **drawn(spec, np.random.default_rng(27)))
+
+
+@every_parameter
+def test_vectors_refuse_a_parameter_in_the_words_of_the_angles(spec: ModelSpec, parameter: Parameter) -> None:
+    parameters = drawn(spec, np.random.default_rng(28)) | {parameter.name: parameter.high * 1.5}
+    with pytest.raises(ValueError, match=f"^{re.escape(refused(spec, parameter, parameter.high * 1.5))}$"):
+        spec.vectors([0.0, 0.6, 0.8], [0.0, 0.6, 0.8], **parameters)
+
+
+def specular_vectors(spec: ModelSpec, wi: Any, parameters: Arguments) -> Any:
+    assert spec.specular is not None
+    twin = getattr(models, f"{spec.specular.__name__}_vectors")
+    return twin(wi, **{name: parameters[name] for name in spec.specular_parameters})
+
+
+@every_specular
+def test_specular_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(29)
+    theta_i, phi_i, _, _ = drawn_angles(rng, 4000)
+    parameters = drawn(spec, rng, 4000)
+    expected, step = specular(spec, theta_i, parameters), 1e-9
+    conditioning = np.abs(specular(spec, np.maximum(theta_i - step, 0.0), parameters) - expected) / step
+    error = np.abs(specular_vectors(spec, unit_vector(theta_i, phi_i), parameters) - expected)
+    assert np.mean(expected > TINY) > 0.5
+    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, TINY))
+    assert worst <= TWIN, f"off by {worst:.3g}"
+
+
+@every_specular
+def test_specular_vectors_keep_the_rules_of_the_others(spec: ModelSpec) -> None:
+    rng = np.random.default_rng(30)
+    parameters = drawn(spec, rng)
+    wi = drawn_vectors(rng, 50).astype(np.float32)
+    single, double = (specular_vectors(spec, w, parameters) for w in (wi, wi.astype(np.float64)))
+    assert (single.dtype, double.dtype) == (np.float32, np.float64)
+    np.testing.assert_array_equal(single, double.astype(np.float32))
+    corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0.0, -1e-30], [0.0, 0.0, -1.0], [np.nan, 0.0, 1.0]])
+    at_the_pole, at_the_horizon, *below, unknown = specular_vectors(spec, corners, parameters)
+    assert at_the_pole == specular(spec, 0.0, parameters)
+    assert 0.0 <= at_the_horizon <= 1.0
+    assert below == [0.0, 0.0]
+    assert np.isnan(unknown)
+    assert isinstance(specular_vectors(spec, [0, 0, 1], parameters), np.float64)
+    several = {name: value[:, None] for name, value in drawn(spec, rng, 3).items()}
+    assert specular_vectors(spec, wi, several).shape == (3, 50)
+    with pytest.raises(ValueError, match=r"^wi: \(0, 0, 2\) has the length 2, not 1$"):
+        specular_vectors(spec, [0, 0, 2], parameters)
