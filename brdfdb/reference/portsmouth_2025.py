@@ -1,7 +1,7 @@
 """Portsmouth, Kutz and Hill 2025 at 40 digits: the energy-preserving Oren-Nayar model (EON), with exact albedos."""
 
 from brdfdb.reference import Number, mp
-from brdfdb.reference.fujii_2012 import fujii
+from brdfdb.reference.fujii_2013 import fujii
 
 
 def energy_preserving(

@@ -13,7 +13,7 @@ from brdfdb import models
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
-from brdfdb.reference import fujii_2012, mp, oren_nayar_1994, portsmouth_2025, torrance_sparrow_1967
+from brdfdb.reference import fujii_2013, mp, oren_nayar_1994, portsmouth_2025, torrance_sparrow_1967
 
 PAPER_VALUES = Path(__file__).parents[1] / "paper_values"
 HALF_PI = np.pi / 2
@@ -152,7 +152,7 @@ def test_fujii_and_eon_against_the_reference() -> None:
     for theta_i, theta_r, delta_phi, rho, slope in draws(150):
         share = slope / HALF_PI
         value = models.oren_nayar_fujii(theta_i, 0.0, theta_r, delta_phi, rho=rho, sigma=share)
-        check(value, fujii_2012.fujii(theta_i, theta_r, delta_phi, rho, share), ROUNDING, (theta_i, theta_r, delta_phi))
+        check(value, fujii_2013.fujii(theta_i, theta_r, delta_phi, rho, share), ROUNDING, (theta_i, theta_r, delta_phi))
         value = models.oren_nayar_energy_preserving(theta_i, 0.0, theta_r, delta_phi, rho=rho, roughness=share)
         expected = sum(portsmouth_2025.energy_preserving(theta_i, theta_r, delta_phi, rho, share))
         check(value, expected, ROUNDING, (theta_i, theta_r, delta_phi))

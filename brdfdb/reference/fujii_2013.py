@@ -1,4 +1,4 @@
-"""Fujii 2012 at 40 digits: the proposed form of "A tiny improvement of Oren-Nayar reflectance model"."""
+"""Fujii 2013 at 40 digits: the proposed form of "A tiny improvement of Oren-Nayar reflectance model"."""
 
 from brdfdb.reference import Number, mp
 

@@ -1,4 +1,4 @@
-"""Fujii 2012: the qualitative Oren-Nayar model without its dark ring, normalised by a mixing ratio."""
+"""Fujii 2013: the qualitative Oren-Nayar model without its dark ring, normalised by a mixing ratio."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def oren_nayar_fujii(
 
     References
     ----------
-    fujii2012
+    fujii2013
 
     Examples
     --------
@@ -92,7 +92,7 @@ SPEC = ModelSpec(
     version=1,
     title="Oren-Nayar, Fujii's form",
     equation="proposed formula",
-    reference="fujii2012",
+    reference="fujii2013",
     parameters=(RHO, SIGMA),
     evaluate=oren_nayar_fujii,
     vectors=oren_nayar_fujii_vectors,
