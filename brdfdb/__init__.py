@@ -5,7 +5,8 @@ Importing this package is cheap: the models, the store and the exports load when
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import importlib
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import os
@@ -36,3 +37,15 @@ def open(root: str | os.PathLike[str]) -> Store:
     from brdfdb.store import Store
 
     return Store(root)
+
+
+_LOADED_WHEN_USED = (
+    *("audit", "energy", "exr", "fresnel", "geometry", "grids", "lookup", "materials", "misprints", "models"),
+    *("quadrature", "roughness", "sampling", "spectra", "store", "tabulate"),
+)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LOADED_WHEN_USED:
+        return importlib.import_module(f"brdfdb.{name}")
+    raise AttributeError(f"module 'brdfdb' has no attribute {name!r}")

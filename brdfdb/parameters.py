@@ -39,7 +39,11 @@ class Parameter:
         bad = ~((array >= self.low) & (array <= self.high))  # nan too
         if np.any(bad):
             first = array[bad].flat[0] if array.ndim else array[()]
-            raise ValueError(f"{self.name}: {first:.16g} is outside {self.interval}")
+            value, interval = f"{first:.16g}", self.interval
+            if f"{first:g}" in (f"{self.low:g}", f"{self.high:g}"):  # next to an end: all digits, or they look alike
+                value = repr(float(first))
+                interval = interval.replace(f"{self.low:g}, {self.high:g}", f"{self.low!r}, {self.high!r}")
+            raise ValueError(f"{self.name}: {value} is outside {interval}")
         return array
 
 

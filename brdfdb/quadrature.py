@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import inspect
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,6 +120,7 @@ def directional_albedo(
     (0.5, True)
     """
     spec = spec_of(model)
+    parameters = named(spec, parameters)
     if not 1e-13 <= tolerance <= 1.0:
         raise ValueError(f"tolerance: {tolerance:.9g} is outside [1e-13, 1]")
     thetas, phis = check_theta("theta_i", theta_i), check_phi("phi_i", phi_i)
@@ -131,6 +133,16 @@ def directional_albedo(
     if specular and spec.specular is not None:
         albedo = albedo + spec.specular(thetas, **{name: parameters[name] for name in spec.specular_parameters})
     return Albedo(albedo[()], error[()])
+
+
+def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters of a model with its defaults filled in, or the TypeError that the model itself would raise."""
+    try:
+        bound = inspect.signature(spec.vectors).bind(None, None, **parameters)
+    except TypeError as error:
+        raise TypeError(f"{spec.name}: {error}") from None
+    bound.apply_defaults()
+    return {name: value for name, value in bound.kwargs.items() if value is not None}
 
 
 def spec_of(model: ModelSpec | str) -> ModelSpec:

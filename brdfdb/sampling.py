@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.geometry import checked_vectors
 from brdfdb.parameters import Floats, Lobe, ModelSpec
-from brdfdb.quadrature import spec_of
+from brdfdb.quadrature import named, spec_of
 
 Array = NDArray[np.float64]
 
@@ -74,6 +74,7 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     0.5
     """
     spec = spec_of(model)
+    parameters = named(spec, parameters)
     v1, v2 = _uniform("u1", u1), _uniform("u2", u2)
     i = checked_vectors(wi, wi).w_i.astype(np.float64)
     lobe = _lobe(spec, i, parameters)
@@ -86,6 +87,7 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     with np.errstate(all="ignore"):  # samples reach every corner; what is finite is tested, not flagged
         f_r = spec.vectors(i, wr, **parameters)
     wr = np.broadcast_to(wr, (*np.shape(f_r), 3)).copy()  # a lobe or none: parameters shape the result
+    wr[np.isnan(f_r)] = np.nan
     density = _density(lobe, i, wr)
     reflected = f_r * np.maximum(wr[..., 2], 0.0)
     # a density that has vanished leaves a direction that nothing draws
@@ -122,7 +124,9 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
     """
     vectors = checked_vectors(wi, wr)
     i, r = vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64)
-    density = _density(_lobe(spec_of(model), i, parameters), i, r)
+    spec = spec_of(model)
+    parameters = named(spec, parameters)
+    density = _density(_lobe(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan goes through
     shape = np.broadcast_shapes(density.shape, *(np.shape(value) for value in parameters.values()))
     return np.broadcast_to(density, shape).copy()[()]
 

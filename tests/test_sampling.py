@@ -309,3 +309,23 @@ def test_the_examples_run(function: Any) -> None:
         runner.run(example)
     assert runner.summarize(verbose=False).failed == 0
     assert runner.tries >= 1
+
+
+def test_a_model_is_called_with_its_own_defaults_and_names_itself_when_it_cannot_be() -> None:
+    wi = [0.6, 0.0, 0.8]
+    with_default = sample("oren_nayar_body_surface", 0.3, 0.4, wi, rho=0.8, sigma=0.3, k_s=0.05)
+    given = sample("oren_nayar_body_surface", 0.3, 0.4, wi, rho=0.8, sigma=0.3, k_s=0.05, k_b=1.0)
+    np.testing.assert_array_equal(with_default.wr, given.wr)
+    assert sample("torrance_sparrow", 0.3, 0.4, wi, sigma=0.2, n=1.5).weight > 0.0
+    with pytest.raises(TypeError, match=r"^ward: missing a required argument: 'rho_s'$"):
+        sample("ward", 0.1, 0.1, wi, rho_d=0.1)
+    with pytest.raises(TypeError, match=r"^ward: got an unexpected keyword argument 'foo'$"):
+        pdf("ward", wi, wi, rho_d=0.1, rho_s=0.1, alpha_x=0.1, alpha_y=0.1, foo=1)
+
+
+def test_nan_in_a_light_is_nan_in_all_that_is_drawn_for_it() -> None:
+    drawn = sample("lambert", 0.3, 0.7, [[np.nan, 0.0, 1.0], [0.0, 0.0, 1.0]], rho=0.5)
+    for each in (drawn.wr, drawn.pdf, drawn.weight):
+        assert np.isnan(each[0]).all()
+        assert np.isfinite(each[1]).all()
+    assert np.isnan(pdf("lambert", [np.nan, 0.0, 1.0], [0.0, 0.0, 1.0], rho=0.5))

@@ -15,8 +15,8 @@ from brdfdb.parameters import Floats, Lobe, Parameter
 
 RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "diffuse reflectance")
 RHO_S = Parameter("rho_s", "ρ_s", "1", 0.0, 1.0, "specular reflectance; the tables of the paper call it ρ_r")
-ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "standard deviation of the slope along x")
-ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "standard deviation of the slope along y")
+ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "width of the slopes along x, exp(-(s / alpha)^2)")
+ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "width of the slopes along y")
 
 Rows = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991_polarised import unit_azimuth
 from brdfdb.parameters import Floats, Parameter
 
-SLOPE = Parameter("slope", "σ_0/τ", "1", 1e-6, 1e6, "rms roughness over autocorrelation length")
+SIGMA_0_OVER_TAU = Parameter("sigma_0_over_tau", "σ_0/τ", "1", 1e-6, 1e6, "rms roughness over autocorrelation length")
 INCIDENT = Parameter("incident_solid_angle_sr", "ω_i", "sr", 1e-12, 1.0, "solid angle of the cone of light")
 RECEIVED = Parameter("received_solid_angle_sr", "ω_r", "sr", 1e-12, 1.0, "solid angle of the cone that is received")
 RINGS = 8  # at most, of the nodes in a cone
@@ -26,7 +26,7 @@ def he_torrance_very_rough(
     theta_r: ArrayLike,
     phi_r: ArrayLike,
     *,
-    slope: ArrayLike,
+    sigma_0_over_tau: ArrayLike,
     n: ArrayLike,
     k: ArrayLike,
     a: ArrayLike = 0.0,
@@ -37,8 +37,9 @@ def he_torrance_very_rough(
     ----------
     theta_i, phi_i, theta_r, phi_r : array_like [rad]
         Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
-    slope : array_like [1]
-        sigma_0 / tau, in [1e-6, 1e6]. The wavelength enters by way of n and k only.
+    sigma_0_over_tau : array_like [1]
+        Roughness over autocorrelation length, in [1e-6, 1e6]; the rms slope of the surface is sqrt(2) times that. The
+        wavelength enters by way of n and k only.
     n, k : array_like [1]
         Complex refractive index n + ik; n in [1e-3, 100], k in [0, 1e4].
     a : array_like [1]
@@ -67,19 +68,23 @@ def he_torrance_very_rough(
 
     Examples
     --------
-    >>> round(float(he_torrance_very_rough(0.5, 0.0, 0.6, 3.0, slope=0.16, n=0.769, k=6.08)), 3)
+    >>> round(float(he_torrance_very_rough(0.5, 0.0, 0.6, 3.0, sigma_0_over_tau=0.16, n=0.769, k=6.08)), 3)
     0.957
     """
     directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
-    return _very_rough(directions, SLOPE.check(slope), full.N.check(n), full.K.check(k), full.A.check(a))
+    return _very_rough(
+        directions, SIGMA_0_OVER_TAU.check(sigma_0_over_tau), full.N.check(n), full.K.check(k), full.A.check(a)
+    )
 
 
 def he_torrance_very_rough_vectors(
-    wi: ArrayLike, wr: ArrayLike, *, slope: ArrayLike, n: ArrayLike, k: ArrayLike, a: ArrayLike = 0.0
+    wi: ArrayLike, wr: ArrayLike, *, sigma_0_over_tau: ArrayLike, n: ArrayLike, k: ArrayLike, a: ArrayLike = 0.0
 ) -> Floats:
     """`he_torrance_very_rough` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
     directions = checked_vectors(wi, wr)
-    return _very_rough(directions, SLOPE.check(slope), full.N.check(n), full.K.check(k), full.A.check(a))
+    return _very_rough(
+        directions, SIGMA_0_OVER_TAU.check(sigma_0_over_tau), full.N.check(n), full.K.check(k), full.A.check(a)
+    )
 
 
 def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:

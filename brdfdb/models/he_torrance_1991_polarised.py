@@ -55,7 +55,8 @@ def he_torrance_jones(
     -------
     complex array [1]
         In the broadcast shape of all arguments and (2, 2): [row of the reflected, column of the incident field], in the
-        order s, p. 0 below the horizon, nan where an angle is nan. Sum of abs(J)^2 / 2 is the |F|^2 of eq. 75.
+        order s, p. 0 below the horizon, nan where an angle is nan. Sum of abs(J)^2 / 2 is the |F|^2 of eq. 75. In the
+        mirror direction it is -diag(F_s, F_p): s and p turn over with the surface between them.
 
     Raises
     ------

@@ -32,10 +32,10 @@ class Parts(NamedTuple):
 _HALF_PI_REST = 6.123233995736766e-17  # pi/2 less the float64 nearest to it
 _NO_AZIMUTH = 1e-300  # smaller products of two sines: an azimuth means nothing
 
-# Measured at rho = 1 over sigma: the albedo reaches 1.0499 (sigma of 18 degrees, theta_i of 89.9) and exceeds 1 from 50
-# degrees on, the qualitative model 1.015 or, with an offset of 0.57, 1.044
+# Measured at rho = 1 over sigma: the albedo reaches 1.0510 (sigma of 17 degrees) and exceeds 1 from 50 degrees on,
+# the qualitative model 1.015 or, with an offset of 0.57, 1.044
 _KNOWN_EXCESS: dict[str, float | str] = {
-    "max_albedo": 1.05,
+    "max_albedo": 1.052,
     "from_theta_i_deg": 45.0,
     "citation": "Oren and Nayar 1994, eqs 27, 28 and 30: near grazing and with an albedo near 1 the fit reflects up to "
     "5 % more than it receives, for sigma below 40 degrees",
@@ -246,8 +246,8 @@ def oren_nayar(
     Eqs (27) to (29), divided by E_0 cos theta_i. beta is the smaller of the two polar angles, so tan beta grows
     without bound only where both reach 90 degrees; there the value is the one at the float64 nearest pi/2.
     Departures from the paper: the fit falls below 0 for rough dark surfaces at grazing angles in the forward
-    direction; there it is 0. Published excess: with rho = 1 the directional albedo reaches 1.04 near grazing for
-    sigma between 10 and 30 degrees.
+    direction; there it is 0. Published excess: with rho = 1 the directional albedo reaches 1.05 near grazing, for
+    sigma below 40 degrees.
 
     References
     ----------

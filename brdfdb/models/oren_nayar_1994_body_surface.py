@@ -105,7 +105,9 @@ def _sum(body: Floats, surface: Floats, k_b: ArrayLike, k_s: ArrayLike, directio
     return finished(K_B.check(k_b) * body + K_S.check(k_s) * surface, directions)
 
 
-def lobe(cos_i: Floats, *, rho: ArrayLike, sigma: ArrayLike, k_s: ArrayLike, k_b: ArrayLike, **_: ArrayLike) -> Lobe:
+def lobe(
+    cos_i: Floats, *, rho: ArrayLike, sigma: ArrayLike, k_s: ArrayLike, k_b: ArrayLike = 1.0, **_: ArrayLike
+) -> Lobe:
     """Where to look for the lobe of the surface: share by the albedos, slopes by sigma."""
     whole = torrance_sparrow_1967.lobe(cos_i, sigma=sigma)
     surface = np.asarray(k_s) * 4.0 * np.pi * whole.alpha_x**2  # the albedo of a narrow lobe with F = 1

@@ -39,7 +39,8 @@ def ward(
     rho_d, rho_s : array_like [1]
         Diffuse and specular reflectance, each in [0, 1].
     alpha_x, alpha_y : array_like [1]
-        Standard deviations of the surface slope along x and y, in [1e-6, 2]; the paper holds the model good to 0.2.
+        Widths of the slopes along x and y, exp(-(slope / alpha)^2), in [1e-6, 2]; the paper holds the model good to
+        0.2. It calls them standard deviations, which are alpha / sqrt(2): see `brdfdb.roughness`.
 
     Returns
     -------
@@ -98,7 +99,8 @@ def ward_half_vector(
     rho_d, rho_s : array_like [1]
         Diffuse and specular reflectance, each in [0, 1].
     alpha_x, alpha_y : array_like [1]
-        Standard deviations of the surface slope along x and y, in [1e-6, 2]; the paper holds the model good to 0.2.
+        Widths of the slopes along x and y, exp(-(slope / alpha)^2), in [1e-6, 2]; the paper holds the model good to
+        0.2. It calls them standard deviations, which are alpha / sqrt(2): see `brdfdb.roughness`.
 
     Returns
     -------

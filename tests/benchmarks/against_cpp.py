@@ -116,7 +116,7 @@ class Row:
 
 
 HEADER = (
-    f"{'million values a second: case / against':52}{'ours':7}"
+    f"{'million values a second: case / against':52}{'timed':7}"
     f"{'theirs':>8}{'best':>8}{'+-%':>4}{'ours':>8}{'best':>8}{'+-%':>4}{'ratio':>7}{'best':>6}{'floor':>6}"
 )
 
@@ -373,6 +373,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=0.2, help="length of a turn")
     parser.add_argument("--json", type=Path, metavar="PATH", help="write the rows there too")
     asked = parser.parse_args()
+    if asked.rounds < 1:
+        parser.error(f"--rounds: {asked.rounds} is less than 1")
     if unknown := [name for name in asked.section if name not in sections]:
         parser.error(f"{', '.join(unknown)}: the sections are {', '.join(sections)}")
     if hasattr(os, "sched_setaffinity"):  # the C++ inherits it

@@ -206,7 +206,7 @@ def he_torrance_jones(*angles: Any, **parameters: Any) -> Any:
 
 
 def he_torrance_very_rough(*angles: Any, a: Any = 0, **parameters: Any) -> Any:
-    return isotropic(he_torrance_1991.very_rough, "slope", *INDEX)(*angles, **parameters) + a / mp.pi
+    return isotropic(he_torrance_1991.very_rough, "sigma_0_over_tau", *INDEX)(*angles, **parameters) + a / mp.pi
 
 
 def he_torrance_specular(t_i: Any, *_: Any, **parameters: Any) -> Any:
@@ -347,7 +347,10 @@ SUBJECTS = (
     Subject(
         "he_torrance_very_rough",
         he_torrance_very_rough,
-        table("slope=1e-4 n=1.5 k=0", "slope=0.16 n=1 k=1000 a=1", "slope=4.4 n=0.2 k=0", "slope=1e3 n=1.000001 k=0"),
+        table(
+            *("sigma_0_over_tau=1e-4 n=1.5 k=0", "sigma_0_over_tau=0.16 n=1 k=1000 a=1"),
+            *("sigma_0_over_tau=4.4 n=0.2 k=0", "sigma_0_over_tau=1e3 n=1.000001 k=0"),
+        ),
     ),
     Subject(
         "he_torrance_specular",

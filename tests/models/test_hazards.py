@@ -431,7 +431,7 @@ WARD_NARROW = "rho_d=0 rho_s=1 alpha_x=1e-4 alpha_y=1e-4"
 NARROW_LOBES = [
     ("torrance_sparrow", "sigma=1e-4", False),
     *((name, WARD_NARROW, True) for name in ("ward", "ward_half_vector", "ward_duer", "ward_bounded")),
-    ("he_torrance_very_rough", "slope=1e-4 n=1.5 k=0", False),
+    ("he_torrance_very_rough", "sigma_0_over_tau=1e-4 n=1.5 k=0", False),
 ]
 CANCELS = "sin(theta_i) - sin(theta_r) cancels at the horizon: 1e-16 / alpha^2 of the value instead of 1e-16 / alpha"
 

@@ -57,7 +57,7 @@ def test_very_rough_against_the_reference() -> None:
         theta_i, theta_r, delta_phi = rng.uniform([0.0, 0.0, -3.0], [1.55, 1.55, 3.0])
         slope, n, k = 10.0 ** rng.uniform(-2.0, 1.0), rng.uniform(0.2, 3.0), rng.uniform(0.0, 5.0)
         expected = float(he_torrance_1991.very_rough(theta_i, theta_r, delta_phi, slope, n, k))
-        value = he_torrance_very_rough(theta_i, 0.3, theta_r, 0.3 + delta_phi, slope=slope, n=n, k=k)
+        value = he_torrance_very_rough(theta_i, 0.3, theta_r, 0.3 + delta_phi, sigma_0_over_tau=slope, n=n, k=k)
         assert value == pytest.approx(expected, rel=VERY_ROUGH, abs=1e-250)
 
 
@@ -71,7 +71,7 @@ def test_he_torrance_converges_to_the_very_rough_limit(wavelength_nm: float) -> 
     value = he_torrance(
         theta_i, 0.0, theta_r, phi_r, wavelength_nm=wavelength_nm, sigma_0_um=0.48, tau_um=3.0, **optics
     )
-    limit = he_torrance_very_rough(theta_i, 0.0, theta_r, phi_r, slope=slope, **optics)
+    limit = he_torrance_very_rough(theta_i, 0.0, theta_r, phi_r, sigma_0_over_tau=slope, **optics)
     sigma = [
         float(he_torrance_1991.effective_roughness(*pair, slope, 1)) for pair in zip(theta_i, theta_r, strict=True)
     ]
@@ -91,7 +91,12 @@ def test_very_rough_is_reciprocal_finite_and_not_negative() -> None:
     theta_i, phi_i, theta_r, phi_r = directions(rng, 3000)
     theta_i[:20], theta_r[10:30], theta_i[30:40] = HALF_PI, HALF_PI, 0.0
     phi_r[:5] = phi_i[:5] + np.pi
-    arguments = {"slope": 10.0 ** rng.uniform(-6.0, 6.0, 3000), "n": rng.uniform(0.2, 3.0, 3000), "k": 0.5, "a": 0.1}
+    arguments = {
+        "sigma_0_over_tau": 10.0 ** rng.uniform(-6.0, 6.0, 3000),
+        "n": rng.uniform(0.2, 3.0, 3000),
+        "k": 0.5,
+        "a": 0.1,
+    }
     value = he_torrance_very_rough(theta_i, phi_i, theta_r, phi_r, **arguments)
     assert np.isfinite(value).all()
     assert (value >= 0.1 / np.pi * (1.0 - 1e-15)).all()
@@ -336,7 +341,7 @@ def test_light_and_receiver_exchange_with_their_cones() -> None:
 OPTICS = {"n": 0.769, "k": 6.08}
 SURFACE = {"wavelength_nm": 2000.0, "sigma_0_um": 0.28, "tau_um": 1.77, **OPTICS}
 CASES = {
-    "he_torrance_very_rough": {"slope": 0.2, **OPTICS},
+    "he_torrance_very_rough": {"sigma_0_over_tau": 0.2, **OPTICS},
     "he_torrance_parts": SURFACE,
     "he_torrance_aperture": CONES | SURFACE | {"rings": 1},
 }
@@ -405,8 +410,8 @@ def test_smooth_of_vectors_is_smooth_of_their_angles() -> None:
 
 
 def test_arguments_out_of_range() -> None:
-    with pytest.raises(ValueError, match="slope: 0 is outside"):
-        he_torrance_very_rough(0.1, 0.0, 0.1, 0.0, slope=0.0, **OPTICS)
+    with pytest.raises(ValueError, match="sigma_0_over_tau: 0 is outside"):
+        he_torrance_very_rough(0.1, 0.0, 0.1, 0.0, sigma_0_over_tau=0.0, **OPTICS)
     for name in CONES:
         with pytest.raises(ValueError, match=f"{name}: 2 is outside"):
             he_torrance_aperture(0.1, 0.0, 0.1, 0.0, **CONES | {name: 2.0}, **SURFACE)
