@@ -20,7 +20,7 @@ _LOG_FACTORIAL_TIMES_M = np.array([0.0] + [math.lgamma(m + 1.0) + math.log(m) fo
 _G_MIN, _V_MIN, _V_MAX = 1e-290, 1e-300, 1e30  # beyond, the sum is its limit: the first term, V = 0, or 0
 # The trapezoid rule in ln(m): nodes _STEP standard deviations of the summand apart, less where the summand is skew, as
 # it is for small m*; they reach _REACH deviations to both sides of the peak, more into the left tail
-_STEP, _STEP_SKEW, _REACH, _LEFT_SKEW = 0.82, 2.1, 7.1, 47.0
+_STEP, _STEP_SKEW, _REACH, _LEFT_SKEW = 0.8, 2.0, 7.2, 52.0
 _TAYLOR_ABOVE = 1e6  # nodes of larger m* lie so close together that a short series is exact
 _SQRT_TWO_PI = 2.5066282746310002
 
