@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -10,34 +9,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from brdfdb.geometry import radians
-from brdfdb.grids import Grid, check_wavelengths
+from brdfdb.layout import TABLE_VERSION, Layout
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
-TABLE_VERSION = 1  # of the variables, dimensions and attributes below
-
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
-_BANDS = 6  # at least, of a reciprocal grid: the squares on the diagonal are computed whole
 
 
-def tabulate(
-    material: Material,
-    grid: Grid,
-    wavelength_nm: NDArray[np.float64] | None = None,
-    progress: Callable[[int], None] = lambda _: None,
-) -> xr.Dataset:
-    """Tabulate the BRDF of a material.
-
-    Parameters
-    ----------
-    material : Material
-        Model, parameters and where they come from.
-    grid : Grid
-        Angles [degree]; anisotropic for anisotropic materials.
-    wavelength_nm : array of shape (L,) [nm], optional
-        For spectral materials, and only for them.
-    progress : callable
-        Called with the number of values that were just computed.
+def tabulate(layout: Layout) -> xr.Dataset:
+    """Tabulate the BRDF of a material: all blocks of a layout, in memory.
 
     Returns
     -------
@@ -45,84 +25,64 @@ def tabulate(
         ``brdf`` [1/sr], float32, over the axes of the grid and, last, ``wavelength``; for models with a Dirac part
         ``specular_reflectance`` [1] over theta_i and wavelength; for spectral materials ``n`` and ``k`` as used.
         Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
-
-    Raises
-    ------
-    ValueError
-        If grid or wavelengths do not suit the material: no wavelengths for a spectral one, an isotropic grid for an
-        anisotropic one, a node at 90 degrees where the model has a pole.
     """
-    check_suits(material, grid, wavelength_nm)
-    brdf = np.empty(grid.shape if wavelength_nm is None else (*grid.shape, wavelength_nm.size), dtype=np.float32)
-    for index, values in _slabs(material, grid, wavelength_nm):
-        brdf[index] = values
-        progress(values.size)
-    return _dataset(material, grid, wavelength_nm, brdf)
+    values = np.concatenate([block(layout, rows) for rows in layout.blocks])
+    return frame(layout).assign({layout.variable: (layout.dims, values, VARIABLES[layout.variable])})
 
 
-def check_suits(material: Material, grid: Grid, wavelength_nm: NDArray[np.float64] | None) -> None:
-    """Raise the ValueError that `tabulate` would raise, at no cost."""
-    spec = material.spec
-    if material.spectral != (wavelength_nm is not None):
-        raise ValueError(f"wavelengths_nm: {material.name} {'needs them' if material.spectral else 'is grey'}")
-    if material.anisotropic and not grid.anisotropic:
-        raise ValueError(f"grid: {material.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r")
-    if spec.grazing_pole and grid.reaches_horizon:
-        raise ValueError(
-            f"grid: theta of 90 degrees is a pole of the model {spec.name} ({material.name}); end the axis below 90"
-        )
-    if wavelength_nm is not None:
-        material.arguments(check_wavelengths(wavelength_nm))
-
-
-def _slabs(
-    material: Material, grid: Grid, wavelength_nm: NDArray[np.float64] | None
-) -> Iterator[tuple[tuple[Any, ...], Floats]]:
-    """Pieces of the table: the index where each goes, and its values."""
+def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
+    """The values of some rows of the first axis of a table: float32, in the shape of the table's other axes."""
+    axes = [radians(nodes) for nodes in layout.grid.axes.values()]
+    values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
     spectrum: list[tuple[tuple[int, ...], dict[str, Any]]]
-    if wavelength_nm is None:
-        spectrum = [((), material.arguments())]
+    if layout.wavelength_nm is None:
+        spectrum = [((), layout.material.arguments())]
     else:
-        spectrum = [((w,), material.arguments(one)) for w, one in enumerate(wavelength_nm)]
-    for block, angles in _blocks(grid):
+        spectrum = [((w,), layout.material.arguments(one)) for w, one in enumerate(layout.wavelength_nm)]
+    step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
+    for start in range(rows.start, rows.stop, step):
+        here = slice(start, min(start + step, rows.stop))
         for last, arguments in spectrum:
-            values = material.spec.evaluate(*angles, **arguments)
-            yield (*block, ..., *last), values
-            if grid.reciprocal:  # as every model is: what is right of the block stands below it too
-                here = block[0]
-                mirrored = np.swapaxes(values[:, here.stop - here.start :], 0, 1)
-                yield (slice(here.stop, None), here, ..., *last), mirrored
+            at: tuple[Any, ...] = (slice(here.start - rows.start, here.stop - rows.start), ..., *last)
+            values[at] = _evaluated(layout, axes, here, arguments)
+    return values
 
 
-def _blocks(grid: Grid) -> Iterator[tuple[tuple[slice, ...], tuple[NDArray[np.float64], ...]]]:
-    """Blocks of rows of the first axis, and their directions of light and viewer; of a reciprocal grid one half."""
-    axes = [radians(nodes) for nodes in grid.axes.values()]
-    rows = max(1, _SLAB // int(np.prod(grid.shape[1:])))
-    if grid.reciprocal:
-        rows = min(rows, -(-grid.shape[0] // _BANDS))
-    for start in range(0, grid.shape[0], rows):
-        here = slice(start, min(start + rows, grid.shape[0]))
-        if grid.anisotropic:
-            theta_i, *others = axes
-            yield (here,), np.ix_(theta_i[here], *others)
-        else:
-            theta_i, theta_r, delta_phi = axes
-            viewer = slice(start if grid.reciprocal else 0, None)
-            light, seen, turned = np.ix_(theta_i[here], theta_r[viewer], delta_phi)
-            yield (here, viewer), (light, np.zeros(()), seen, turned)
+def _evaluated(layout: Layout, axes: list[NDArray[np.float64]], rows: slice, arguments: dict[str, Any]) -> Floats:
+    """The model at some rows of the first axis; on a reciprocal grid with the smaller theta always the light's.
+
+    There a table is its own transpose to the last bit, in whatever pieces it is computed.
+    """
+    evaluate = layout.material.spec.evaluate
+    first, *others = axes
+    if not layout.grid.reciprocal:
+        return evaluate(*_directions(layout, [first[rows], *others]), **arguments)
+    theta, delta_phi = others
+    values = np.empty((rows.stop - rows.start, theta.size, delta_phi.size))
+    values[:, rows.start :] = evaluate(*_directions(layout, [first[rows], theta[rows.start :], delta_phi]), **arguments)
+    swapped = evaluate(*_directions(layout, [theta[: rows.stop], first[rows], delta_phi]), **arguments)
+    smaller = np.arange(rows.stop) < np.arange(rows.start, rows.stop)[:, np.newaxis]
+    np.copyto(values[:, : rows.stop], np.swapaxes(swapped, 0, 1), where=smaller[..., np.newaxis])
+    return values
 
 
-def _dataset(
-    material: Material, grid: Grid, wavelength_nm: NDArray[np.float64] | None, brdf: NDArray[np.float32]
-) -> xr.Dataset:
+def _directions(layout: Layout, axes: list[NDArray[np.float64]]) -> tuple[NDArray[np.float64], ...]:
+    """theta_i, phi_i, theta_r, phi_r of the nodes that axes span, each on its own axis."""
+    if layout.grid.anisotropic:
+        return np.ix_(*axes)
+    light, seen, turned = np.ix_(*axes)
+    return light, np.zeros(()), seen, turned
+
+
+def frame(layout: Layout) -> xr.Dataset:
+    """All of a table but its values: coordinates, the Dirac part, refractive indices and attributes."""
+    material, grid, wavelength_nm = layout.material, layout.grid, layout.wavelength_nm
     spec = material.spec
     spectral = () if wavelength_nm is None else ("wavelength",)
     coordinates: dict[str, Any] = {
         name: (name, nodes, {"units": "degree", "long_name": _LONG_NAMES[name]}) for name, nodes in grid.axes.items()
     }
-    variables: dict[str, Any] = {
-        "brdf": ((*grid.axes, *spectral), brdf, {"units": "sr-1", "long_name": "bidirectional reflectance f_r"})
-    }
+    variables: dict[str, Any] = {}
     arguments = material.arguments(wavelength_nm)
     if wavelength_nm is not None:
         coordinates["wavelength"] = (
@@ -186,3 +146,5 @@ _LONG_NAMES = {
     "phi_r": "azimuth of the viewer",
     "delta_phi": "azimuth of the viewer minus azimuth of the light",
 }
+
+VARIABLES = {"brdf": {"units": "sr-1", "long_name": "bidirectional reflectance f_r"}}

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from brdfdb import audit as module
 from brdfdb.audit import AuditReport, MaterialAudit, audit, directional_albedo, report
 from brdfdb.grids import Grid
+from brdfdb.layout import Layout
 from brdfdb.lookup import Table
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
@@ -64,7 +65,7 @@ def material(model: str, parameters: dict[str, Any], **more: Any) -> Material:
 
 
 def tabulated(made_up: Material, grid: Grid, wavelengths: NDArray[np.float64] | None = None) -> Table:
-    dataset = tabulate(made_up, grid, wavelengths)
+    dataset = tabulate(Layout(made_up, grid, wavelengths))
     specular = dataset["specular_reflectance"].values.astype(np.float32) if "specular_reflectance" in dataset else None
     brdf = dataset["brdf"].values
     return Table(made_up.name, "r000001", dataset.attrs, grid.axes, wavelengths, brdf, specular)

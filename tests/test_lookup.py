@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from brdfdb.grids import Grid
+from brdfdb.layout import Layout
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.tabulate import tabulate
@@ -366,7 +367,7 @@ def test_the_two_kinds_of_table_of_one_material_agree() -> None:
     )
     tables = []
     for grid in (iso, aniso):
-        dataset = tabulate(plaster, grid)
+        dataset = tabulate(Layout(plaster, grid))
         tables.append(Table("plaster", "r000001", dataset.attrs, grid.axes, None, dataset["brdf"].values, None))
     assert [table.anisotropic for table in tables] == [False, True]
     theta_i, _, theta_r, phi_r = random_directions(300)

@@ -24,6 +24,7 @@ import zarr
 import brdfdb
 from brdfdb import store as module
 from brdfdb.grids import Grid
+from brdfdb.layout import Layout
 from brdfdb.materials import Material
 from brdfdb.store import Build, Store, StoreError, UnknownMaterialError
 from brdfdb.tabulate import tabulate
@@ -42,11 +43,11 @@ COPPER = {
 def lambert(rho: float) -> xr.Dataset:
     """A table whose values tell which one it is."""
     table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-    return tabulate(Material.from_table("white", table), GRID)
+    return tabulate(Layout(Material.from_table("white", table), GRID))
 
 
 def copper() -> xr.Dataset:
-    return tabulate(Material.from_table("copper", COPPER), GRID, np.array([450.0, 500.0, 700.0]))
+    return tabulate(Layout(Material.from_table("copper", COPPER), GRID, np.array([450.0, 500.0, 700.0])))
 
 
 def publish(root: Path, **tables: xr.Dataset) -> list[str]:

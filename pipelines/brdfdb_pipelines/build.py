@@ -53,11 +53,12 @@ def build(recipe: Recipe, root: Path, executor: Executor, progress: Callable[[in
     with Build(root, recipe.model_dump(mode="json")) as target:
 
         def run(job: Job) -> Built:
-            dataset = tabulate(job.material, job.grid, job.wavelength_nm, progress)
+            dataset = tabulate(job.layout())
+            progress(dataset["brdf"].size)
             return Built(job, *target.publish(job.material.name, dataset))
 
         # the largest first: the last worker then has little left to do
-        ordered = sorted(jobs, key=lambda job: job.size, reverse=True)
+        ordered = sorted(jobs, key=lambda job: job.layout().size, reverse=True)
         futures: dict[Future[Built], Job] = {executor.submit(run, job): job for job in ordered}
         built: dict[str, Built] = {}
         try:
@@ -76,7 +77,7 @@ def run(recipe_path: Path | None, root: Path, workers: int) -> None:
     """Build a recipe file, by default the built-in one, on threads; show progress and what came out."""
     recipe = load(recipe_path)
     start = time.perf_counter()
-    total = sum(job.size for job in recipe.jobs())
+    total = sum(job.layout().size for job in recipe.jobs())
     with terminal.progress(counted=False) as bar, ThreadPoolExecutor(workers) as executor:
         task = bar.add_task("tabulating", total=total)
         built = build(recipe, root, executor, lambda count: bar.advance(task, count))

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brdfdb.grids import Axis, Grid, check_wavelengths
+from brdfdb.layout import Layout
 from brdfdb.materials import Material, presets
-from brdfdb.tabulate import check_suits
 
 _STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 _MOST_NODES = 100_000  # of a range: far above any axis, far below what fills the memory
@@ -90,10 +90,14 @@ class Job:
     grid: Grid
     wavelength_nm: NDArray[np.float64] | None
 
+    def layout(self) -> Layout:
+        """What the table is going to be."""
+        return Layout(self.material, self.grid, self.wavelength_nm)
+
     @property
-    def size(self) -> int:
-        """Number of values in the table."""
-        return int(np.prod(self.grid.shape)) * (1 if self.wavelength_nm is None else self.wavelength_nm.size)
+    def request(self) -> dict[str, Any]:
+        """All that decides the table, ready for JSON: the same request makes the same table."""
+        return self.layout().document()
 
 
 class Recipe(BaseModel):
@@ -128,11 +132,12 @@ class Recipe(BaseModel):
                 wavelength_nm = wavelengths if stated is None else np.array(stated)
             several = wavelength_nm is not None and wavelength_nm.size > 1
             kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
+            job = Job(material, grids[kind], wavelength_nm)
             try:
-                check_suits(material, grids[kind], wavelength_nm)
+                job.layout()
             except ValueError as error:
                 raise RecipeError(f"{material.name} on grids.{kind}: {error}") from None
-            jobs.append(Job(material, grids[kind], wavelength_nm))
+            jobs.append(job)
         return jobs
 
     def _grid(self, name: str) -> Grid:

@@ -17,14 +17,15 @@ def main(wanted: list[str]) -> None:
     """Time every table of the default recipe, or those of the models that are named."""
     jobs = [job for job in load().jobs() if not wanted or job.material.model in wanted]
     for first in {job.material.model: job for job in jobs}.values():  # compile before the clock runs
-        tabulate(first.material, first.grid, first.wavelength_nm)
+        tabulate(first.layout())
     totals: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
     for job in jobs:
         start = time.perf_counter()
-        tabulate(job.material, job.grid, job.wavelength_nm)
+        tabulate(job.layout())
         seconds = time.perf_counter() - start
-        print(f"{job.material.name:36}{job.material.model:14}{job.size / seconds / 1e6:8.1f} million values a second")
-        totals[job.material.model][0] += job.size
+        size = job.layout().size
+        print(f"{job.material.name:36}{job.material.model:14}{size / seconds / 1e6:8.1f} million values a second")
+        totals[job.material.model][0] += size
         totals[job.material.model][1] += seconds
     for model, (size, seconds) in totals.items():
         print(f"{'all of':36}{model:14}{size / seconds / 1e6:8.1f} million values a second, one core")

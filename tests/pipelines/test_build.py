@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import brdfdb
-from brdfdb.materials import Material
+from brdfdb.layout import Layout
 from brdfdb.store import Store, StoreError
 from brdfdb.tabulate import tabulate
 from brdfdb_pipelines import build as module
@@ -45,10 +45,10 @@ def chunks(store: Store, name: str) -> dict[str, bytes]:
 def failing(monkeypatch: pytest.MonkeyPatch, name: str, error: BaseException) -> None:
     """Let the tabulation of one material fail."""
 
-    def fail(material: Material, *rest: Any) -> xr.Dataset:
-        if material.name == name:
+    def fail(layout: Layout) -> xr.Dataset:
+        if layout.material.name == name:
             raise error
-        return tabulate(material, *rest)
+        return tabulate(layout)
 
     monkeypatch.setattr(module, "tabulate", fail)
 
@@ -60,7 +60,7 @@ def test_what_was_built_is_told_in_the_order_of_the_recipe(recipe: Path, tmp_pat
         built = build(plan, tmp_path, executor, counts.append)
     assert [b.job.material.name for b in built] == names
     assert [b.revision for b in built] == ["r000001"] * len(names)
-    assert sum(counts) == sum(job.size for job in plan.jobs())
+    assert sum(counts) == sum(job.layout().size for job in plan.jobs())
     store = brdfdb.open(tmp_path)
     assert list(store) == sorted(names)
     for b in built:
@@ -72,7 +72,7 @@ def test_tables_are_those_of_tabulate_with_the_recipe_beside_them(recipe: Path, 
     store = brdfdb.open(built)
     plan = load(recipe)
     for job in plan.jobs():
-        expected = tabulate(job.material, job.grid, job.wavelength_nm)
+        expected = tabulate(job.layout())
         with store.dataset(job.material.name) as found:
             xr.testing.assert_identical(found.load(), expected.assign_attrs(recipe=plan.model_dump(mode="json")))
 
@@ -82,7 +82,7 @@ def test_the_largest_table_comes_first_and_the_number_of_workers_changes_nothing
 ) -> None:
     executor = OneByOne()
     build(load(recipe), tmp_path, executor, lambda _: None)
-    sizes = {job.material.name: job.size for job in load(recipe).jobs()}
+    sizes = {job.material.name: job.layout().size for job in load(recipe).jobs()}
     assert sorted(executor.submitted) == sorted(names)
     assert [sizes[name] for name in executor.submitted] == sorted(sizes.values(), reverse=True)
     one, other = brdfdb.open(tmp_path), brdfdb.open(built)
@@ -99,7 +99,7 @@ def test_building_again_makes_new_revisions(recipe: Path, tmp_path: Path, names:
 
 def tabulated(recipe: Path, name: str) -> Any:
     (job,) = (job for job in load(recipe).jobs() if job.material.name == name)
-    return tabulate(job.material, job.grid, job.wavelength_nm)["brdf"].values
+    return tabulate(job.layout())["brdf"].values
 
 
 def test_a_recipe_that_cannot_be_built_is_refused_before_anything_is_written(recipe: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.grids import Grid
+from brdfdb.layout import Layout
 from brdfdb.materials import Material, presets
 from brdfdb.store import Build
 from brdfdb.tabulate import tabulate
@@ -430,8 +431,8 @@ def test_a_violation_is_exit_code_1_and_stands_in_the_report(
     theta = [0, 30, 60, 80]
     grid = Grid({"theta_i": theta, "theta_r": theta, "delta_phi": [0, 90, 180]})
     with Build(tmp_path, {}) as build:
-        build.publish("good", tabulate(Material.from_table("good", grey), grid))
-        build.publish("bad", change(tabulate(Material.from_table("bad", grey), grid)))
+        build.publish("good", tabulate(Layout(Material.from_table("good", grey), grid)))
+        build.publish("bad", change(tabulate(Layout(Material.from_table("bad", grey), grid))))
     assert run("audit", "--store", tmp_path) == 1
     out, err = capsys.readouterr()
     assert f"bad: {said}\n" in out
@@ -449,7 +450,7 @@ def test_audit_notices_a_file_that_was_exchanged_for_a_sound_one(tmp_path: Path,
     with Build(tmp_path, {}) as build:
         for name, rho in (("grey", 0.25), ("white", 0.75)):
             table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-            build.publish(name, tabulate(Material.from_table(name, table), grid))
+            build.publish(name, tabulate(Layout(Material.from_table(name, table), grid)))
     grey, white = (brdfdb.open(tmp_path).path(name) / "brdf" / "c" / "0" / "0" / "0" for name in ("grey", "white"))
     assert (grey.stat().st_size, grey.read_bytes() != white.read_bytes()) == (white.stat().st_size, True)
     shutil.copyfile(white, grey)

@@ -243,7 +243,7 @@ def test_the_kind_of_a_material_chooses_its_grid(tmp_path: Path) -> None:
         "scene-copper-sphere": (2, 2, 3),
         "blue-plastic": (3, 2, 2),  # stated at one wavelength: as many values as a grey one
     }
-    assert {name: job.size for name, job in jobs.items()} == {
+    assert {name: job.layout().size for name, job in jobs.items()} == {
         "foam": 12, "rolled-brass": 36, "scene-copper-sphere": 24, "blue-plastic": 12,
     }  # fmt: skip
     wavelengths = {name: job.wavelength_nm for name, job in jobs.items()}
