@@ -1,4 +1,4 @@
-"""The angular grids of tables: which axes, in degrees, and what an axis must satisfy."""
+"""The angular grids of tables: which axes, in degrees, what an axis must satisfy, and what symmetry leaves out."""
 
 from __future__ import annotations
 
@@ -9,27 +9,39 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.geometry import directions_from_half_difference, radians
+
 Axis = NDArray[np.float64]
 
 ISOTROPIC_AXES = ("theta_i", "theta_r", "delta_phi")
 ANISOTROPIC_AXES = ("theta_i", "phi_i", "theta_r", "phi_r")
+HALF_DIFFERENCE_AXES = ("theta_h", "theta_d", "phi_d")
+ANISOTROPIC_HALF_DIFFERENCE_AXES = ("theta_h", "phi_h", "theta_d", "phi_d")
+KINDS = (ISOTROPIC_AXES, ANISOTROPIC_AXES, HALF_DIFFERENCE_AXES, ANISOTROPIC_HALF_DIFFERENCE_AXES)
 
-# First and last node of an axis [degree]; None: anything up to 90. Azimuths close on themselves.
-_ENDS: dict[str, tuple[float, float | None]] = {
-    "theta_i": (0.0, None),
-    "theta_r": (0.0, None),
-    "delta_phi": (0.0, 180.0),
-    "phi_i": (0.0, 360.0),
-    "phi_r": (0.0, 360.0),
+# Where azimuths may end [degree]; all begin at 0. Polar angles end anywhere up to 90.
+_AZIMUTHS: dict[tuple[str, ...], dict[str, tuple[float, ...]]] = {
+    ISOTROPIC_AXES: {"delta_phi": (180.0,)},
+    ANISOTROPIC_AXES: {"phi_i": (360.0, 180.0, 90.0), "phi_r": (360.0,)},
+    HALF_DIFFERENCE_AXES: {"phi_d": (90.0,)},
+    ANISOTROPIC_HALF_DIFFERENCE_AXES: {"phi_h": (360.0, 180.0, 90.0), "phi_d": (180.0,)},
 }
+
+_RECIPROCITY = "brdf(theta_i, theta_r) = brdf(theta_r, theta_i)"
+_HALF_TURN = "brdf(phi_i + 180, phi_r + 180) = brdf(phi_i, phi_r)"
+_MIRROR = "brdf(-phi_i, -phi_r) = brdf(phi_i, phi_r)"
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
     """A rectilinear grid of directions.
 
-    Isotropic grids have the axes theta_i, theta_r and delta_phi (0 to 180 degrees, the rest by mirror symmetry);
-    anisotropic grids theta_i, phi_i, theta_r and phi_r (0 to 360, both ends stored). Nodes need not be uniform.
+    Grids of light and viewer have the axes theta_i, theta_r and delta_phi (0 to 180 degrees, the rest by mirror
+    symmetry), anisotropic ones theta_i, phi_i, theta_r and phi_r. Grids of half and difference vectors (Rusinkiewicz
+    1998, ``rusinkiewicz1998``) have theta_h, theta_d and phi_d (0 to 90, the rest by mirror symmetry and reciprocity),
+    anisotropic ones theta_h, phi_h, theta_d and phi_d (0 to 180, the rest by reciprocity). phi_i and phi_h end at 360,
+    at 180 for surfaces that half a turn leaves the same, or at 90 for those that are also their own mirror image in x.
+    Both ends of an axis are nodes; nodes need not be uniform.
 
     Parameters
     ----------
@@ -39,21 +51,31 @@ class Grid:
     Raises
     ------
     ValueError
-        If the axes are not one of the two sets, or an axis does not start, end or increase as it must.
+        If the axes are not one of the four sets, or an axis does not start, end or increase as it must.
     """
 
     axes: dict[str, Axis]
 
     def __init__(self, axes: Mapping[str, Any]) -> None:
         names = tuple(axes)
-        if names not in (ISOTROPIC_AXES, ANISOTROPIC_AXES):
-            raise ValueError(f"grid axes: {names} is neither {ISOTROPIC_AXES} nor {ANISOTROPIC_AXES}")
-        object.__setattr__(self, "axes", {name: check_axis(name, nodes) for name, nodes in axes.items()})
+        if names not in KINDS:
+            raise ValueError(f"grid axes: {names} is none of {', '.join(map(str, KINDS))}")
+        object.__setattr__(self, "axes", {name: _checked(names, name, nodes) for name, nodes in axes.items()})
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the axes, in the order of the dimensions."""
+        return tuple(self.axes)
 
     @property
     def anisotropic(self) -> bool:
-        """Whether the grid resolves the azimuth of the light, not only the difference of azimuths."""
-        return "phi_i" in self.axes
+        """Whether the grid resolves how the surface is turned about its normal."""
+        return len(self.axes) == 4
+
+    @property
+    def half_difference(self) -> bool:
+        """Whether the axes are those of half and difference vectors."""
+        return "theta_h" in self.axes
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -61,35 +83,75 @@ class Grid:
         return tuple(nodes.size for nodes in self.axes.values())
 
     @property
+    def copies(self) -> int:
+        """How many times the azimuth of an anisotropic grid, phi_i or phi_h, goes into a full turn: 1, 2 or 4."""
+        turned = self.axes.get("phi_i", self.axes.get("phi_h"))
+        return 1 if turned is None else round(360.0 / turned[-1])
+
+    @property
     def reciprocal(self) -> bool:
-        """Whether a table is its own transpose: isotropic, with the same theta nodes for light and viewer."""
-        return not self.anisotropic and np.array_equal(self.axes["theta_i"], self.axes["theta_r"])
+        """Whether a table is its own transpose: theta_i, theta_r, delta_phi with the same nodes for both thetas."""
+        return self.names == ISOTROPIC_AXES and np.array_equal(self.axes["theta_i"], self.axes["theta_r"])
 
     @property
     def symmetries(self) -> list[str]:
         """What a table on the grid leaves out or repeats, in words."""
-        mirror = [] if self.anisotropic else ["brdf(delta_phi) = brdf(-delta_phi)"]
-        return mirror + (["brdf(theta_i, theta_r) = brdf(theta_r, theta_i)"] if self.reciprocal else [])
+        known = [] if self.anisotropic else ["brdf(delta_phi) = brdf(-delta_phi)"]
+        known += [_HALF_TURN] if self.copies > 1 else []
+        known += [_MIRROR] if self.copies == 4 else []
+        return known + ([_RECIPROCITY] if self.reciprocal or self.half_difference else [])
+
+    @property
+    def ends(self) -> list[tuple[str, str]]:
+        """For each axis, what is known of a table beyond its first and its last node: see `interpolation.prepared`."""
+        even_pole = "even" if not self.anisotropic or self.copies > 1 else "open"
+        known = {
+            "delta_phi": ("even", "even"),
+            "phi_r": ("periodic", "periodic"),
+            "phi_i": ("periodic", "periodic") if self.copies == 1 else ("open", "open"),
+            "phi_h": ("periodic", "periodic") if self.copies < 4 else ("open", "open"),
+            "phi_d": ("periodic", "periodic") if self.anisotropic else ("even", "even"),
+            "theta_h": (even_pole, "open"),  # past the pole the half vector, and the light about it, are turned by 180
+            "theta_d": ("even", "open"),  # past the pole light and viewer are exchanged
+        }
+        return [known.get(name, ("open", "open")) for name in self.axes]
+
+    def directions(self, first: slice = slice(None)) -> tuple[NDArray[np.float64], ...]:
+        """theta_i, phi_i, theta_r, phi_r [rad] of the nodes, of some rows of the first axis only.
+
+        Arrays that broadcast to the shape of the grid. On a grid of half and difference vectors either theta may pass
+        pi/2, where that direction is below the horizon.
+        """
+        axes = [radians(nodes) for nodes in self.axes.values()]
+        axes[0] = axes[0][first]
+        nodes = np.ix_(*axes)
+        if self.names == ISOTROPIC_AXES:
+            return nodes[0], np.zeros(()), nodes[1], nodes[2]
+        if self.names == ANISOTROPIC_AXES:
+            return nodes
+        if self.anisotropic:
+            return directions_from_half_difference(*nodes)
+        return directions_from_half_difference(nodes[0], 0.0, nodes[1], nodes[2])
 
     @property
     def reaches_horizon(self) -> bool:
-        """Whether a theta axis has a node at exactly 90 degrees."""
-        return any(nodes[-1] == 90.0 for name, nodes in self.axes.items() if name.startswith("theta"))
+        """Whether a theta axis of light or viewer has a node at exactly 90 degrees."""
+        return any(nodes[-1] == 90.0 for name, nodes in self.axes.items() if name in ("theta_i", "theta_r"))
 
 
-def check_axis(name: str, nodes: Any) -> Axis:
-    """Return the nodes of axis `name` [degree] as float64, or raise a ValueError saying what is wrong with them."""
+def _checked(names: tuple[str, ...], name: str, nodes: Any) -> Axis:
+    """The nodes of an axis [degree] as float64, or a ValueError saying what is wrong with them."""
     axis = np.array(nodes, dtype=np.float64)
     if axis.ndim != 1 or axis.size < 2:
         raise ValueError(f"{name}: needs a list of at least two nodes, got an array of shape {axis.shape}")
     if not np.all(np.diff(axis) > 0.0):
         raise ValueError(f"{name}: the nodes must increase strictly")
-    first, last = _ENDS[name]
-    if axis[0] != first:
-        raise ValueError(f"{name}: starts at {axis[0]:g} degrees, must start at {first:g}")
-    if last is not None and axis[-1] != last:
-        raise ValueError(f"{name}: ends at {axis[-1]:g} degrees, must end at {last:g}")
-    if last is None and not axis[-1] <= 90.0:
+    if axis[0] != 0.0:
+        raise ValueError(f"{name}: starts at {axis[0]:g} degrees, must start at 0")
+    ends = _AZIMUTHS[names].get(name)
+    if ends is not None and axis[-1] not in ends:
+        raise ValueError(f"{name}: ends at {axis[-1]:g} degrees, must end at {' or '.join(f'{end:g}' for end in ends)}")
+    if ends is None and not axis[-1] <= 90.0:
         raise ValueError(f"{name}: ends at {axis[-1]:g} degrees, must end at or below 90")
     return axis
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,45 @@ from brdfdb.materials import Material
 
 TABLE_VERSION = 2  # of the variables, dimensions and attributes of a table
 
+_METHODS = ("linear", "cubic")
+
 _BLOCK_VALUES = 1 << 20  # values of a block, 4 MB
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """How the numbers of a table become f_r between its nodes.
+
+    Attributes
+    ----------
+    method : str
+        "linear", or "cubic": Catmull-Rom, each cell the Hermite cubic with the slopes of parabolas through three nodes.
+    logarithm : bool
+        Whether logarithms are tabulated and interpolated.
+    power : float
+        What is tabulated is f_r times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a
+        model has at the horizon.
+    """
+
+    method: str = "linear"
+    logarithm: bool = False
+    power: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.method not in _METHODS:
+            raise ValueError(f"interpolation: {self.method!r} is not one of {', '.join(_METHODS)}")
+        if self.power not in (0.0, 0.5, 1.0):
+            raise ValueError(f"power: {self.power!r} is not 0, 0.5 or 1")
+
+    @property
+    def cubic(self) -> bool:
+        """Whether four nodes of an axis count, not two."""
+        return self.method == "cubic"
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is f_r itself that is tabulated."""
+        return not self.logarithm and self.power == 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +69,16 @@ class Layout:
         Angles [degree]; anisotropic for anisotropic materials.
     wavelength_nm : array of shape (L,) [nm], optional
         For spectral materials, and only for them.
+    interpolation : Interpolation
+        How the numbers of the table become f_r between its nodes; by default they are f_r, and linear.
+    spectra : array of shape (parts, L), optional
+        Of logarithms: orthonormal rows that make up the spectrum of every node, which then is stored in parts.
+    offset : float [1/sr]
+        Of logarithms: added before they are taken, so that values much smaller than this take no nodes.
+    bits : int
+        Bits of the mantissa that are kept, in [1, 23].
+    reason : str
+        Why the table is laid out so.
 
     Raises
     ------
@@ -42,6 +90,11 @@ class Layout:
     material: Material
     grid: Grid
     wavelength_nm: NDArray[np.float64] | None = None
+    interpolation: Interpolation = Interpolation()
+    spectra: NDArray[np.float64] | None = None
+    offset: float = 0.0
+    bits: int = 23
+    reason: str = ""
 
     def __post_init__(self) -> None:
         material = self.material
@@ -49,7 +102,7 @@ class Layout:
             raise ValueError(f"wavelengths_nm: {material.name} {'needs them' if material.spectral else 'is grey'}")
         if material.anisotropic and not self.grid.anisotropic:
             raise ValueError(f"grid: {material.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r")
-        if material.spec.grazing_pole and self.grid.reaches_horizon:
+        if material.spec.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
             raise ValueError(
                 f"grid: theta of 90 degrees is a pole of the model {material.spec.name} ({material.name}); "
                 "end the axis below 90"
@@ -59,19 +112,41 @@ class Layout:
             material.arguments(self.wavelength_nm)
 
     @property
+    def plain(self) -> bool:
+        """Whether the stored numbers are f_r itself."""
+        return self.interpolation.plain and self.spectra is None
+
+    @property
+    def apart(self) -> str | None:
+        """The parameter whose part of f_r, the same in all directions, is not in the table but beside it."""
+        return None if self.plain else self.material.spec.uniform
+
+    @property
+    def uniform(self) -> NDArray[np.float64] | None:
+        """That part [1/sr], of shape (1,)."""
+        return None if self.apart is None else np.array([self.material.parameters[self.apart] / np.pi])
+
+    @property
     def variable(self) -> str:
         """Name of the variable that holds the values."""
-        return "brdf"
+        return "brdf" if self.plain else "parts"
+
+    @property
+    def spectral_dims(self) -> dict[str, int]:
+        """Name and length of the last dimension of the variable, if it has one besides the axes of the grid."""
+        if self.spectra is not None:
+            return {"part": self.spectra.shape[0]}
+        return {} if self.wavelength_nm is None else {"wavelength": self.wavelength_nm.size}
 
     @property
     def dims(self) -> tuple[str, ...]:
         """Dimensions of the variable: the axes of the grid and, last, that of the spectrum, if it has one."""
-        return (*self.grid.axes, *(() if self.wavelength_nm is None else ("wavelength",)))
+        return (*self.grid.axes, *self.spectral_dims)
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the variable."""
-        return (*self.grid.shape, *(() if self.wavelength_nm is None else self.wavelength_nm.shape))
+        return (*self.grid.shape, *self.spectral_dims.values())
 
     @property
     def size(self) -> int:
@@ -99,16 +174,27 @@ class Layout:
             "material": self.material.model_dump(mode="json"),
             "grid": {name: nodes.tolist() for name, nodes in self.grid.axes.items()},
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
+            "interpolation": asdict(self.interpolation),
+            "spectra": None if self.spectra is None else self.spectra.tolist(),
+            "offset": self.offset,
+            "bits": self.bits,
+            "reason": self.reason,
         }
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Layout:
         """The layout that a document describes."""
-        wavelength_nm = document["wavelength_nm"]
+        arrays = {
+            name: None if document[name] is None else np.array(document[name]) for name in ("wavelength_nm", "spectra")
+        }
         return cls(
             Material.model_validate(document["material"]),
             Grid(document["grid"]),
-            None if wavelength_nm is None else np.array(wavelength_nm),
+            interpolation=Interpolation(**document["interpolation"]),
+            offset=document["offset"],
+            bits=document["bits"],
+            reason=document["reason"],
+            **arrays,
         )
 
 

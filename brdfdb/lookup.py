@@ -1,18 +1,40 @@
-"""Values of a table at any direction and wavelength: multilinear interpolation on the stored grid."""
+"""Values of a table at any direction and wavelength: what is stored, interpolated on its grid."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb._numba import kernel
-from brdfdb.geometry import checked_angles, finished, fold_delta_phi, radians
-from brdfdb.grids import ANISOTROPIC_AXES, Axis
+from brdfdb import _lookup_kernels
+from brdfdb._elementary import COS_HORIZON
+from brdfdb.geometry import HALF_PI, checked_angles, checked_vectors, finished, radians, unit_vector
+from brdfdb.grids import Axis, Grid
+from brdfdb.interpolation import Axes, prepared
+from brdfdb.layout import Interpolation, Layout
 from brdfdb.parameters import Floats
+
+_VECTORS = 1 << 15  # directions that are turned into unit vectors at a time
+
+
+class Stated(NamedTuple):
+    """Values of f_r with the error that their table states for them.
+
+    Attributes
+    ----------
+    brdf : array [1/sr]
+        As by `Table.lookup`.
+    error : array [1/sr]
+        In the same shape: 99 of 100 values of the table in this band of theta_i, at this wavelength, are within that
+        of the model.
+    """
+
+    brdf: Floats
+    error: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,10 +51,18 @@ class Table:
         Nodes of the angular axes, in the order of the dimensions.
     wavelength_nm : array (L,) [nm] or None
         Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
-    brdf : float32 array [1/sr]
-        f_r over the angular axes and, last, the wavelengths.
+    values : float32 array
+        Numbers over the angular axes and, last, the wavelengths, or the parts of a factored spectrum.
     specular : float32 array (theta_i[, L]) [1] or None
         Reflectance of the Dirac part, None if the model has none.
+    interpolation : Interpolation
+        How the numbers become f_r between the nodes; by default they are f_r and linear.
+    offset : float [1/sr]
+        What was added to f_r before logarithms were taken.
+    spectra : array (parts, L) or None
+        How the parts of a factored spectrum make up the wavelengths.
+    uniform : array (L,) or (1,) [1/sr]
+        The part of f_r that is the same in all directions, which is not in `values`.
     """
 
     name: str
@@ -40,13 +70,52 @@ class Table:
     attrs: Mapping[str, Any]
     axes_deg: Mapping[str, Axis]
     wavelength_nm: Axis | None
-    brdf: NDArray[np.float32]
+    values: NDArray[np.float32]
     specular: NDArray[np.float32] | None
+    interpolation: Interpolation = Interpolation()
+    offset: float = 0.0
+    spectra: NDArray[np.float64] | None = None
+    uniform: NDArray[np.float64] | None = None
+
+    @classmethod
+    def of(cls, layout: Layout, values: NDArray[np.float32]) -> Table:
+        """The table of a layout before it is stored: its values alone, without the Dirac part."""
+        return cls(
+            name=layout.material.name,
+            revision="",
+            attrs={},
+            axes_deg=layout.grid.axes,
+            wavelength_nm=layout.wavelength_nm,
+            values=values,
+            specular=None,
+            interpolation=layout.interpolation,
+            offset=layout.offset,
+            spectra=layout.spectra,
+            uniform=layout.uniform,
+        )
+
+    @functools.cached_property
+    def grid(self) -> Grid:
+        """The grid of the table."""
+        return Grid(self.axes_deg)
 
     @property
     def anisotropic(self) -> bool:
-        """Whether the table resolves the azimuth of the light."""
-        return "phi_i" in self.axes_deg
+        """Whether the table resolves how the surface is turned about its normal."""
+        return len(self.axes_deg) == 4
+
+    @functools.cached_property
+    def brdf(self) -> NDArray[np.float32]:
+        """f_r [1/sr] at the nodes: over the angular axes and, last, the wavelengths; 0 below the horizon."""
+        if self.values_are_brdf:
+            return self.values
+        theta_i, phi_i, theta_r, phi_r = self.grid.directions()
+        return self.lookup(theta_i, phi_i, theta_r, phi_r).astype(np.float32)
+
+    @property
+    def values_are_brdf(self) -> bool:
+        """Whether the stored numbers are f_r itself."""
+        return self.spectra is None and self.uniform is None and self.interpolation.plain
 
     def lookup(
         self,
@@ -70,28 +139,66 @@ class Table:
         array [1/sr]
             In the shape of the angles, with a last axis for the wavelengths of a spectral table, or M if an array of
             wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is nan.
-            Between the last theta node and 90 degrees the value is the last node's.
+            Beyond the last theta node of its grid the value is that of the node. float32 arrays in give float32 out.
 
         Raises
         ------
         ValueError
             If an angle or a wavelength is outside its range; the message names it.
         """
-        angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
-        if self.anisotropic:
-            phis = np.remainder(angles.phi_i, 2.0 * np.pi), np.remainder(angles.phi_r, 2.0 * np.pi)
-            axes = [radians(self.axes_deg[name]) for name in ANISOTROPIC_AXES]
-        else:
-            phis = np.zeros(()), fold_delta_phi(angles.phi_r - angles.phi_i)
-            theta_axis, theta_r_axis, delta_phi_axis = (radians(nodes) for nodes in self.axes_deg.values())
-            axes = [theta_axis, np.zeros(1), theta_r_axis, delta_phi_axis]
-        points = np.broadcast_arrays(angles.theta_i, phis[0], angles.theta_r, phis[1])
-        shape = points[0].shape
-        values = np.empty((points[0].size, weight.size))
-        table = self.brdf.reshape(*(nodes.size for nodes in axes), -1)
-        _interpolate(tuple(axes), table, tuple(np.ravel(p) for p in points), low, weight, values)
-        return finished(values.reshape(*shape, weight.size), angles, trailing=1).reshape(shape + wavelength_shape)[()]
+        given = [np.asarray(angle) for angle in (theta_i, phi_i, theta_r, phi_r)]
+        if self.grid.half_difference:
+            return self._by_half_vectors(given, low, weight, wavelength_shape)
+        dtype = np.result_type(*given)
+        if dtype not in (np.float32, np.float64):
+            dtype = checked_angles(*given).dtype  # numbers of other kinds, or not numbers
+        shape = np.broadcast_shapes(*(angle.shape for angle in given))
+        flat = [np.ascontiguousarray(np.broadcast_to(angle, shape), dtype=dtype).reshape(-1) for angle in given]
+        values = np.empty((flat[0].size, weight.size), dtype)
+        if not _lookup_kernels.by_angles(*self._kernel, low, weight, *flat, float(dtype.type(HALF_PI)), values):
+            checked_angles(*given)
+        return values.reshape(shape + wavelength_shape)[()]
+
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+        low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
+        vectors = checked_vectors(wi, wr)
+        shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
+        flat = [
+            np.ascontiguousarray(np.broadcast_to(w, shape), dtype=vectors.dtype).reshape(-1)
+            for w in (vectors.w_i, vectors.w_r)
+        ]
+        values = np.empty((flat[0].size // 3, weight.size), vectors.dtype)
+        _lookup_kernels.by_vectors(*self._kernel, low, weight, *flat, values)
+        return values.reshape(shape[:-1] + wavelength_shape)[()]
+
+    def _by_half_vectors(
+        self, given: list[NDArray[Any]], low: NDArray[np.int64], weight: NDArray[np.float64], tail: tuple[int, ...]
+    ) -> Floats:
+        """Values on a grid of half and difference vectors, of angles."""
+        angles = checked_angles(*given)
+        flat = [np.ravel(a) for a in np.broadcast_arrays(angles.theta_i, angles.phi_i, angles.theta_r, angles.phi_r)]
+        values = np.empty((flat[0].size, weight.size))
+        for start in range(0, flat[0].size, _VECTORS):
+            some = slice(start, start + _VECTORS)
+            theta_i, phi_i, theta_r, phi_r = (angle[some] for angle in flat)
+            wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+            _lookup_kernels.by_vectors(*self._kernel, low, weight, wi.reshape(-1), wr.reshape(-1), values[some])
+        shape = np.broadcast_shapes(*(angle.shape for angle in given))
+        return finished(values.reshape(*shape, weight.size), angles, trailing=1).reshape(shape + tail)[()]
+
+    @functools.cached_property
+    def _kernel(self) -> tuple[Any, ...]:
+        """What kernels need to know of the table: how numbers become f_r, the axes, the numbers, their spectra."""
+        grid, how = self.grid, self.interpolation
+        rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, how.logarithm, self.offset, float(how.power))
+        axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
+        channels = self.values.size // int(np.prod(grid.shape))
+        spectra = np.empty((0, 0)) if self.spectra is None else self.spectra
+        count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
+        uniform = np.zeros(count) if self.uniform is None else np.broadcast_to(self.uniform, (count,)).copy()
+        return rule, axes, self.values.reshape(-1), channels, spectra, uniform
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the reflectance of the Dirac part; 0 for models that have none.
@@ -157,55 +264,3 @@ class Table:
         step = stored[np.minimum(low + 1, stored.size - 1)] - stored[low]
         weight = np.divide(flat - stored[low], step, out=np.zeros(flat.size), where=step > 0.0)
         return low, weight, wanted.shape
-
-
-@kernel
-def _bracket(nodes: NDArray[np.float64], x: float) -> tuple[int, float]:
-    """Index of the node at or below x and the weight of the next one; outside the nodes, the end node alone."""
-    last = nodes.size - 1
-    if not x > nodes[0]:
-        return 0, 0.0
-    if x >= nodes[last]:
-        return last, 0.0
-    low, high = 0, last
-    while high - low > 1:
-        middle = (low + high) // 2
-        if nodes[middle] <= x:
-            low = middle
-        else:
-            high = middle
-    return low, (x - nodes[low]) / (nodes[low + 1] - nodes[low])
-
-
-@kernel
-def _interpolate(
-    nodes: tuple[NDArray[np.float64], ...],
-    table: NDArray[np.float32],
-    points: tuple[NDArray[np.float64], ...],
-    low: NDArray[np.int64],
-    weight: NDArray[np.float64],
-    values: NDArray[np.float64],
-) -> None:
-    """Multilinear over the four angles and the wavelength. An isotropic table has one phi_i node and delta_phi last."""
-    index = np.empty((4, 2), np.int64)
-    share = np.empty((4, 2))
-    for point in range(values.shape[0]):
-        for axis in range(4):
-            at, upper = _bracket(nodes[axis], points[axis][point])
-            index[axis, 0] = at
-            index[axis, 1] = min(at + 1, table.shape[axis] - 1)
-            share[axis, 0] = 1.0 - upper
-            share[axis, 1] = upper
-        for m in range(low.size):
-            values[point, m] = 0.0
-        for corner in range(16):
-            a, b, c, d = corner & 1, (corner >> 1) & 1, (corner >> 2) & 1, corner >> 3
-            factor = share[0, a] * share[1, b] * share[2, c] * share[3, d]
-            if factor == 0.0:
-                continue
-            row = table[index[0, a], index[1, b], index[2, c], index[3, d]]
-            for m in range(low.size):
-                value = np.float64(row[low[m]])
-                if weight[m] > 0.0:
-                    value += weight[m] * (np.float64(row[low[m] + 1]) - value)
-                values[point, m] += factor * value

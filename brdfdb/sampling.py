@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -77,18 +78,18 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     parameters = named(spec, parameters)
     v1, v2 = _uniform("u1", u1), _uniform("u2", u2)
     i = checked_vectors(wi, wi).w_i.astype(np.float64)
-    lobe = _lobe(spec, i, parameters)
+    lobe = lobe_of(spec, i, parameters)
     in_lobe = (v1 < lobe.share) | (lobe.share >= 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):  # of the component that is not taken
         stretched = np.where(in_lobe, v1 / lobe.share, (v1 - lobe.share) / (1.0 - lobe.share))
     angle = 2.0 * np.pi * v2
-    mirrored = _mirrored(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
+    mirrored = mirrored_in_lobe(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
     wr = np.where(in_lobe[..., np.newaxis], mirrored, _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle))
     with np.errstate(all="ignore"):  # samples reach every corner; what is finite is tested, not flagged
         f_r = spec.vectors(i, wr, **parameters)
     wr = np.broadcast_to(wr, (*np.shape(f_r), 3)).copy()  # a lobe or none: parameters shape the result
     wr[np.isnan(f_r)] = np.nan
-    density = _density(lobe, i, wr)
+    density = mixture_density(lobe, i, wr)
     reflected = f_r * np.maximum(wr[..., 2], 0.0)
     # a density that has vanished leaves a direction that nothing draws
     weight = np.divide(reflected, density, where=density != 0.0, out=np.zeros(np.shape(density)))
@@ -126,7 +127,7 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
     i, r = vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64)
     spec = spec_of(model)
     parameters = named(spec, parameters)
-    density = _density(_lobe(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan goes through
+    density = _density(lobe_of(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan goes through
     shape = np.broadcast_shapes(density.shape, *(np.shape(value) for value in parameters.values()))
     return np.broadcast_to(density, shape).copy()[()]
 
@@ -205,7 +206,8 @@ def ward_pdf(wi: ArrayLike, wr: ArrayLike, *, alpha_x: ArrayLike, alpha_y: Array
     return pdf("ward", wi, wr, rho_d=0.0, rho_s=1.0, alpha_x=alpha_x, alpha_y=alpha_y)
 
 
-def _lobe(spec: ModelSpec, i: Array, parameters: dict[str, ArrayLike]) -> Lobe:
+def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> Lobe:
+    """Where a model has its lobe, of lights `i`; of a diffuse model, a lobe that has no share."""
     for parameter in spec.parameters:
         if parameter.name in parameters:
             parameter.check(parameters[parameter.name])
@@ -223,7 +225,7 @@ def _uniform(name: str, u: ArrayLike) -> Array:
     return array
 
 
-def _mirrored(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
+def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
     """The light mirrored in a half vector drawn by Ward's eq. 7, in slopes: tan(delta) times cos(phi) and sin(phi)."""
     radius = np.sqrt(-np.log(u1))
     s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
@@ -239,7 +241,7 @@ def _cosine_weighted(u1: Array, angle: Array) -> Array:
     return np.stack([x, y, z], axis=-1)
 
 
-def _density(lobe: Lobe, i: Array, r: Array) -> Array:
+def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
     """Density [1/sr] of the mixture over the whole sphere."""
     cosine = np.maximum(r[..., 2], 0.0) / np.pi
     if not np.any(lobe.share):

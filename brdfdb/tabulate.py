@@ -8,11 +8,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from brdfdb.geometry import radians
+from brdfdb._elementary import COS_HORIZON
+from brdfdb.geometry import directions_from_half_difference, radians, unit_vector
+from brdfdb.grids import Axis
 from brdfdb.layout import TABLE_VERSION, Layout
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
+_SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
+_CONTINUED = np.deg2rad(15.0)  # how far beyond the horizon numbers go on with it
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
 
 
@@ -32,46 +36,121 @@ def tabulate(layout: Layout) -> xr.Dataset:
 
 def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
     """The values of some rows of the first axis of a table: float32, in the shape of the table's other axes."""
-    axes = [radians(nodes) for nodes in layout.grid.axes.values()]
     values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
-    spectrum: list[tuple[tuple[int, ...], dict[str, Any]]]
-    if layout.wavelength_nm is None:
-        spectrum = [((), layout.material.arguments())]
-    else:
-        spectrum = [((w,), layout.material.arguments(one)) for w, one in enumerate(layout.wavelength_nm)]
     step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
     for start in range(rows.start, rows.stop, step):
         here = slice(start, min(start + step, rows.stop))
-        for last, arguments in spectrum:
-            at: tuple[Any, ...] = (slice(here.start - rows.start, here.stop - rows.start), ..., *last)
-            values[at] = _evaluated(layout, axes, here, arguments)
-    return values
+        at = slice(here.start - rows.start, here.stop - rows.start)
+        if layout.plain and not layout.grid.half_difference:
+            for last, arguments in _spectrum(layout):
+                values[(at, ..., *last)] = _evaluated(layout, here, arguments)
+        else:
+            numbers = node_numbers(layout, here)
+            if layout.spectra is not None:
+                numbers = numbers @ layout.spectra.T
+            values[at] = numbers.reshape(here.stop - here.start, *layout.shape[1:])
+    return values if layout.bits == 23 else rounded(values, layout.bits)
 
 
-def _evaluated(layout: Layout, axes: list[NDArray[np.float64]], rows: slice, arguments: dict[str, Any]) -> Floats:
+def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
+    """float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
+    drop = np.uint32(23 - bits)
+    whole = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
+    half = np.uint32(1 << int(drop - 1))
+    return ((whole + half) >> drop << drop).view(np.float32)
+
+
+def _spectrum(layout: Layout) -> list[tuple[tuple[int, ...], dict[str, Any]]]:
+    """The arguments of the model at each wavelength, and where their values go in the last dimension."""
+    if layout.wavelength_nm is None:
+        return [((), layout.material.arguments())]
+    return [((w,), layout.material.arguments(one)) for w, one in enumerate(layout.wavelength_nm)]
+
+
+def _evaluated(layout: Layout, rows: slice, arguments: dict[str, Any]) -> Floats:
     """The model at some rows of the first axis; on a reciprocal grid with the smaller theta always the light's.
 
     There a table is its own transpose to the last bit, in whatever pieces it is computed.
     """
     evaluate = layout.material.spec.evaluate
-    first, *others = axes
     if not layout.grid.reciprocal:
-        return evaluate(*_directions(layout, [first[rows], *others]), **arguments)
-    theta, delta_phi = others
-    values = np.empty((rows.stop - rows.start, theta.size, delta_phi.size))
-    values[:, rows.start :] = evaluate(*_directions(layout, [first[rows], theta[rows.start :], delta_phi]), **arguments)
-    swapped = evaluate(*_directions(layout, [theta[: rows.stop], first[rows], delta_phi]), **arguments)
-    smaller = np.arange(rows.stop) < np.arange(rows.start, rows.stop)[:, np.newaxis]
+        return evaluate(*layout.grid.directions(rows), **arguments)
+    theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
+    here, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
+    values = np.empty((here.size, theta.size, delta_phi.size))
+    values[:, rows.start :] = evaluate(*_spread(here, right, delta_phi), **arguments)
+    swapped = evaluate(*_spread(left, here, delta_phi), **arguments)
+    smaller = left < here[:, np.newaxis]
     np.copyto(values[:, : rows.stop], np.swapaxes(swapped, 0, 1), where=smaller[..., np.newaxis])
     return values
 
 
-def _directions(layout: Layout, axes: list[NDArray[np.float64]]) -> tuple[NDArray[np.float64], ...]:
-    """theta_i, phi_i, theta_r, phi_r of the nodes that axes span, each on its own axis."""
-    if layout.grid.anisotropic:
-        return np.ix_(*axes)
-    light, seen, turned = np.ix_(*axes)
+def _spread(theta_i: Axis, theta_r: Axis, delta_phi: Axis) -> tuple[Axis, ...]:
+    light, seen, turned = np.ix_(theta_i, theta_r, delta_phi)
     return light, np.zeros(()), seen, turned
+
+
+def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
+    """What a table holds or would hold at any directions: shape (..., L), before a spectrum is taken in parts.
+
+    Parameters
+    ----------
+    layout : Layout
+        Which numbers.
+    wi, wr : arrays of shape (..., 3)
+        Unit vectors, at the horizon or above.
+    """
+    how = layout.interpolation
+    mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
+    spectrum = _spectrum(layout)
+    values = np.empty((*mu.shape, len(spectrum)))
+    for w, (_, arguments) in enumerate(spectrum):
+        if layout.apart is not None:
+            arguments = arguments | {layout.apart: 0.0}
+        values[..., w] = layout.material.spec.vectors(wi, wr, **arguments)
+    if how.power != 0.0:
+        values *= (mu**how.power)[..., np.newaxis]
+    return np.log(values + layout.offset) if how.logarithm else values
+
+
+def node_numbers(layout: Layout, rows: slice) -> Floats:
+    """`numbers` at some rows of nodes, continued beyond the horizon on a grid of half and difference vectors.
+
+    There theta_d is held at its largest value, where light or viewer is at the horizon; from there the numbers go on
+    along theta_d with the slope that they arrive with.
+    """
+    grid = layout.grid
+    if not grid.half_difference:
+        theta_i, phi_i, theta_r, phi_r = grid.directions(rows)
+        return numbers(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+    axes = [radians(nodes) for nodes in grid.axes.values()]
+    axes[0] = axes[0][rows]
+    nodes = np.ix_(*axes)
+    theta_h, phi_h, theta_d, phi_d = nodes if grid.anisotropic else (nodes[0], np.zeros(()), nodes[1], nodes[2])
+    return continued(layout, theta_h, phi_h, theta_d, phi_d)
+
+
+def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
+    """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
+    largest = np.arctan2(np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d)))
+    largest = np.maximum(largest * (1.0 - 1e-12), 0.0)
+    held = np.minimum(theta_d, largest)
+    values = numbers(layout, *_half_vectors(theta_h, phi_h, held, phi_d))
+    beyond = np.broadcast_to(theta_d - held, values.shape[:-1])
+    if np.any(beyond > 0.0):
+        step = np.minimum(_SLOPE_STEP, 0.5 * largest)
+        inside = numbers(layout, *_half_vectors(theta_h, phi_h, np.maximum(held - step, 0.0), phi_d))
+        share = np.minimum(beyond, _CONTINUED) / np.broadcast_to(np.maximum(step, 1e-9), beyond.shape)
+        values += share[..., np.newaxis] * (values - inside)
+    return values
+
+
+def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats]:
+    theta_i, phi_i, theta_r, phi_r = directions_from_half_difference(theta_h, phi_h, theta_d, phi_d)
+    light, viewer = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+    for w in (light, viewer):
+        w[..., 2] = np.maximum(w[..., 2], 0.0)  # rounding at the horizon
+    return light, viewer
 
 
 def frame(layout: Layout) -> xr.Dataset:

@@ -297,5 +297,6 @@ SPEC = ModelSpec(
     specular=he_torrance_specular,
     specular_parameters=("wavelength_nm", "sigma_0_um", "tau_um", "n", "k"),
     spectral=True,
+    uniform="a",
     lobe=lobe,
 )

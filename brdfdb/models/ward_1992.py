@@ -166,6 +166,7 @@ SPEC = ModelSpec(
     vectors=ward_vectors,
     grazing_pole=True,
     lobe_axes=("alpha_x", "alpha_y"),
+    uniform="rho_d",
     lobe=lobe,
     known_excess=_KNOWN_EXCESS,
 )
@@ -180,6 +181,7 @@ HALF_VECTOR_SPEC = ModelSpec(
     vectors=ward_half_vector_vectors,
     grazing_pole=True,
     lobe_axes=("alpha_x", "alpha_y"),
+    uniform="rho_d",
     lobe=wide_lobe,
     known_excess=_HALF_VECTOR_KNOWN_EXCESS,
 )

@@ -1,0 +1,294 @@
+"""Interpolation on rectilinear grids: where a point lies on each axis, and the nodes that count there, with weights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb._elementary import BLOCK
+from brdfdb._numba import kernel
+
+Array = NDArray[np.float64]
+
+MOST_AXES = 4
+_MOST_BUCKETS = 1 << 15  # of an axis: nodes closer together than a part in this share a bucket
+
+
+class Axes(NamedTuple):
+    """The axes of a grid as kernels read them, one after another in flat arrays.
+
+    Attributes
+    ----------
+    count, first : int64 (axes,)
+        Number of nodes, and where those of an axis begin in the arrays of nodes.
+    nodes, inverse : float64 (nodes,)
+        Nodes, and the inverse of the step to the next one.
+    uniform : bool (axes,)
+        Whether the steps of an axis are equal: its cells are found without a search.
+    scale : float64 (axes,)
+        Cells or buckets for one unit along the axis.
+    bucket, bucket_first : int64
+        The cell at the beginning of each bucket; where the buckets of an axis begin.
+    width : int64 (axes,)
+        Nodes that count in a cell: 2, or 4 of a cubic.
+    stencil : int64 (nodes, 4)
+        Which nodes those are.
+    slopes : float64 (nodes, 8)
+        The slopes at both ends of a cell, times its length, as weights of those nodes.
+    """
+
+    count: NDArray[np.int64]
+    first: NDArray[np.int64]
+    nodes: Array
+    inverse: Array
+    uniform: NDArray[np.bool_]
+    scale: Array
+    bucket: NDArray[np.int64]
+    bucket_first: NDArray[np.int64]
+    width: NDArray[np.int64]
+    stencil: NDArray[np.int64]
+    slopes: Array
+
+
+def prepared(axes: Sequence[Array], ends: Sequence[tuple[str, str]], *, cubic: bool) -> Axes:
+    """Axes ready for kernels.
+
+    Parameters
+    ----------
+    axes : sequence of float64 arrays
+        Nodes, strictly increasing, two or more on each axis.
+    ends : sequence of (str, str)
+        What is known of the function beyond the first and the last node: "even" where it is mirrored there,
+        "periodic" where the last node is the first again, "open" where nothing is.
+    cubic : bool
+        Catmull-Rom cubics on the axes that have three nodes or more, else linear.
+    """
+    tables = [_buckets(nodes) for nodes in axes]
+    cells = [_cubic_cells(nodes, end) for nodes, end in zip(axes, ends, strict=True)]
+    counts = np.array([nodes.size for nodes in axes])
+    sizes = np.array([bucket.size for bucket, _, _ in tables])
+    return Axes(
+        count=counts,
+        first=np.cumsum(counts) - counts,
+        nodes=np.concatenate(axes),
+        inverse=np.concatenate([np.append(1.0 / np.diff(nodes), 0.0) for nodes in axes]),
+        uniform=np.array([uniform for _, _, uniform in tables]),
+        scale=np.array([scale for _, scale, _ in tables]),
+        bucket=np.concatenate([bucket for bucket, _, _ in tables]),
+        bucket_first=np.cumsum(sizes) - sizes,
+        width=np.array([4 if cubic and nodes.size > 2 else 2 for nodes in axes]),
+        stencil=np.concatenate([stencil for stencil, _ in cells]),
+        slopes=np.concatenate([slopes for _, slopes in cells]),
+    )
+
+
+def _buckets(nodes: Array) -> tuple[NDArray[np.int64], float, bool]:
+    """Equal pieces of an axis, none longer than its shortest cell: the cell in which each begins, pieces a unit."""
+    steps = np.diff(nodes)
+    extent = nodes[-1] - nodes[0]
+    if np.ptp(steps) <= 1e-9 * steps[0]:
+        return np.arange(steps.size), steps.size / extent, True
+    pieces = int(min(np.ceil(extent / steps.min()) + 1, _MOST_BUCKETS))
+    begins = nodes[0] + np.arange(pieces + 1) * (extent / pieces)
+    return np.clip(np.searchsorted(nodes, begins, side="right") - 1, 0, nodes.size - 2), pieces / extent, False
+
+
+def _cubic_cells(nodes: Array, ends: tuple[str, str]) -> tuple[NDArray[np.int64], Array]:
+    """The four nodes that count in each cell of an axis, and the slopes at its two ends as weights of them.
+
+    Catmull-Rom for unequal steps: Hermite's cubic whose slope at a node is that of the parabola through it and its two
+    neighbours. The cell after the last node is never looked up.
+    """
+    count = nodes.size
+    stencil, slopes = np.zeros((count, 4), np.int64), np.zeros((count, 2, 4))
+    for cell in range(count - 1 if count > 2 else 0):
+        around = [_neighbour(nodes, cell + step, ends) for step in (-1, 0, 1, 2)]
+        x = np.array([position for _, position in around])
+        for end in (0, 1):
+            three = np.arange(end, end + 3)
+            if not np.isfinite(x[three]).all():  # an open end: the parabola through the nodes inside
+                three = np.arange(1 - end, 4 - end)
+            slopes[cell, end, three] = (x[2] - x[1]) * _slope(x[three], x[1 + end])
+        stencil[cell] = [at for at, _ in around]
+    return stencil, slopes.reshape(count, 8)
+
+
+def _neighbour(nodes: Array, at: int, ends: tuple[str, str]) -> tuple[int, float]:
+    """Which node stands at an index that may be one beyond an end, and where; nan where nothing is known."""
+    last = nodes.size - 1
+    if 0 <= at <= last:
+        return at, float(nodes[at])
+    low = at < 0
+    if ends[0 if low else 1] == "even":
+        inside = 1 if low else last - 1
+        return inside, 2.0 * nodes[0 if low else last] - nodes[inside]
+    if ends[0 if low else 1] == "periodic":
+        inside = last - 1 if low else 1
+        return inside, nodes[inside] + (nodes[0] - nodes[last]) * (1.0 if low else -1.0)
+    return 0 if low else last, np.nan  # such a node gets no weight
+
+
+def _slope(x: Array, at: float) -> Array:
+    """The slope at one of three nodes of the parabola through them, as weights of their values."""
+    a, b, c = x
+    return np.array(
+        [
+            (2.0 * at - b - c) / ((a - b) * (a - c)),
+            (2.0 * at - a - c) / ((b - a) * (b - c)),
+            (2.0 * at - a - b) / ((c - a) * (c - b)),
+        ]
+    )
+
+
+@kernel
+def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64], share: Array) -> None:
+    """Cell and share of it, in [0, 1], of `count` points of one axis; beyond its ends, the end."""
+    first = np.uint64(axes.first[axis])
+    buckets = np.uint64(axes.bucket_first[axis])
+    last = axes.count[axis] - 2
+    low, high = axes.nodes[first], axes.nodes[first + np.uint64(last + 1)]
+    scale = axes.scale[axis]
+    if axes.uniform[axis]:
+        top = float(last)
+        for j in range(count):
+            y = (x[j] - low) * scale
+            y = y if y > 0.0 else 0.0  # nan too
+            whole = np.floor(y)
+            whole = whole if whole < top else top
+            y = y - whole
+            share[j] = y if y < 1.0 else 1.0
+            cell[j] = np.int64(whole)
+        return
+    below = np.nextafter(high, low)
+    for j in range(count):
+        y = x[j] if x[j] < below else below
+        y = y if y > low else low  # nan too
+        share[j] = y
+        cell[j] = np.int64((y - low) * scale)
+    one = np.uint64(1)
+    for j in range(count):
+        y = share[j]
+        c = np.uint64(axes.bucket[buckets + np.uint64(cell[j])])
+        c += np.uint64(y >= axes.nodes[first + c + one])
+        while y >= axes.nodes[first + c + one]:  # of axes with more nodes than buckets
+            c += one
+        share[j] = (y - axes.nodes[first + c]) * axes.inverse[first + c]
+        cell[j] = np.int64(c)
+
+
+@kernel
+def _weigh(axes: Axes, axis: int, c: int, t: float, stride: int, at: NDArray[np.uint64], w: Array) -> None:
+    """Offsets and weights of the nodes that count for a point, into row `axis` of `at` and `w`."""
+    if axes.width[axis] == 2:
+        at[axis, 0], at[axis, 1] = np.uint64(c * stride), np.uint64((c + 1) * stride)
+        w[axis, 0], w[axis, 1] = 1.0 - t, t
+        return
+    k = np.uint64(axes.first[axis] + c)
+    t2 = t * t
+    h_1 = t2 * (3.0 - 2.0 * t)
+    m_0, m_1 = t * (1.0 - t) * (1.0 - t), t2 * (t - 1.0)
+    for node in range(4):
+        at[axis, node] = np.uint64(axes.stencil[k, node] * stride)
+        w[axis, node] = m_0 * axes.slopes[k, node] + m_1 * axes.slopes[k, node + 4]
+    w[axis, 1] += 1.0 - h_1
+    w[axis, 2] += h_1
+
+
+@kernel
+def trilinear(
+    axes: Axes, cell: NDArray[np.int64], share: Array, count: int, table: NDArray[np.float32], out: Array
+) -> None:
+    """Linear interpolation on three axes of a table with one value a node, of the points that `locate` found."""
+    n_1, n_2 = axes.count[1], axes.count[2]
+    one, row, layer = np.uint64(1), np.uint64(n_2), np.uint64(n_1 * n_2)
+    for j in range(count):
+        o = np.uint64((cell[0, j] * n_1 + cell[1, j]) * n_2 + cell[2, j])
+        t_0, t_1, t_2 = share[0, j], share[1, j], share[2, j]
+        p, q, r = o + row, o + layer, o + layer + row
+        a = table[o] + t_2 * (table[o + one] - table[o])
+        b = table[p] + t_2 * (table[p + one] - table[p])
+        c = table[q] + t_2 * (table[q + one] - table[q])
+        d = table[r] + t_2 * (table[r + one] - table[r])
+        a = a + t_1 * (b - a)
+        c = c + t_1 * (d - c)
+        out[j] = a + t_0 * (c - a)
+
+
+@kernel
+def tricubic(
+    axes: Axes, cell: NDArray[np.int64], share: Array, count: int, table: NDArray[np.float32], out: Array
+) -> None:
+    """Cubic interpolation on three axes of a table with one value a node, of the points that `locate` found."""
+    at, w = np.empty((3, 4), np.uint64), np.empty((3, 4))
+    n_2 = axes.count[2]
+    n_1 = axes.count[1] * n_2
+    for j in range(count):
+        _weigh(axes, 0, cell[0, j], share[0, j], n_1, at, w)
+        _weigh(axes, 1, cell[1, j], share[1, j], n_2, at, w)
+        _weigh(axes, 2, cell[2, j], share[2, j], 1, at, w)
+        p, q, r, s = at[2, 0], at[2, 1], at[2, 2], at[2, 3]
+        a, b, c, d = w[2, 0], w[2, 1], w[2, 2], w[2, 3]
+        total = 0.0
+        for i in range(4):
+            layer = 0.0
+            for k in range(4):
+                o = at[0, i] + at[1, k]
+                line = (a * table[o + p] + b * table[o + q]) + (c * table[o + r] + d * table[o + s])
+                layer += w[1, k] * line
+            total += w[0, i] * layer
+        out[j] = total
+
+
+@kernel
+def weighted(
+    axes: Axes,
+    cell: NDArray[np.int64],
+    share: Array,
+    count: int,
+    table: NDArray[np.float32],
+    channels: int,
+    out: Array,
+) -> None:
+    """Interpolation on three or four axes of a table with `channels` values a node, of the points that `locate` found.
+
+    `out` is of shape (points, channels).
+    """
+    dimensions = axes.count.size
+    at, w = np.zeros((4, 4), np.uint64), np.zeros((4, 4))
+    w[0, 0] = 1.0  # of three axes, there is no first
+    widths = np.ones(4, np.int64)
+    lead = 4 - dimensions
+    for axis in range(dimensions):
+        widths[lead + axis] = axes.width[axis]
+    for j in range(count):
+        stride = channels
+        for back in range(dimensions):
+            axis = dimensions - 1 - back
+            _weigh(axes, axis, cell[axis, j], share[axis, j], stride, at[lead:], w[lead:])
+            stride *= axes.count[axis]
+        if channels == 1:
+            total = 0.0
+            for i in range(widths[0]):
+                for k in range(widths[1]):
+                    for m in range(widths[2]):
+                        base = at[0, i] + at[1, k] + at[2, m]
+                        line = w[3, 0] * table[base + at[3, 0]] + w[3, 1] * table[base + at[3, 1]]
+                        if widths[3] == 4:
+                            line += w[3, 2] * table[base + at[3, 2]] + w[3, 3] * table[base + at[3, 3]]
+                        total += w[0, i] * w[1, k] * w[2, m] * line
+            out[j, 0] = total
+            continue
+        for channel in range(channels):
+            out[j, channel] = 0.0
+        for i in range(widths[0]):
+            for k in range(widths[1]):
+                for m in range(widths[2]):
+                    for n in range(widths[3]):
+                        base = at[0, i] + at[1, k] + at[2, m] + at[3, n]
+                        factor = w[0, i] * w[1, k] * w[2, m] * w[3, n]
+                        if factor != 0.0:
+                            for channel in range(channels):
+                                out[j, channel] += factor * table[base + np.uint64(channel)]
