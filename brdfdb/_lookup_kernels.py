@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import BLOCK, COS_HORIZON, arcsin, cosine, exp
+from brdfdb._elementary import BLOCK, arcsin, cosine, exp
 from brdfdb._numba import kernel, loop
 from brdfdb.interpolation import Axes, locate, tricubic, trilinear, weighted
 
@@ -49,10 +49,9 @@ class Rule(NamedTuple):
 @kernel
 def angle(y: float, x: float) -> float:
     """atan2(y, x) of a point in the first quadrant, the axes included; 0 at the origin."""
-    longest = max(x, y)
     length = np.sqrt(x * x + y * y)
-    a = arcsin(min(x, y) / (length if longest > 0.0 else 1.0))
-    return HALF_PI - a if y > x else a
+    a = arcsin(min(x, y) / (length if length > 0.0 else 1.0))
+    return float(HALF_PI - a if y > x else a)
 
 
 @kernel
@@ -178,10 +177,8 @@ def points_of_vectors(
 
 
 @loop
-def interpolated(
-    rule: Rule, axes: Axes, table: NDArray[np.float32], channels: int, x: Array, mu: Array, count: int, out: Array
-) -> None:
-    """Numbers of the table at points on its grid, `out` of shape (points, channels): no logarithms any more."""
+def interpolated(axes: Axes, table: NDArray[np.float32], channels: int, x: Array, count: int, out: Array) -> None:
+    """Numbers of the table at points on its grid, `out` of shape (points, channels)."""
     cell, share = np.empty((x.shape[0], BLOCK), np.int64), np.empty((x.shape[0], BLOCK))
     for axis in range(x.shape[0]):
         locate(axes, axis, x[axis], count, cell[axis], share[axis])
@@ -254,7 +251,7 @@ def by_angles(
     out: Array,
 ) -> bool:
     """f_r of directions by angles [rad] on a grid of light and viewer; False where an angle is not what it may be."""
-    x, mu = np.empty((axes.count.size, BLOCK)), np.empty(BLOCK)
+    x, mu = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK)
     numbers = np.empty((BLOCK, channels))
     good = True
     for start in range(0, theta_i.size, BLOCK):
@@ -265,12 +262,12 @@ def by_angles(
             bad += t_i < 0.0 or t_i > PI or t_r < 0.0 or t_r > PI or abs(p_i) > PHI_MAX or abs(p_r) > PHI_MAX
         good = good and bad == 0
         points_of_angles(rule, theta_i, phi_i, theta_r, phi_r, start, count, x, mu)
-        interpolated(rule, axes, table, channels, x, mu, count, numbers)
+        interpolated(axes, table, channels, x, count, numbers)
         finished(rule, numbers, mu, spectra, uniform, low, weight, start, count, out)
         for j in range(count):
             t_i, t_r = theta_i[start + j], theta_r[start + j]
             nan = t_i + t_r + phi_i[start + j] + phi_r[start + j]
-            if t_i > horizon or t_r > horizon or not nan == nan:
+            if t_i > horizon or t_r > horizon or nan != nan:
                 for m in range(low.size):
                     out[start + j, m] = 0.0 if nan == nan else np.nan
     return good
@@ -291,17 +288,17 @@ def by_vectors(
     out: Array,
 ) -> None:
     """f_r of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
-    x, mu, scratch = np.empty((axes.count.size, BLOCK)), np.empty(BLOCK), np.empty((2, BLOCK))
+    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((2, BLOCK))
     numbers = np.empty((BLOCK, channels))
     points = out.shape[0]
     for start in range(0, points, BLOCK):
         count = min(BLOCK, points - start)
         points_of_vectors(rule, wi, wr, start, count, x, mu, scratch)
-        interpolated(rule, axes, table, channels, x, mu, count, numbers)
+        interpolated(axes, table, channels, x, count, numbers)
         finished(rule, numbers, mu, spectra, uniform, low, weight, start, count, out)
         ui, ur = wi[3 * start :], wr[3 * start :]
         for j in range(count):
             nan = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]
-            if ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0 or not nan == nan:
+            if ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0 or nan != nan:
                 for m in range(low.size):
                     out[start + j, m] = 0.0 if nan == nan else np.nan

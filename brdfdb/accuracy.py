@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.geometry import unit_vector
+from brdfdb.error import Error, Overall
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.grids import Grid
 from brdfdb.layout import Layout
-from brdfdb.lookup import Table
+from brdfdb.lookup import Table, points
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 from brdfdb.sampling import lobe_of, mirrored_in_lobe, mixture_density
 
 BANDS_DEG = np.linspace(0.0, 90.0, 10)  # of theta_i
-FLOOR = 1e-3  # of the Lambertian BRDF with the albedo of the material: errors of smaller values are relative to this
-DIRECTIONS = 8000  # of each band
+FLOOR = 1e-3  # of the Lambertian BRDF with the albedo of the material
+DIRECTIONS = 6000  # of each band
 SEED = 1991
+_WINDOW = 1 << 24  # values of a table that are held at a time
+_MODEL = 1 << 16  # directions at which the model is evaluated at a time
 
 
 class Draw(NamedTuple):
@@ -32,56 +36,131 @@ class Draw(NamedTuple):
     band: NDArray[np.int64]
     weight: Floats
 
+    @property
+    def above(self) -> NDArray[np.bool_]:
+        """Which viewers are above the horizon."""
+        return np.asarray(self.weight > 0.0)
+
 
 def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int) -> Draw:
     """`count` pairs of directions a band, half of the viewers over the hemisphere and half in the lobe.
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
-    light is mirrored in half vectors that follow `ModelSpec.lobe`, of wavelengths in turn. Viewers of a model without a
-    lobe are all drawn over the hemisphere.
+    light is mirrored in half vectors that follow `ModelSpec.lobe`, of the wavelengths in turn. Viewers of a model
+    without a lobe are all drawn over the hemisphere.
     """
     rng = np.random.default_rng(seed)
-    bands = BANDS_DEG.size - 1
-    band = np.repeat(np.arange(bands), count)
-    theta_i = np.deg2rad(BANDS_DEG[band] + rng.random(band.size) * np.diff(BANDS_DEG)[band])
+    band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
+    theta_i = radians(BANDS_DEG[band] + rng.random(band.size) * np.diff(BANDS_DEG)[band])
     wi = unit_vector(theta_i, rng.uniform(0.0, 2.0 * np.pi, band.size))
     u, angle = 1.0 - rng.random(band.size), rng.uniform(0.0, 2.0 * np.pi, band.size)
     over = unit_vector(np.arccos(u), angle)
-    density = np.where(over[:, 2] >= 0.0, 1.0 / (2.0 * np.pi), 0.0)
     if material.spec.lobe is None:
-        return Draw(wi, over, band, over[:, 2] / density)
-    spectrum = material.arguments(wavelength_nm)
+        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi))
     turns = np.arange(band.size) % (1 if wavelength_nm is None else wavelength_nm.size)
-    of_each = {name: np.asarray(v)[turns] if np.ndim(v) else v for name, v in spectrum.items()}
-    lobe = lobe_of(material.spec, wi, of_each)
+    spectrum = material.arguments(wavelength_nm)
+    lobe = lobe_of(material.spec, wi, {name: v[turns] if np.ndim(v) else v for name, v in spectrum.items()})
     lobe = lobe._replace(share=np.ones(1))
-    in_lobe = np.arange(band.size) // 2 % 2 == 0
+    in_lobe = rng.random(band.size) < 0.5
     wr = np.where(in_lobe[:, np.newaxis], mirrored_in_lobe(u, angle, wi, lobe), over)
-    above = wr[:, 2] > 0.0
-    mixed = 0.5 * mixture_density(lobe, wi, wr) + 0.5 / (2.0 * np.pi)
-    return Draw(wi, wr, band, np.where(above, wr[:, 2], 0.0) / mixed)
-
-
-def measured(layout: Layout, read: Callable[[slice], NDArray[np.float32]]) -> dict[str, Any]:
-    return compare(Table.of(layout, read(slice(0, layout.shape[0]))), layout, draw(layout.material, layout.wavelength_nm, DIRECTIONS, SEED))
+    density = 0.5 * mixture_density(lobe, wi, wr) + 0.5 / (2.0 * np.pi)
+    return Draw(wi, wr, band, np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density)
 
 
 def model_values(material: Material, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:
     """f_r [1/sr] of the model, of shape (N, L), L = 1 for a grey material."""
     spectrum = [material.arguments()] if wavelength_nm is None else [material.arguments(w) for w in wavelength_nm]
-    return np.stack([material.spec.vectors(wi, wr, **arguments) for arguments in spectrum], axis=-1)
+    values = np.empty((len(wi), len(spectrum)))
+    for start in range(0, len(wi), _MODEL):
+        some = slice(start, start + _MODEL)
+        for w, arguments in enumerate(spectrum):
+            values[some, w] = material.spec.vectors(wi[some], wr[some], **arguments)
+    return values
 
 
-def relative(found: Floats, truth: Floats, drawn: Draw) -> tuple[Floats, Floats]:
-    floor = FLOOR / np.pi * np.mean(drawn.weight[:, np.newaxis] * truth, axis=0)
-    error = np.abs(found - truth) / np.maximum(np.maximum(truth, floor), 1e-300)
-    return error, floor
+def floor_of(truth: Floats, drawn: Draw) -> Floats:
+    """The floor [1/sr] of relative errors at each wavelength: `FLOOR` of the Lambertian BRDF of the same albedo."""
+    return np.asarray(FLOOR / np.pi * np.mean(drawn.weight[:, np.newaxis] * truth, axis=0))
 
 
-def compare(table: Table, layout: Layout, drawn: Draw) -> dict[str, Any]:
+def relative(found: Floats, truth: Floats, floor: Floats) -> Floats:
+    """abs(found - truth) / max(truth, floor); 0 where nothing is and nothing was found."""
+    scale = np.maximum(truth, floor)
+    error = np.abs(found - truth)
+    return np.divide(error, scale, out=np.where(error > 0.0, np.inf, 0.0), where=scale > 0.0)
+
+
+def measure(
+    layout: Layout, read: Callable[[slice], NDArray[np.float32]], count: int = DIRECTIONS, seed: int = SEED
+) -> Error:
+    """Measure the error of a table.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the table.
+    read : callable
+        Gives some rows of the first axis of the stored array. Tables larger than 16 million values are read piece by
+        piece.
+    count : int
+        Directions a band of theta_i.
+    seed : int
+        Of the directions.
+
+    Returns
+    -------
+    Error
+        For each band and wavelength, and overall, to three digits.
+    """
+    drawn = draw(layout.material, layout.wavelength_nm, count, seed)
     truth = model_values(layout.material, layout.wavelength_nm, drawn.wi, drawn.wr)
-    found = table.lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
-    error, floor = relative(found, truth, drawn)
-    above = drawn.weight > 0.0
-    q = lambda e: np.percentile(e, [50, 95, 99, 100], axis=0)
-    return {"all": q(error[above]), "bands": np.stack([q(error[above & (drawn.band == b)]) for b in range(9)]), "floor": floor}
+    return compare(_looked_up(layout, read, drawn).reshape(truth.shape), truth, drawn, seed)
+
+
+def compare(found: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:
+    """The error of values of f_r, shape (N, L), against the truth at the directions of a draw."""
+    floor = floor_of(truth, drawn)
+    error = relative(found, truth, floor)
+    above, weight = drawn.above, drawn.weight[:, np.newaxis]
+
+    def statistics(chosen: NDArray[np.bool_]) -> Floats:
+        percentiles = np.percentile(error[chosen & above], [50.0, 95.0, 99.0, 100.0], axis=0)
+        wrong = np.sum((weight * np.abs(found - truth))[chosen], axis=0)
+        whole = np.sum((weight * truth)[chosen], axis=0)
+        l1 = np.divide(wrong, whole, out=np.zeros_like(wrong), where=whole > 0.0)
+        return np.concatenate([l1[np.newaxis], percentiles])
+
+    bands = np.stack([statistics(drawn.band == band) for band in range(BANDS_DEG.size - 1)], axis=1)
+    worst = statistics(np.ones(above.shape, dtype=bool)).max(axis=-1)
+    names = tuple(Overall.model_fields)
+    return Error(
+        theta_i_deg=BANDS_DEG.tolist(),
+        directions=int(np.count_nonzero(above)),
+        seed=seed,
+        floor=_short(floor),
+        overall=Overall(**dict(zip(names, _short(worst), strict=True))),
+        **{name: [_short(row) for row in rows] for name, rows in zip(names, bands, strict=True)},
+    )
+
+
+def _looked_up(layout: Layout, read: Callable[[slice], NDArray[np.float32]], drawn: Draw) -> Floats:
+    """The values of a table at the directions of a draw, read in windows of rows with one more on either side."""
+    rows = layout.shape[0]
+    step = max(2, min(rows, _WINDOW // (layout.size // rows)))
+    if step >= rows:
+        return Table.of(layout, read(slice(0, rows))).lookup_vectors(drawn.wi, drawn.wr)
+    grid = layout.grid
+    x = points(grid, drawn.wi, drawn.wr)
+    row = np.clip(np.searchsorted(radians(next(iter(grid.axes.values()))), x[0], side="right") - 1, 0, rows - 2)
+    found = np.zeros((len(drawn.wi), 1 if layout.wavelength_nm is None else layout.wavelength_nm.size))
+    for start in range(0, rows - 1, step):
+        here = (row >= start) & (row < start + step)
+        window = slice(max(start - 1, 0), min(start + step + 2, rows))
+        table = Table.of(layout, read(window), Grid.part(grid, window))
+        found[here] = table.lookup_vectors(drawn.wi[here], drawn.wr[here]).reshape(-1, found.shape[1])
+    return found
+
+
+def _short(values: Floats) -> list[float]:
+    """Numbers to three digits."""
+    return [float(f"{value:.3g}") for value in values.tolist()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,12 @@ ISOTROPIC_AXES = ("theta_i", "theta_r", "delta_phi")
 ANISOTROPIC_AXES = ("theta_i", "phi_i", "theta_r", "phi_r")
 HALF_DIFFERENCE_AXES = ("theta_h", "theta_d", "phi_d")
 ANISOTROPIC_HALF_DIFFERENCE_AXES = ("theta_h", "phi_h", "theta_d", "phi_d")
-KINDS = (ISOTROPIC_AXES, ANISOTROPIC_AXES, HALF_DIFFERENCE_AXES, ANISOTROPIC_HALF_DIFFERENCE_AXES)
+KINDS: tuple[tuple[str, ...], ...] = (
+    ISOTROPIC_AXES,
+    ANISOTROPIC_AXES,
+    HALF_DIFFERENCE_AXES,
+    ANISOTROPIC_HALF_DIFFERENCE_AXES,
+)
 
 # Where azimuths may end [degree]; all begin at 0. Polar angles end anywhere up to 90.
 _AZIMUTHS: dict[tuple[str, ...], dict[str, tuple[float, ...]]] = {
@@ -55,6 +60,15 @@ class Grid:
     """
 
     axes: dict[str, Axis]
+
+    @classmethod
+    def part(cls, whole: Grid, rows: slice) -> Grid:
+        """Some rows of the first axis of a grid, which need not begin at 0."""
+        part = object.__new__(cls)
+        first, *others = whole.axes
+        axes = {first: whole.axes[first][rows], **{name: whole.axes[name] for name in others}}
+        object.__setattr__(part, "axes", axes)
+        return part
 
     def __init__(self, axes: Mapping[str, Any]) -> None:
         names = tuple(axes)
@@ -122,21 +136,25 @@ class Grid:
         Arrays that broadcast to the shape of the grid. On a grid of half and difference vectors either theta may pass
         pi/2, where that direction is below the horizon.
         """
-        axes = [radians(nodes) for nodes in self.axes.values()]
-        axes[0] = axes[0][first]
-        nodes = np.ix_(*axes)
-        if self.names == ISOTROPIC_AXES:
-            return nodes[0], np.zeros(()), nodes[1], nodes[2]
-        if self.names == ANISOTROPIC_AXES:
-            return nodes
-        if self.anisotropic:
-            return directions_from_half_difference(*nodes)
-        return directions_from_half_difference(nodes[0], 0.0, nodes[1], nodes[2])
+        leading, *others = self.axes.values()
+        return directions(self.names, [leading[first], *others])
 
     @property
     def reaches_horizon(self) -> bool:
         """Whether a theta axis of light or viewer has a node at exactly 90 degrees."""
         return any(nodes[-1] == 90.0 for name, nodes in self.axes.items() if name in ("theta_i", "theta_r"))
+
+
+def directions(names: tuple[str, ...], nodes: Sequence[Axis]) -> tuple[NDArray[np.float64], ...]:
+    """theta_i, phi_i, theta_r, phi_r [rad] of nodes [degree] on the axes that are named: see `Grid.directions`."""
+    on_axes = np.ix_(*(radians(each) for each in nodes))
+    if names == ISOTROPIC_AXES:
+        return on_axes[0], np.zeros(()), on_axes[1], on_axes[2]
+    if names == ANISOTROPIC_AXES:
+        return on_axes
+    if names == ANISOTROPIC_HALF_DIFFERENCE_AXES:
+        return directions_from_half_difference(*on_axes)
+    return directions_from_half_difference(on_axes[0], 0.0, on_axes[1], on_axes[2])
 
 
 def _checked(names: tuple[str, ...], name: str, nodes: Any) -> Axis:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import BLOCK
 from brdfdb._numba import kernel
 
 Array = NDArray[np.float64]
@@ -22,7 +21,7 @@ class Axes(NamedTuple):
 
     Attributes
     ----------
-    count, first : int64 (axes,)
+    counts, first : int64 (axes,)
         Number of nodes, and where those of an axis begin in the arrays of nodes.
     nodes, inverse : float64 (nodes,)
         Nodes, and the inverse of the step to the next one.
@@ -40,7 +39,7 @@ class Axes(NamedTuple):
         The slopes at both ends of a cell, times its length, as weights of those nodes.
     """
 
-    count: NDArray[np.int64]
+    counts: NDArray[np.int64]
     first: NDArray[np.int64]
     nodes: Array
     inverse: Array
@@ -71,7 +70,7 @@ def prepared(axes: Sequence[Array], ends: Sequence[tuple[str, str]], *, cubic: b
     counts = np.array([nodes.size for nodes in axes])
     sizes = np.array([bucket.size for bucket, _, _ in tables])
     return Axes(
-        count=counts,
+        counts=counts,
         first=np.cumsum(counts) - counts,
         nodes=np.concatenate(axes),
         inverse=np.concatenate([np.append(1.0 / np.diff(nodes), 0.0) for nodes in axes]),
@@ -148,7 +147,7 @@ def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64],
     """Cell and share of it, in [0, 1], of `count` points of one axis; beyond its ends, the end."""
     first = np.uint64(axes.first[axis])
     buckets = np.uint64(axes.bucket_first[axis])
-    last = axes.count[axis] - 2
+    last = axes.counts[axis] - 2
     low, high = axes.nodes[first], axes.nodes[first + np.uint64(last + 1)]
     scale = axes.scale[axis]
     if axes.uniform[axis]:
@@ -202,7 +201,7 @@ def trilinear(
     axes: Axes, cell: NDArray[np.int64], share: Array, count: int, table: NDArray[np.float32], out: Array
 ) -> None:
     """Linear interpolation on three axes of a table with one value a node, of the points that `locate` found."""
-    n_1, n_2 = axes.count[1], axes.count[2]
+    n_1, n_2 = axes.counts[1], axes.counts[2]
     one, row, layer = np.uint64(1), np.uint64(n_2), np.uint64(n_1 * n_2)
     for j in range(count):
         o = np.uint64((cell[0, j] * n_1 + cell[1, j]) * n_2 + cell[2, j])
@@ -223,8 +222,8 @@ def tricubic(
 ) -> None:
     """Cubic interpolation on three axes of a table with one value a node, of the points that `locate` found."""
     at, w = np.empty((3, 4), np.uint64), np.empty((3, 4))
-    n_2 = axes.count[2]
-    n_1 = axes.count[1] * n_2
+    n_2 = axes.counts[2]
+    n_1 = axes.counts[1] * n_2
     for j in range(count):
         _weigh(axes, 0, cell[0, j], share[0, j], n_1, at, w)
         _weigh(axes, 1, cell[1, j], share[1, j], n_2, at, w)
@@ -256,7 +255,7 @@ def weighted(
 
     `out` is of shape (points, channels).
     """
-    dimensions = axes.count.size
+    dimensions = axes.counts.size
     at, w = np.zeros((4, 4), np.uint64), np.zeros((4, 4))
     w[0, 0] = 1.0  # of three axes, there is no first
     widths = np.ones(4, np.int64)
@@ -268,7 +267,7 @@ def weighted(
         for back in range(dimensions):
             axis = dimensions - 1 - back
             _weigh(axes, axis, cell[axis, j], share[axis, j], stride, at[lead:], w[lead:])
-            stride *= axes.count[axis]
+            stride *= axes.counts[axis]
         if channels == 1:
             total = 0.0
             for i in range(widths[0]):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from brdfdb.grids import Grid, check_wavelengths
 from brdfdb.materials import Material
+from brdfdb.parameters import Floats
 
 TABLE_VERSION = 2  # of the variables, dimensions and attributes of a table
 
@@ -31,6 +32,8 @@ class Interpolation:
         "linear", or "cubic": Catmull-Rom, each cell the Hermite cubic with the slopes of parabolas through three nodes.
     logarithm : bool
         Whether logarithms are tabulated and interpolated.
+    offset : float [1/sr]
+        What is added before logarithms are taken: values much smaller take no nodes.
     power : float
         What is tabulated is f_r times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a
         model has at the horizon.
@@ -38,6 +41,7 @@ class Interpolation:
 
     method: str = "linear"
     logarithm: bool = False
+    offset: float = 0.0
     power: float = 0.0
 
     def __post_init__(self) -> None:
@@ -56,6 +60,19 @@ class Interpolation:
         """Whether it is f_r itself that is tabulated."""
         return not self.logarithm and self.power == 0.0
 
+    def numbers(self, f_r: Floats, mu: Floats) -> Floats:
+        """What is tabulated of f_r [1/sr], shape (..., L), where mu = cos theta_i cos theta_r, shape (...)."""
+        values = f_r if self.power == 0.0 else f_r * (mu**self.power)[..., np.newaxis]
+        return np.log(values + self.offset) if self.logarithm else values
+
+    def f_r(self, numbers: Floats, mu: Floats) -> Floats:
+        """f_r [1/sr] from what is tabulated: the inverse of `numbers`, nothing below 0."""
+        values = np.maximum(np.exp(numbers) - self.offset, 0.0) if self.logarithm else numbers
+        return values if self.power == 0.0 else values / (mu**self.power)[..., np.newaxis]
+
+
+PLAIN = Interpolation()
+
 
 @dataclass(frozen=True, eq=False)
 class Layout:
@@ -73,8 +90,6 @@ class Layout:
         How the numbers of the table become f_r between its nodes; by default they are f_r, and linear.
     spectra : array of shape (parts, L), optional
         Of logarithms: orthonormal rows that make up the spectrum of every node, which then is stored in parts.
-    offset : float [1/sr]
-        Of logarithms: added before they are taken, so that values much smaller than this take no nodes.
     bits : int
         Bits of the mantissa that are kept, in [1, 23].
     reason : str
@@ -90,9 +105,8 @@ class Layout:
     material: Material
     grid: Grid
     wavelength_nm: NDArray[np.float64] | None = None
-    interpolation: Interpolation = Interpolation()
+    interpolation: Interpolation = PLAIN
     spectra: NDArray[np.float64] | None = None
-    offset: float = 0.0
     bits: int = 23
     reason: str = ""
 
@@ -176,7 +190,6 @@ class Layout:
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
             "interpolation": asdict(self.interpolation),
             "spectra": None if self.spectra is None else self.spectra.tolist(),
-            "offset": self.offset,
             "bits": self.bits,
             "reason": self.reason,
         }
@@ -191,7 +204,6 @@ class Layout:
             Material.model_validate(document["material"]),
             Grid(document["grid"]),
             interpolation=Interpolation(**document["interpolation"]),
-            offset=document["offset"],
             bits=document["bits"],
             reason=document["reason"],
             **arrays,

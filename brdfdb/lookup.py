@@ -5,20 +5,25 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import _lookup_kernels
 from brdfdb._elementary import COS_HORIZON
+from brdfdb.error import Error, stated
 from brdfdb.geometry import HALF_PI, checked_angles, checked_vectors, finished, radians, unit_vector
-from brdfdb.grids import Axis, Grid
+from brdfdb.grids import KINDS, Axis, Grid
 from brdfdb.interpolation import Axes, prepared
-from brdfdb.layout import Interpolation, Layout
+from brdfdb.layout import PLAIN, Interpolation, Layout
 from brdfdb.parameters import Floats
 
 _VECTORS = 1 << 15  # directions that are turned into unit vectors at a time
+
+
+# how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
+_Ready = tuple[_lookup_kernels.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
 
 
 class Stated(NamedTuple):
@@ -47,18 +52,18 @@ class Table:
         Which material, and which of its revisions.
     attrs : dict
         What the store says of it: title, model, parameters, sources and more.
-    axes_deg : dict of str to array [degree]
-        Nodes of the angular axes, in the order of the dimensions.
+    grid : Grid
+        The angular axes, in the order of the dimensions.
     wavelength_nm : array (L,) [nm] or None
         Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
     values : float32 array
         Numbers over the angular axes and, last, the wavelengths, or the parts of a factored spectrum.
     specular : float32 array (theta_i[, L]) [1] or None
         Reflectance of the Dirac part, None if the model has none.
+    specular_theta_deg : array [degree] or None
+        Where; by default the nodes of the axis theta_i.
     interpolation : Interpolation
         How the numbers become f_r between the nodes; by default they are f_r and linear.
-    offset : float [1/sr]
-        What was added to f_r before logarithms were taken.
     spectra : array (parts, L) or None
         How the parts of a factored spectrum make up the wavelengths.
     uniform : array (L,) or (1,) [1/sr]
@@ -68,54 +73,83 @@ class Table:
     name: str
     revision: str
     attrs: Mapping[str, Any]
-    axes_deg: Mapping[str, Axis]
+    grid: Grid
     wavelength_nm: Axis | None
     values: NDArray[np.float32]
     specular: NDArray[np.float32] | None
-    interpolation: Interpolation = Interpolation()
-    offset: float = 0.0
+    specular_theta_deg: Axis | None = None
+    interpolation: Interpolation = PLAIN
     spectra: NDArray[np.float64] | None = None
     uniform: NDArray[np.float64] | None = None
 
     @classmethod
-    def of(cls, layout: Layout, values: NDArray[np.float32]) -> Table:
-        """The table of a layout before it is stored: its values alone, without the Dirac part."""
+    def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
+        """The table of a layout, or of a part of its grid, before it is stored: without the Dirac part."""
         return cls(
             name=layout.material.name,
             revision="",
             attrs={},
-            axes_deg=layout.grid.axes,
+            grid=layout.grid if grid is None else grid,
             wavelength_nm=layout.wavelength_nm,
             values=values,
             specular=None,
             interpolation=layout.interpolation,
-            offset=layout.offset,
             spectra=layout.spectra,
             uniform=layout.uniform,
         )
 
-    @functools.cached_property
-    def grid(self) -> Grid:
-        """The grid of the table."""
-        return Grid(self.axes_deg)
+    @property
+    def axes_deg(self) -> Mapping[str, Axis]:
+        """Nodes of the angular axes [degree] by name."""
+        return self.grid.axes
 
     @property
     def anisotropic(self) -> bool:
         """Whether the table resolves how the surface is turned about its normal."""
-        return len(self.axes_deg) == 4
+        return self.grid.anisotropic
 
     @functools.cached_property
     def brdf(self) -> NDArray[np.float32]:
         """f_r [1/sr] at the nodes: over the angular axes and, last, the wavelengths; 0 below the horizon."""
         if self.values_are_brdf:
             return self.values
-        theta_i, phi_i, theta_r, phi_r = self.grid.directions()
-        return self.lookup(theta_i, phi_i, theta_r, phi_r).astype(np.float32)
+        numbers = self.values.reshape(*self.grid.shape, -1)
+        f_r = rebuilt(numbers, self.interpolation, self.spectra, self.uniform, *self.grid.directions()[::2])
+        return f_r.astype(np.float32).reshape(self.grid.shape if self.wavelength_nm is None else f_r.shape)
 
     @property
     def values_are_brdf(self) -> bool:
         """Whether the stored numbers are f_r itself."""
         return self.spectra is None and self.uniform is None and self.interpolation.plain
+
+    @functools.cached_property
+    def error(self) -> Error | None:
+        """The error that the table states; None if none was measured."""
+        return None if "error" not in self.attrs else Error.model_validate(self.attrs["error"])
+
+    @overload
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[False] = False,
+    ) -> Floats: ...
+
+    @overload
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[True],
+    ) -> Stated: ...
 
     def lookup(
         self,
@@ -124,7 +158,9 @@ class Table:
         theta_r: ArrayLike,
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
-    ) -> Floats:
+        *,
+        with_error: bool = False,
+    ) -> Floats | Stated:
         """Interpolate f_r.
 
         Parameters
@@ -133,10 +169,12 @@ class Table:
             Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
         wavelength_nm : float or array_like (M,) [nm], optional
             Within the table's wavelengths; grey tables take any. By default all wavelengths of the table.
+        with_error : bool
+            Give the error that the table states beside the values.
 
         Returns
         -------
-        array [1/sr]
+        array [1/sr], or Stated
             In the shape of the angles, with a last axis for the wavelengths of a spectral table, or M if an array of
             wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is nan.
             Beyond the last theta node of its grid the value is that of the node. float32 arrays in give float32 out.
@@ -144,8 +182,12 @@ class Table:
         Raises
         ------
         ValueError
-            If an angle or a wavelength is outside its range; the message names it.
+            If an angle or a wavelength is outside its range; the message names it. If an error is asked of a table
+            that states none.
         """
+        if with_error:
+            brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+            return Stated(brdf, self._stated(np.asarray(theta_i), brdf, wavelength_nm))
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
         given = [np.asarray(angle) for angle in (theta_i, phi_i, theta_r, phi_r)]
         if self.grid.half_difference:
@@ -156,12 +198,36 @@ class Table:
         shape = np.broadcast_shapes(*(angle.shape for angle in given))
         flat = [np.ascontiguousarray(np.broadcast_to(angle, shape), dtype=dtype).reshape(-1) for angle in given]
         values = np.empty((flat[0].size, weight.size), dtype)
-        if not _lookup_kernels.by_angles(*self._kernel, low, weight, *flat, float(dtype.type(HALF_PI)), values):
+        horizon = float(dtype.type(HALF_PI))
+        if not _lookup_kernels.by_angles(
+            *self._kernel, low, weight, flat[0], flat[1], flat[2], flat[3], horizon, values
+        ):
             checked_angles(*given)
         return values.reshape(shape + wavelength_shape)[()]
 
-    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+    @overload
+    def lookup_vectors(
+        self,
+        wi: ArrayLike,
+        wr: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[False] = False,
+    ) -> Floats: ...
+
+    @overload
+    def lookup_vectors(
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: Literal[True]
+    ) -> Stated: ...
+
+    def lookup_vectors(
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: bool = False
+    ) -> Floats | Stated:
         """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+        if with_error:
+            brdf = self.lookup_vectors(wi, wr, wavelength_nm)
+            theta_i = np.arccos(np.clip(np.asarray(wi)[..., 2], -1.0, 1.0))
+            return Stated(brdf, self._stated(theta_i, brdf, wavelength_nm))
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
@@ -170,8 +236,18 @@ class Table:
             for w in (vectors.w_i, vectors.w_r)
         ]
         values = np.empty((flat[0].size // 3, weight.size), vectors.dtype)
-        _lookup_kernels.by_vectors(*self._kernel, low, weight, *flat, values)
+        _lookup_kernels.by_vectors(*self._kernel, low, weight, flat[0], flat[1], values)
         return values.reshape(shape[:-1] + wavelength_shape)[()]
+
+    def _stated(self, theta_i: NDArray[Any], brdf: Floats, wavelength_nm: ArrayLike | None) -> Floats:
+        """The error stated for values looked up, in their shape; between wavelengths the larger of the two."""
+        if self.error is None:
+            raise ValueError(f"with_error: the table of {self.name} states no error; build it anew")
+        low, weight, tail = self._wavelengths(wavelength_nm)
+        values = brdf if tail else np.asarray(brdf)[..., np.newaxis]
+        theta = np.broadcast_to(theta_i, values.shape[:-1])
+        found = np.maximum(*(stated(self.error, theta, values, at) for at in (low, low + (weight > 0.0))))
+        return np.asarray(found if tail else found[..., 0])[()]
 
     def _by_half_vectors(
         self, given: list[NDArray[Any]], low: NDArray[np.int64], weight: NDArray[np.float64], tail: tuple[int, ...]
@@ -189,10 +265,12 @@ class Table:
         return finished(values.reshape(*shape, weight.size), angles, trailing=1).reshape(shape + tail)[()]
 
     @functools.cached_property
-    def _kernel(self) -> tuple[Any, ...]:
-        """What kernels need to know of the table: how numbers become f_r, the axes, the numbers, their spectra."""
+    def _kernel(self) -> _Ready:
+        """What kernels need to know of the table."""
         grid, how = self.grid, self.interpolation
-        rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, how.logarithm, self.offset, float(how.power))
+        rule = _lookup_kernels.Rule(
+            grid.half_difference, grid.copies, how.logarithm, float(how.offset), float(how.power)
+        )
         axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
         channels = self.values.size // int(np.prod(grid.shape))
         spectra = np.empty((0, 0)) if self.spectra is None else self.spectra
@@ -227,7 +305,8 @@ class Table:
             table = self.specular.reshape(self.specular.shape[0], -1).astype(np.float64)
             upper = np.minimum(low + 1, table.shape[1] - 1)
             table = (1.0 - weight) * table[:, low] + weight * table[:, upper]
-            nodes = radians(self.axes_deg["theta_i"])
+            at_deg = self.specular_theta_deg
+            nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
             position = np.interp(angles.theta_i, nodes, np.arange(nodes.size))  # nan stays nan
             at = np.minimum(np.nan_to_num(position).astype(np.int64), nodes.size - 2)
             share = (position - at)[..., np.newaxis]
@@ -264,3 +343,53 @@ class Table:
         step = stored[np.minimum(low + 1, stored.size - 1)] - stored[low]
         weight = np.divide(flat - stored[low], step, out=np.zeros(flat.size), where=step > 0.0)
         return low, weight, wanted.shape
+
+
+def rebuilt(
+    numbers: Floats,
+    interpolation: Interpolation,
+    spectra: Floats | None,
+    uniform: Floats | None,
+    theta_i: Floats,
+    theta_r: Floats,
+) -> Floats:
+    """f_r [1/sr] at nodes, shape (..., L), from what is stored there, shape (..., parts or L); 0 below the horizon.
+
+    theta_i and theta_r [rad] broadcast to the shape of the nodes; uniform and spectra are those of a `Table`.
+    """
+    wavelengths = numbers if spectra is None else numbers.astype(np.float64) @ spectra
+    mu = np.maximum(np.cos(theta_i), COS_HORIZON) * np.maximum(np.cos(theta_r), COS_HORIZON)
+    f_r = interpolation.f_r(wavelengths, mu) + (0.0 if uniform is None else uniform)
+    return np.asarray(np.where((np.maximum(theta_i, theta_r) > HALF_PI)[..., np.newaxis], 0.0, f_r))
+
+
+def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
+    """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
+    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((2, len(wi)))
+    rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0)
+    flat = [np.ascontiguousarray(w, dtype=np.float64).reshape(-1) for w in (wi, wr)]
+    _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], 0, len(wi), x, mu, scratch)
+    return x
+
+
+def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], attrs: Mapping[str, Any]) -> Table:
+    """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
+    how = dict(attrs.get("interpolation", {}))
+    variable = "brdf" if "brdf" in arrays else "parts"
+    # a grid of half and difference vectors may come with a theta_i for its Dirac part
+    names = next(kind for kind in reversed(KINDS) if set(kind) <= set(arrays))
+    specular = arrays.get("specular_reflectance")
+    uniform = arrays.get("uniform")
+    return Table(
+        name=name,
+        revision=revision,
+        attrs=attrs,
+        grid=Grid({axis: arrays[axis] for axis in names}),
+        wavelength_nm=arrays.get("wavelength"),
+        values=arrays[variable],
+        specular=None if specular is None else specular.astype(np.float32),
+        specular_theta_deg=arrays.get("theta_i"),
+        interpolation=Interpolation(**how),
+        spectra=arrays.get("spectra"),
+        uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),
+    )

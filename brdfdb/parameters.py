@@ -73,7 +73,7 @@ class ModelSpec:
     which angle on and where that is known, in the keys of `brdfdb.materials.KnownExcess`.
     `lobe_axes` names the two parameters that make the model anisotropic when they differ; `anisotropic`, of models that
     are so in another way, says of their parameters whether they make it so.
-    `uniform` names the parameter that, over pi, is a part of the value that is the same in all directions, if there is one.
+    `uniform`, if there is one, names the parameter that over pi is a part of the value, the same in all directions.
     `lobe`, of models that have one, is called as ``lobe(cos_i, **parameters)`` and says where; None: a diffuse model.
     """
 

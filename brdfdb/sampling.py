@@ -127,7 +127,7 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
     i, r = vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64)
     spec = spec_of(model)
     parameters = named(spec, parameters)
-    density = _density(lobe_of(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan goes through
+    density = mixture_density(lobe_of(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan goes through
     shape = np.broadcast_shapes(density.shape, *(np.shape(value) for value in parameters.values()))
     return np.broadcast_to(density, shape).copy()[()]
 

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from brdfdb.lookup import Table
+from brdfdb.lookup import Table, table_from
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -153,8 +153,9 @@ class Store(Mapping[str, Table]):
 
         group, digest = self._head(name)
         check_manifest(group, digest, contents=False)
-        dataset: xr.Dataset = xr.open_zarr(group, chunks=None)
-        return dataset
+        from brdfdb.rebuilt import with_brdf
+
+        return with_brdf(xr.open_zarr(group, chunks=None))
 
     def verify(self, name: str) -> None:
         """Check every file of the current revision against its manifest, and the manifest against the pointer.
@@ -186,18 +187,7 @@ def _decode(name: str, path: Path) -> Table:
         arrays = {key: np.asarray(array[...]) for key, array in group.arrays()}
     except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
         raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
-    brdf_metadata: Any = group["brdf"].metadata
-    dimensions = [d for d in brdf_metadata.dimension_names if d != "wavelength"]
-    specular = arrays.get("specular_reflectance")
-    return Table(
-        name=name,
-        revision=path.name,
-        attrs=dict(group.attrs),
-        axes_deg={d: arrays[d] for d in dimensions},
-        wavelength_nm=arrays.get("wavelength"),
-        brdf=arrays["brdf"],
-        specular=None if specular is None else specular.astype(np.float32),
-    )
+    return table_from(name, path.name, arrays, dict(group.attrs))
 
 
 class Build:

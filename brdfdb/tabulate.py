@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from brdfdb.parameters import Floats
 
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 _CONTINUED = np.deg2rad(15.0)  # how far beyond the horizon numbers go on with it
+SPECULAR_THETA_DEG = np.append(np.arange(0.0, 89.0, 1.0), np.arange(89.0, 90.01, 0.1).round(1))  # without theta_i
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
 
 
@@ -26,7 +29,8 @@ def tabulate(layout: Layout) -> xr.Dataset:
     Returns
     -------
     Dataset
-        ``brdf`` [1/sr], float32, over the axes of the grid and, last, ``wavelength``; for models with a Dirac part
+        ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says: float32, over
+        the axes of the grid and, last, ``wavelength`` or ``part``; for models with a Dirac part
         ``specular_reflectance`` [1] over theta_i and wavelength; for spectral materials ``n`` and ``k`` as used.
         Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
     """
@@ -43,21 +47,23 @@ def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
         at = slice(here.start - rows.start, here.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
             for last, arguments in _spectrum(layout):
-                values[(at, ..., *last)] = _evaluated(layout, here, arguments)
+                index: tuple[Any, ...] = (at, ..., *last)
+                values[index] = _evaluated(layout, here, arguments)
         else:
             numbers = node_numbers(layout, here)
             if layout.spectra is not None:
                 numbers = numbers @ layout.spectra.T
             values[at] = numbers.reshape(here.stop - here.start, *layout.shape[1:])
-    return values if layout.bits == 23 else rounded(values, layout.bits)
+    return rounded(values, layout.bits)
 
 
 def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
     """float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
-    drop = np.uint32(23 - bits)
+    drop = 23 - bits
+    if drop == 0:
+        return values
     whole = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
-    half = np.uint32(1 << int(drop - 1))
-    return ((whole + half) >> drop << drop).view(np.float32)
+    return ((whole + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
 
 
 def _spectrum(layout: Layout) -> list[tuple[tuple[int, ...], dict[str, Any]]]:
@@ -100,17 +106,15 @@ def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
     wi, wr : arrays of shape (..., 3)
         Unit vectors, at the horizon or above.
     """
-    how = layout.interpolation
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
-    spectrum = _spectrum(layout)
-    values = np.empty((*mu.shape, len(spectrum)))
-    for w, (_, arguments) in enumerate(spectrum):
-        if layout.apart is not None:
-            arguments = arguments | {layout.apart: 0.0}
-        values[..., w] = layout.material.spec.vectors(wi, wr, **arguments)
-    if how.power != 0.0:
-        values *= (mu**how.power)[..., np.newaxis]
-    return np.log(values + layout.offset) if how.logarithm else values
+    return _numbers(layout, lambda arguments: layout.material.spec.vectors(wi, wr, **arguments), mu)
+
+
+def _numbers(layout: Layout, evaluate: Callable[[dict[str, Any]], Floats], mu: Floats) -> Floats:
+    """Numbers from f_r at the wavelengths of a layout, mu = cos theta_i cos theta_r."""
+    without = {} if layout.apart is None else {layout.apart: 0.0}
+    f_r = [evaluate(arguments | without) for _, arguments in _spectrum(layout)]
+    return layout.interpolation.numbers(np.stack(f_r, axis=-1).astype(np.float64), mu)
 
 
 def node_numbers(layout: Layout, rows: slice) -> Floats:
@@ -121,8 +125,9 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
     """
     grid = layout.grid
     if not grid.half_difference:
-        theta_i, phi_i, theta_r, phi_r = grid.directions(rows)
-        return numbers(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+        angles = grid.directions(rows)
+        mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
+        return _numbers(layout, lambda arguments: layout.material.spec.evaluate(*angles, **arguments), mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
     axes[0] = axes[0][rows]
     nodes = np.ix_(*axes)
@@ -154,13 +159,11 @@ def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats
 
 
 def frame(layout: Layout) -> xr.Dataset:
-    """All of a table but its values: coordinates, the Dirac part, refractive indices and attributes."""
+    """All of a table but its values: coordinates, Dirac part, how to rebuild f_r, refractive indices, attributes."""
     material, grid, wavelength_nm = layout.material, layout.grid, layout.wavelength_nm
     spec = material.spec
     spectral = () if wavelength_nm is None else ("wavelength",)
-    coordinates: dict[str, Any] = {
-        name: (name, nodes, {"units": "degree", "long_name": _LONG_NAMES[name]}) for name, nodes in grid.axes.items()
-    }
+    coordinates: dict[str, Any] = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
     variables: dict[str, Any] = {}
     arguments = material.arguments(wavelength_nm)
     if wavelength_nm is not None:
@@ -171,24 +174,50 @@ def frame(layout: Layout) -> xr.Dataset:
         )
         for name, meaning in (("n", "refractive index"), ("k", "extinction coefficient")):
             variables[name] = ("wavelength", arguments[name], {"units": "1", "long_name": meaning})
+    if layout.spectra is not None:
+        variables["spectra"] = (("part", "wavelength"), layout.spectra, VARIABLES["spectra"])
+    if layout.uniform is not None:
+        variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])
     if spec.specular is not None:
-        theta_i = radians(grid.axes["theta_i"])
-        specular = spec.specular(
-            theta_i[:, np.newaxis] if spectral else theta_i,
-            **{name: arguments[name] for name in spec.specular_parameters},
-        )
+        theta_i_deg = grid.axes.get("theta_i", SPECULAR_THETA_DEG)
+        coordinates["theta_i"] = _coordinate("theta_i", theta_i_deg)
+        theta_i = radians(theta_i_deg)
         variables["specular_reflectance"] = (
             ("theta_i", *spectral),
-            specular,
+            spec.specular(
+                theta_i[:, np.newaxis] if spectral else theta_i,
+                **{name: arguments[name] for name in spec.specular_parameters},
+            ),
             {"units": "1", "long_name": "reflectance of the Dirac part, in the exact mirror direction"},
         )
     extent = [] if wavelength_nm is None else [float(wavelength_nm[0]), float(wavelength_nm[-1])]
+    how = {"interpolation": asdict(layout.interpolation), "bits": layout.bits}
     return xr.Dataset(
         variables,
         coordinates,
         _attributes(material)
-        | {"anisotropic": grid.anisotropic, "symmetries": grid.symmetries, "wavelength_range_nm": extent},
+        | {"anisotropic": grid.anisotropic, "symmetries": grid.symmetries, "wavelength_range_nm": extent}
+        | how
+        | {"reconstruction": _reconstruction(layout), "reason": layout.reason},
     )
+
+
+def _coordinate(name: str, nodes: Axis) -> tuple[str, Axis, dict[str, str]]:
+    return name, nodes, {"units": "degree", "long_name": _LONG_NAMES[name]}
+
+
+def _reconstruction(layout: Layout) -> str:
+    """How to rebuild f_r from the arrays of a table, in one line."""
+    if layout.plain:
+        return f"brdf is f_r; between nodes {layout.interpolation.method}"
+    how = layout.interpolation
+    number = "parts @ spectra" if layout.spectra is not None else "parts"
+    value = f"max(exp({number}) - {how.offset!r}, 0)" if how.logarithm else number
+    if how.power != 0.0:
+        value = f"{value} / (cos(theta_i) * cos(theta_r))**{how.power:g}"
+    value = f"uniform + {value}" if layout.uniform is not None else value
+    beyond = "; nodes below the horizon hold a continuation" if layout.grid.half_difference else ""
+    return f"brdf = {value}; between nodes, parts are interpolated, {how.method}{beyond}"
 
 
 def _attributes(material: Material) -> dict[str, Any]:
@@ -224,6 +253,15 @@ _LONG_NAMES = {
     "phi_i": "azimuth of the light",
     "phi_r": "azimuth of the viewer",
     "delta_phi": "azimuth of the viewer minus azimuth of the light",
+    "theta_h": "polar angle of the half vector, the bisector of light and viewer",
+    "phi_h": "azimuth of the half vector",
+    "theta_d": "angle between light and half vector",
+    "phi_d": "azimuth of the light about the half vector",
 }
 
-VARIABLES = {"brdf": {"units": "sr-1", "long_name": "bidirectional reflectance f_r"}}
+VARIABLES = {
+    "brdf": {"units": "sr-1", "long_name": "bidirectional reflectance f_r"},
+    "parts": {"units": "1", "long_name": "what f_r is rebuilt from, as the attribute reconstruction says"},
+    "spectra": {"units": "1", "long_name": "how the parts make up each wavelength"},
+    "uniform": {"units": "sr-1", "long_name": "the part of f_r that is the same in all directions"},
+}

@@ -109,7 +109,8 @@ class Points:
     def brdf(self, table: Table) -> NDArray[Any]:
         """The BRDF [1/sr], of `shape`, then the wavelengths; a RequestError (422) where the table does not reach."""
         with _refused():
-            return np.asarray(table.lookup(**self.angles, wavelength_nm=self.wavelength_nm))
+            theta_i, phi_i, theta_r, phi_r = (self.angles[name] for name in ANGLES)
+            return np.asarray(table.lookup(theta_i, phi_i, theta_r, phi_r, self.wavelength_nm))
 
     def specular_reflectance(self, table: Table) -> NDArray[Any]:
         """The Dirac part [1], of the shape of theta_i, then the wavelengths."""

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brdfdb.grids import Axis, Grid, check_wavelengths
-from brdfdb.layout import Layout
+from brdfdb.layout import TABLE_VERSION, Layout
 from brdfdb.materials import Material, presets
+from brdfdb.plan import PLAN_VERSION, coarsest, plan
 
 _STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 _MOST_NODES = 100_000  # of a range: far above any axis, far below what fills the memory
@@ -84,20 +85,37 @@ class Grids(BaseModel):
 
 @dataclass(frozen=True)
 class Job:
-    """One table to build."""
+    """One table to build: on a grid, or to a tolerance, of which one is None."""
 
     material: Material
-    grid: Grid
     wavelength_nm: NDArray[np.float64] | None
+    grid: Grid | None
+    tolerance: float | None
 
     def layout(self) -> Layout:
-        """What the table is going to be."""
-        return Layout(self.material, self.grid, self.wavelength_nm)
+        """What the table is going to be; to a tolerance, this takes the planner a second or more."""
+        if self.grid is not None:
+            return Layout(self.material, self.grid, self.wavelength_nm)
+        assert self.tolerance is not None
+        return plan(self.material, self.wavelength_nm, self.tolerance)
+
+    def check(self) -> None:
+        """Raise the ValueError that `layout` would raise for what does not suit the material."""
+        grid = coarsest(self.material) if self.grid is None else self.grid
+        Layout(self.material, grid, self.wavelength_nm)
 
     @property
     def request(self) -> dict[str, Any]:
         """All that decides the table, ready for JSON: the same request makes the same table."""
-        return self.layout().document()
+        return {
+            "table_version": TABLE_VERSION,
+            "model_version": self.material.spec.version,
+            "material": self.material.model_dump(mode="json"),
+            "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
+            "grid": None if self.grid is None else {name: nodes.tolist() for name, nodes in self.grid.axes.items()},
+            "tolerance": self.tolerance,
+            "plan_version": None if self.tolerance is None else PLAN_VERSION,
+        }
 
 
 class Recipe(BaseModel):
@@ -108,7 +126,10 @@ class Recipe(BaseModel):
     title: str = ""
     materials: list[str] = Field(min_length=1, description="names or shell patterns")
     wavelengths_nm: Nodes
-    grids: Grids
+    tolerance: float | None = Field(
+        default=None, ge=1e-4, le=0.5, description="99th percentile of the relative error, instead of grids"
+    )
+    grids: Grids | None = None
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
 
     def jobs(self) -> list[Job]:
@@ -119,7 +140,9 @@ class Recipe(BaseModel):
         RecipeError
             If a name matches nothing, or a material, grid or wavelength is not what it must be.
         """
-        grids = {name: self._grid(name) for name in Grids.model_fields}
+        if (self.tolerance is None) == (self.grids is None):
+            raise RecipeError("tolerance, grids: give one of the two")
+        grids = {} if self.grids is None else {name: self._grid(self.grids, name) for name in Grids.model_fields}
         try:
             wavelengths = check_wavelengths(_nodes("wavelengths_nm", self.wavelengths_nm))
         except ValueError as error:
@@ -132,16 +155,17 @@ class Recipe(BaseModel):
                 wavelength_nm = wavelengths if stated is None else np.array(stated)
             several = wavelength_nm is not None and wavelength_nm.size > 1
             kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
-            job = Job(material, grids[kind], wavelength_nm)
+            job = Job(material, wavelength_nm, grids.get(kind), self.tolerance)
             try:
-                job.layout()
+                job.check()
             except ValueError as error:
-                raise RecipeError(f"{material.name} on grids.{kind}: {error}") from None
+                where = "" if job.grid is None else f" on grids.{kind}"
+                raise RecipeError(f"{material.name}{where}: {error}") from None
             jobs.append(job)
         return jobs
 
-    def _grid(self, name: str) -> Grid:
-        parts: dict[str, list[float | Range]] = dict(getattr(self.grids, name))
+    def _grid(self, grids: Grids, name: str) -> Grid:
+        parts: dict[str, list[float | Range]] = dict(getattr(grids, name))
         try:
             axes = {field.removesuffix("_deg"): _nodes(field, nodes) for field, nodes in parts.items()}
         except RecipeError as error:

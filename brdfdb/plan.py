@@ -1,0 +1,379 @@
+"""The planner: from the error that a user asks for to the smallest table that keeps to it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb import accuracy, tabulate
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.grids import (
+    ANISOTROPIC_AXES,
+    ANISOTROPIC_HALF_DIFFERENCE_AXES,
+    HALF_DIFFERENCE_AXES,
+    ISOTROPIC_AXES,
+    Axis,
+    Grid,
+)
+from brdfdb.interpolation import prepared
+from brdfdb.layout import Interpolation, Layout
+from brdfdb.lookup import Table, points
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+
+PLAN_VERSION = 1
+
+MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
+_TRIED = 2  # ways to interpolate on each kind of grid, those that promise to be smallest
+_ROUNDS = 8  # of finer and coarser axes
+_MARGIN = 0.9  # of the tolerance: other directions than the planner's find other errors
+_STRICTER = (1.0, 0.75, 0.5, 0.3)  # tolerances at a few wavelengths, of that at all of them
+_WAVELENGTHS = 4  # that the axes are chosen for; the finished table is measured at all
+_DRAWS = 700  # directions of a band of theta_i
+_SEED = 1994
+_LINES = 100
+_POINTS = 145  # of a line
+_COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112, 137)  # nodes of an axis
+_ENOUGH = 0.05  # of the tolerance: numbers of nodes that leave less are not looked at
+_EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
+_BITS = range(9, 24)
+_WORTH_ROUNDING = 4096  # values: of smaller tables nothing is rounded
+
+# Where the points of a line lie, s in [0, 1]: (end [degree], power); a power p > 0 crowds them at 0 as s**p, p < 0 at
+# the end
+_LINE = {
+    "theta_i": (90.0, -2.0),
+    "theta_r": (90.0, -2.0),
+    "delta_phi": (180.0, -1.5),
+    "phi_i": (180.0, 1.0),
+    "phi_r": (360.0, 1.0),
+    "theta_h": (90.0, 2.0),
+    "theta_d": (90.0, -1.5),
+    "phi_h": (180.0, 1.0),
+    "phi_d": (90.0, 1.0),
+}
+_POLE_END = 89.9  # of theta axes where the pole of a model is tabulated as it is
+
+
+class _Need(NamedTuple):
+    """What an axis needs: where its nodes go, and the error that so many of them leave."""
+
+    density: Floats  # of nodes, over the points of the lines, its integral 1
+    error: dict[int, float]
+
+
+_Candidate = tuple[float, Layout, dict[str, _Need]]  # likely number of values, kind of table, needs of its axes
+
+
+class _Task(NamedTuple):
+    """What is planned: a material at a few wavelengths, directions, the model there, and the tolerance."""
+
+    material: Material
+    wavelength_nm: NDArray[np.float64] | None
+    drawn: accuracy.Draw
+    truth: Floats
+    tolerance: float
+
+
+def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout:
+    """The smallest table that keeps to a tolerance.
+
+    Parameters
+    ----------
+    material : Material
+        What is to be tabulated.
+    wavelength_nm : array of shape (L,) [nm], or None
+        For spectral materials, and only for them.
+    tolerance : float
+        The 99th percentile of the relative error of f_r against the model, over the directions that `accuracy.draw`
+        describes, at the worst wavelength; in [1e-4, 0.5].
+
+    Returns
+    -------
+    Layout
+        Kind of grid, axes, interpolation, spectrum and bits, with the reason in words.
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is outside its range, or takes more than `MOST_VALUES` values.
+
+    Notes
+    -----
+    Along each axis of each kind of grid the numbers to be tabulated are looked at on lines through directions of the
+    draw. The nodes of an axis are spread by what their differences, second for linear and fourth for cubic
+    interpolation, leave of an error; the numbers of nodes are those that leave the same error on each axis. The kinds
+    that promise the fewest values are tabulated, measured, and made coarser or finer until they keep to the tolerance.
+    """
+    if not 1e-4 <= tolerance <= 0.5:
+        raise ValueError(f"tolerance: {tolerance:g} is outside [0.0001, 0.5]")
+    task = _task(material, wavelength_nm, tolerance)
+    if not task.truth.any():
+        return Layout(material, coarsest(material), wavelength_nm, reason="f_r is 0: all light is in the Dirac part")
+    candidates = list(_candidates(task))
+    for stricter in _STRICTER:
+        layout = _smallest(task._replace(tolerance=stricter * tolerance), candidates)
+        finished = None if layout is None else _finished(layout, wavelength_nm, tolerance)
+        if finished is not None:
+            return finished
+    raise ValueError(
+        f"tolerance: {tolerance:g} takes more than {MOST_VALUES} values of {material.name}; ask for more error"
+    )
+
+
+def _smallest(task: _Task, candidates: list[_Candidate]) -> Layout | None:
+    """The smallest table of some kinds that keeps to the tolerance of the task."""
+    best: Layout | None = None
+    tried: Counter[tuple[str, ...]] = Counter()
+    for size, layout, needs in sorted(candidates, key=lambda candidate: candidate[0]):
+        tried[layout.grid.names] += 1
+        if tried[layout.grid.names] <= _TRIED and (best is None or size < best.size):
+            best = _refined(task, layout, needs, MOST_VALUES if best is None else best.size) or best
+    return best
+
+
+def _task(material: Material, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> _Task:
+    some = wavelength_nm
+    if wavelength_nm is not None and wavelength_nm.size > _WAVELENGTHS:
+        some = wavelength_nm[np.round(np.linspace(0, wavelength_nm.size - 1, _WAVELENGTHS)).astype(int)]
+    drawn = accuracy.draw(material, some, _DRAWS, _SEED)
+    return _Task(material, some, drawn, accuracy.model_values(material, some, drawn.wi, drawn.wr), tolerance)
+
+
+def coarsest(material: Material) -> Grid:
+    """The smallest grid that suits a material."""
+    names = ANISOTROPIC_AXES if material.anisotropic else ISOTROPIC_AXES
+    pole = material.spec.grazing_pole
+    return Grid(
+        {name: [0.0, _POLE_END if pole and name in ("theta_i", "theta_r") else _end(material, name)] for name in names}
+    )
+
+
+def _end(material: Material, name: str) -> float:
+    """Where an axis ends [degree], of which symmetry leaves out what it may."""
+    elliptical = material.spec.lobe_axes is not None
+    if name in ("phi_i", "phi_h"):
+        return 90.0 if elliptical else 180.0 if name == "phi_h" else 360.0
+    if name == "phi_d" and material.anisotropic:
+        return 180.0
+    return _LINE[name][0]
+
+
+def _candidates(task: _Task) -> Iterator[_Candidate]:
+    """Kinds of tables, each with the number of values that it is likely to take; simple ones first."""
+    material, spec = task.material, task.material.spec
+    floor = accuracy.floor_of(task.truth, task.drawn)
+    offset = float(max(0.5 * floor.min(), 1e-12))
+    kinds: list[tuple[str, ...]]
+    if material.anisotropic:
+        kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if spec.lobe_axes else [ANISOTROPIC_AXES]
+    else:
+        kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if spec.lobe else [ISOTROPIC_AXES]
+    for names in kinds:
+        for power in (0.0, 0.5, 1.0) if spec.grazing_pole else (0.0,):
+            for logarithm in (False, True):
+                ends = {name: _end(material, name) for name in names}
+                if spec.grazing_pole and power == 0.0:
+                    ends |= {name: _POLE_END for name in ("theta_i", "theta_r") if name in names}
+                grid = Grid({name: [0.0, end] for name, end in ends.items()})
+                layout = Layout(
+                    material,
+                    grid,
+                    task.wavelength_nm,
+                    interpolation=Interpolation("linear", logarithm, offset if logarithm else 0.0, power),
+                )
+                lines = {name: _lines(task, layout, axis) for axis, name in enumerate(names)}
+                for method in ("linear", "cubic"):
+                    chosen = replace(layout, interpolation=replace(layout.interpolation, method=method))
+                    needs = {
+                        name: _need(chosen, axis, *lines[name], enough=_ENOUGH * task.tolerance)
+                        for axis, name in enumerate(names)
+                    }
+                    if names == ISOTROPIC_AXES:
+                        needs["theta_r"] = needs["theta_i"]
+                    size = math.prod(_count(need, task.tolerance) for need in needs.values())
+                    yield size, chosen, needs
+
+
+def _points(name: str, end: float, s: Floats) -> Axis:
+    """Where on an axis [degree] a line has its point s, in [0, 1]."""
+    power = _LINE[name][1]
+    return np.asarray(end * (s**power if power > 0.0 else 1.0 - (1.0 - s) ** -power), dtype=np.float64)
+
+
+def _lines(task: _Task, layout: Layout, axis: int) -> tuple[Floats, Floats]:
+    """Numbers along lines of one axis through directions of the draw, (lines, points, L), and the error of f_r that an
+    error of one in them makes, relative to f_r or its floor; 0 below the horizon."""
+    grid = layout.grid
+    above = np.flatnonzero(task.drawn.above)
+    chosen = above[:: max(1, above.size // _LINES)][:_LINES]
+    wi, wr = task.drawn.wi[chosen], task.drawn.wr[chosen]
+    x = points(grid, wi, wr)
+    name = grid.names[axis]
+    coordinates = [np.repeat(each[:, np.newaxis], _POINTS, axis=1) for each in x]
+    coordinates[axis][:] = radians(_points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, _POINTS)))
+    if grid.half_difference:
+        theta_h, *others = coordinates
+        phi_h, theta_d, phi_d = others if grid.anisotropic else (np.zeros_like(theta_h), *others)
+        numbers = tabulate.continued(layout, theta_h, phi_h, theta_d, phi_d)
+        cos_h, sin_h = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
+        lowest, mu = cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h)
+    else:
+        theta_i, *others = coordinates
+        phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros_like(theta_i), *others)
+        numbers = tabulate.numbers(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+        lowest, mu = np.minimum(np.cos(theta_i), np.cos(theta_r)), np.cos(theta_i) * np.cos(theta_r)
+    how = layout.interpolation
+    factor = np.maximum(mu, 1e-12)[..., np.newaxis] ** -how.power
+    floor = accuracy.floor_of(task.truth, task.drawn)
+    uniform = 0.0 if layout.uniform is None else layout.uniform
+    if how.logarithm:
+        shifted = np.exp(numbers)
+        f_r, slope = (shifted - how.offset) * factor + uniform, shifted * factor
+    else:
+        f_r, slope = numbers * factor + uniform, factor
+    weight = np.where((lowest > 1e-3)[..., np.newaxis], slope / np.maximum(f_r, floor), 0.0)
+    return numbers, weight
+
+
+def _need(layout: Layout, axis: int, numbers: Floats, weight: Floats, enough: float) -> _Need:
+    """How to spread nodes on an axis, and the error that so many of them leave on the lines, while it is not small."""
+    order = 4 if layout.interpolation.cubic else 2
+    lines, points, wavelengths = numbers.shape
+    rows = np.moveaxis(numbers, 2, 1).reshape(lines * wavelengths, points)
+    weights = np.moveaxis(weight, 2, 1).reshape(lines * wavelengths, points)
+    left = np.abs(np.diff(rows, order, axis=1)) * weights[:, order // 2 : points - order // 2]
+    peak = np.percentile(left, 98, axis=0) ** (1.0 / order)
+    peak = np.pad(peak, order // 2, mode="edge")
+    width = 9
+    smooth = np.convolve(np.pad(peak, width // 2, mode="edge"), np.full(width, 1.0 / width), mode="valid")
+    density = smooth + _EASED * smooth.mean() + 1e-30
+    density /= density.sum()
+    error = {}
+    for count in _COUNTS:
+        at = _spread(density, count)
+        if at is None:
+            break
+        error[count] = _left(layout, axis, at, rows, weights)
+        if error[count] < enough:
+            break
+    return _Need(density, error)
+
+
+def _spread(density: Floats, count: int) -> NDArray[np.int64] | None:
+    """The points of a line that are nodes of an axis with so many; None if two would be the same."""
+    at = np.round(_quantiles(density, count) * (density.size - 1)).astype(np.int64)
+    return at if np.all(np.diff(at) > 0) else None
+
+
+def _quantiles(density: Floats, count: int) -> Floats:
+    """Places s in [0, 1] between which the density of nodes has equal integrals."""
+    steps = 0.5 * (density[1:] + density[:-1])
+    total = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.interp(np.linspace(0.0, total[-1], count), total, np.linspace(0.0, 1.0, density.size))
+
+
+def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weights: Floats) -> float:
+    """99th percentile of the error on lines that are interpolated between some of their points."""
+    grid = layout.grid
+    name = grid.names[axis]
+    x = _points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, rows.shape[1]))
+    nodes = x[at]
+    ready = prepared([nodes], [grid.ends[axis]], cubic=layout.interpolation.cubic)
+    cell = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2)
+    t = (x - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
+    matrix = np.zeros((x.size, nodes.size))
+    here = np.arange(x.size)
+    if ready.width[0] == 2:
+        matrix[here, cell], matrix[here, cell + 1] = 1.0 - t, t
+    else:
+        rise = t * t * (3.0 - 2.0 * t)
+        for k in range(4):
+            share = t * (1 - t) ** 2 * ready.slopes[cell, k] + t * t * (t - 1) * ready.slopes[cell, k + 4]
+            share = share + (1.0 - rise if k == 1 else rise if k == 2 else 0.0)
+            np.add.at(matrix, (here, ready.stencil[cell, k]), share)
+    error = np.abs(rows[:, at] @ matrix.T - rows) * weights
+    return float(np.percentile(error[weights > 0.0], 99)) if np.any(weights > 0.0) else 0.0
+
+
+def _count(need: _Need, error: float) -> float:
+    """The smallest number of nodes of an axis that leaves no more than an error; infinite if none known does."""
+    return next((count for count, left in need.error.items() if left <= error), math.inf)
+
+
+def _with_axes(layout: Layout, needs: dict[str, _Need], error: float) -> Layout | None:
+    """The layout with the axes that leave an error each; None if no known number of nodes does."""
+    axes = {}
+    for name, need in needs.items():
+        count = _count(need, error)
+        if count == math.inf:
+            return None
+        end = layout.grid.axes[name][-1]
+        nodes = _points(name, end, _quantiles(need.density, int(count)))
+        axes[name] = np.append(np.round(nodes[:-1], 4), end)
+    return replace(layout, grid=Grid(axes))
+
+
+def _error(layout: Layout, values: NDArray[np.float32], drawn: accuracy.Draw, truth: Floats) -> float:
+    """99th percentile of the relative error at the worst wavelength."""
+    found = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
+    error = accuracy.relative(found, truth, accuracy.floor_of(truth, drawn))
+    return float(np.percentile(error[drawn.above], 99, axis=0).max())
+
+
+def _values(layout: Layout) -> NDArray[np.float32]:
+    return np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
+
+
+def _refined(task: _Task, layout: Layout, needs: dict[str, _Need], most: int) -> Layout | None:
+    """The coarsest axes that keep to the tolerance, of those tried; None if none of less than `most` values does."""
+    goal, error, best = _MARGIN * task.tolerance, task.tolerance, None
+    known: dict[tuple[int, ...], float] = {}
+    for _ in range(_ROUNDS):
+        trial = _with_axes(layout, needs, error)
+        if trial is None or trial.size >= most:
+            break
+        if trial.grid.shape not in known:
+            known[trial.grid.shape] = _error(trial, _values(trial), task.drawn, task.truth) / goal
+        ratio = known[trial.grid.shape]
+        if ratio <= 1.0 and (best is None or trial.size < best.size):
+            best = trial
+        if 0.75 <= ratio <= 1.0 or (ratio < 1.0 and max(trial.grid.shape) == 2):
+            break
+        error *= float(np.clip(0.85 / max(ratio, 1e-9), 0.25, 4.0))
+    return best
+
+
+def _finished(layout: Layout, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout | None:
+    """The layout at all wavelengths, its spectrum in as few parts and its numbers in as few bits as the error allows.
+
+    None if not even all parts and bits keep to the tolerance.
+    """
+    material = layout.material
+    drawn = accuracy.draw(material, wavelength_nm, _DRAWS, _SEED + 1)
+    truth = accuracy.model_values(material, wavelength_nm, drawn.wi, drawn.wr)
+    goal = 0.5 * (1.0 + _MARGIN) * tolerance
+    layout = replace(layout, wavelength_nm=wavelength_nm)
+    whole = _values(layout)
+    if layout.interpolation.logarithm and wavelength_nm is not None and wavelength_nm.size > 2:
+        rows = whole.reshape(-1, wavelength_nm.size).astype(np.float64)
+        floor = accuracy.floor_of(truth, drawn)
+        significance = np.max(np.minimum(np.exp(rows) / floor, 1.0), axis=1, keepdims=True)
+        basis = np.linalg.svd((rows * significance)[:: max(1, len(rows) // 20_000)], full_matrices=False)[2]
+        for parts in range(1, wavelength_nm.size // 2 + 1):
+            factored = replace(layout, spectra=basis[:parts])
+            values = (rows @ basis[:parts].T).astype(np.float32).reshape(factored.shape)
+            if _error(factored, values, drawn, truth) <= goal:
+                layout, whole = factored, values
+                break
+    for bits in _BITS if layout.size > _WORTH_ROUNDING else (23,):
+        rounded = replace(layout, bits=bits)
+        if _error(rounded, tabulate.rounded(whole, bits), drawn, truth) <= goal:
+            return rounded
+    return None
