@@ -65,7 +65,7 @@ def _full_turn(y: float, x: float) -> float:
 @kernel
 def _folded(phi: float, period: float) -> float:
     """An azimuth in [0, period]."""
-    return phi - np.floor(phi * (1.0 / period)) * period
+    return float(phi - np.floor(phi * (1.0 / period)) * period)
 
 
 @kernel

@@ -25,7 +25,7 @@ def with_brdf(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(brdf=xr.Variable(brdf.dims, indexing.LazilyIndexedArray(brdf), VARIABLES["brdf"]))
 
 
-class _Rebuilt(BackendArray):  # type: ignore[misc]  # xarray leaves it untyped
+class _Rebuilt(BackendArray):
     """What xarray indexes: f_r of the nodes and wavelengths that are asked for."""
 
     def __init__(self, dataset: xr.Dataset) -> None:

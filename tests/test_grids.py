@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.grids import ANISOTROPIC_AXES, ISOTROPIC_AXES, Grid, check_axis, check_wavelengths
+from brdfdb.grids import KINDS, Grid, check_wavelengths
 
 ISOTROPIC = {"theta_i": [0, 30, 80], "theta_r": [0, 89.5], "delta_phi": [0, 7, 90, 180]}
 ANISOTROPIC = {"theta_i": [0, 80], "phi_i": [0, 120, 240, 360], "theta_r": [0, 10, 80], "phi_r": [0, 180, 360]}
