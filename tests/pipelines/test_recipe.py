@@ -117,7 +117,7 @@ BAD = [
     changed("[0, 80]", "[10, 80]", "grids.isotropic.theta_r_deg: starts at 10 degrees, must start at 0"),
     changed("[0, 80]", "[0, 91]", "grids.isotropic.theta_r_deg: ends at 91 degrees, must end at or below 90"),
     changed("[0, 180]", "[0, 90]", "grids.isotropic.delta_phi_deg: ends at 90 degrees, must end at 180"),
-    changed("phi_i_deg = [0, 180, 360]", "phi_i_deg = [0, 180]", "grids.anisotropic.phi_i_deg: ends at 180 degrees"),
+    changed("phi_i_deg = [0, 180, 360]", "phi_i_deg = [0, 120]", "grids.anisotropic.phi_i_deg: ends at 120 degrees"),
     changed("[0, 80]", "[0, 90]", "foam on grids.isotropic: grid: theta of 90 degrees is a pole of the model"),
     # wavelengths
     changed("[500, 550]", "[]", "wavelengths_nm: "),
