@@ -68,14 +68,16 @@ def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
     values : float32 array
         The block, as `tabulate.block` returns it.
     """
-    shape = tuple(layout.shape)
-    files: dict[str, Buffer] = {
-        "zarr.json": Bytes.from_bytes(_array_metadata(layout.variable, tuple(layout.dims), shape, layout.block_rows))
-    }
+    files: dict[str, Buffer] = {"zarr.json": Bytes.from_bytes(array_metadata(layout))}
     array = zarr.open_array(MemoryStore(files), mode="r+", config={"write_empty_chunks": True})
     array[layout.blocks[number]] = values
     (data,) = (data for name, data in files.items() if name != "zarr.json")
     return data.to_bytes()
+
+
+def array_metadata(layout: Layout) -> bytes:
+    """The metadata of the array that holds the blocks."""
+    return _array_metadata(layout.variable, tuple(layout.dims), tuple(layout.shape), layout.block_rows)
 
 
 @lru_cache(maxsize=256)
@@ -89,7 +91,7 @@ def _array_metadata(variable: str, dims: tuple[str, ...], shape: tuple[int, ...]
         compressors=COMPRESSORS,
         fill_value=np.nan,  # zarr's own 0 reads as a plausible black material
         dimension_names=dims,
-        attributes=VARIABLES[variable],
+        attributes={**VARIABLES[variable]},
         config={"write_empty_chunks": True},
     )
     return files["zarr.json"].to_bytes()
@@ -97,9 +99,7 @@ def _array_metadata(variable: str, dims: tuple[str, ...], shape: tuple[int, ...]
 
 def frame_files(layout: Layout, frame: xr.Dataset) -> dict[str, bytes]:
     """All files of a revision but the blocks: group and array metadata, coordinates and small variables."""
-    shape = tuple(layout.shape)
-    array = _array_metadata(layout.variable, tuple(layout.dims), shape, layout.block_rows)
-    return _group_files(frame, {f"{layout.variable}/zarr.json": array})
+    return _group_files(frame, {f"{layout.variable}/zarr.json": array_metadata(layout)})
 
 
 def dataset_files(dataset: xr.Dataset) -> dict[str, bytes]:
@@ -123,11 +123,7 @@ def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, 
     )
     files = {name: data.to_bytes() for name, data in written.items()} | dict(others)
     metadata = json.loads(files["zarr.json"])
-    arrays = {
-        name.removesuffix("/zarr.json"): json.loads(files[name])
-        for name in sorted(files)
-        if name.endswith("/zarr.json")
-    }
+    arrays = {name[: -len("/zarr.json")]: json.loads(files[name]) for name in sorted(files) if "/zarr.json" in name}
     metadata["consolidated_metadata"] = {"kind": "inline", "must_understand": False, "metadata": arrays}
     files["zarr.json"] = json.dumps(metadata, indent=1).encode()
     return files

@@ -139,8 +139,9 @@ def rollback(root: Path, name: str, revision: str) -> str:
 def verify(root: Path, name: str) -> int:
     """Check all of the current revision of a material; returns its bytes.
 
-    Sizes and sha256 of its files against the manifest, that against the pointer, and that nothing else lies there; every
-    chunk is decoded, which checks its crc32c; dimensions, types and shapes agree, and the attributes are those of a table.
+    Sizes and sha256 of its files against the manifest, that against the pointer, and that nothing else lies there;
+    every chunk is decoded, which checks its crc32c; dimensions, types and shapes agree, and the attributes are those of
+    a table.
 
     Raises
     ------
@@ -218,10 +219,10 @@ class Collected:
 def collect(root: Path, keep: int = 2) -> Collected:
     """Remove what no reader is served and no build is at work on.
 
-    Staging directories of builds that were broken off (they could have been resumed), revisions that are neither current
-    nor among the newest, and what crashes left behind: directories without a manifest, manifests without a directory,
-    temporary files. A reader that holds a decoded table keeps it; one that is just reading a revision that goes reads the
-    current one instead, or is told.
+    Staging directories of builds that were broken off (they could have been resumed), revisions that are neither
+    current nor among the newest, and what crashes left behind: directories without a manifest, manifests without a
+    directory, temporary files. A reader that holds a decoded table keeps it; one that is just reading a revision that
+    goes reads the current one instead, or is told.
 
     Parameters
     ----------
@@ -263,25 +264,19 @@ def collect(root: Path, keep: int = 2) -> Collected:
 
 
 def _collect_material(store: Store, material: Path, keep: int, collected: Collected) -> None:
-    root = store.root
     whole = _whole(material)
     try:
         current = store.path(material.name)
-    except UnknownMaterialError:
-        current = None
+        others = [group for group in whole if group != current]
+        kept = {current, *others[max(0, len(others) - (keep - 1)) :]}
+    except UnknownMaterialError:  # never published: the next build of the same request takes what is whole
+        kept = set(whole)
     except StoreError:
-        return  # who knows what the pointer pointed to: the next build repairs it
-    others = [group for group in whole if group != current]
-    kept = {material / "HEAD.json", *others[len(others) - keep + (current is not None) :]} if current else set(whole)
-    if current is not None:
-        kept.add(current)
+        return  # nobody knows what the pointer pointed to: the next build repairs it
     for path in sorted(material.iterdir(), reverse=True):  # a manifest before its directory: that is then an orphan
-        group = material / path.name.removesuffix(".MANIFEST.json")
-        known = number_of(group.name) or path.name.startswith(".")
-        if known and path not in kept and group not in kept and path != material / "HEAD.json":
-            _remove(root, path, collected)
-        elif known and group == current and not group.is_dir():
-            continue
+        group = path.with_name(path.name.removesuffix(".MANIFEST.json"))
+        if (number_of(group.name) and group not in kept) or path.name.startswith("."):
+            _remove(store.root, path, collected)
     if not any(material.iterdir()):
         material.rmdir()
 

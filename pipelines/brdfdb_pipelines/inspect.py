@@ -26,8 +26,8 @@ def list_store(root: Path) -> None:
     store = brdfdb.open(root)
     rows = []
     for name in store:
-        attributes = store.attributes(name)
-        rows.append((name, attributes["title"], attributes["model"], store.head(name)))
+        head = store.summary(name)
+        rows.append((name, head["title"], head["model"], head["revision"]))
     terminal.print_table(f"{len(rows)} materials in {root}", ("material", "title", "model", "revision"), rows)
 
 

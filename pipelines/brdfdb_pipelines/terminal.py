@@ -9,14 +9,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 
-def progress(counted: bool = True) -> Progress:
-    """A progress bar; `counted` shows how many of how many, for tasks that count things."""
+def progress(counted: bool = True, text: str = "") -> Progress:
+    """A progress bar; `counted` shows how many of how many, for tasks that count things; `text` what else to show."""
     count = [MofNCompleteColumn()] if counted else []
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         *count,
         TextColumn("{task.percentage:>3.0f}%"),
+        *([TextColumn(text)] if text else []),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
         console=Console(stderr=True),
