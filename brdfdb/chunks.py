@@ -21,6 +21,8 @@ from brdfdb.layout import Layout
 from brdfdb.manifest import StoreError, manifest_of
 from brdfdb.tabulate import VARIABLES
 
+_CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset that comes as a whole, 4 MB
+
 # crc32c last: without it nearly every flipped bit reads back as a plausible number
 COMPRESSORS = (BloscCodec(cname="zstd", clevel=1, shuffle="shuffle"), Crc32cCodec())
 
@@ -102,8 +104,14 @@ def frame_files(layout: Layout, frame: xr.Dataset) -> dict[str, bytes]:
     return _group_files(frame, {f"{layout.variable}/zarr.json": array_metadata(layout)})
 
 
+def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Whole rows of the first axis, as many as make a chunk of _CHUNK_VALUES."""
+    rest = int(np.prod(shape[1:]))
+    return (max(1, min(shape[0], _CHUNK_VALUES // max(rest, 1))), *shape[1:])
+
+
 def dataset_files(dataset: xr.Dataset) -> dict[str, bytes]:
-    """All files of a revision that holds a dataset, each variable in one chunk."""
+    """All files of a revision that holds a dataset."""
     return _group_files(dataset, {})
 
 
@@ -115,7 +123,7 @@ def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, 
     """
     written: dict[str, Buffer] = {}
     encoding: dict[str, Any] = {
-        str(name): {"compressors": COMPRESSORS, "fill_value": np.nan, "chunks": variable.shape}
+        str(name): {"compressors": COMPRESSORS, "fill_value": np.nan, "chunks": _chunks(variable.shape)}
         for name, variable in dataset.variables.items()
     }
     dataset.to_zarr(

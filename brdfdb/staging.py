@@ -318,7 +318,7 @@ def publish(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) ->
             "title": attributes.get("title", ""),
             "model": attributes.get("model", ""),
             "model_version": attributes.get("model_version", 0),
-            "request_sha256": attributes["request_sha256"],
+            "request_sha256": attributes.get("request_sha256", ""),
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "bytes": stored,
         }
@@ -399,7 +399,7 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
 
     store = Path(root)
     make_store(store)
-    files = dataset_files(dataset.assign_attrs({"request_sha256": "", **dataset.attrs}))
+    files = dataset_files(dataset)
     with Lock(store, name):
         staging = store / ".staging" / name / "dataset"
         with writing(store, name):
