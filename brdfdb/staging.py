@@ -113,6 +113,7 @@ class Lock:
 
     def __enter__(self) -> Lock:
         with writing(self.root, self.name):
+            (self.root / ".staging").mkdir(exist_ok=True)
             while self._handle is None:
                 self._handle = self._acquired()
         return self
@@ -122,7 +123,9 @@ class Lock:
         try:
             self.path.parent.mkdir(exist_ok=True)
             handle = self.path.open("ab")
-        except FileNotFoundError:
+        except (FileNotFoundError, FileExistsError):  # its holder took the directory away, maybe between two calls
+            if self.path.parent.exists() and not self.path.parent.is_dir():
+                raise
             return None
         try:
             fcntl.flock(handle, fcntl.LOCK_EX if self.wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
