@@ -247,7 +247,8 @@ class _Builder:
                 job = jobs.popleft()
 
                 def then(future: Future[Survey], job: Job = job) -> None:
-                    self._surveyed(job, future.result())
+                    if (found := self._result(job.material.name, future)) is not None:
+                        self._surveyed(job, found)
 
                 self._submit(then, survey, str(self.root), job)
             self._wait()
@@ -347,11 +348,14 @@ class _Builder:
         return False
 
     def _close(self, table: _Table) -> None:
-        self.open.remove(table)
-        table.lock.__exit__(None, None, None)
+        if table in self.open:
+            self.open.remove(table)
+            table.lock.__exit__(None, None, None)
 
     def _written(self, table: _Table, number: int, future: Future[Block]) -> None:
-        if (block := self._result(table, future)) is None:
+        block = self._result(table.name, future)
+        if block is None or table not in self.open:  # this block failed, or another one of the table
+            self._close(table)
             return
         table.files[block["name"]] = block["entry"]
         values = table.survey.block_values
@@ -369,30 +373,27 @@ class _Builder:
             self.ready.append(table)
 
     def _framed(self, table: _Table, future: Future[dict[str, Entry]]) -> None:
-        if (files := self._result(table, future)) is None:
-            return
-        revision, stored = publish(self.root, table.name, table.staging, {**table.files, **files})
-        why = table.survey.standing.why
-        self.built[table.name] = Built(table.job, "published", revision, stored, why, table.survey.shape)
-        self.report({"event": "published", "material": table.name, "revision": revision, "bytes": stored, "why": why})
+        files = self._result(table.name, future)
+        if files is not None:
+            revision, stored = publish(self.root, table.name, table.staging, {**table.files, **files})
+            why = table.survey.standing.why
+            self.built[table.name] = Built(table.job, "published", revision, stored, why, table.survey.shape)
+            self.report(
+                {"event": "published", "material": table.name, "revision": revision, "bytes": stored, "why": why}
+            )
         self._close(table)
 
-    def _result(self, table: _Table, future: Future[Any]) -> Any:
-        """What a task returned; None if its table failed, which takes no other with it."""
-        if table not in self.open:  # it failed in another of its blocks
-            return None
+    def _result(self, name: str, future: Future[Any]) -> Any:
+        """What a task returned; None if it failed, which takes no table with it but its own."""
         error = future.exception()
         if error is None:
             return future.result()
         if isinstance(error, StoreError | OSError | MemoryError) or not isinstance(error, Exception):
             raise error
         if workers.lost(error):
-            raise ChildProcessError(
-                "the workers are gone, killed or out of memory; the same command resumes"
-            ) from error
+            raise ChildProcessError("the workers are gone, killed or out of memory; build again to resume") from error
         self.error = self.error or error
-        self.report({"event": "failed", "material": table.name, "error": str(error)})
-        self._close(table)
+        self.report({"event": "failed", "material": name, "error": str(error)})
         return None
 
 

@@ -348,11 +348,11 @@ def test_a_damaged_store_is_one_sentence(built: Path, tmp_path: Path, capsys: Ca
     said = "brdfdb: foam r000001 is damaged: brdf/c/0/0/0 is missing"
     for arguments in (("audit",), ("show", "foam"), ("lookup", "foam", 0, 0, 0, 0), ("rollback", "foam", "r000001")):
         assert fails(capsys, *arguments, "--store", root) == said
+    assert fails(capsys, "export", "exr", "foam", "--store", root, "--out", tmp_path / "exr") == said
     assert run("list", "--store", root) == 0  # reads pointers, no tables
     assert "foam" in capsys.readouterr().out
     (root / "materials" / "foam" / "HEAD.json").write_text("{")
     assert fails(capsys, "list", "--store", root).startswith(f"brdfdb: cannot read {root}/materials/foam/HEAD.json: ")
-    assert fails(capsys, "export", "exr", "foam", "--store", root, "--out", tmp_path / "exr") == said
 
 
 # Directories that cannot be written
