@@ -413,7 +413,7 @@ def run(
     at: AbstractContextManager[Workers] = (
         workers.cluster(scheduler) if scheduler else (workers.processes if processes else workers.threads)(jobs)
     )
-    with Lines() if as_json else Bars() as report, at as opened:
+    with at as opened, Lines() if as_json else Bars() as report:
         built = build(recipe, root, opened, report, memory=memory)
     if not as_json:
         _print(built, root, time.perf_counter() - start)
