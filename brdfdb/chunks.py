@@ -8,13 +8,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import google_crc32c
 import numpy as np
 import xarray as xr
 import zarr
+from numcodecs import Blosc
 from numpy.typing import NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.core.buffer import Buffer
-from zarr.core.buffer.cpu import Buffer as Bytes
 from zarr.storage import LocalStore, MemoryStore
 
 from brdfdb.layout import Layout
@@ -25,6 +26,7 @@ _CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset that comes as a whole,
 
 # crc32c last: without it nearly every flipped bit reads back as a plausible number
 COMPRESSORS = (BloscCodec(cname="zstd", clevel=1, shuffle="shuffle"), Crc32cCodec())
+_BLOSC = Blosc(cname="zstd", clevel=1, shuffle=Blosc.SHUFFLE)
 
 
 class Whole(LocalStore):
@@ -59,7 +61,7 @@ def chunk_name(layout: Layout, number: int) -> str:
 
 
 def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
-    """The bytes of the file that holds a block.
+    """The bytes of the file that holds a block: those that zarr writes with `COMPRESSORS`, without its event loop.
 
     Parameters
     ----------
@@ -70,33 +72,49 @@ def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
     values : float32 array
         The block, as `tabulate.block` returns it.
     """
-    files: dict[str, Buffer] = {"zarr.json": Bytes.from_bytes(array_metadata(layout))}
-    array = zarr.open_array(MemoryStore(files), mode="r+", config={"write_empty_chunks": True})
-    array[layout.blocks[number]] = values
-    (data,) = (data for name, data in files.items() if name != "zarr.json")
-    return data.to_bytes()
+    rows = layout.blocks[number]
+    if rows.stop - rows.start < layout.block_rows:  # chunks are of one size: the last is filled up
+        whole = np.full((layout.block_rows, *layout.shape[1:]), np.nan, dtype=np.float32)
+        whole[: len(values)] = values
+        values = whole
+    data: bytes = _BLOSC.encode(np.ascontiguousarray(values, dtype="<f4"))
+    checksum: int = google_crc32c.value(data)
+    return data + checksum.to_bytes(4, "little")
 
 
 def array_metadata(layout: Layout) -> bytes:
     """The metadata of the array that holds the blocks."""
-    return _array_metadata(layout.variable, tuple(layout.dims), tuple(layout.shape), layout.block_rows)
+    rest = tuple(layout.shape[1:])
+    attributes = json.dumps(VARIABLES[layout.variable])
+    shape, chunks = (layout.shape[0], *rest), (layout.block_rows, *rest)
+    return _array_files(tuple(layout.dims), shape, chunks, "<f4", attributes, None)["zarr.json"]
 
 
 @lru_cache(maxsize=256)
-def _array_metadata(variable: str, dims: tuple[str, ...], shape: tuple[int, ...], rows: int) -> bytes:
+def _array_files(
+    dims: tuple[str, ...],
+    shape: tuple[int, ...],
+    chunks: tuple[int, ...],
+    dtype: str,
+    attributes: str,
+    data: bytes | None,
+) -> dict[str, bytes]:
+    """The files of an array by their path inside it, kept: tables share coordinates, and zarr takes its time."""
     files: dict[str, Buffer] = {}
-    zarr.create_array(
+    array = zarr.create_array(
         MemoryStore(files),
         shape=shape,
-        chunks=(rows, *shape[1:]),
-        dtype=np.float32,
+        chunks=chunks,
+        dtype=dtype,
         compressors=COMPRESSORS,
         fill_value=np.nan,  # zarr's own 0 reads as a plausible black material
         dimension_names=dims,
-        attributes={**VARIABLES[variable]},
+        attributes=json.loads(attributes),
         config={"write_empty_chunks": True},
     )
-    return files["zarr.json"].to_bytes()
+    if data is not None:
+        array[...] = np.frombuffer(data, dtype=dtype).reshape(shape)
+    return {name: content.to_bytes() for name, content in files.items()}
 
 
 def frame_files(layout: Layout, frame: xr.Dataset) -> dict[str, bytes]:
@@ -116,22 +134,29 @@ def dataset_files(dataset: xr.Dataset) -> dict[str, bytes]:
 
 
 def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The files of a group, with the metadata of all arrays repeated in those of the group.
+    """The files of a group of plain arrays, with the metadata of all of them repeated in those of the group.
 
     A plain `xarray.open_zarr` looks for them there first. `zarr.consolidate_metadata` warns while it does the same. A
     revision never changes: nothing goes stale.
     """
-    written: dict[str, Buffer] = {}
-    encoding: dict[str, Any] = {
-        str(name): {"compressors": COMPRESSORS, "fill_value": np.nan, "chunks": _chunks(variable.shape)}
-        for name, variable in dataset.variables.items()
-    }
-    dataset.to_zarr(
-        MemoryStore(written), mode="w-", zarr_format=3, consolidated=False, encoding=encoding, write_empty_chunks=True
-    )
-    files = {name: data.to_bytes() for name, data in written.items()} | dict(others)
-    metadata = json.loads(files["zarr.json"])
+    files = dict(others)
+    for name, variable in dataset.variables.items():
+        values = np.ascontiguousarray(variable.values)
+        written = _array_files(
+            tuple(map(str, variable.dims)),
+            values.shape,
+            _chunks(values.shape),
+            values.dtype.newbyteorder("<").str,
+            json.dumps(variable.attrs),
+            values.tobytes(),
+        )
+        files |= {f"{name}/{file}": data for file, data in written.items()}
     arrays = {name[: -len("/zarr.json")]: json.loads(files[name]) for name in sorted(files) if "/zarr.json" in name}
-    metadata["consolidated_metadata"] = {"kind": "inline", "must_understand": False, "metadata": arrays}
-    files["zarr.json"] = json.dumps(metadata, indent=1).encode()
+    metadata = {
+        "attributes": dataset.attrs,
+        "zarr_format": 3,
+        "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": arrays},
+        "node_type": "group",
+    }
+    files["zarr.json"] = json.dumps(metadata, indent=1, allow_nan=False).encode()
     return files
