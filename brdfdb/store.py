@@ -20,15 +20,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from brdfdb.lookup import Table
 from brdfdb.manifest import Head, StoreError, check_manifest, json_object, number_of, read_json
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.chunks import Whole
+    from brdfdb.lookup import Table
 
 __all__ = ["FORMAT", "FORMAT_VERSION", "Store", "StoreError", "UnknownMaterialError"]
 
@@ -60,7 +58,7 @@ class UnknownMaterialError(KeyError):
         return f"no material {self.name!r} in the store{hint}"
 
 
-class Store(Mapping[str, Table]):
+class Store(Mapping[str, "Table"]):
     """A store opened for reading: a mapping from material names to decoded tables of the current revisions.
 
     Parameters
@@ -221,7 +219,10 @@ class Store(Mapping[str, Table]):
 
 
 def _decode(name: str, path: Path, files: Whole) -> Table:
+    import numpy as np
     import zarr
+
+    from brdfdb.lookup import Table
 
     try:
         group = zarr.open_group(files, mode="r")
