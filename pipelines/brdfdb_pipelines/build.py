@@ -6,7 +6,7 @@ import json
 import time
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -385,7 +385,11 @@ class _Builder:
 
     def _result(self, name: str, future: Future[Any]) -> Any:
         """What a task returned; None if it failed, which takes no table with it but its own."""
-        error = future.exception()
+        error: BaseException | None
+        try:
+            error = future.exception()
+        except CancelledError as cancelled:  # not by us: the cluster lost it
+            error = cancelled
         if error is None:
             return future.result()
         if isinstance(error, StoreError | OSError | MemoryError) or not isinstance(error, Exception):
