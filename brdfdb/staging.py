@@ -177,6 +177,11 @@ def prepare(root: Path, name: str, request: Mapping[str, Any], layout: str) -> P
     return staging
 
 
+def discard(root: Path, name: str, request: Mapping[str, Any]) -> None:
+    """Remove what is staged of a request; the lock must be held."""
+    shutil.rmtree(directory_of(root, name, digest(request)), ignore_errors=True)
+
+
 def planned(root: Path, name: str, request: Mapping[str, Any]) -> str | None:
     """The layout that an earlier build of the same request left in the staging directory, as JSON; None without."""
     staging = directory_of(root, name, digest(request))

@@ -19,6 +19,7 @@ from brdfdb.staging import (
     Block,
     BusyError,
     Lock,
+    discard,
     make_store,
     planned,
     point_to,
@@ -339,6 +340,7 @@ class _Builder:
         if found.state == "adoptable":
             with writing(self.root, name):
                 point_to(self.root / "materials" / name, found.revision)
+            discard(self.root, name, job.request)  # where the build was killed that made this revision
             stored = summary_of(self.root / "materials" / name / found.revision)["bytes"]
             self.built[name] = Built(job, "adopted", found.revision, stored, found.why)
             self.report({"event": "adopted", "material": name, "revision": found.revision, "why": found.why})

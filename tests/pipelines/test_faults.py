@@ -152,9 +152,14 @@ class Reader(threading.Thread):
 
 
 def marked(root: Path) -> set[tuple[str, int]]:
-    """Materials and numbers of the blocks that are whole in the staging directories."""
+    """Materials and numbers of the blocks that are whole in the staging directories.
+
+    A directory without a table is what was left when a build was killed right after it had published.
+    """
     return {
-        (path.parent.parent.parent.name, int(path.stem)) for path in (root / ".staging").rglob("blocks/[0-9]*.json")
+        (path.parent.parent.parent.name, int(path.stem))
+        for path in (root / ".staging").rglob("blocks/[0-9]*.json")
+        if (path.parent.parent / "table").is_dir()
     }
 
 
