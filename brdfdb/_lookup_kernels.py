@@ -273,7 +273,7 @@ def by_angles(
         for j in range(count):
             t_i, t_r, p_i, p_r = theta_i[start + j], theta_r[start + j], phi_i[start + j], phi_r[start + j]
             usual = (t_i >= 0.0) & (t_i <= horizon) & (t_r >= 0.0) & (t_r <= horizon)
-            odd += np.int64(not (usual & (abs(p_i) <= PHI_MAX) & (abs(p_r) <= PHI_MAX)))
+            odd += int(not (usual & (abs(p_i) <= PHI_MAX) & (abs(p_r) <= PHI_MAX)))
         if odd > 0:
             for j in range(count):
                 t_i, t_r, p_i, p_r = theta_i[start + j], theta_r[start + j], phi_i[start + j], phi_r[start + j]
@@ -318,7 +318,7 @@ def by_vectors(
         odd = 0
         for j in range(count):
             flat = abs(ui[3 * j]) + abs(ui[3 * j + 1]) + abs(ur[3 * j]) + abs(ur[3 * j + 1])
-            odd += np.int64(not ((ui[3 * j + 2] >= 0.0) & (ur[3 * j + 2] >= 0.0) & (flat < PHI_MAX)))
+            odd += int(not ((ui[3 * j + 2] >= 0.0) & (ur[3 * j + 2] >= 0.0) & (flat < PHI_MAX)))
         if odd > 0:
             for j in range(count):
                 direction = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]

@@ -115,9 +115,9 @@ def _cubic_cells(nodes: Array, ends: tuple[str, str]) -> tuple[NDArray[np.int64]
     at_nodes = _slopes(x[:-2], x[1:-1], x[2:], x[1:-1])
     slopes[:-1, 0, 0:3], slopes[:-1, 1, 1:4] = at_nodes[:-1], at_nodes[1:]
     if np.isnan(x_before):  # the parabola through the nodes inside; the one outside gets no weight
-        slopes[0, 0] = [0.0, *_slopes(*nodes[:3], nodes[0])]
+        slopes[0, 0] = [0.0, *_slopes(nodes[0], nodes[1], nodes[2], nodes[0])]
     if np.isnan(x_after):
-        slopes[-2, 1] = [*_slopes(*nodes[-3:], nodes[-1]), 0.0]
+        slopes[-2, 1] = [*_slopes(nodes[-3], nodes[-2], nodes[-1], nodes[-1]), 0.0]
     slopes[:-1] *= np.diff(nodes)[:, np.newaxis, np.newaxis]
     return stencil, slopes.reshape(count, 8)
 
