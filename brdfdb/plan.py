@@ -359,7 +359,8 @@ def _finished(layout: Layout, wavelength_nm: NDArray[np.float64] | None, toleran
     drawn = accuracy.draw(material, wavelength_nm, _DRAWS, _SEED + 1)
     truth = accuracy.model_values(material, wavelength_nm, drawn.wi, drawn.wr)
     goal = 0.5 * (1.0 + _MARGIN) * tolerance
-    layout = replace(layout, wavelength_nm=wavelength_nm)
+    reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
+    layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason)
     whole = _values(layout)
     if layout.interpolation.logarithm and wavelength_nm is not None and wavelength_nm.size > 2:
         rows = whole.reshape(-1, wavelength_nm.size).astype(np.float64)

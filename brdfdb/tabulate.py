@@ -19,7 +19,8 @@ from brdfdb.parameters import Floats
 
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 _CONTINUED = np.deg2rad(15.0)  # how far beyond the horizon numbers go on with it
-SPECULAR_THETA_DEG = np.append(np.arange(0.0, 89.0, 1.0), np.arange(89.0, 90.01, 0.1).round(1))  # without theta_i
+# Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner's has few nodes, none for it
+SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
 
 
@@ -31,7 +32,8 @@ def tabulate(layout: Layout) -> xr.Dataset:
     Dataset
         ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says: float32, over
         the axes of the grid and, last, ``wavelength`` or ``part``; for models with a Dirac part
-        ``specular_reflectance`` [1] over theta_i and wavelength; for spectral materials ``n`` and ``k`` as used.
+        ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
+        ``k`` as used.
         Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
     """
     values = np.concatenate([block(layout, rows) for rows in layout.blocks])
@@ -179,11 +181,13 @@ def frame(layout: Layout) -> xr.Dataset:
     if layout.uniform is not None:
         variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])
     if spec.specular is not None:
-        theta_i_deg = grid.axes.get("theta_i", SPECULAR_THETA_DEG)
-        coordinates["theta_i"] = _coordinate("theta_i", theta_i_deg)
+        given = "theta_i" in grid.axes and not layout.reason
+        name = "theta_i" if given else "specular_theta_i"
+        theta_i_deg = grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
+        coordinates[name] = _coordinate(name, theta_i_deg)
         theta_i = radians(theta_i_deg)
         variables["specular_reflectance"] = (
-            ("theta_i", *spectral),
+            (name, *spectral),
             spec.specular(
                 theta_i[:, np.newaxis] if spectral else theta_i,
                 **{name: arguments[name] for name in spec.specular_parameters},
@@ -249,6 +253,7 @@ def _attributes(material: Material) -> dict[str, Any]:
 
 _LONG_NAMES = {
     "theta_i": "polar angle of the light",
+    "specular_theta_i": "polar angle of the light, of the Dirac part",
     "theta_r": "polar angle of the viewer",
     "phi_i": "azimuth of the light",
     "phi_r": "azimuth of the viewer",
