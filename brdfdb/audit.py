@@ -26,28 +26,43 @@ ENERGY_TOLERANCE = 1e-6
 MODEL_RECIPROCITY_TOLERANCE = 1e-11
 # float32 rounds two values that differ by that to the same number or to neighbours, 6e-8 apart: measured 0
 TABLE_RECIPROCITY_TOLERANCE = 1e-6
-# TODO
-LOOKUP_RECIPROCITY_TOLERANCE = 1e-6
+# Sums of the same numbers in another order, of f_r with the offset of its logarithm: TODO
+LOOKUP_RECIPROCITY_TOLERANCE = 1e-12
 MODEL_RECIPROCITY_PAIRS = 2000
 _SEED = 1994
 _POLAR = ("theta_i", "theta_r", "theta_h", "theta_d")
 
 # Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
-QUADRATURE_TOLERANCE = 1e-4
+QUADRATURE_TOLERANCE = 2e-5
 _MOST_PANELS = 1000
 # Lights for which such a table is integrated [degree]; by symmetry the phi_i stand for those of all quadrants
 THETA_I_DEG = np.array([*range(0, 90, 5), 87.5, 89.0, 89.5], dtype=np.float64)
 PHI_I_DEG = np.array([0.0, 30.0, 60.0, 90.0])
+_BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
+_NOT_FINITE = 1e30  # stands for an albedo that is not finite
 _LOOKED_UP = 250  # directions of each band of theta_i, half of them in the lobe, where values are looked at
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
+class Bands(BaseModel):
+    """What a table that states its error is judged by: the mean of the albedo over bands of theta_i."""
+
+    model_config = _STRICT
+
+    theta_i_deg: list[float] = Field(description="edges of the bands")
+    albedo: list[list[float | None]] = Field(description="[band][wavelength], Dirac part included; null: not finite")
+    stated_error: list[list[float]] = Field(
+        description="[band][wavelength], of what the Dirac part leaves: integral of abs(error) cos theta_r over that of "
+        "f_r cos theta_r"
+    )
+
+
 class Energy(BaseModel):
     """Directional albedo of the table, Dirac part included: what leaves, of unit flux from theta_i.
 
-    A table that states its error may exceed 1, or what is known of it, by that error: a reflectance within it, divided
-    by 1 + stated_error, is what is judged.
+    A table that states its error does so over bands of theta_i, relative to what is reflected there. Its mean over a
+    band may exceed 1, or what is known of the material, by that error, and no more.
     """
 
     model_config = _STRICT
@@ -59,19 +74,16 @@ class Energy(BaseModel):
         "null: not finite"
     )
     specular: list[list[float | None]] = Field(description="[theta_i][wavelength], the share of the Dirac part in it")
-    integration_error: float = Field(
-        description="of the albedo, the largest estimate; 0: the exact integral of the interpolant"
+    integration_error: float | None = Field(
+        description="of the albedo, the largest estimate; 0: the exact integral of the interpolant; null: not finite"
     )
-    stated_error: list[list[float]] | None = Field(
-        description="[theta_i][wavelength], relative, of all but the Dirac part: the l1 error that the table states; "
-        "null: it states none and is allowed none"
-    )
+    bands: Bands | None = Field(description="null: the table states no error, and is allowed none")
     max_albedo: float | None = Field(description="null: not finite")
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
     exceeds_1_from_theta_i_deg: float | None
     exceeds_1_beyond_error_from_theta_i_deg: float | None = Field(
-        description="where the stated error and that of the integration do not explain it"
+        description="where neither the stated error nor that of the integration explains it"
     )
     verdict: Verdict
     reason: str = Field(description="also where a table passes because of the error that it states")
@@ -96,7 +108,8 @@ class Reciprocity(BaseModel):
     model: Asymmetry = Field(description="over random pairs of directions")
     table: Asymmetry = Field(
         description="over every pair that the grid holds both ways round; of tables that hold other numbers than f_r, "
-        "or hold them over half and difference vectors, over pairs that are looked up, too"
+        "or hold them over half and difference vectors, over pairs that are looked up, too, to whose f_r the offset of "
+        "the logarithms is added"
     )
     verdict: Verdict
 
@@ -302,42 +315,45 @@ def _theta_weights(nodes: Axis) -> Axis:
     return weights
 
 
+class _Judged(NamedTuple):
+    """Albedos that are compared with 1, over rows and wavelengths, less what may be wrong with them.
+
+    Each row stands for some of the theta_i, as `covers`, of shape (rows, theta_i), says.
+    """
+
+    certain: Floats
+    covers: NDArray[np.bool_]
+    bands: Bands | None
+
+
 def _energy(table: Table, material: Material) -> Energy:
     theta_i, diffuse, integration = directional_albedo(table)
     if table.anisotropic:
         diffuse = diffuse.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
-    # what the error that the table states, and that of the integration, leave for certain
-    stated = _stated_l1(table, theta_i, diffuse.shape)
-    slack = np.minimum(integration, QUADRATURE_TOLERANCE)[:, np.newaxis]
-    certain = (diffuse - slack) / (1.0 + (0.0 if stated is None else stated)) + specular
-    finite, beyond = (np.where(np.isfinite(each), each, np.inf) for each in (albedo, certain))
+    judged = _judged(table, theta_i, diffuse, specular, np.minimum(integration, QUADRATURE_TOLERANCE))
+    finite = np.where(np.isfinite(albedo), albedo, np.inf)
     worst_theta, worst_wavelength = np.unravel_index(np.argmax(finite), finite.shape)
     largest = float(finite[worst_theta, worst_wavelength])
-    exceeding, unexplained = (theta_i[np.any(a > 1.0 + ENERGY_TOLERANCE, axis=1)] for a in (finite, beyond))
+    above = finite > 1.0 + ENERGY_TOLERANCE
+    beyond = above & (judged.covers.T.astype(int) @ (judged.certain > 1.0 + ENERGY_TOLERANCE) > 0)
+    exceeding, unexplained = (theta_i[np.any(each, axis=1)] for each in (above, beyond))
     known: Mapping[str, Any] = table.attrs.get("known_excess") or material.spec.known_excess or {}
     verdict: Verdict
     if unexplained.size == 0:
-        verdict, reason = "passes", ""
-        if exceeding.size:
-            why = "that of its integration" if stated is None else "the error that the table states"
-            reason = f"reflects {largest:.6g} of what arrives at {theta_i[worst_theta]:g} degrees, within {why}"
-    elif known and beyond.max() <= known["max_albedo"] and unexplained[0] >= known["from_theta_i_deg"]:
+        verdict, reason = "passes", _excuse(judged, theta_i, finite) if exceeding.size else ""
+    elif known and judged.certain.max() <= known["max_albedo"] and unexplained[0] >= known["from_theta_i_deg"]:
         verdict, reason = "known published excess", str(known["citation"])
     else:
-        at = np.unravel_index(np.argmax(beyond), beyond.shape)
-        share = f"{finite[at]:.4g}" if np.isfinite(finite[at]) else "no finite share"
-        verdict, reason = "violates", f"reflects {share} of what arrives at {theta_i[at[0]]:g} degrees"
-        if stated is not None and np.isfinite(finite[at]):
-            reason += f", where the table states an error of {stated[at]:.2g}"
+        verdict, reason = "violates", _reflects(theta_i, finite) + _stated(judged)
     return Energy(
         theta_i_deg=theta_i.tolist(),
         wavelength_nm=None if table.wavelength_nm is None else table.wavelength_nm.tolist(),
         albedo=_json(albedo),
         specular=_json(specular),
-        integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else 1.0,
-        stated_error=None if stated is None else stated.tolist(),
+        integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else None,
+        bands=judged.bands,
         max_albedo=largest if np.isfinite(largest) else None,
         max_at_theta_i_deg=float(theta_i[worst_theta]),
         max_at_wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength]),
@@ -348,6 +364,64 @@ def _energy(table: Table, material: Material) -> Energy:
     )
 
 
+def _judged(table: Table, theta_i_deg: Axis, diffuse: Floats, specular: Floats, integration: Axis) -> _Judged:
+    """Each theta_i of a table without a stated error; of others the mean over bands, over which they state it.
+
+    In a band, the table reflects 1 + l1 of what the model does, at most, besides the Dirac part.
+    """
+    if table.error is None:
+        return _Judged(_known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None)
+    edges, l1 = np.array(table.error.theta_i_deg), np.array(table.error.l1)
+    means = _band_means(theta_i_deg, edges)
+    reflected, mirrored = means @ _known(diffuse), means @ _known(specular)
+    found = means @ _known(diffuse + specular)
+    bands = Bands(
+        theta_i_deg=edges.tolist(),
+        albedo=_json(np.where(found < _NOT_FINITE * 1e-6, found, np.nan)),
+        stated_error=l1.tolist(),
+    )
+    within = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
+    return _Judged((reflected - means @ integration[:, np.newaxis]) / (1.0 + l1) + mirrored, within, bands)
+
+
+def _known(values: Floats) -> Floats:
+    """Values of which those that are not finite are replaced by one that exceeds everything."""
+    return np.where(np.isfinite(values), values, _NOT_FINITE)
+
+
+def _band_means(theta_i_deg: Axis, edges: Axis) -> Floats:
+    """Weights, (bands, theta_i), of the mean over each band of what is linear between theta_i and the same beyond."""
+    share = (np.arange(_BAND_POINTS) + 0.5) / _BAND_POINTS
+    inside = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * share
+    return np.stack([np.interp(inside, theta_i_deg, one).mean(axis=1) for one in np.eye(theta_i_deg.size)], axis=1)
+
+
+def _reflects(theta_i_deg: Axis, albedo: Floats) -> str:
+    """The largest albedo in words."""
+    theta, wavelength = np.unravel_index(np.argmax(albedo), albedo.shape)
+    largest = albedo[theta, wavelength]
+    share = f"{largest:.4g}" if np.isfinite(largest) else "no finite share"
+    return f"reflects {share} of what arrives at {theta_i_deg[theta]:g} degrees"
+
+
+def _stated(judged: _Judged) -> str:
+    """What remains of the band that exceeds 1 most, in words; nothing of a table that states no error."""
+    if judged.bands is None:
+        return ""
+    band, wavelength = np.unravel_index(np.argmax(judged.certain), judged.certain.shape)
+    low, high = judged.bands.theta_i_deg[band : band + 2]
+    mean, error = judged.bands.albedo[band][wavelength], judged.bands.stated_error[band][wavelength]
+    share = "no finite share" if mean is None else f"{mean:.6g}"
+    return f"; of {low:g} to {high:g} degrees {share}, where the table states an error of {error:.3g}"
+
+
+def _excuse(judged: _Judged, theta_i_deg: Axis, albedo: Floats) -> str:
+    """Why an albedo above 1 is not held against a table."""
+    if judged.bands is None:
+        return f"{_reflects(theta_i_deg, albedo)}, within the error of its integration"
+    return f"{_reflects(theta_i_deg, albedo)}: within the error that the table states{_stated(judged)}"
+
+
 def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats:
     """The reflectance of the Dirac part, over theta_i and wavelength."""
     if table.specular is None:
@@ -355,16 +429,6 @@ def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats
     if table.specular_theta_deg is None and np.array_equal(theta_i_deg, table.axes_deg["theta_i"]):
         return table.specular.reshape(shape)
     return table.specular_reflectance(radians(theta_i_deg)).reshape(shape)
-
-
-def _stated_l1(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats | None:
-    """The l1 error that the table states, over theta_i and wavelength; of two bands that meet there, the larger."""
-    if table.error is None:
-        return None
-    l1 = np.array(table.error.l1)
-    bands = [np.searchsorted(table.error.theta_i_deg, theta_i_deg, side=side) - 1 for side in ("left", "right")]
-    below, above = (l1[np.clip(band, 0, len(l1) - 1)] for band in bands)
-    return np.broadcast_to(np.maximum(below, above), shape)
 
 
 def _json(values: Floats) -> list[list[float | None]]:
@@ -412,7 +476,9 @@ def _table_asymmetry(table: Table, looked_up: _LookedUp | None) -> Asymmetry:
     if not table.grid.half_difference:
         found.append(_node_asymmetry(table))
     if looked_up is not None and (table.grid.half_difference or table.grid.reciprocal):
-        found.append(_asymmetry(*looked_up, len(looked_up.forward), LOOKUP_RECIPROCITY_TOLERANCE))
+        # what is interpolated is the logarithm of f_r with an offset: of f_r far below it, rounding alone is left
+        forward, backward = (each + table.interpolation.offset for each in looked_up)
+        found.append(_asymmetry(forward, backward, len(forward), LOOKUP_RECIPROCITY_TOLERANCE))
     worst = max(found, key=lambda each: each.max / each.tolerance)
     pairs = sum(each.pairs for each in found)
     return worst.model_copy(

@@ -54,7 +54,8 @@ def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
         else:
             numbers = node_numbers(layout, here)
             if layout.spectra is not None:
-                numbers = numbers @ layout.spectra.T
+                # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
+                numbers = np.einsum("...w,pw->...p", numbers, layout.spectra)
             values[at] = numbers.reshape(here.stop - here.start, *layout.shape[1:])
     return rounded(values, layout.bits)
 
@@ -129,7 +130,7 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        return _numbers(layout, lambda arguments: layout.material.spec.evaluate(*angles, **arguments), mu)
+        return _numbers(layout, lambda arguments: _evaluated(layout, rows, arguments), mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
     axes[0] = axes[0][rows]
     nodes = np.ix_(*axes)
