@@ -32,11 +32,13 @@ MODEL_RECIPROCITY_PAIRS = 2000
 _SEED = 1994
 _POLAR = ("theta_i", "theta_r", "theta_h", "theta_d")
 
+# More cannot be asked of a planner: a table that states more is judged as if it stated this
+MOST_ERROR = 0.5
 # Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
 QUADRATURE_TOLERANCE = 2e-5
 _MOST_PANELS = 1000
 # Lights for which such a table is integrated [degree]; by symmetry the phi_i stand for those of all quadrants
-THETA_I_DEG = np.array([*range(0, 90, 5), 87.5, 89.0, 89.5], dtype=np.float64)
+THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=np.float64)
 PHI_I_DEG = np.array([0.0, 30.0, 60.0, 90.0])
 _BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
 _NOT_FINITE = 1e30  # stands for an albedo that is not finite
@@ -223,8 +225,8 @@ def directional_albedo(table: Table) -> TableAlbedo:
     Returns
     -------
     TableAlbedo
-        At the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and `PHI_I_DEG`; at
-        `THETA_I_DEG`, too, if a planner chose the nodes: the attribute ``reason`` says so.
+        At the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and `PHI_I_DEG`; at nodes
+        and `THETA_I_DEG`, but not 90 degrees, if a planner chose the nodes: the attribute ``reason`` says so.
 
     Notes
     -----
@@ -245,8 +247,9 @@ def directional_albedo(table: Table) -> TableAlbedo:
         brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
         albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)
     if table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
-        matrix = np.stack([np.interp(THETA_I_DEG, nodes, one) for one in np.eye(nodes.size)], axis=1)
-        nodes, albedo = THETA_I_DEG, np.tensordot(matrix, albedo, axes=1)
+        lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
+        matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
+        nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
     return TableAlbedo(nodes, np.asarray(albedo), np.zeros(nodes.size))
 
 
@@ -371,7 +374,7 @@ def _judged(table: Table, theta_i_deg: Axis, diffuse: Floats, specular: Floats, 
     """
     if table.error is None:
         return _Judged(_known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None)
-    edges, l1 = np.array(table.error.theta_i_deg), np.array(table.error.l1)
+    edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     reflected, mirrored = means @ _known(diffuse), means @ _known(specular)
     found = means @ _known(diffuse + specular)

@@ -18,7 +18,8 @@ from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
-_CONTINUED = np.deg2rad(15.0)  # how far beyond the horizon numbers go on with it
+_POLE_END = np.deg2rad(89.9)  # of light and viewer, where the pole of a model is tabulated as it is
+_CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
 # Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner's has few nodes, none for it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
@@ -123,8 +124,8 @@ def _numbers(layout: Layout, evaluate: Callable[[dict[str, Any]], Floats], mu: F
 def node_numbers(layout: Layout, rows: slice) -> Floats:
     """`numbers` at some rows of nodes, continued beyond the horizon on a grid of half and difference vectors.
 
-    There theta_d is held at its largest value, where light or viewer is at the horizon; from there the numbers go on
-    along theta_d with the slope that they arrive with.
+    There theta_d is held at its largest value, where light or viewer is at the horizon, or at 89.9 degrees if the
+    numbers have a pole there; from there they go on along theta_d with the slope that they arrive with.
     """
     grid = layout.grid
     if not grid.half_difference:
@@ -140,7 +141,12 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
 
 def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
     """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
-    largest = np.arctan2(np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d)))
+    lowest = 0.0  # cosine of light and viewer
+    if layout.material.spec.grazing_pole and layout.interpolation.power == 0.0:
+        lowest, theta_h = np.cos(_POLE_END), np.minimum(theta_h, _POLE_END)
+    # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
+    along, across = np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d))
+    largest = np.arccos(np.minimum(lowest / np.hypot(along, across), 1.0)) - np.arctan2(across, along)
     largest = np.maximum(largest * (1.0 - 1e-12), 0.0)
     held = np.minimum(theta_d, largest)
     values = numbers(layout, *_half_vectors(theta_h, phi_h, held, phi_d))
@@ -148,7 +154,7 @@ def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, p
     if np.any(beyond > 0.0):
         step = np.minimum(_SLOPE_STEP, 0.5 * largest)
         inside = numbers(layout, *_half_vectors(theta_h, phi_h, np.maximum(held - step, 0.0), phi_d))
-        share = np.minimum(beyond, _CONTINUED) / np.broadcast_to(np.maximum(step, 1e-9), beyond.shape)
+        share = np.minimum(beyond / np.broadcast_to(np.maximum(step, 1e-9), beyond.shape), _CONTINUED)
         values += share[..., np.newaxis] * (values - inside)
     return values
 
