@@ -177,23 +177,24 @@ def points_of_vectors(
 
 
 @loop
-def interpolated(axes: Axes, table: NDArray[np.float32], channels: int, x: Array, count: int, out: Array) -> None:
-    """Numbers of the table at points on its grid, `out` of shape (points, channels)."""
+def interpolated(axes: Axes, table: NDArray[np.float32], channels: int, x: Array, count: int, numbers: Array) -> None:
+    """What a table holds at points on its grid: `channels` numbers a point, point after point."""
     cell, share = np.empty((x.shape[0], BLOCK), np.int64), np.empty((x.shape[0], BLOCK))
     for axis in range(x.shape[0]):
         locate(axes, axis, x[axis], count, cell[axis], share[axis])
     if channels == 1 and x.shape[0] == 3 and axes.width.sum() == 6:
-        trilinear(axes, cell, share, count, table, out.ravel())
+        trilinear(axes, cell, share, count, table, numbers)
     elif channels == 1 and x.shape[0] == 3 and axes.width.sum() == 12:
-        tricubic(axes, cell, share, count, table, out.ravel())
+        tricubic(axes, cell, share, count, table, numbers)
     else:
-        weighted(axes, cell, share, count, table, channels, out)
+        weighted(axes, cell, share, count, table, channels, numbers)
 
 
 @loop
 def finished(
     rule: Rule,
     numbers: Array,
+    channels: int,
     mu: Array,
     spectra: Array,
     uniform: Array,
@@ -203,21 +204,29 @@ def finished(
     count: int,
     out: Array,
 ) -> None:
-    """f_r from what was interpolated: numbers of shape (points, channels), out of shape (all points, wavelengths).
+    """f_r at the wavelengths asked for, point after point, from what was interpolated.
 
     `spectra` of shape (channels, L) says how the channels make up L wavelengths, of shape (0, 0) that they are them.
     """
-    channels = numbers.shape[1]
-    factor = np.empty(count)
-    for j in range(count):
-        factor[j] = 1.0
     if rule.power == 0.5:
         for j in range(count):
-            factor[j] = 1.0 / np.sqrt(mu[j])
+            mu[j] = 1.0 / np.sqrt(mu[j])
     elif rule.power == 1.0:
         for j in range(count):
-            factor[j] = 1.0 / mu[j]
-    for m in range(low.size):
+            mu[j] = 1.0 / mu[j]
+    else:
+        for j in range(count):
+            mu[j] = 1.0
+    if channels == 1 and low.size == 1 and spectra.size == 0:
+        if rule.logarithm:
+            for j in range(count):
+                value = exp(numbers[j]) - rule.offset
+                numbers[j] = value if value > 0.0 else 0.0 * value  # nan stays nan
+        for j in range(count):
+            out[start + j] = numbers[j] * mu[j] + uniform[0]
+        return
+    wavelengths = low.size
+    for m in range(wavelengths):
         for side in range(2 if weight[m] > 0.0 else 1):
             w = low[m] + side
             part = weight[m] if side == 1 else 1.0 - weight[m]
@@ -225,12 +234,13 @@ def finished(
                 value = 0.0
                 if spectra.size > 0:
                     for channel in range(channels):
-                        value += numbers[j, channel] * spectra[channel, w]
+                        value += numbers[j * channels + channel] * spectra[channel, w]
                 else:
-                    value = numbers[j, w]
+                    value = numbers[j * channels + w]
                 value = max(exp(value) - rule.offset, 0.0) if rule.logarithm else value
-                value = part * (value * factor[j] + uniform[w])
-                out[start + j, m] = value if side == 0 else out[start + j, m] + value
+                value = part * (value * mu[j] + uniform[w])
+                at = (start + j) * wavelengths + m
+                out[at] = value if side == 0 else out[at] + value
 
 
 @kernel
@@ -252,25 +262,33 @@ def by_angles(
 ) -> bool:
     """f_r of directions by angles [rad] on a grid of light and viewer; False where an angle is not what it may be."""
     x, mu = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK)
-    numbers = np.empty((BLOCK, channels))
+    numbers = np.empty(BLOCK * channels)
     good = True
     for start in range(0, theta_i.size, BLOCK):
         count = min(BLOCK, theta_i.size - start)
-        bad = 0
-        for j in range(count):
-            t_i, t_r, p_i, p_r = theta_i[start + j], theta_r[start + j], phi_i[start + j], phi_r[start + j]
-            bad += t_i < 0.0 or t_i > PI or t_r < 0.0 or t_r > PI or abs(p_i) > PHI_MAX or abs(p_r) > PHI_MAX
-        good = good and bad == 0
         points_of_angles(rule, theta_i, phi_i, theta_r, phi_r, start, count, x, mu)
         interpolated(axes, table, channels, x, count, numbers)
-        finished(rule, numbers, mu, spectra, uniform, low, weight, start, count, out)
+        finished(rule, numbers, channels, mu, spectra, uniform, low, weight, start, count, out)
+        odd = 0
         for j in range(count):
-            t_i, t_r = theta_i[start + j], theta_r[start + j]
-            nan = t_i + t_r + phi_i[start + j] + phi_r[start + j]
-            if t_i > horizon or t_r > horizon or nan != nan:
-                for m in range(low.size):
-                    out[start + j, m] = 0.0 if nan == nan else np.nan
+            t_i, t_r, p_i, p_r = theta_i[start + j], theta_r[start + j], phi_i[start + j], phi_r[start + j]
+            usual = (t_i >= 0.0) & (t_i <= horizon) & (t_r >= 0.0) & (t_r <= horizon)
+            odd += int(not (usual & (abs(p_i) <= PHI_MAX) & (abs(p_r) <= PHI_MAX)))
+        if odd > 0:
+            for j in range(count):
+                t_i, t_r, p_i, p_r = theta_i[start + j], theta_r[start + j], phi_i[start + j], phi_r[start + j]
+                bad = t_i < 0.0 or t_i > PI or t_r < 0.0 or t_r > PI or abs(p_i) > PHI_MAX or abs(p_r) > PHI_MAX
+                good = good and not bad
+                _outside(t_i + t_r + p_i + p_r, t_i > horizon or t_r > horizon, start + j, low.size, out)
     return good
+
+
+@kernel
+def _outside(direction: float, below: bool, point: int, wavelengths: int, out: Array) -> None:
+    """nan where a direction is nan, 0 below the horizon."""
+    if below or direction != direction:
+        for m in range(wavelengths):
+            out[point * wavelengths + m] = np.nan if direction != direction else 0.0
 
 
 @kernel
@@ -289,16 +307,19 @@ def by_vectors(
 ) -> None:
     """f_r of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
     x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((2, BLOCK))
-    numbers = np.empty((BLOCK, channels))
-    points = out.shape[0]
+    numbers = np.empty(BLOCK * channels)
+    points = wi.size // 3
     for start in range(0, points, BLOCK):
         count = min(BLOCK, points - start)
         points_of_vectors(rule, wi, wr, start, count, x, mu, scratch)
         interpolated(axes, table, channels, x, count, numbers)
-        finished(rule, numbers, mu, spectra, uniform, low, weight, start, count, out)
+        finished(rule, numbers, channels, mu, spectra, uniform, low, weight, start, count, out)
         ui, ur = wi[3 * start :], wr[3 * start :]
+        odd = 0
         for j in range(count):
-            nan = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]
-            if ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0 or nan != nan:
-                for m in range(low.size):
-                    out[start + j, m] = 0.0 if nan == nan else np.nan
+            flat = abs(ui[3 * j]) + abs(ui[3 * j + 1]) + abs(ur[3 * j]) + abs(ur[3 * j + 1])
+            odd += int(not ((ui[3 * j + 2] >= 0.0) & (ur[3 * j + 2] >= 0.0) & (flat < PHI_MAX)))
+        if odd > 0:
+            for j in range(count):
+                direction = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]
+                _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, start + j, low.size, out)

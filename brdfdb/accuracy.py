@@ -19,9 +19,10 @@ from brdfdb.sampling import lobe_of, mirrored_in_lobe, mixture_density
 
 BANDS_DEG = np.linspace(0.0, 90.0, 10)  # of theta_i
 FLOOR = 1e-3  # of the Lambertian BRDF with the albedo of the material
-DIRECTIONS = 6000  # of each band
+DIRECTIONS = 6000  # of each band; of more than _FEW wavelengths, each with errors of its own, fewer
+_FEW, _FEWER_DIRECTIONS = 4, 2500
 SEED = 1991
-_WINDOW = 1 << 24  # values of a table that are held at a time
+_WINDOW = 1 << 21  # values of a table that are held at a time
 _MODEL = 1 << 16  # directions at which the model is evaluated at a time
 
 
@@ -91,7 +92,7 @@ def relative(found: Floats, truth: Floats, floor: Floats) -> Floats:
 
 
 def measure(
-    layout: Layout, read: Callable[[slice], NDArray[np.float32]], count: int = DIRECTIONS, seed: int = SEED
+    layout: Layout, read: Callable[[slice], NDArray[np.float32]], count: int | None = None, seed: int = SEED
 ) -> Error:
     """Measure the error of a table.
 
@@ -100,10 +101,9 @@ def measure(
     layout : Layout
         Of the table.
     read : callable
-        Gives some rows of the first axis of the stored array. Tables larger than 16 million values are read piece by
-        piece.
-    count : int
-        Directions a band of theta_i.
+        Gives some rows of the first axis of the stored array. Large tables are read piece by piece.
+    count : int, optional
+        Directions a band of theta_i, by default 6000, or 2500 of more than four wavelengths.
     seed : int
         Of the directions.
 
@@ -112,6 +112,9 @@ def measure(
     Error
         For each band and wavelength, and overall, to three digits.
     """
+    if count is None:
+        several = layout.wavelength_nm is not None and layout.wavelength_nm.size > _FEW
+        count = _FEWER_DIRECTIONS if several else DIRECTIONS
     drawn = draw(layout.material, layout.wavelength_nm, count, seed)
     truth = model_values(layout.material, layout.wavelength_nm, drawn.wi, drawn.wr)
     return compare(_looked_up(layout, read, drawn).reshape(truth.shape), truth, drawn, seed)

@@ -111,7 +111,7 @@ def checked_angles(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi
         np.minimum(t_r.astype(np.float64), HALF_PI),
         p_r.astype(np.float64),
         (t_i > t_i.dtype.type(HALF_PI)) | (t_r > t_r.dtype.type(HALF_PI)),
-        _asked_for(theta_i, phi_i, theta_r, phi_r),
+        asked_for(theta_i, phi_i, theta_r, phi_r),
     )
 
 
@@ -180,7 +180,7 @@ def checked_vectors(wi: ArrayLike, wr: ArrayLike) -> Vectors:
     ValueError
         If an array has no last axis of 3, does not hold numbers, or holds vectors that are not of length 1.
     """
-    return Vectors(_unit_vectors("wi", wi), _unit_vectors("wr", wr), _asked_for(wi, wr))
+    return Vectors(_unit_vectors("wi", wi), _unit_vectors("wr", wr), asked_for(wi, wr))
 
 
 Directions = Angles | Vectors
@@ -202,7 +202,7 @@ def _unit_vectors(name: str, w: ArrayLike) -> Floats:
     return array
 
 
-def _asked_for(*directions: ArrayLike) -> np.dtype[Any]:
+def asked_for(*directions: ArrayLike) -> np.dtype[Any]:
     """float32 if the arrays among the directions are, else float64."""
     arrays = [each for each in directions if isinstance(each, np.ndarray | np.generic)]
     single = bool(arrays) and np.result_type(*arrays) == np.float32

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,43 +102,46 @@ def _cubic_cells(nodes: Array, ends: tuple[str, str]) -> tuple[NDArray[np.int64]
     neighbours. The cell after the last node is never looked up.
     """
     count = nodes.size
+    if count < 3:
+        return np.zeros((count, 4), np.int64), np.zeros((count, 8))
+    (before, x_before), (after, x_after) = (
+        _beyond(nodes, end, low) for end, low in zip(ends, (True, False), strict=True)
+    )
+    x = np.concatenate([[x_before], nodes, [x_after]])
+    index = np.concatenate([[before], np.arange(count), [after]])
     stencil, slopes = np.zeros((count, 4), np.int64), np.zeros((count, 2, 4))
-    for cell in range(count - 1 if count > 2 else 0):
-        around = [_neighbour(nodes, cell + step, ends) for step in (-1, 0, 1, 2)]
-        x = np.array([position for _, position in around])
-        for end in (0, 1):
-            three = np.arange(end, end + 3)
-            if not np.isfinite(x[three]).all():  # an open end: the parabola through the nodes inside
-                three = np.arange(1 - end, 4 - end)
-            slopes[cell, end, three] = (x[2] - x[1]) * _slope(x[three], x[1 + end])
-        stencil[cell] = [at for at, _ in around]
+    for k in range(4):
+        stencil[:-1, k] = index[k : k + count - 1]
+    at_nodes = _slopes(x[:-2], x[1:-1], x[2:], x[1:-1])
+    slopes[:-1, 0, 0:3], slopes[:-1, 1, 1:4] = at_nodes[:-1], at_nodes[1:]
+    if np.isnan(x_before):  # the parabola through the nodes inside; the one outside gets no weight
+        slopes[0, 0] = [0.0, *_slopes(nodes[0], nodes[1], nodes[2], nodes[0])]
+    if np.isnan(x_after):
+        slopes[-2, 1] = [*_slopes(nodes[-3], nodes[-2], nodes[-1], nodes[-1]), 0.0]
+    slopes[:-1] *= np.diff(nodes)[:, np.newaxis, np.newaxis]
     return stencil, slopes.reshape(count, 8)
 
 
-def _neighbour(nodes: Array, at: int, ends: tuple[str, str]) -> tuple[int, float]:
-    """Which node stands at an index that may be one beyond an end, and where; nan where nothing is known."""
+def _beyond(nodes: Array, end: str, low: bool) -> tuple[int, float]:
+    """Which node stands one beyond an end of an axis, and where; nan where nothing is known."""
     last = nodes.size - 1
-    if 0 <= at <= last:
-        return at, float(nodes[at])
-    low = at < 0
-    if ends[0 if low else 1] == "even":
-        inside = 1 if low else last - 1
-        return inside, 2.0 * nodes[0 if low else last] - nodes[inside]
-    if ends[0 if low else 1] == "periodic":
-        inside = last - 1 if low else 1
-        return inside, nodes[inside] + (nodes[0] - nodes[last]) * (1.0 if low else -1.0)
-    return 0 if low else last, np.nan  # such a node gets no weight
+    if end == "even":
+        return (1, 2.0 * nodes[0] - nodes[1]) if low else (last - 1, 2.0 * nodes[last] - nodes[last - 1])
+    if end == "periodic":
+        turn = nodes[last] - nodes[0]
+        return (last - 1, nodes[last - 1] - turn) if low else (1, nodes[1] + turn)
+    return (0 if low else last), np.nan
 
 
-def _slope(x: Array, at: float) -> Array:
-    """The slope at one of three nodes of the parabola through them, as weights of their values."""
-    a, b, c = x
-    return np.array(
+def _slopes(a: Any, b: Any, c: Any, at: Any) -> Array:
+    """The slopes at one of three nodes of the parabolas through them, as weights of their values: shape (..., 3)."""
+    return np.stack(
         [
             (2.0 * at - b - c) / ((a - b) * (a - c)),
             (2.0 * at - a - c) / ((b - a) * (b - c)),
             (2.0 * at - a - b) / ((c - a) * (c - b)),
-        ]
+        ],
+        axis=-1,
     )
 
 
@@ -161,9 +164,8 @@ def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64],
             share[j] = y if y < 1.0 else 1.0
             cell[j] = np.int64(whole)
         return
-    below = np.nextafter(high, low)
     for j in range(count):
-        y = x[j] if x[j] < below else below
+        y = x[j] if x[j] < high else high
         y = y if y > low else low  # nan too
         share[j] = y
         cell[j] = np.int64((y - low) * scale)
@@ -171,8 +173,8 @@ def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64],
     for j in range(count):
         y = share[j]
         c = np.uint64(axes.bucket[buckets + np.uint64(cell[j])])
-        c += np.uint64(y >= axes.nodes[first + c + one])
-        while y >= axes.nodes[first + c + one]:  # of axes with more nodes than buckets
+        c += np.uint64(y > axes.nodes[first + c + one])
+        while y > axes.nodes[first + c + one]:  # of axes with more nodes than buckets
             c += one
         share[j] = (y - axes.nodes[first + c]) * axes.inverse[first + c]
         cell[j] = np.int64(c)
@@ -207,10 +209,11 @@ def trilinear(
         o = np.uint64((cell[0, j] * n_1 + cell[1, j]) * n_2 + cell[2, j])
         t_0, t_1, t_2 = share[0, j], share[1, j], share[2, j]
         p, q, r = o + row, o + layer, o + layer + row
-        a = table[o] + t_2 * (table[o + one] - table[o])
-        b = table[p] + t_2 * (table[p + one] - table[p])
-        c = table[q] + t_2 * (table[q + one] - table[q])
-        d = table[r] + t_2 * (table[r + one] - table[r])
+        s_2 = 1.0 - t_2
+        a = s_2 * table[o] + t_2 * table[o + one]
+        b = s_2 * table[p] + t_2 * table[p + one]
+        c = s_2 * table[q] + t_2 * table[q + one]
+        d = s_2 * table[r] + t_2 * table[r + one]
         a = a + t_1 * (b - a)
         c = c + t_1 * (d - c)
         out[j] = a + t_0 * (c - a)
@@ -253,7 +256,7 @@ def weighted(
 ) -> None:
     """Interpolation on three or four axes of a table with `channels` values a node, of the points that `locate` found.
 
-    `out` is of shape (points, channels).
+    `out` holds the channels of one point after those of another.
     """
     dimensions = axes.counts.size
     at, w = np.zeros((4, 4), np.uint64), np.zeros((4, 4))
@@ -278,10 +281,10 @@ def weighted(
                         if widths[3] == 4:
                             line += w[3, 2] * table[base + at[3, 2]] + w[3, 3] * table[base + at[3, 3]]
                         total += w[0, i] * w[1, k] * w[2, m] * line
-            out[j, 0] = total
+            out[j] = total
             continue
         for channel in range(channels):
-            out[j, channel] = 0.0
+            out[j * channels + channel] = 0.0
         for i in range(widths[0]):
             for k in range(widths[1]):
                 for m in range(widths[2]):
@@ -290,4 +293,4 @@ def weighted(
                         factor = w[0, i] * w[1, k] * w[2, m] * w[3, n]
                         if factor != 0.0:
                             for channel in range(channels):
-                                out[j, channel] += factor * table[base + np.uint64(channel)]
+                                out[j * channels + channel] += factor * table[base + np.uint64(channel)]

@@ -99,7 +99,8 @@ class Layout:
     ------
     ValueError
         If grid or wavelengths do not suit the material: no wavelengths for a spectral one, an isotropic grid for an
-        anisotropic one, a node at 90 degrees where the model has a pole.
+        anisotropic one, an azimuth of 90 or 180 degrees for a surface without the symmetry of an ellipse, a node at 90
+        degrees where the model has a pole.
     """
 
     material: Material
@@ -116,6 +117,8 @@ class Layout:
             raise ValueError(f"wavelengths_nm: {material.name} {'needs them' if material.spectral else 'is grey'}")
         if material.anisotropic and not self.grid.anisotropic:
             raise ValueError(f"grid: {material.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r")
+        if material.anisotropic and material.spec.lobe_axes is None and self.grid.copies > 1:
+            raise ValueError(f"grid: {material.name} has no symmetry of an ellipse; phi must end at 360 degrees")
         if material.spec.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
             raise ValueError(
                 f"grid: theta of 90 degrees is a pole of the model {material.spec.name} ({material.name}); "

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb import _lookup_kernels
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.error import Error, stated
-from brdfdb.geometry import HALF_PI, checked_angles, checked_vectors, finished, radians, unit_vector
+from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, finished, radians, unit_vector
 from brdfdb.grids import KINDS, Axis, Grid
 from brdfdb.interpolation import Axes, prepared
 from brdfdb.layout import PLAIN, Interpolation, Layout
@@ -192,12 +192,12 @@ class Table:
         given = [np.asarray(angle) for angle in (theta_i, phi_i, theta_r, phi_r)]
         if self.grid.half_difference:
             return self._by_half_vectors(given, low, weight, wavelength_shape)
-        dtype = np.result_type(*given)
-        if dtype not in (np.float32, np.float64):
-            dtype = checked_angles(*given).dtype  # numbers of other kinds, or not numbers
+        dtype = asked_for(theta_i, phi_i, theta_r, phi_r)
+        if any(angle.dtype.kind not in "iuf" for angle in given):
+            checked_angles(*given)
         shape = np.broadcast_shapes(*(angle.shape for angle in given))
         flat = [np.ascontiguousarray(np.broadcast_to(angle, shape), dtype=dtype).reshape(-1) for angle in given]
-        values = np.empty((flat[0].size, weight.size), dtype)
+        values = np.empty(flat[0].size * weight.size, dtype)
         horizon = float(dtype.type(HALF_PI))
         if not _lookup_kernels.by_angles(
             *self._kernel, low, weight, flat[0], flat[1], flat[2], flat[3], horizon, values
@@ -235,7 +235,7 @@ class Table:
             np.ascontiguousarray(np.broadcast_to(w, shape), dtype=vectors.dtype).reshape(-1)
             for w in (vectors.w_i, vectors.w_r)
         ]
-        values = np.empty((flat[0].size // 3, weight.size), vectors.dtype)
+        values = np.empty(flat[0].size // 3 * weight.size, vectors.dtype)
         _lookup_kernels.by_vectors(*self._kernel, low, weight, flat[0], flat[1], values)
         return values.reshape(shape[:-1] + wavelength_shape)[()]
 
@@ -260,7 +260,9 @@ class Table:
             some = slice(start, start + _VECTORS)
             theta_i, phi_i, theta_r, phi_r = (angle[some] for angle in flat)
             wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
-            _lookup_kernels.by_vectors(*self._kernel, low, weight, wi.reshape(-1), wr.reshape(-1), values[some])
+            _lookup_kernels.by_vectors(
+                *self._kernel, low, weight, wi.reshape(-1), wr.reshape(-1), values[some].reshape(-1)
+            )
         shape = np.broadcast_shapes(*(angle.shape for angle in given))
         return finished(values.reshape(*shape, weight.size), angles, trailing=1).reshape(shape + tail)[()]
 

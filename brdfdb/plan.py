@@ -121,7 +121,7 @@ def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, toleranc
         layout = _smallest(task._replace(tolerance=stricter * tolerance), candidates)
         finished = None if layout is None else _finished(layout, wavelength_nm, tolerance)
         if finished is not None:
-            return finished
+            return replace(finished, reason=_reason(finished, tolerance, candidates))
     raise ValueError(
         f"tolerance: {tolerance:g} takes more than {MOST_VALUES} values of {material.name}; ask for more error"
     )
@@ -136,6 +136,28 @@ def _smallest(task: _Task, candidates: list[_Candidate]) -> Layout | None:
         if tried[layout.grid.names] <= _TRIED and (best is None or size < best.size):
             best = _refined(task, layout, needs, MOST_VALUES if best is None else best.size) or best
     return best
+
+
+def _reason(layout: Layout, tolerance: float, candidates: list[_Candidate]) -> str:
+    """Why a table is laid out so, in words: what it takes, and what the other grid and the simplest table would."""
+    chosen, nodes = _kind(layout), math.prod(layout.grid.shape)
+    said = [f"for a tolerance of {tolerance:g}, {chosen} takes {nodes} nodes"]
+    ranked = sorted(candidates, key=lambda candidate: candidate[0])
+    simplest = [c for c in ranked if c[1].interpolation.plain and not c[1].interpolation.cubic]
+    others = [c for c in ranked if c[1].grid.names != layout.grid.names][:1] + simplest[:1]
+    for size, other, _ in others:
+        if _kind(other) != chosen:
+            said.append(f"{_kind(other)} {f'about {size:.2g}' if size < MOST_VALUES else f'more than {MOST_VALUES}'}")
+    if layout.spectra is not None:
+        said.append(f"{layout.spectra.shape[1]} wavelengths are made of {len(layout.spectra)} parts")
+    return "; ".join(said)
+
+
+def _kind(layout: Layout) -> str:
+    how = layout.interpolation
+    what = "logarithms" if how.logarithm else "f_r"
+    weight = {0.0: "", 0.5: " times the root of cos cos", 1.0: " times cos cos"}[how.power]
+    return f"{how.method} in {what}{weight} over {', '.join(layout.grid.names)}"
 
 
 def _task(material: Material, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> _Task:
@@ -159,7 +181,7 @@ def _end(material: Material, name: str) -> float:
     """Where an axis ends [degree], of which symmetry leaves out what it may."""
     elliptical = material.spec.lobe_axes is not None
     if name in ("phi_i", "phi_h"):
-        return 90.0 if elliptical else 180.0 if name == "phi_h" else 360.0
+        return 90.0 if elliptical else 360.0
     if name == "phi_d" and material.anisotropic:
         return 180.0
     return _LINE[name][0]
@@ -371,7 +393,8 @@ def _finished(layout: Layout, wavelength_nm: NDArray[np.float64] | None, toleran
         rows = whole.reshape(-1, wavelength_nm.size).astype(np.float64)
         floor = accuracy.floor_of(truth, drawn)
         significance = np.max(np.minimum(np.exp(rows) / floor, 1.0), axis=1, keepdims=True)
-        basis = np.linalg.svd((rows * significance)[:: max(1, len(rows) // 20_000)], full_matrices=False)[2]
+        seen = rows * significance
+        basis = np.linalg.eigh(seen.T @ seen).eigenvectors[:, ::-1].T  # the spectra that say most come first
         for parts in range(1, wavelength_nm.size // 2 + 1):
             factored = replace(layout, spectra=basis[:parts])
             values = (rows @ basis[:parts].T).astype(np.float32).reshape(factored.shape)

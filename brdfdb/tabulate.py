@@ -184,6 +184,8 @@ def frame(layout: Layout) -> xr.Dataset:
         for name, meaning in (("n", "refractive index"), ("k", "extinction coefficient")):
             variables[name] = ("wavelength", arguments[name], {"units": "1", "long_name": meaning})
     if layout.spectra is not None:
+        parts = np.arange(float(len(layout.spectra)))
+        coordinates["part"] = ("part", parts, {"units": "1", "long_name": "number of a part"})
         variables["spectra"] = (("part", "wavelength"), layout.spectra, VARIABLES["spectra"])
     if layout.uniform is not None:
         variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])

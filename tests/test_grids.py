@@ -33,7 +33,7 @@ ANISOTROPIC = {"theta_i": [0, 80], "phi_i": [0, 120, 240, 360], "theta_r": [0, 1
         ("delta_phi", [-180, 180], "delta_phi: starts at -180 degrees, must start at 0"),
         ("delta_phi", [0, 90], "delta_phi: ends at 90 degrees, must end at 180"),
         ("delta_phi", [0, 360], "delta_phi: ends at 360 degrees, must end at 180"),
-        ("phi_i", [0, 180], "phi_i: ends at 180 degrees, must end at 360"),
+        ("phi_i", [0, 120], "phi_i: ends at 120 degrees, must end at 360 or 180 or 90"),
         ("phi_r", [0, 355], "phi_r: ends at 355 degrees, must end at 360"),
         ("theta_i", [0, 90.5], "theta_i: ends at 90.5 degrees, must end at or below 90"),
         ("theta_r", [0, np.nextafter(90, 91)], "theta_r: ends at 90 degrees, must end at or below 90"),
@@ -42,7 +42,7 @@ ANISOTROPIC = {"theta_i": [0, 80], "phi_i": [0, 120, 240, 360], "theta_r": [0, 1
 )
 def test_an_axis_that_cannot_be_is_refused_in_one_sentence(name: str, nodes: Any, sentence: str) -> None:
     with pytest.raises(ValueError, match=f"^{re.escape(sentence)}$"):
-        check_axis(name, nodes)
+        Grid({**(ANISOTROPIC if name.startswith("phi") else ISOTROPIC), name: nodes})
 
 
 @pytest.mark.parametrize("axes", [ISOTROPIC, ANISOTROPIC])
@@ -59,12 +59,12 @@ def test_a_grid_reports_the_sentence_of_the_axis_that_is_wrong(axes: dict[str, l
         ("theta_i", "theta_r"),
         ("theta_r", "theta_i", "delta_phi"),
         ("theta_i", "theta_r", "phi_i", "phi_r"),
-        (*ISOTROPIC_AXES, "wavelength"),
+        (*ISOTROPIC, "wavelength"),
         ("theta_i", "phi_i", "theta_r", "delta_phi"),
     ],
 )
 def test_other_sets_or_orders_of_axes_are_refused(names: tuple[str, ...]) -> None:
-    sentence = f"grid axes: {names} is neither {ISOTROPIC_AXES} nor {ANISOTROPIC_AXES}"
+    sentence = f"grid axes: {names} is none of {', '.join(map(str, KINDS))}"
     with pytest.raises(ValueError, match=f"^{re.escape(sentence)}$"):
         Grid({name: [0, 180] for name in names})
 
@@ -75,8 +75,8 @@ def test_a_grid_says_what_it_is() -> None:
     assert anisotropic.anisotropic
     assert isotropic.shape == (3, 2, 4)
     assert anisotropic.shape == (2, 4, 3, 3)
-    assert tuple(isotropic.axes) == ISOTROPIC_AXES
-    assert tuple(anisotropic.axes) == ANISOTROPIC_AXES
+    assert tuple(isotropic.axes) == tuple(ISOTROPIC)
+    assert tuple(anisotropic.axes) == tuple(ANISOTROPIC)
     assert all(nodes.dtype == np.float64 for nodes in isotropic.axes.values())
     assert isotropic.axes["delta_phi"].tolist() == [0.0, 7.0, 90.0, 180.0]
 
@@ -114,3 +114,38 @@ def test_wavelengths_that_cannot_be_are_refused(wavelengths: Any) -> None:
 def test_wavelengths_are_taken_as_they_are() -> None:
     assert check_wavelengths([500]).tolist() == [500.0]
     assert check_wavelengths((380.5, 400, 2000)).dtype == np.float64
+
+
+HALF = {"theta_h": [0, 5, 90], "theta_d": [0, 45, 90], "phi_d": [0, 45, 90]}
+TURNED_HALF = {"theta_h": [0, 5, 90], "phi_h": [0, 45, 90], "theta_d": [0, 90], "phi_d": [0, 90, 180]}
+
+
+def test_grids_of_half_and_difference_vectors_say_what_they_are() -> None:
+    isotropic, anisotropic = Grid(HALF), Grid(TURNED_HALF)
+    assert (isotropic.half_difference, isotropic.anisotropic, isotropic.copies) == (True, False, 1)
+    assert (anisotropic.half_difference, anisotropic.anisotropic, anisotropic.copies) == (True, True, 4)
+    assert not isotropic.reciprocal  # not its own transpose: reciprocity is in the angles
+    assert isotropic.symmetries[-1] == anisotropic.symmetries[-1] == "brdf(theta_i, theta_r) = brdf(theta_r, theta_i)"
+    assert len(anisotropic.symmetries) == 3
+    assert not Grid(HALF).reaches_horizon
+    assert Grid(TURNED_HALF | {"phi_h": [0, 90, 180]}).copies == 2
+    assert Grid(ANISOTROPIC | {"phi_i": [0, 180]}).copies == 2
+    assert Grid(ANISOTROPIC).copies == 1
+
+
+@pytest.mark.parametrize(("name", "nodes"), [("phi_d", [0, 180]), ("phi_d", [0, 45]), ("theta_h", [1, 90])])
+def test_an_axis_of_half_and_difference_vectors_ends_where_symmetry_takes_over(name: str, nodes: list[float]) -> None:
+    with pytest.raises(ValueError, match=rf"^{name}: (starts|ends) at \d+ degrees, must"):
+        Grid(HALF | {name: nodes})
+
+
+@pytest.mark.parametrize("axes", [ISOTROPIC, ANISOTROPIC, HALF, TURNED_HALF])
+def test_directions_of_some_rows_are_those_of_the_whole_grid(axes: dict[str, list[float]]) -> None:
+    grid = Grid(axes)
+    whole, some = grid.directions(), grid.directions(slice(1, 2))
+    for all_rows, row in zip(whole, some, strict=True):
+        expected = np.broadcast_to(all_rows, grid.shape)[1:2]
+        np.testing.assert_array_equal(np.broadcast_to(row, expected.shape), expected)
+    part = Grid.part(grid, slice(1, 2))
+    assert part.shape == (1, *grid.shape[1:])
+    assert part.ends == grid.ends

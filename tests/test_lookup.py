@@ -45,7 +45,7 @@ def made_up(kind: str, wavelengths: NDArray[np.float64] | None = None, *, dirac:
         brdf[:, -1] = brdf[:, 0]
         brdf[:, :, :, -1] = brdf[:, :, :, 0]
     specular = rng.uniform(0.0, 1.0, (axes["theta_i"].size, *spectral)).astype(np.float32) if dirac else None
-    return Table("random", "r000001", {}, axes, wavelengths, brdf, specular)
+    return Table("random", "r000001", {}, Grid(axes), wavelengths, brdf, specular)
 
 
 def directions(table: Table, *nodes: Any) -> tuple[Any, ...]:
@@ -368,7 +368,7 @@ def test_the_two_kinds_of_table_of_one_material_agree() -> None:
     tables = []
     for grid in (iso, aniso):
         dataset = tabulate(Layout(plaster, grid))
-        tables.append(Table("plaster", "r000001", dataset.attrs, grid.axes, None, dataset["brdf"].values, None))
+        tables.append(Table("plaster", "r000001", dataset.attrs, grid, None, dataset["brdf"].values, None))
     assert [table.anisotropic for table in tables] == [False, True]
     theta_i, _, theta_r, phi_r = random_directions(300)
     # with the light on a node the two interpolate between the same values, but for their rounding to float32

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import errno
-import fcntl
 import hashlib
 import json
-import os
 import shutil
-import signal
-import subprocess
-import sys
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,14 +15,15 @@ import xarray as xr
 import zarr
 
 import brdfdb
+from brdfdb import chunks
 from brdfdb import store as module
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout
 from brdfdb.materials import Material
-from brdfdb.store import Build, Store, StoreError, UnknownMaterialError
+from brdfdb.staging import publish_dataset
+from brdfdb.store import Store, StoreError, UnknownMaterialError
 from brdfdb.tabulate import tabulate
 
-RECIPE = {"title": "Größe", "wavelengths_nm": [500.0]}
 GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
 COPPER = {
     "title": "Rakić's copper",
@@ -51,9 +45,8 @@ def copper() -> xr.Dataset:
 
 
 def publish(root: Path, **tables: xr.Dataset) -> list[str]:
-    """One build of one revision a table; returns the revisions."""
-    with Build(root, RECIPE) as build:
-        return [build.publish(name, dataset)[0] for name, dataset in tables.items()]
+    """One revision a table; returns the revisions."""
+    return [publish_dataset(root, name, dataset)[0] for name, dataset in tables.items()]
 
 
 def rho(store: Store, name: str = "white") -> float:
@@ -93,8 +86,7 @@ def test_a_second_build_leaves_every_byte_of_the_first_revision_alone(root: Path
 
 
 def test_the_manifest_holds_size_and_digest_of_every_file_and_the_pointer_that_of_the_manifest(root: Path) -> None:
-    with Build(root, RECIPE) as build:
-        revision, stored = build.publish("copper", copper())
+    revision, stored = publish_dataset(root, "copper", copper())
     group = root / "materials" / "copper" / revision
     files = json.loads((group.parent / f"{revision}.MANIFEST.json").read_bytes())["files"]
     assert files == {
@@ -103,11 +95,11 @@ def test_the_manifest_holds_size_and_digest_of_every_file_and_the_pointer_that_o
     assert stored == sum(len(data) for data in contents(group).values())
     head = json.loads(pointer(root, "copper").read_bytes())
     manifest = (group.parent / f"{revision}.MANIFEST.json").read_bytes()
-    assert head == {"revision": revision, "manifest_sha256": hashlib.sha256(manifest).hexdigest()}
+    assert (head["revision"], head["manifest_sha256"]) == (revision, hashlib.sha256(manifest).hexdigest())
 
 
 def test_nothing_is_left_of_a_build_that_went_well(root: Path) -> None:
-    assert [path.name for path in (root / ".staging").iterdir()] == ["lock"]
+    assert not list((root / ".staging").iterdir())
     assert sorted(path.name for path in root.iterdir()) == [".staging", "brdfdb.json", "materials"]
     assert sorted(path.name for path in (root / "materials" / "white").iterdir()) == [
         "HEAD.json",
@@ -143,7 +135,7 @@ def test_a_table_is_what_was_published(root: Path) -> None:
         name: nodes.tolist() for name, nodes in GRID.axes.items()
     }
     assert list(table.axes_deg) == list(GRID.axes)
-    assert dict(table.attrs) == {**dataset.attrs, "recipe": RECIPE}
+    assert dict(table.attrs) == dataset.attrs
 
 
 def test_an_open_store_serves_the_new_head_and_the_old_table_stays_whole(root: Path) -> None:
@@ -157,16 +149,16 @@ def test_an_open_store_serves_the_new_head_and_the_old_table_stays_whole(root: P
 
 def test_a_table_never_mixes_two_revisions(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = brdfdb.open(root)
-    read = module._read_json
+    read = module.json_object
     waiting = [lambert(0.75)]
 
-    def overtaken(path: Path) -> dict[str, Any]:
-        content = read(path)
+    def overtaken(path: Path, data: bytes) -> dict[str, Any]:
+        content = read(path, data)
         if path.name == "HEAD.json" and waiting:  # another process publishes while we read
             publish(root, white=waiting.pop())
         return content
 
-    monkeypatch.setattr(module, "_read_json", overtaken)
+    monkeypatch.setattr(module, "json_object", overtaken)
     table = store["white"]
     assert not waiting
     assert (table.revision, float(table.brdf[0, 0, 0])) == ("r000001", np.float32(0.25 / np.pi))
@@ -196,16 +188,15 @@ def test_xarray_reads_a_revision_without_a_warning(root: Path, keywords: dict[st
     dataset = copper()
     publish(root, copper=dataset)
     with xr.open_zarr(brdfdb.open(root).path("copper"), **keywords) as found:
-        xr.testing.assert_identical(found.load(), dataset.assign_attrs(recipe=RECIPE))
+        xr.testing.assert_identical(found.load(), dataset)
         assert found["brdf"].dtype == np.float32
         assert found["theta_i"].attrs["units"] == "degree"
         assert found.attrs["parameters"] == {"sigma_0_um": 0.1, "tau_um": 2.0, "a": 0.0}
-        assert found.attrs["recipe"] == RECIPE
 
 
 def test_the_store_hands_out_the_same_dataset(root: Path) -> None:
     with brdfdb.open(root).dataset("white") as found:
-        xr.testing.assert_identical(found.load(), lambert(0.25).assign_attrs(recipe=RECIPE))
+        xr.testing.assert_identical(found.load(), lambert(0.25))
 
 
 def test_a_revision_copied_elsewhere_is_a_whole_zarr_group(root: Path, tmp_path: Path) -> None:
@@ -216,7 +207,7 @@ def test_a_revision_copied_elsewhere_is_a_whole_zarr_group(root: Path, tmp_path:
     group = zarr.open_group(tmp_path / "copy", mode="r")
     assert sorted(group.array_keys()) == sorted(map(str, dataset.variables))
     with xr.open_zarr(tmp_path / "copy") as found:
-        xr.testing.assert_identical(found.load(), dataset.assign_attrs(recipe=RECIPE))
+        xr.testing.assert_identical(found.load(), dataset)
 
 
 def test_every_array_has_a_checksum_and_reads_as_nan_where_it_is_missing(root: Path) -> None:
@@ -253,7 +244,7 @@ def test_chunks_of_one_value_are_written_like_all_others(root: Path, value: floa
 
 
 @pytest.mark.parametrize(
-    ("shape", "chunks"),
+    ("shape", "expected"),
     [
         ((5,), (5,)),
         ((91, 91, 181), (63, 91, 181)),
@@ -262,21 +253,21 @@ def test_chunks_of_one_value_are_written_like_all_others(root: Path, value: floa
         ((1, 1, 1, 1), (1, 1, 1, 1)),
     ],
 )
-def test_chunks_are_whole_rows_of_about_four_megabytes(shape: tuple[int, ...], chunks: tuple[int, ...]) -> None:
-    assert module._chunks(shape) == chunks
+def test_chunks_are_whole_rows_of_about_four_megabytes(shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    assert chunks._chunks(shape) == expected
 
 
 def test_a_table_of_many_chunks_is_read_back_and_each_of_them_matters(
     root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "_CHUNK_VALUES", 18)
+    monkeypatch.setattr(chunks, "_CHUNK_VALUES", 18)
     dataset = copper()
     publish(root, copper=dataset)
     store = brdfdb.open(root)
-    chunks = sorted(path for path in (store.path("copper") / "brdf" / "c").rglob("*") if path.is_file())
-    assert len(chunks) == 4
+    files = sorted(path for path in (store.path("copper") / "brdf" / "c").rglob("*") if path.is_file())
+    assert len(files) == 4
     np.testing.assert_array_equal(store["copper"].brdf, dataset["brdf"].values)
-    for chunk in chunks:
+    for chunk in files:
         data = chunk.read_bytes()
         chunk.unlink()
         with pytest.raises(StoreError, match="is missing"):
@@ -393,8 +384,8 @@ def test_a_store_of_another_format_is_neither_read_nor_written(tmp_path: Path, m
     (tmp_path / "brdfdb.json").write_text(marker)
     with pytest.raises(StoreError, match=r"brdfdb\.json"):
         brdfdb.open(tmp_path)
-    with pytest.raises(StoreError, match=r"brdfdb\.json"), Build(tmp_path, RECIPE):
-        pytest.fail("entered")
+    with pytest.raises(StoreError, match=r"brdfdb\.json"):
+        publish(tmp_path, white=lambert(0.5))
     assert contents(tmp_path) == {"brdfdb.json": marker.encode()}
 
 
@@ -402,29 +393,6 @@ def test_another_version_is_named(tmp_path: Path) -> None:
     (tmp_path / "brdfdb.json").write_text('{"format": "brdfdb", "version": 2}')
     with pytest.raises(StoreError, match=r"says format brdfdb version 2, this program reads brdfdb version 1$"):
         brdfdb.open(tmp_path)
-
-
-@pytest.mark.parametrize("name", ["thesis.tex", ".git", "materials", "HEAD.json"])
-def test_a_directory_of_something_else_is_not_touched(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_text("precious")
-    with (
-        pytest.raises(StoreError, match=f"^{tmp_path} is not empty and not a store; name an empty or a new directory$"),
-        Build(tmp_path, RECIPE),
-    ):
-        pytest.fail("entered")
-    assert contents(tmp_path) == {name: b"precious"}
-
-
-def test_an_empty_directory_becomes_a_store(tmp_path: Path) -> None:
-    assert publish(tmp_path, white=lambert(0.5)) == ["r000001"]
-    assert json.loads((tmp_path / "brdfdb.json").read_bytes()) == {"format": "brdfdb", "version": 1}
-
-
-def test_what_a_build_that_was_killed_at_once_left_behind_becomes_a_store(tmp_path: Path) -> None:
-    (tmp_path / ".brdfdb.json.0123456789abcdef").write_text("{")
-    assert publish(tmp_path, white=lambert(0.5)) == ["r000001"]
-    shutil.rmtree(tmp_path / "materials")  # killed right after the marker
-    assert publish(tmp_path, white=lambert(0.5)) == ["r000001"]
 
 
 @pytest.mark.parametrize("name", ["whit", "../x", "../materials/white", "white/", "white/r000001", ".", "..", "", "/"])
@@ -448,184 +416,3 @@ def test_an_unknown_name_comes_with_the_closest_ones(root: Path) -> None:
     with pytest.raises(UnknownMaterialError) as caught:
         brdfdb.open(root)["zzz"]
     assert str(caught.value) == "no material 'zzz' in the store"
-
-
-# Builds that fail
-
-
-@pytest.mark.parametrize("below", ["file/store", "file"])
-def test_a_root_that_cannot_be_made_is_one_sentence(tmp_path: Path, below: str) -> None:
-    (tmp_path / "file").write_text("precious")
-    where = tmp_path / below
-    with pytest.raises(StoreError, match=f"^cannot write a store at {where}: "), Build(where, RECIPE):
-        pytest.fail("entered")
-    assert contents(tmp_path) == {"file": b"precious"}
-
-
-@pytest.mark.parametrize("call", ["replace", "rename", "fsync"])
-@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), OSError("the disk is gone")])
-def test_a_build_that_cannot_write_leaves_the_old_revision_served(
-    root: Path, monkeypatch: pytest.MonkeyPatch, call: str, error: OSError
-) -> None:
-    def fail(*_: Any) -> None:
-        raise error
-
-    with monkeypatch.context() as patch, Build(root, RECIPE) as build:
-        patch.setattr(os, call, fail)
-        with pytest.raises(StoreError) as caught:
-            build.publish("white", lambert(0.75))
-    assert str(caught.value) == f"cannot write white to the store at {root}: {error.strerror or error}"
-    store = brdfdb.open(root)
-    store.verify("white")
-    assert (rho(store), store.head("white")) == (0.25, "r000001")
-    assert not list(root.rglob(".HEAD*"))
-    assert [path.name for path in (root / ".staging").iterdir()] == ["lock"]
-    publish(root, white=lambert(0.75))
-    assert rho(store) == 0.75
-
-
-def test_a_store_that_cannot_be_made_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: Any) -> None:
-        raise OSError(errno.EROFS, "Read-only file system")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", fail)
-        sentence = f"^cannot write a store at {tmp_path / 'new'}: Read-only file system$"
-        with pytest.raises(StoreError, match=sentence), Build(tmp_path / "new", RECIPE):
-            pytest.fail("entered")
-    assert contents(tmp_path) == {}
-
-
-def test_an_error_inside_a_build_passes_and_leaves_nothing_behind(root: Path) -> None:
-    def fail() -> None:
-        with Build(root, RECIPE) as build:
-            build.publish("black", lambert(0.0))
-            raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        fail()
-    assert [path.name for path in (root / ".staging").iterdir()] == ["lock"]
-    assert list(brdfdb.open(root)) == ["black", "white"]
-
-
-KILLED = """
-import os, signal, sys
-import numpy as np
-import xarray as xr
-from brdfdb import store
-
-def die(*_):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-root, step = sys.argv[1:]
-with store.Build(root, {}) as build:
-    setattr(store, step, die)
-    build.publish("white", xr.Dataset({"brdf": (("theta_i", "theta_r"), np.full((2, 2), 9.0, dtype=np.float32))}))
-"""
-
-
-@pytest.mark.parametrize("step", ["_consolidate", "_move_in", "_manifest_of", "_swap_json"])
-def test_a_killed_build_changes_nothing_for_readers_and_the_next_one_sweeps(root: Path, step: str) -> None:
-    done = subprocess.run([sys.executable, "-c", KILLED, root, step], capture_output=True, text=True, check=False)
-    assert done.returncode == -signal.SIGKILL, done.stderr
-    store = brdfdb.open(root)
-    store.verify("white")
-    assert (rho(store), store.head("white"), list(store)) == (0.25, "r000001", ["white"])
-    left = [path for path in (root / ".staging").iterdir() if path.is_dir()]
-    assert len(left) == 1
-    before = contents(root / "materials")
-    (revision,) = publish(root, white=lambert(0.75))
-    assert revision == ("r000002" if step in ("_consolidate", "_move_in") else "r000003")
-    assert [path.name for path in (root / ".staging").iterdir()] == ["lock"]
-    after = contents(root / "materials")
-    assert {name: after[name] for name in before if not name.endswith("HEAD.json")} == {
-        name: data for name, data in before.items() if not name.endswith("HEAD.json")
-    }
-    assert (rho(store), store.head("white")) == (0.75, revision)
-
-
-# Builds side by side
-
-
-def test_the_staging_of_a_build_at_work_is_not_swept(root: Path) -> None:
-    dead = root / ".staging" / "0123456789abcdef"
-    locked = root / ".staging" / "fedcba9876543210"
-    for directory in (dead, locked):
-        (directory / "white").mkdir(parents=True)
-    with (locked / "lock").open("w") as held:
-        fcntl.flock(held, fcntl.LOCK_EX)
-        with Build(root, RECIPE) as first, Build(root, RECIPE) as second:
-            live = {locked, first._staging, second._staging}
-            assert {path for path in (root / ".staging").iterdir() if path.is_dir()} == live
-            assert second.publish("white", lambert(0.5))[0] == "r000002"
-            assert first.publish("white", lambert(0.75))[0] == "r000003"
-        assert [path for path in (root / ".staging").iterdir() if path.is_dir()] == [locked]
-    assert not dead.exists()
-    assert rho(brdfdb.open(root)) == 0.75
-
-
-def test_builds_that_start_at_the_same_moment_make_one_store(tmp_path: Path) -> None:
-    errors: list[BaseException] = []
-    for attempt in range(20):
-        barrier = threading.Barrier(4)
-
-        def start(root: Path = tmp_path / str(attempt), barrier: threading.Barrier = barrier) -> None:
-            barrier.wait()
-            try:
-                for _ in range(3):
-                    with Build(root, RECIPE) as build:
-                        assert (build._staging / "recipe.json").is_file()
-            except BaseException as error:
-                errors.append(error)
-
-        threads = [threading.Thread(target=start) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert not errors
-    assert all(len(brdfdb.open(tmp_path / str(attempt))) == 0 for attempt in range(20))
-
-
-PUBLISHER = """
-import sys, time
-from pathlib import Path
-import numpy as np
-import xarray as xr
-from brdfdb.store import Build
-
-root, me = Path(sys.argv[1]), sys.argv[2]
-value = np.full((2, 2), float(me), dtype=np.float32)
-dataset = xr.Dataset({"brdf": (("theta_i", "theta_r"), value)}, {"theta_i": [0.0, 80.0], "theta_r": [0.0, 80.0]})
-root.with_name(me).touch()
-while not (root.with_name("1").exists() and root.with_name("2").exists()):
-    time.sleep(0.001)
-for _ in range(5):
-    with Build(root, {"by": me}) as build:
-        print(build.publish("white", dataset)[0])
-"""
-
-
-def test_two_processes_build_into_one_new_store_and_none_loses_a_revision(tmp_path: Path) -> None:
-    root = tmp_path / "store"
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-c", PUBLISHER, root, me], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        for me in ("1", "2")
-    ]
-    outputs = [process.communicate(timeout=60) for process in processes]
-    assert [process.returncode for process in processes] == [0, 0], outputs
-    published = [(me, name) for me, (out, _) in zip("12", outputs, strict=True) for name in out.split()]
-    assert sorted(name for _, name in published) == [f"r{number:06d}" for number in range(1, 11)]
-    for me, name in published:
-        group = root / "materials" / "white" / name
-        manifest = (group.parent / f"{name}.MANIFEST.json").read_bytes()
-        module.check_manifest(group, hashlib.sha256(manifest).hexdigest(), contents=True)
-        with xr.open_zarr(group) as found:
-            assert found["brdf"].values.tolist() == [[float(me)] * 2] * 2
-            assert found.attrs["recipe"] == {"by": me}
-    store = brdfdb.open(root)
-    store.verify("white")
-    assert store.head("white") in {"r000009", "r000010"}
-    assert [path.name for path in (root / ".staging").iterdir()] == ["lock"]

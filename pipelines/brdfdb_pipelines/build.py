@@ -1,30 +1,148 @@
-"""The build job: tabulate what a recipe asks for, on a pool of workers, and publish each table when it is whole."""
+"""The build job: the tables of a recipe, block by block on workers; what is there already is not computed again."""
 
 from __future__ import annotations
 
+import json
 import time
+from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from brdfdb.store import Build
-from brdfdb.tabulate import tabulate
-from brdfdb_pipelines import terminal
+from brdfdb.layout import Layout
+from brdfdb.manifest import Entry, StoreError
+from brdfdb.revisions import Standing, standing
+from brdfdb.staging import (
+    Block,
+    BusyError,
+    Lock,
+    discard,
+    make_store,
+    planned,
+    point_to,
+    prepare,
+    publish,
+    summary_of,
+    write_block,
+    write_frame,
+    writing,
+)
+from brdfdb_pipelines import terminal, workers
 from brdfdb_pipelines.recipe import Job, Recipe, load
+from brdfdb_pipelines.report import Bars, Event, Lines, Tally
+from brdfdb_pipelines.workers import Workers
+
+_POLL_S = 0.1  # between looks at a lock that another build holds
+_TASK_BYTES = 16_000_000  # that a task takes, whatever its block: intermediates of the kernel
+_VALUE_BYTES = 16  # and for each value of its block: float32, zarr's copy, the encoded bytes and theirs
 
 
 @dataclass(frozen=True)
 class Built:
-    """What became of one job."""
+    """What became of one job.
+
+    Attributes
+    ----------
+    job : Job
+        What was asked for.
+    state : str
+        "published", "adopted" (a revision that was there is current again) or "unchanged".
+    revision : str
+        The current one.
+    stored_bytes : int
+        Of that revision.
+    why : str
+        Why it was not left alone, in a phrase; empty for "unchanged".
+    shape : tuple of int
+        Of the table; empty unless it was computed.
+    """
 
     job: Job
+    state: str
     revision: str
     stored_bytes: int
+    why: str = ""
+    shape: tuple[int, ...] = ()
 
 
-def build(recipe: Recipe, root: Path, executor: Executor, progress: Callable[[int], None]) -> list[Built]:
-    """Build every table of a recipe.
+@dataclass(frozen=True)
+class Survey:
+    """What a look at the store, and the planner, say about a job: how it stands, and the layout that is missing."""
+
+    standing: Standing
+    head: str
+    layout: str = ""
+    shape: tuple[int, ...] = ()
+    block_values: tuple[int, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Values to compute."""
+        return sum(self.block_values)
+
+    @property
+    def task_bytes(self) -> int:
+        """Memory that a task takes."""
+        return _TASK_BYTES + _VALUE_BYTES * max(self.block_values, default=0)
+
+
+def survey(root: str, job: Job) -> Survey:
+    """Look at what the store has for a job, and lay out what is missing: a task for a worker."""
+    store, name, request = Path(root), job.material.name, job.request
+    head = _head(store, name)
+    found = standing(store, name, request)
+    if found.state != "missing":
+        return Survey(found, head)
+    text = planned(store, name, request)
+    if text is None:
+        text = json.dumps(job.layout().document())
+        try:
+            with Lock(store, name, wait=False):
+                prepare(store, name, request, text)
+        except BusyError:
+            pass  # another build is at it, and most likely does all there is to do
+    layout = Layout.from_document(json.loads(text))
+    rest = layout.size // layout.shape[0]
+    values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
+    return Survey(found, head, text, tuple(layout.shape), values)
+
+
+def _head(root: Path, name: str) -> str:
+    try:
+        return (root / "materials" / name / "HEAD.json").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
+@dataclass(eq=False)
+class _Table:
+    """A table in progress."""
+
+    job: Job
+    survey: Survey
+    lock: Lock
+    staging: Path = Path()
+    blocks: deque[int] = field(default_factory=deque)  # not submitted yet
+    files: dict[str, Entry] = field(default_factory=dict)
+    told: bool = False  # that another build holds the lock
+
+    @property
+    def name(self) -> str:
+        return self.job.material.name
+
+
+def build(
+    recipe: Recipe,
+    root: Path,
+    at: Workers | Executor,
+    report: Callable[[Event], None] = lambda _: None,
+    *,
+    memory: int | None = None,
+) -> list[Built]:
+    """Build what is missing of the tables of a recipe.
 
     Parameters
     ----------
@@ -32,10 +150,12 @@ def build(recipe: Recipe, root: Path, executor: Executor, progress: Callable[[in
         What to build.
     root : Path
         Directory of the store; made if it does not exist.
-    executor : Executor
-        Where tables are computed and written, one task a table. Kernels hold no lock of the interpreter.
-    progress : callable
-        Called from the workers with the number of values just computed.
+    at : Workers or Executor
+        Where tasks run: threads, processes or machines that see `root` under the same path.
+    report : callable
+        Called with every event, as the README lists them.
+    memory : int, optional
+        Bytes that all tasks together may take.
 
     Returns
     -------
@@ -46,56 +166,293 @@ def build(recipe: Recipe, root: Path, executor: Executor, progress: Callable[[in
     ------
     RecipeError
         Before anything is written, if the recipe cannot be built.
+    ValueError
+        If a single block does not fit into `memory`.
     StoreError
-        If the store cannot be written. Revisions published so far stay; the others keep their old pointer.
+        If the store cannot be written. What was published stays, and so does every block that is whole: the next build
+        of the same recipe goes on from there. Any other error of a table lets the others be built first.
     """
     jobs = recipe.jobs()
-    with Build(root, recipe.model_dump(mode="json")) as target:
+    make_store(root)
+    return _Builder(jobs, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory).run()
 
-        def run(job: Job) -> Built:
-            dataset = tabulate(job.layout())
-            progress(dataset["brdf"].size)
-            return Built(job, *target.publish(job.material.name, dataset))
 
-        # the largest first: the last worker then has little left to do
-        ordered = sorted(jobs, key=lambda job: job.layout().size, reverse=True)
-        futures: dict[Future[Built], Job] = {executor.submit(run, job): job for job in ordered}
-        built: dict[str, Built] = {}
+class _Builder:
+    def __init__(
+        self, jobs: list[Job], root: Path, at: Workers, report: Callable[[Event], None], memory: int | None
+    ) -> None:
+        self.jobs, self.root, self.at, self.report, self.memory = jobs, root, at, report, memory
+        self.task_bytes = _TASK_BYTES
+        self.running: dict[Future[Any], Callable[[Future[Any]], None]] = {}
+        self.surveys: dict[str, Survey] = {}
+        self.waiting: deque[_Table] = deque()  # not begun
+        self.open: list[_Table] = []
+        self.ready: deque[_Table] = deque()  # all blocks are there
+        self.built: dict[str, Built] = {}
+        self.error: Exception | None = None
+        self.tally = Tally(0)
+
+    def run(self) -> list[Built]:
+        """Survey, tabulate, publish; in the order of the recipe what became of each job."""
+        start = time.perf_counter()
+        self.report({"event": "start", "tables": len(self.jobs), "store": str(self.root)})
         try:
-            for future in as_completed(futures):
-                done = future.result()
-                built[done.job.material.name] = done
-        except BaseException:
-            for future in futures:
-                future.cancel()
-            executor.shutdown(wait=True, cancel_futures=True)
-            raise
-    return [built[job.material.name] for job in jobs]
+            self._survey()
+            self._tabulate()
+        finally:
+            self._leave()
+        if self.error is not None:
+            raise self.error
+        built = [self.built[job.material.name] for job in self.jobs]
+        states = [b.state for b in built]
+        self.report(
+            {
+                "event": "done",
+                "tables": len(built),
+                **{state: states.count(state) for state in ("published", "adopted", "unchanged")},
+                "bytes": sum(b.stored_bytes for b in built),
+                "seconds": round(time.perf_counter() - start, 3),
+            }
+        )
+        return built
+
+    def _submit(self, then: Callable[[Future[Any]], None], task: Callable[..., Any], *arguments: Any) -> None:
+        self.running[self.at.executor.submit(task, *arguments)] = then
+
+    @property
+    def _room(self) -> bool:
+        most = 2 * self.at.slots()  # a worker that is done finds the next task waiting
+        if self.memory is not None:
+            most = min(most, self.memory // self.task_bytes)
+        return len(self.running) < max(1, most)
+
+    def _wait(self) -> None:
+        done, _ = wait(self.running, return_when=FIRST_COMPLETED)
+        for future in done:
+            self.running.pop(future)(future)
+
+    def _leave(self) -> None:
+        """Begin nothing more, let what runs come to its end, and give the locks back; what is staged stays."""
+        for future in self.running:
+            future.cancel()
+        wait(self.running)
+        for table in self.open:
+            table.lock.__exit__(None, None, None)
+
+    # Survey
+
+    def _survey(self) -> None:
+        jobs = deque(self.jobs)
+        while jobs or self.running:
+            while jobs and self._room:
+                job = jobs.popleft()
+
+                def then(future: Future[Survey], job: Job = job) -> None:
+                    if (found := self._result(job.material.name, future)) is not None:
+                        self._surveyed(job, found)
+
+                self._submit(then, survey, str(self.root), job)
+            self._wait()
+        missing = sorted(self.waiting, key=lambda table: table.survey.size, reverse=True)  # the largest first
+        self.waiting = deque(missing)
+        for table in missing:
+            need = table.survey.task_bytes
+            self.task_bytes = max(self.task_bytes, need)
+            if self.memory is not None and need > self.memory:
+                raise ValueError(
+                    f"memory: a block of {table.name} takes about {terminal.size(need)}, "
+                    f"more than the {terminal.size(self.memory)} allowed"
+                )
+        self.tally = Tally(sum(table.survey.size for table in missing))
+        self.report({"event": "planned", "tables": len(missing), "values": self.tally.total})
+
+    def _surveyed(self, job: Job, found: Survey) -> None:
+        name = job.material.name
+        self.report({"event": "surveyed", "material": name, "state": found.standing.state, "why": found.standing.why})
+        if found.standing.state == "current":
+            self._is_current(job, found.standing.revision)
+        else:
+            self.waiting.append(_Table(job, found, Lock(self.root, name, wait=False)))
+
+    def _is_current(self, job: Job, revision: str) -> None:
+        name = job.material.name
+        stored = summary_of(self.root / "materials" / name / revision)["bytes"]
+        self.built[name] = Built(job, "unchanged", revision, stored)
+        self.report({"event": "unchanged", "material": name, "revision": revision})
+
+    # Tables
+
+    def _tabulate(self) -> None:
+        while self.waiting or self.open or self.running:
+            while self._room and self._next():
+                pass
+            if self.running:
+                self._wait()
+            elif self.waiting:
+                time.sleep(_POLL_S)  # all that is left is in the hands of other builds
+
+    def _next(self) -> bool:
+        """Submit a task; False if there is none to submit now."""
+        if self.ready:
+            table = self.ready.popleft()
+            self._submit(
+                lambda future: self._framed(table, future), write_frame, str(table.staging), table.survey.layout
+            )
+            return True
+        for table in self.open:
+            if table.blocks:
+                self._submit_block(table)
+                return True
+        for _ in range(len(self.waiting)):
+            table = self.waiting.popleft()
+            if self._begin(table):
+                self._submit_block(table)
+                return True
+        return False
+
+    def _submit_block(self, table: _Table) -> None:
+        number = table.blocks.popleft()
+
+        def then(future: Future[Block]) -> None:
+            self._written(table, number, future)
+
+        self._submit(then, write_block, str(table.staging), table.survey.layout, number)
+
+    def _begin(self, table: _Table) -> bool:
+        """Take the lock of a material, and see what is still to do; whether there are blocks to compute."""
+        job, name = table.job, table.name
+        try:
+            table.lock.__enter__()
+        except BusyError:
+            if not table.told:
+                self.report({"event": "waiting", "material": name})
+                table.told = True
+            self.waiting.append(table)
+            return False
+        self.open.append(table)
+        if _head(self.root, name) != table.survey.head:  # another build published meanwhile
+            table.survey = survey(str(self.root), job)
+        found = table.survey.standing
+        if found.state == "missing":
+            table.staging = prepare(self.root, name, job.request, table.survey.layout)
+            table.blocks.extend(range(len(table.survey.block_values)))
+            return True
+        if found.state == "adoptable":
+            with writing(self.root, name):
+                point_to(self.root / "materials" / name, found.revision)
+            discard(self.root, name, job.request)  # where the build was killed that made this revision
+            stored = summary_of(self.root / "materials" / name / found.revision)["bytes"]
+            self.built[name] = Built(job, "adopted", found.revision, stored, found.why)
+            self.report({"event": "adopted", "material": name, "revision": found.revision, "why": found.why})
+        else:
+            self._is_current(job, found.revision)
+        self._close(table)
+        return False
+
+    def _close(self, table: _Table) -> None:
+        if table in self.open:
+            self.open.remove(table)
+            table.lock.__exit__(None, None, None)
+
+    def _written(self, table: _Table, number: int, future: Future[Block]) -> None:
+        block = self._result(table.name, future)
+        if block is None or table not in self.open:  # this block failed, or another one of the table
+            self._close(table)
+            return
+        table.files[block["name"]] = block["entry"]
+        values = table.survey.block_values
+        self.report(
+            {
+                "event": "block",
+                "material": table.name,
+                "block": number,
+                "blocks": len(values),
+                "kept": block["kept"],
+                **self.tally.add(values[number], kept=block["kept"]),
+            }
+        )
+        if len(table.files) == len(values):
+            self.ready.append(table)
+
+    def _framed(self, table: _Table, future: Future[dict[str, Entry]]) -> None:
+        files = self._result(table.name, future)
+        if files is not None:
+            revision, stored = publish(self.root, table.name, table.staging, {**table.files, **files})
+            why = table.survey.standing.why
+            self.built[table.name] = Built(table.job, "published", revision, stored, why, table.survey.shape)
+            self.report(
+                {"event": "published", "material": table.name, "revision": revision, "bytes": stored, "why": why}
+            )
+        self._close(table)
+
+    def _result(self, name: str, future: Future[Any]) -> Any:
+        """What a task returned; None if it failed, which takes no table with it but its own."""
+        error: BaseException | None
+        try:
+            error = future.exception()
+        except CancelledError as cancelled:  # not by us: the cluster lost it
+            error = cancelled
+        if error is None:
+            return future.result()
+        if isinstance(error, StoreError | OSError | MemoryError) or not isinstance(error, Exception):
+            raise error
+        if workers.lost(error):
+            raise ChildProcessError("the workers are gone, killed or out of memory; build again to resume") from error
+        self.error = self.error or error
+        self.report({"event": "failed", "material": name, "error": str(error)})
+        return None
 
 
-def run(recipe_path: Path | None, root: Path, workers: int) -> None:
-    """Build a recipe file, by default the built-in one, on threads; show progress and what came out."""
+def run(
+    recipe_path: Path | None,
+    root: Path,
+    *,
+    jobs: int,
+    processes: bool = False,
+    scheduler: str | None = None,
+    memory: int | None = None,
+    as_json: bool = False,
+) -> None:
+    """Build a recipe file, by default the built-in one; show progress and what came out."""
     recipe = load(recipe_path)
     start = time.perf_counter()
-    total = sum(job.layout().size for job in recipe.jobs())
-    with terminal.progress(counted=False) as bar, ThreadPoolExecutor(workers) as executor:
-        task = bar.add_task("tabulating", total=total)
-        built = build(recipe, root, executor, lambda count: bar.advance(task, count))
-    seconds = time.perf_counter() - start
-    terminal.print_table(
-        f"{len(built)} tables, {total / 1e6:.1f} million values, in {seconds:.1f} s",
-        ("material", "model", "grid", "wavelengths", "revision", "stored"),
-        [
-            (
-                b.job.material.name,
-                b.job.material.model,
-                " x ".join(str(n) for n in b.job.grid.shape),
-                "grey" if b.job.wavelength_nm is None else str(b.job.wavelength_nm.size),
-                b.revision,
-                terminal.size(b.stored_bytes),
-            )
-            for b in built
-        ],
-        numbers=("grid", "wavelengths", "stored"),
+    at: AbstractContextManager[Workers] = (
+        workers.cluster(scheduler) if scheduler else (workers.processes if processes else workers.threads)(jobs)
     )
-    print(f"stored {terminal.size(sum(b.stored_bytes for b in built))} in {root}")
+    with at as opened, Lines() if as_json else Bars() as report:
+        built = build(recipe, root, opened, report, memory=memory)
+    if not as_json:
+        _print(built, root, time.perf_counter() - start)
+
+
+def _print(built: list[Built], root: Path, seconds: float) -> None:
+    """What came out: a line for each table that is not as it was before."""
+    changed = [b for b in built if b.state != "unchanged"]
+    if changed:
+        values = sum(_size(b.shape) for b in changed)
+        terminal.print_table(
+            f"{len(changed)} tables, {values / 1e6:.1f} million values, in {seconds:.1f} s",
+            ("material", "model", "shape", "revision", "stored", "why"),
+            [
+                (
+                    b.job.material.name,
+                    b.job.material.model,
+                    " x ".join(map(str, b.shape)),
+                    b.revision,
+                    terminal.size(b.stored_bytes),
+                    f"{b.why}; {b.revision} is current again" if b.state == "adopted" else b.why,
+                )
+                for b in changed
+            ],
+            numbers=("shape", "stored"),
+        )
+    if len(changed) < len(built):
+        print(f"{len(built) - len(changed)} tables unchanged")
+    print(f"{terminal.size(sum(b.stored_bytes for b in built))} in {root}")
+
+
+def _size(shape: tuple[int, ...]) -> int:
+    count = 1 if shape else 0
+    for nodes in shape:
+        count *= nodes
+    return count

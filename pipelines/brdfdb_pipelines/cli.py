@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import io
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-FAILED, VIOLATED = 2, 1  # exit codes: an error in one sentence; an audit that found a new violation
+# Exit codes: an error in one sentence; an audit that found a new violation; Ctrl-C
+FAILED, VIOLATED, INTERRUPTED = 2, 1, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -18,7 +20,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that lacks a letter shows ? in its place
-    options = _parser().parse_args(arguments)
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options = _parser().parse_args(arguments, argparse.Namespace(arguments=arguments))
     run: Callable[[argparse.Namespace], int] = options.run
     try:
         code = run(options)
@@ -26,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except KeyboardInterrupt:
         print("brdfdb: interrupted; what was published before stays", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -41,7 +44,9 @@ def _is_users(error: Exception) -> bool:
     """Whether an error is about what the user gave, not about this program."""
     from brdfdb.store import StoreError, UnknownMaterialError
 
-    return isinstance(error, StoreError | UnknownMaterialError | ValueError | OSError | MemoryError)
+    return isinstance(
+        error, StoreError | UnknownMaterialError | ValueError | OSError | MemoryError | ModuleNotFoundError
+    )
 
 
 def _sentence(error: Exception) -> str:
@@ -71,11 +76,29 @@ def _parser() -> argparse.ArgumentParser:
         )
         return sub
 
-    build = command("build", _build, "Tabulate the materials of a recipe into the store.")
+    build = command("build", _build, "Tabulate what is missing of the materials of a recipe into the store.")
     build.add_argument("recipe", type=Path, nargs="?", help="a TOML file; by default every material of the papers")
     build.add_argument(
-        "--jobs", type=_positive, default=os.cpu_count() or 1, metavar="N", help="threads (default: %(default)s)"
+        "--jobs",
+        type=_positive,
+        default=len(os.sched_getaffinity(0)),
+        metavar="N",
+        help="threads or processes (default: %(default)s)",
     )
+    where = build.add_mutually_exclusive_group()
+    where.add_argument("--processes", action="store_true", help="work in processes, not in threads of this one")
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="work on the dask cluster of this scheduler, such as tcp://10.0.0.1:8786; its workers see DIR, too",
+    )
+    build.add_argument(
+        "--memory",
+        type=_bytes,
+        metavar="SIZE",
+        help="of all blocks in work, such as 500MB (default: no limit)",
+    )
+    build.add_argument("--json", action="store_true", help="print progress as JSON, an object a line")
 
     audit = command("audit", _audit, "Audit energy, reciprocity, positivity and finiteness; exit 1 on a new violation.")
     audit.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
@@ -110,6 +133,35 @@ def _parser() -> argparse.ArgumentParser:
     show = command("show", _show, "Show parameters, sources, grid, albedo and files of a material.")
     show.add_argument("name", metavar="NAME")
 
+    history = command("history", _history, "List the revisions of a material.")
+    history.add_argument("name", metavar="NAME")
+
+    rollback = command("rollback", _rollback, "Make another revision of a material current, after verifying it.")
+    rollback.add_argument("name", metavar="NAME")
+    rollback.add_argument("revision", metavar="REVISION", help="such as r000001; `brdfdb history NAME` lists them")
+
+    verify = command(
+        "verify",
+        _verify,
+        "Verify tables: sizes, sha256, each chunk with its crc32c, dimensions and attributes.",
+    )
+    verify.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
+
+    gc = command(
+        "gc",
+        _gc,
+        "Remove builds that were broken off and could be resumed, revisions that are neither current nor kept, and "
+        "what crashes left behind. Nothing of a material that a build is at work on. Readers may be running: tables "
+        "that they hold stay, a revision that is removed while it is read is never read as data.",
+    )
+    gc.add_argument(
+        "--keep",
+        type=_positive,
+        default=2,
+        metavar="N",
+        help="revisions of each material that stay: the current one and the newest others (default: %(default)s)",
+    )
+
     serve = command("serve", _serve, "Answer lookups over HTTP.")
     serve.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     serve.add_argument("--port", type=int, default=8000, help="port (default: %(default)s)")
@@ -123,10 +175,62 @@ def _positive(text: str) -> int:
     return value
 
 
+def _bytes(text: str) -> int:
+    units = {"": 1, "B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+    number = text.rstrip("BkMGT")
+    try:
+        return int(float(number) * units[text[len(number) :]])
+    except (KeyError, ValueError, OverflowError):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of bytes, such as 500MB or 2GB") from None
+
+
 def _build(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import build
 
-    build.run(options.recipe, options.store, options.jobs)
+    try:
+        build.run(
+            options.recipe,
+            options.store,
+            jobs=options.jobs,
+            processes=options.processes,
+            scheduler=options.scheduler,
+            memory=options.memory,
+            as_json=options.json,
+        )
+    except KeyboardInterrupt:
+        print(
+            "brdfdb: interrupted; what was published before stays, and every block that is whole; "
+            f"to resume: {shlex.join(['brdfdb', *options.arguments])}",
+            file=sys.stderr,
+        )
+        return INTERRUPTED
+    return 0
+
+
+def _history(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import maintain
+
+    maintain.history(options.store, options.name)
+    return 0
+
+
+def _rollback(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import maintain
+
+    maintain.rollback(options.store, options.name, options.revision)
+    return 0
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import maintain
+
+    return FAILED if maintain.verify(options.store, options.names) else 0
+
+
+def _gc(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import maintain
+
+    maintain.collect(options.store, options.keep)
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Looking into a store from the command line: list, show, lookup."""
+"""Looking into a store from the command line: list, which loads little, show and lookup."""
 
 from __future__ import annotations
 
@@ -6,17 +6,13 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 import brdfdb
-from brdfdb.audit import directional_albedo
-from brdfdb.geometry import radians
-from brdfdb.grids import ANISOTROPIC_AXES
-from brdfdb.lookup import Table
-from brdfdb.materials import presets
 from brdfdb_pipelines import terminal
+
+if TYPE_CHECKING:
+    from brdfdb.lookup import Table
 
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
@@ -26,13 +22,15 @@ def list_store(root: Path) -> None:
     store = brdfdb.open(root)
     rows = []
     for name in store:
-        attributes = store.attributes(name)
-        rows.append((name, attributes["title"], attributes["model"], store.head(name)))
+        head = store.summary(name)
+        rows.append((name, head["title"], head["model"], head["revision"]))
     terminal.print_table(f"{len(rows)} materials in {root}", ("material", "title", "model", "revision"), rows)
 
 
 def list_presets() -> None:
     """Print a line for each built-in material."""
+    from brdfdb.materials import presets
+
     rows = [(m.name, m.title, m.model, m.source) for m in presets().values()]
     terminal.print_table(f"{len(rows)} built-in materials", ("material", "title", "model", "source"), rows)
 
@@ -77,6 +75,11 @@ def show(root: Path, name: str) -> None:
 
 def _print_albedo(table: Table) -> None:
     """Directional albedo of the table at a few angles: the first, the middle and the last wavelength."""
+    import numpy as np
+
+    from brdfdb.audit import directional_albedo
+    from brdfdb.geometry import radians
+
     diffuse = directional_albedo(table)
     if table.anisotropic:
         diffuse = diffuse.mean(axis=1)
@@ -102,6 +105,11 @@ def lookup(
     root: Path, name: str, angles_deg: Sequence[float], wavelength_nm: Sequence[float] | None, *, as_json: bool
 ) -> None:
     """Print f_r at theta_i, phi_i, theta_r, phi_r [degree], and the Dirac part's reflectance if the model has one."""
+    import numpy as np
+
+    from brdfdb.geometry import radians
+    from brdfdb.grids import ANISOTROPIC_AXES
+
     for angle, value in zip(ANISOTROPIC_AXES, angles_deg, strict=True):
         if not math.isfinite(value):
             raise ValueError(f"{angle}: {value} is not a number of degrees")

@@ -20,11 +20,14 @@ import brdfdb
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout
 from brdfdb.materials import Material, presets
-from brdfdb.store import Build
+from brdfdb.staging import publish_dataset
 from brdfdb.tabulate import tabulate
 from brdfdb_pipelines import cli, terminal
 
-COMMANDS = ["build", "audit", "export exr", "lookup", "list", "show", "serve"]
+COMMANDS = [
+    *("build", "audit", "export exr", "lookup", "list", "show"),
+    *("history", "rollback", "verify", "gc", "serve"),
+]
 HEAVY = ["numpy", "numba", "xarray", "zarr", "pydantic", "rich", "fastapi", "uvicorn", "OpenEXR", "brdfdb.store"]
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "audit.schema.json"
 
@@ -97,11 +100,11 @@ def test_build_shows_progress_on_stderr_and_a_table_on_stdout(
     assert "tabulating" not in out
     lines = out.splitlines()
     assert lines[0].startswith("5 tables, 0.0 million values, in ")
-    assert lines[1].split() == ["material", "model", "grid", "wavelengths", "revision", "stored"]
+    assert lines[1].split() == ["material", "model", "shape", "revision", "stored", "why"]
     assert [line.split()[0] for line in lines[2:7]] == names
-    assert lines[2].split()[:9] == ["foam", "oren_nayar_body_surface", "11", "x", "11", "x", "13", "grey", "r000001"]
-    assert lines[4].split()[1:8] == ["he_torrance", "6", "x", "6", "x", "7", "16"]
-    assert lines[7].startswith("stored ")
+    assert lines[2].split()[:8] == ["foam", "oren_nayar_body_surface", "11", "x", "11", "x", "13", "r000001"]
+    assert lines[4].split()[1:9] == ["he_torrance", "6", "x", "6", "x", "7", "x", "16"]
+    assert all(line.split()[-1] == "new" for line in lines[2:7])
     assert lines[7].endswith(f" in {tmp_path / 'store'}")
 
 
@@ -266,6 +269,9 @@ def test_a_bad_wavelength_is_named(wavelength: str, built: Path, capsys: Capture
         (("lookup",), "the following arguments are required: NAME, THETA_I, PHI_I, THETA_R, PHI_R"),
         (("build", "--jobs", "0"), "argument --jobs: 0 is not at least 1"),
         (("build", "--jobs", "many"), "argument --jobs: invalid _positive value: 'many'"),
+        (("build", "--memory", "lots"), "argument --memory: 'lots' is not a number of bytes, such as 500MB or 2GB"),
+        (("build", "--processes", "--scheduler", "tcp://x"), "argument --scheduler: not allowed with argument --proc"),
+        (("gc", "--keep", "0"), "argument --keep: 0 is not at least 1"),
         (("serve", "--port", "http"), "argument --port: invalid int value: 'http'"),
         (("export", "png", "foam"), "argument FORMAT: invalid choice: 'png'"),
         (("shine",), "argument COMMAND: invalid choice: 'shine'"),
@@ -289,6 +295,10 @@ def test_a_command_line_that_cannot_be_read_is_one_line(
         ("export", "exr", "--all"),
         ("list",),
         ("show", "foam"),
+        ("history", "foam"),
+        ("rollback", "foam", "r000001"),
+        ("verify",),
+        ("gc",),
         ("serve",),
         ("lookup", "foam", 0, 0, 0, 0),
     ],
@@ -315,6 +325,9 @@ def test_a_missing_store_is_one_sentence(
         ("audit", "foam", "{}"),
         ("export", "exr", "{}", "--out", os.devnull),
         ("show", "{}"),
+        ("history", "{}"),
+        ("rollback", "{}", "r000001"),
+        ("verify", "{}"),
         ("lookup", "{}", 0, 0, 0, 0),
     ],
     ids=lambda arguments: "-".join(map(str, arguments)),
@@ -333,9 +346,13 @@ def test_a_damaged_store_is_one_sentence(built: Path, tmp_path: Path, capsys: Ca
     shutil.copytree(built, root)
     (root / "materials" / "foam" / "r000001" / "brdf" / "c" / "0" / "0" / "0").unlink()
     said = "brdfdb: foam r000001 is damaged: brdf/c/0/0/0 is missing"
-    for arguments in (("audit",), ("show", "foam"), ("lookup", "foam", 0, 0, 0, 0), ("list",)):
+    for arguments in (("audit",), ("show", "foam"), ("lookup", "foam", 0, 0, 0, 0), ("rollback", "foam", "r000001")):
         assert fails(capsys, *arguments, "--store", root) == said
     assert fails(capsys, "export", "exr", "foam", "--store", root, "--out", tmp_path / "exr") == said
+    assert run("list", "--store", root) == 0  # reads pointers, no tables
+    assert "foam" in capsys.readouterr().out
+    (root / "materials" / "foam" / "HEAD.json").write_text("{")
+    assert fails(capsys, "list", "--store", root).startswith(f"brdfdb: cannot read {root}/materials/foam/HEAD.json: ")
 
 
 # Directories that cannot be written
@@ -430,9 +447,8 @@ def test_a_violation_is_exit_code_1_and_stands_in_the_report(
     grey = {"title": "Grey", "model": "lambert", "source": "no paper", "parameters": {"rho": 0.5}}
     theta = [0, 30, 60, 80]
     grid = Grid({"theta_i": theta, "theta_r": theta, "delta_phi": [0, 90, 180]})
-    with Build(tmp_path, {}) as build:
-        build.publish("good", tabulate(Layout(Material.from_table("good", grey), grid)))
-        build.publish("bad", change(tabulate(Layout(Material.from_table("bad", grey), grid))))
+    publish_dataset(tmp_path, "good", tabulate(Layout(Material.from_table("good", grey), grid)))
+    publish_dataset(tmp_path, "bad", change(tabulate(Layout(Material.from_table("bad", grey), grid))))
     assert run("audit", "--store", tmp_path) == 1
     out, err = capsys.readouterr()
     assert f"bad: {said}\n" in out
@@ -447,10 +463,9 @@ def test_a_violation_is_exit_code_1_and_stands_in_the_report(
 
 def test_audit_notices_a_file_that_was_exchanged_for_a_sound_one(tmp_path: Path, capsys: Captured) -> None:
     grid = Grid({"theta_i": [0, 80], "theta_r": [0, 80], "delta_phi": [0, 90, 180]})
-    with Build(tmp_path, {}) as build:
-        for name, rho in (("grey", 0.25), ("white", 0.75)):
-            table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-            build.publish(name, tabulate(Layout(Material.from_table(name, table), grid)))
+    for name, rho in (("grey", 0.25), ("white", 0.75)):
+        table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
+        publish_dataset(tmp_path, name, tabulate(Layout(Material.from_table(name, table), grid)))
     grey, white = (brdfdb.open(tmp_path).path(name) / "brdf" / "c" / "0" / "0" / "0" for name in ("grey", "white"))
     assert (grey.stat().st_size, grey.read_bytes() != white.read_bytes()) == (white.stat().st_size, True)
     shutil.copyfile(white, grey)

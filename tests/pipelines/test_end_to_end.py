@@ -151,7 +151,9 @@ def test_the_application_serves_a_new_revision_as_soon_as_it_is_published(recipe
     assert cli.main(command) == 0
     app = create_app(Settings(store=tmp_path))
     assert get(app, "/v1/materials/foam/lookup", **QUERY).json()["revision"] == "r000001"
-    assert cli.main(command) == 0
+    changed = tmp_path.with_name("changed.toml")
+    changed.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 30"), encoding="utf-8")
+    assert cli.main([command[0], str(changed), *command[2:]]) == 0
     assert get(app, "/v1/materials/foam/lookup", **QUERY).json()["revision"] == "r000002"
 
 

@@ -1,0 +1,443 @@
+"""Staging: a table while it is being written, so that a build killed at any moment goes on where it was.
+
+ROOT/.staging/NAME/lock              held by the build at work on the material: one at a time
+ROOT/.staging/NAME/KEY/              one request, by the first digits of its digest
+ROOT/.staging/NAME/KEY/request.json  what was asked for
+ROOT/.staging/NAME/KEY/layout.json   what the table is going to be
+ROOT/.staging/NAME/KEY/table/        the zarr group, growing
+ROOT/.staging/NAME/KEY/blocks/       a marker for each block that is whole: size, sha256, and of which layout
+
+Blocks are computed and written by `write_block`, the rest of the table by `write_frame`: functions of plain arguments,
+for threads, processes and other machines alike that see the same file system. Whoever holds the lock publishes.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+from types import TracebackType
+from typing import IO, TYPE_CHECKING, Any, TypedDict
+
+import numpy as np
+
+from brdfdb import tabulate
+from brdfdb.layout import Layout, digest
+from brdfdb.manifest import (
+    Entry,
+    Manifest,
+    StoreError,
+    Summary,
+    check_manifest,
+    manifest_of,
+    number_of,
+    read_json,
+    sha256_of,
+    swap_json,
+    write_file,
+    write_json,
+)
+from brdfdb.store import FORMAT, FORMAT_VERSION, Store
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Block(TypedDict):
+    """A block that is whole: its file inside the group, and whether an earlier build had written it."""
+
+    name: str
+    entry: Entry
+    kept: bool
+
+
+def make_store(root: Path) -> None:
+    """Make a store, or see that there is one.
+
+    Raises
+    ------
+    StoreError
+        If `root` cannot be written, or is something other than a store.
+    """
+    marker = root / "brdfdb.json"
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        strangers = [path for path in root.iterdir() if not path.name.startswith(f".{marker.name}.")]
+        if marker.exists():  # asked after the look around: another build may be making the store right now
+            Store(root)
+        elif strangers:
+            raise StoreError(f"{root} is not empty and not a store; name an empty or a new directory")
+        else:
+            swap_json(marker, {"format": FORMAT, "version": FORMAT_VERSION})
+        (root / "materials").mkdir(exist_ok=True)
+        (root / ".staging").mkdir(exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"cannot write a store at {root}: {error.strerror or error}") from error
+
+
+@contextmanager
+def writing(root: Path, name: str) -> Iterator[None]:
+    """Turns what the file system says into one sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(f"cannot write {name} to the store at {root}: {error.strerror or error}") from error
+
+
+class Lock:
+    """The right to change a material: a context manager; others see it with `held_elsewhere`.
+
+    Parameters
+    ----------
+    root : Path
+        Directory of the store.
+    name : str
+        Of the material.
+    wait : bool
+        Whether to wait for another holder; without, `BusyError` is raised.
+
+    Raises
+    ------
+    BusyError
+        If another process, or another thread of this one, holds it.
+    """
+
+    def __init__(self, root: Path, name: str, *, wait: bool = True) -> None:
+        self.path = root / ".staging" / name / "lock"
+        self.root, self.name, self.wait = root, name, wait
+        self._handle: IO[bytes] | None = None
+
+    def __enter__(self) -> Lock:
+        with writing(self.root, self.name):
+            (self.root / ".staging").mkdir(exist_ok=True)
+            while self._handle is None:
+                self._handle = self._acquired()
+        return self
+
+    def _acquired(self) -> IO[bytes] | None:
+        """The locked file; None if its holder took it away in the meantime."""
+        try:
+            self.path.parent.mkdir(exist_ok=True)
+            handle = self.path.open("ab")
+        except (FileNotFoundError, FileExistsError):  # its holder took the directory away, maybe between two calls
+            if self.path.parent.exists() and not self.path.parent.is_dir():
+                raise
+            return None
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX if self.wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.fstat(handle.fileno()).st_ino == self.path.stat().st_ino:
+                return handle
+        except BlockingIOError:
+            handle.close()
+            raise BusyError(f"another build is at work on {self.name}") from None
+        except FileNotFoundError:
+            pass
+        except BaseException:
+            handle.close()
+            raise
+        handle.close()
+        return None
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Give it back, and take the directory away if nothing is left in it."""
+        assert self._handle is not None
+        try:
+            if os.listdir(self.path.parent) == ["lock"]:
+                self.path.unlink()
+                self.path.parent.rmdir()
+        except OSError:  # another build has come in: it is theirs
+            pass
+        self._handle.close()
+        self._handle = None
+
+
+class BusyError(Exception):
+    """Another build holds the lock of a material."""
+
+
+def directory_of(root: Path, name: str, request_sha256: str) -> Path:
+    """Where a request is staged."""
+    return root / ".staging" / name / request_sha256[:16]
+
+
+def prepare(root: Path, name: str, request: Mapping[str, Any], layout: str) -> Path:
+    """Make the staging directory of a request, with its layout as JSON, and return it."""
+    staging = directory_of(root, name, digest(request))
+    with writing(root, name):
+        (staging / "blocks").mkdir(parents=True, exist_ok=True)
+        for file, text in (("request.json", json.dumps(request, sort_keys=True)), ("layout.json", layout)):
+            if not (staging / file).is_file() or (staging / file).read_bytes() != text.encode():
+                write_file(staging / file, text.encode(), staging)
+    return staging
+
+
+def discard(root: Path, name: str, request: Mapping[str, Any]) -> None:
+    """Remove what is staged of a request; the lock must be held."""
+    shutil.rmtree(directory_of(root, name, digest(request)), ignore_errors=True)
+
+
+def planned(root: Path, name: str, request: Mapping[str, Any]) -> str | None:
+    """The layout that an earlier build of the same request left in the staging directory, as JSON; None without."""
+    staging = directory_of(root, name, digest(request))
+    try:
+        if read_json(staging / "request.json") != json.loads(json.dumps(request)):
+            return None
+        text = (staging / "layout.json").read_text(encoding="utf-8")
+        _layout(text)
+    except (OSError, StoreError, ValueError, KeyError):
+        return None
+    return text
+
+
+@lru_cache(maxsize=64)
+def _layout(text: str) -> Layout:
+    """A layout from JSON, kept: a worker gets many blocks of one.
+
+    Raises
+    ------
+    StoreError
+        If this program would compute something else than the program that wrote the JSON.
+    """
+    document = json.loads(text)
+    layout = Layout.from_document(document)
+    if json.loads(json.dumps(layout.document())) != document:
+        raise StoreError(f"{layout.material.name}: the table was laid out by another version of this program")
+    return layout
+
+
+def write_block(staging: str, layout: str, number: int) -> Block:
+    """Compute a block and write it, unless it is there already: the task that a build gives to its workers.
+
+    Parameters
+    ----------
+    staging : str
+        The staging directory, on a file system that builder and worker share.
+    layout : str
+        Of the table, as JSON.
+    number : int
+        Of the block.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written.
+    """
+    from brdfdb.chunks import chunk_name, encoded
+
+    directory = Path(staging)
+    table = _layout(layout)
+    name = chunk_name(table, number)
+    path = directory / "table" / name
+    marker = directory / "blocks" / f"{number:06d}.json"
+    if (entry := _kept(marker, path, layout)) is not None:
+        return {"name": name, "entry": entry, "kept": True}
+    data = encoded(table, number, tabulate.block(table, table.blocks[number]))
+    with writing(directory.parent.parent.parent, table.material.name):
+        entry = write_file(path, data, directory)
+        write_json(marker, {**entry, "layout": _short(layout)}, directory)
+    return {"name": name, "entry": entry, "kept": False}
+
+
+def _short(layout: str) -> str:
+    return digest({"layout": layout})[:16]
+
+
+def _kept(marker: Path, path: Path, layout: str) -> Entry | None:
+    """What a marker says of a block, if the block is what the marker says."""
+    try:
+        found = json.loads(marker.read_bytes())
+        entry: Entry = {"size": found["size"], "sha256": found["sha256"]}
+        whole = (
+            found["layout"] == _short(layout)
+            and path.stat().st_size == entry["size"]
+            and sha256_of(path) == entry["sha256"]
+        )
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return entry if whole else None
+
+
+def write_frame(staging: str, layout: str) -> dict[str, Entry]:
+    """Write all of a table but its blocks, which are there: the last task of a table; returns the files it wrote.
+
+    Raises
+    ------
+    StoreError
+        If they cannot be written.
+    """
+    from brdfdb.chunks import array_metadata, frame_files
+
+    directory = Path(staging)
+    table = _layout(layout)
+    request = read_json(directory / "request.json")
+    with writing(directory.parent.parent.parent, table.material.name):
+        write_file(directory / "table" / table.variable / "zarr.json", array_metadata(table), directory)
+    frame = tabulate.frame(table).assign_attrs(
+        request=request, request_sha256=digest(request), **_measured(table, directory / "table")
+    )
+    with writing(directory.parent.parent.parent, table.material.name):
+        return {
+            name: write_file(directory / "table" / name, data, directory)
+            for name, data in frame_files(table, frame).items()
+        }
+
+
+def _measured(layout: Layout, table: Path) -> dict[str, Any]:
+    """Attributes that only the finished blocks in the group `table` can tell: the error against the model."""
+    import zarr
+
+    from brdfdb.accuracy import measure
+
+    stored: Any = zarr.open_array(table / layout.variable, mode="r")
+    error = measure(layout, lambda rows: np.asarray(stored[rows], dtype=np.float32))
+    return {"error": error.model_dump(mode="json")}
+
+
+def publish(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) -> tuple[str, int]:
+    """Make a staged table the current revision of its material; the lock must be held. Returns revision and bytes.
+
+    Until the pointer is swapped, as the last step, readers see the revision before. After a crash in between, the
+    revision lies whole in its place and the next build of the request makes it current.
+
+    Parameters
+    ----------
+    files : mapping
+        Every file of the group, by its path inside: what else lies there is removed.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written.
+    """
+    material = root / "materials" / name
+    table = staging / "table"
+    with writing(root, name):
+        for path in table.rglob("*"):
+            if path.is_file() and path.relative_to(table).as_posix() not in files:
+                path.unlink()
+        attributes = read_json(table / "zarr.json")["attributes"]
+        stored = sum(entry["size"] for entry in files.values())
+        summary: Summary = {
+            "title": attributes.get("title", ""),
+            "model": attributes.get("model", ""),
+            "model_version": attributes.get("model_version", 0),
+            "request_sha256": attributes.get("request_sha256", ""),
+            "error_p99": attributes.get("error", {}).get("overall", {}).get("p99"),
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "bytes": stored,
+        }
+        manifest: Manifest = {"summary": summary, "files": dict(files)}
+        material.mkdir(exist_ok=True)
+        revision = f"r{newest(material) + 1:06d}"
+        write_json(manifest_of(material / revision), manifest, staging)
+        table.rename(material / revision)
+        point_to(material, revision)
+        shutil.rmtree(staging, ignore_errors=True)
+    return revision, stored
+
+
+def point_to(material: Path, revision: str) -> None:
+    """Swap the pointer of a material to one of its revisions; the lock must be held."""
+    path = manifest_of(material / revision)
+    summary = summary_of(material / revision)
+    head = {
+        "revision": revision,
+        "manifest_sha256": sha256_of(path),
+        **summary,
+        "last": newest(material),
+    }
+    swap_json(material / "HEAD.json", head)
+
+
+def summary_of(group: Path) -> Summary:
+    """What the manifest of a revision says of it; of one from before manifests did, what its attributes say."""
+    found: Any = read_json(manifest_of(group))
+    if "summary" in found:
+        summary: Summary = found["summary"]
+        return summary
+    attributes = read_json(group / "zarr.json")["attributes"]
+    created = datetime.fromtimestamp(manifest_of(group).stat().st_mtime, UTC)
+    return {
+        "title": attributes["title"],
+        "model": attributes["model"],
+        "model_version": attributes["model_version"],
+        "request_sha256": "",
+        "error_p99": None,
+        "created": created.isoformat(timespec="seconds"),
+        "bytes": sum(entry["size"] for entry in found["files"].values()),
+    }
+
+
+def newest(material: Path) -> int:
+    """The highest number that a revision of a material ever had, also of one that was removed since; 0 without any."""
+    try:
+        last = int(read_json(material / "HEAD.json").get("last", 0))
+    except (StoreError, TypeError, ValueError):
+        last = 0
+    numbers = (number_of(name.removesuffix(".MANIFEST.json")) for name in os.listdir(material))
+    return max(last, *numbers, 0)
+
+
+def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset) -> tuple[str, int]:
+    """Publish a table that is in memory, whoever computed it, as the next revision of a material.
+
+    Parameters
+    ----------
+    root : path
+        Directory of the store; made if it does not exist.
+    name : str
+        Of the material.
+    dataset : Dataset
+        As `tabulate.tabulate` makes it.
+
+    Returns
+    -------
+    revision, bytes
+        Such as ``r000003``, and how much it takes.
+
+    Raises
+    ------
+    StoreError
+        If the store cannot be written.
+    """
+    from brdfdb.chunks import dataset_files
+
+    store = Path(root)
+    make_store(store)
+    files = dataset_files(dataset)
+    with Lock(store, name):
+        staging = store / ".staging" / name / "dataset"
+        with writing(store, name):
+            shutil.rmtree(staging, ignore_errors=True)
+            try:
+                staging.mkdir()
+                written = {file: write_file(staging / "table" / file, data, staging) for file, data in files.items()}
+                return publish(store, name, staging, written)
+            finally:
+                shutil.rmtree(staging, ignore_errors=True)
+
+
+def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
+    """The newest revision of a material that answers a request and is undamaged; None without any."""
+    material = root / "materials" / name
+    try:
+        numbers = sorted((number_of(entry) for entry in os.listdir(material)), reverse=True)
+    except OSError:
+        return None
+    for number in numbers:
+        group = material / f"r{number:06d}"
+        try:
+            if number and summary_of(group)["request_sha256"] == request_sha256:
+                check_manifest(group, None, contents=True)
+                return group.name
+        except (StoreError, KeyError, TypeError, OSError):
+            continue
+    return None

@@ -1,0 +1,101 @@
+"""How a build tells where it is: bars for people on stderr, a JSON object a line for programs on stdout."""
+
+from __future__ import annotations
+
+import json
+import time
+from types import TracebackType
+from typing import Any
+
+from rich.progress import TaskID
+
+from brdfdb_pipelines import terminal
+
+Event = dict[str, Any]
+
+
+class Tally:
+    """Counts values, and tells how fast they come and how long the rest will take."""
+
+    def __init__(self, total: int) -> None:
+        self.total, self.done, self._computed = total, 0, 0
+        self._start = time.perf_counter()
+
+    def add(self, values: int, *, kept: bool) -> Event:
+        """Count values, of which those that an earlier build kept say nothing about the speed."""
+        self.done += values
+        self._computed += 0 if kept else values
+        rate = self._computed / max(time.perf_counter() - self._start, 1e-9)
+        left = (self.total - self.done) / rate if rate else None
+        return {
+            "values_done": self.done,
+            "values_total": self.total,
+            "values_per_s": round(rate),
+            "seconds_left": None if left is None else round(left, 1),
+        }
+
+
+class Lines:
+    """Prints every event as it is; a context manager like `Bars`."""
+
+    def __enter__(self) -> Lines:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        pass
+
+    def __call__(self, event: Event) -> None:
+        """Print an event."""
+        print(json.dumps(event), flush=True)
+
+
+class Bars:
+    """A bar for the whole build, and one for each table in progress that has several blocks."""
+
+    def __init__(self) -> None:
+        self._progress = terminal.progress(counted=False, text="{task.fields[rate]}")
+        self._overall: TaskID | None = None
+        self._tables: dict[str, TaskID] = {}
+
+    def __enter__(self) -> Bars:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def __call__(self, event: Event) -> None:
+        """Show an event."""
+        match event["event"]:
+            case "start":
+                self._overall = self._progress.add_task("planning", total=event["tables"], rate="")
+            case "surveyed" if self._overall is not None:
+                self._progress.advance(self._overall)
+            case "planned" if self._overall is not None:
+                self._progress.reset(
+                    self._overall, description="tabulating", total=event["values"], completed=0, rate=""
+                )
+                self._progress.update(self._overall, completed=0 if event["values"] else 1, total=event["values"] or 1)
+            case "waiting":
+                self._progress.console.print(f"waiting for {event['material']}: another build is at work on it")
+            case "failed":
+                self._progress.console.print(f"{event['material']} failed: {event['error']}", markup=False)
+            case "block":
+                self._block(event)
+            case "published" | "adopted" | "unchanged":
+                if (task := self._tables.pop(event["material"], None)) is not None:
+                    self._progress.remove_task(task)
+
+    def _block(self, event: Event) -> None:
+        name = event["material"]
+        if event["blocks"] > 1:
+            if name not in self._tables:
+                self._tables[name] = self._progress.add_task(f"  {name}", total=event["blocks"], rate="")
+            self._progress.advance(self._tables[name])
+        if self._overall is not None:
+            rate = f"{event['values_per_s'] / 1e6:.1f} M values/s"
+            self._progress.update(self._overall, completed=event["values_done"], rate=rate)

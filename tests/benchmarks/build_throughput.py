@@ -1,0 +1,74 @@
+"""A build end to end, against its kernels alone and its codec alone: ``python tests/benchmarks/build_throughput.py``.
+
+All three in one run, on the same threads, of the same tables: those of the default recipe, or of the models that are
+named. Prints values a second and what share of the slower of the two the build reaches. By default it writes to memory
+(/dev/shm), so that the disk, which every block is synced to, has no part in it; ``--dir`` names a directory on one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.chunks import encoded
+from brdfdb.layout import Layout
+from brdfdb.tabulate import block
+from brdfdb_pipelines.build import build
+from brdfdb_pipelines.recipe import Recipe, load
+from brdfdb_pipelines.workers import Workers
+
+
+def main() -> None:
+    """Time kernels, codec and build."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("models", nargs="*", metavar="MODEL")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--dir", type=Path, default=Path("/dev/shm") if Path("/dev/shm").is_dir() else None)
+    parser.add_argument("--repeat", type=int, default=3)
+    options = parser.parse_args()
+    recipe = load()
+    names = [job.material.name for job in recipe.jobs() if not options.models or job.material.model in options.models]
+    recipe = Recipe.model_validate({**recipe.model_dump(), "materials": names})
+    tasks = [(job.layout(), number) for job in recipe.jobs() for number in range(len(job.layout().blocks))]
+    tasks.sort(key=lambda task: task[0].size, reverse=True)
+    total = sum(job.layout().size for job in recipe.jobs())
+    for layout in {layout.material.model: layout for layout, _ in tasks}.values():  # compile before the clock runs
+        encoded(layout, 0, block(layout, layout.blocks[0]))
+    best: dict[str, float] = {}
+    with ThreadPoolExecutor(options.jobs) as pool:
+        at = Workers(pool, lambda: options.jobs)
+
+        def compute(task: tuple[Layout, int]) -> NDArray[np.float32]:
+            layout, number = task
+            return block(layout, layout.blocks[number])
+
+        def encode(task: tuple[Layout, int], values: NDArray[np.float32]) -> int:
+            return len(encoded(*task, values))
+
+        for _ in range(options.repeat):  # in turn, so that a noisy machine is unfair to none
+            start = time.perf_counter()
+            values = list(pool.map(compute, tasks))
+            computed = time.perf_counter()
+            list(pool.map(encode, tasks, values))
+            coded = time.perf_counter()
+            del values
+            with tempfile.TemporaryDirectory(dir=options.dir) as root:
+                began = time.perf_counter()
+                build(recipe, Path(root), at)
+                built = time.perf_counter()
+            for what, seconds in (("kernels", computed - start), ("codec", coded - computed), ("build", built - began)):
+                best[what] = min(best.get(what, float("inf")), seconds)
+    slower = max(best["kernels"], best["codec"])
+    for what, seconds in best.items():
+        print(f"{what:8} {total / seconds / 1e6:8.1f} million values a second, {options.jobs} threads")
+    print(f"the build reaches {slower / best['build']:.0%} of the slower of kernels and codec")
+
+
+if __name__ == "__main__":
+    main()

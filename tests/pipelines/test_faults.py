@@ -1,0 +1,393 @@
+"""Faults of whole processes: killed, interrupted, without space, without permission, short of memory."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb_pipelines import cli
+
+KILLS = 50
+SEED = 20261121
+WAIT_S = 60.0
+
+# Its tables are constant: a value tells which recipe it is of, a table of several values mixes two
+RECIPE = """\
+materials = ["grey", "white"]
+wavelengths_nm = [500]
+[grids.isotropic]
+theta_i_deg = [{{ start = 0, stop = 89, step = 1 }}]
+theta_r_deg = [{{ start = 0, stop = 89, step = 0.5 }}]
+delta_phi_deg = [{{ start = 0, stop = 180, step = {step} }}]
+[grids.spectral]
+theta_i_deg = [0, 80]
+theta_r_deg = [0, 80]
+delta_phi_deg = [0, 180]
+[grids.anisotropic]
+theta_i_deg = [0, 80]
+phi_i_deg = [0, 360]
+theta_r_deg = [0, 80]
+phi_r_deg = [0, 360]
+[define.grey]
+title = "Grey"
+model = "lambert"
+source = "no paper"
+[define.grey.parameters]
+rho = {rho}
+[define.white]
+title = "White"
+model = "lambert"
+source = "no paper"
+[define.white.parameters]
+rho = {rho}
+"""
+
+# Imports once, then forks a build for each line: a fork is safe while there is one thread
+NURSERY = """
+import os, sys
+from pathlib import Path
+import numpy, numba, xarray, zarr, zarr.codecs
+from brdfdb import chunks, layout, staging, tabulate
+from brdfdb_pipelines import build, cli, recipe
+jobs = recipe.load(Path(sys.argv[1])).jobs()
+tabulate.block(jobs[0].layout(), slice(0, 1))
+tabulate.frame(jobs[0].layout())
+print("warm", flush=True)
+for line in sys.stdin:
+    recipe_path, root, out = line.split()
+    if (child := os.fork()) == 0:
+        os.dup2(os.open(out, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 1)
+        os.dup2(1, 2)
+        os._exit(cli.main(["build", recipe_path, "--store", root, "--jobs", "2", "--json"]))
+    print(child, flush=True)
+    sys.stdin.readline()  # until then the child's number is its own, dead or alive
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+
+class Nursery:
+    """Builds in processes of their own that start within milliseconds."""
+
+    def __init__(self, recipe: Path) -> None:
+        command = [sys.executable, "-c", NURSERY, str(recipe)]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self._line() == "warm"
+
+    def _line(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline().strip()
+
+    def build(self, recipe: Path, root: Path, out: Path, kill_after_s: float | None = None) -> int:
+        """Run a build, and kill it after a time; returns its exit code."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{recipe} {root} {out}\n")
+        self._process.stdin.flush()
+        child = int(self._line())
+        if kill_after_s is not None:
+            time.sleep(kill_after_s)
+            os.kill(child, signal.SIGKILL)
+        self._process.stdin.write("wait\n")
+        self._process.stdin.flush()
+        return int(self._line())
+
+    def close(self) -> None:
+        self._process.communicate(timeout=WAIT_S)
+
+
+@pytest.fixture
+def nursery(tmp_path: Path) -> Iterator[Nursery]:
+    first = write_recipe(tmp_path / "first.toml", 1 / 128)
+    made = Nursery(first)
+    yield made
+    made.close()
+
+
+def write_recipe(path: Path, rho: float, step: float = 1.0) -> Path:
+    path.write_text(RECIPE.format(rho=rho, step=step), encoding="utf-8")
+    return path
+
+
+class Reader(threading.Thread):
+    """Opens tables over and over, as a program does that has just started, and checks that each is of one recipe."""
+
+    def __init__(self, root: Path, started: Callable[[], set[float]]) -> None:
+        super().__init__()
+        self.root, self.started = root, started
+        self.reads, self.over = 0, threading.Event()
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        seen: dict[str, int] = {}
+        try:
+            while not self.over.is_set():
+                for name in ("grey", "white"):
+                    try:
+                        table = brdfdb.open(self.root)[name]
+                    except brdfdb.store.UnknownMaterialError:
+                        assert name not in seen, "what was published is gone"
+                        continue
+                    rho = float(np.float32(table.attrs["parameters"]["rho"] / np.pi))
+                    assert np.all(table.brdf == np.float32(rho)), "half of a build was read"
+                    assert table.attrs["parameters"]["rho"] in self.started()
+                    number = int(table.revision[1:])
+                    assert number >= seen.get(name, 0), "an old revision came back"
+                    seen[name] = number
+                    self.reads += 1
+        except BaseException as error:
+            self.error = error
+
+
+def marked(root: Path) -> set[tuple[str, int]]:
+    """Materials and numbers of the blocks that are whole in the staging directories.
+
+    A directory without a table is what was left when a build was killed right after it had published.
+    """
+    return {
+        (path.parent.parent.parent.name, int(path.stem))
+        for path in (root / ".staging").rglob("blocks/[0-9]*.json")
+        if (path.parent.parent / "table").is_dir()
+    }
+
+
+def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
+    tmp_path: Path, nursery: Nursery
+) -> None:
+    root, out = tmp_path / "store", tmp_path / "out.jsonl"
+    draw = random.Random(SEED)
+    assert nursery.build(tmp_path / "first.toml", tmp_path / "other", out) == 0
+    started = time.perf_counter()
+    assert nursery.build(tmp_path / "first.toml", root, out) == 0
+    whole_s = time.perf_counter() - started
+    rhos = {1 / 128}
+    reader = Reader(root, lambda: rhos)
+    reader.start()
+    kills = resumed = published = 0
+    left: set[tuple[str, int]] = set()
+    number = 1
+    try:
+        while kills < KILLS:
+            number += 1
+            rhos.add(number / 128)
+            recipe = write_recipe(tmp_path / f"{number}.toml", number / 128)
+            left = set()
+            while True:
+                last = kills == KILLS
+                out.write_bytes(b"")
+                code = nursery.build(recipe, root, out, None if last else draw.uniform(0.0, 1.2 * whole_s))
+                assert code in (0, -signal.SIGKILL), out.read_text()
+                lines = out.read_text().splitlines(keepends=True)
+                events = [json.loads(line) for line in lines if line.endswith("\n")]
+                kept = {(e["material"], e["block"]) for e in events if e["event"] == "block" and e["kept"]}
+                computed = {(e["material"], e["block"]) for e in events if e["event"] == "block" and not e["kept"]}
+                assert not computed & left, "what was whole before the kill was computed again"
+                resumed += len(kept)
+                published += sum(e["event"] == "published" for e in events)
+                for name in ("grey", "white"):
+                    brdfdb.open(root).verify(name)
+                if code == 0:
+                    break
+                kills += 1
+                left = marked(root)
+            store = brdfdb.open(root)
+            assert {store.attributes(name)["parameters"]["rho"] for name in store} == {number / 128}
+            if number % 8 == 0:
+                assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
+    finally:
+        reader.over.set()
+        reader.join(WAIT_S)
+    if reader.error is not None:
+        raise reader.error
+    assert reader.reads > 10
+    assert resumed > 10
+    assert published > 0
+    assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
+    assert not list((root / ".staging").iterdir())
+    for name in ("grey", "white"):
+        head = brdfdb.open(root).head(name)
+        assert sorted(path.name for path in (root / "materials" / name).iterdir()) == [
+            "HEAD.json", head, f"{head}.MANIFEST.json"
+        ]  # fmt: skip
+    assert cli.main(["verify", "--store", str(root)]) == 0
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "brdfdb_pipelines.cli", *map(str, arguments)]
+
+
+def test_ctrl_c_says_how_to_resume_and_the_same_command_does(tmp_path: Path) -> None:
+    recipe, root = write_recipe(tmp_path / "recipe.toml", 0.5, step=0.05), tmp_path / "store"
+    build = command("build", recipe, "--store", root, "--jobs", 1, "--json")
+    with subprocess.Popen(build, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if json.loads(line)["event"] == "block":
+                break
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=WAIT_S)
+    assert process.returncode == 130
+    assert err == (
+        "brdfdb: interrupted; what was published before stays, and every block that is whole; "
+        f"to resume: brdfdb build {recipe} --store {root} --jobs 1 --json\n"
+    )
+    left = marked(root)
+    assert left
+    done = subprocess.run(build, capture_output=True, text=True, check=True)
+    events = [json.loads(line) for line in done.stdout.splitlines()]
+    assert {(e["material"], e["block"]) for e in events if e["event"] == "block" and e["kept"]} == left
+    assert not list((root / ".staging").iterdir())
+
+
+# Runs commands in a process that is somebody else or may do less
+RESTRICTED = """
+import contextlib, io, json, os, resource, sys, tempfile
+from brdfdb_pipelines import cli
+what, recipe, commands = sys.argv[1:]
+
+def run(*arguments):
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        code = cli.main(arguments)
+    return code, out.getvalue(), err.getvalue()
+
+if what == "nobody" and os.geteuid() == 0:
+    with tempfile.TemporaryDirectory() as store:  # all that is imported late, nobody may not be able to read
+        assert run("build", recipe, "--store", store)[0] == 0
+        assert run("lookup", "foam", "0", "0", "0", "0", "--store", store)[0] == 0
+    os.setgid(65534)
+    os.setuid(65534)
+elif what.isdecimal():
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(what), int(what)))
+answers = [run(*arguments) for arguments in json.loads(commands)]
+print(json.dumps(answers))
+"""
+
+
+def restricted(what: object, recipe: Path, *commands: list[object]) -> list[tuple[int, str, str]]:
+    """Exit code, stdout and stderr of each command."""
+    said = json.dumps([[str(argument) for argument in command] for command in commands])
+    run = [sys.executable, "-c", RESTRICTED, str(what), str(recipe), said]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return [(code, out, err) for code, out, err in json.loads(done.stdout)]
+
+
+@pytest.fixture
+def public() -> Iterator[Path]:
+    """A directory that everybody may enter, unlike those of pytest."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+def sentence(code: int, out: str, err: str) -> str:
+    assert (code, out, err.count("brdfdb: ")) == (2, "", 1), err
+    assert "Traceback" not in err
+    return err.splitlines()[-1]
+
+
+def test_a_directory_that_is_read_only_is_one_sentence(recipe_text: str, built: Path, public: Path) -> None:
+    root, recipe, other = public / "store", public / "recipe.toml", public / "other.toml"
+    shutil.copytree(built, root)
+    recipe.write_text(recipe_text, encoding="utf-8")
+    for path in [root, *root.rglob("*")]:
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    other.write_text(recipe_text.replace("step = 15", "step = 30"), encoding="utf-8")
+    try:
+        changed, unchanged, lookup, new = restricted(
+            "nobody",
+            recipe,
+            ["build", other, "--store", root],
+            ["build", recipe, "--store", root],
+            ["lookup", "foam", 0, 0, 0, 0, "--store", root],
+            ["build", recipe, "--store", public / "new"],
+        )
+    finally:
+        for path in [root, *(path for path in root.rglob("*") if path.is_dir())]:
+            path.chmod(0o755)
+    said = sentence(*changed)
+    assert said.startswith("brdfdb: cannot write ")
+    assert said.endswith(f" to the store at {root}: Permission denied")
+    assert (unchanged[0], lookup[0]) == (0, 0)
+    assert sentence(*new) == f"brdfdb: cannot write a store at {public / 'new'}: Permission denied"
+    assert brdfdb.open(root).head("foam") == "r000001"
+
+
+def test_a_limit_on_the_size_of_files_is_one_sentence_and_the_old_revision_is_served(
+    recipe: Path, built: Path, tmp_path: Path
+) -> None:
+    root = tmp_path / "store"
+    shutil.copytree(built, root)
+    other = tmp_path / "other.toml"
+    other.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 5"), encoding="utf-8")
+    (answer,) = restricted(8000, recipe, ["build", other, "--store", root])
+    said = sentence(*answer)
+    assert said.startswith("brdfdb: cannot write ")
+    assert said.endswith(f" to the store at {root}: File too large")
+    failed = said.split()[3]
+    assert brdfdb.open(root).head(failed) == "r000001"
+    for name in brdfdb.open(root):
+        brdfdb.open(root).verify(name)
+    assert cli.main(["build", str(other), "--store", str(root)]) == 0
+    assert brdfdb.open(root).head(failed) == "r000002"
+
+
+def test_a_full_disk_is_one_sentence_and_the_old_revision_is_served(recipe: Path, tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=600k", "none", str(disk)]
+    mounted = subprocess.run(mount, capture_output=True, check=False)
+    if mounted.returncode != 0:
+        pytest.skip("no tmpfs can be mounted here; test_build has a write that fails instead")
+    try:
+        root = disk / "store"
+        assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
+        other = tmp_path / "other.toml"
+        other.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 0.1"), encoding="utf-8")
+        done = subprocess.run(command("build", other, "--store", root), capture_output=True, text=True, check=False)
+        said = sentence(done.returncode, done.stdout, done.stderr)
+        assert said.startswith("brdfdb: cannot write ")
+        assert said.endswith(f" to the store at {root}: No space left on device")
+        for name in brdfdb.open(root):
+            brdfdb.open(root).verify(name)
+        assert brdfdb.open(root).head("foam") == "r000001"
+        subprocess.run(["mount", "-o", "remount,size=20m", disk], capture_output=True, check=True)
+        assert cli.main(["build", str(other), "--store", str(root)]) == 0
+        assert brdfdb.open(root).head("foam") == "r000002"
+    finally:
+        subprocess.run(["umount", disk], capture_output=True, check=True)
+
+
+MEMORY = """
+import resource, sys
+from brdfdb_pipelines import cli
+small, large, root, memory = sys.argv[1:]
+assert cli.main(["build", small, "--store", root, "--json"]) == 0  # imports, compiled kernels, zarr's threads
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+assert cli.main(["build", large, "--store", root, "--json", "--memory", memory]) == 0
+print(1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before), file=sys.stderr)
+"""
+
+
+def test_a_build_stays_within_its_memory(tmp_path: Path) -> None:
+    allowed = 50_000_000
+    large = write_recipe(tmp_path / "large.toml", 0.5, step=0.02)
+    large.write_text(large.read_text().replace('["grey", "white"]', '["grey"]'), encoding="utf-8")
+    small = write_recipe(tmp_path / "small.toml", 0.5, step=90)
+    run = [sys.executable, "-c", MEMORY, small, large, tmp_path / "store", str(allowed)]
+    done = subprocess.run(run, capture_output=True, text=True, check=True)
+    table = brdfdb.open(tmp_path / "store").dataset("grey")["brdf"]
+    assert table.nbytes >= 10 * allowed
+    assert int(done.stderr.splitlines()[-1]) <= allowed

@@ -1,0 +1,79 @@
+"""history, rollback, verify and gc at the command line: what they print, and what they exit with."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import brdfdb
+from brdfdb_pipelines import cli
+
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def root(built: Path, recipe: Path, tmp_path: Path, capsys: Captured) -> Path:
+    """A store with two revisions of foam and blue-plastic."""
+    store = tmp_path / "store"
+    shutil.copytree(built, store)
+    other = tmp_path / "other.toml"
+    other.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 30"), encoding="utf-8")
+    assert cli.main(["build", str(other), "--store", str(store)]) == 0
+    capsys.readouterr()
+    return store
+
+
+def run(root: Path, *arguments: str) -> int:
+    return cli.main([*arguments, "--store", str(root)])
+
+
+def test_history_is_a_line_a_revision(root: Path, capsys: Captured) -> None:
+    assert run(root, "history", "foam") == 0
+    title, head, first, second = capsys.readouterr().out.splitlines()
+    assert title.strip() == f"2 revisions of foam in {root}"
+    assert head.split() == ["revision", "built", "model", "version", "stored", "request"]
+    assert first.split()[::2][:2] == ["r000001", "oren_nayar_body_surface"]
+    assert second.split()[-1] == "current"
+    digest = brdfdb.open(root).attributes("foam")["request_sha256"]
+    assert second.split()[-2] == digest[:8]
+
+
+def test_rollback_says_what_was_current(root: Path, capsys: Captured) -> None:
+    assert run(root, "rollback", "foam", "r000001") == 0
+    assert capsys.readouterr().out == "foam: r000001 is current, r000002 was\n"
+    assert run(root, "rollback", "foam", "r000001") == 0
+    assert capsys.readouterr().out == "foam: r000001 stays current\n"
+    assert run(root, "rollback", "foam", "r000007") == 2
+    assert capsys.readouterr().err == "brdfdb: foam has no revision 'r000007'; it has r000001, r000002\n"
+
+
+def test_verify_names_all_that_is_damaged(root: Path, capsys: Captured) -> None:
+    assert run(root, "verify") == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("5 materials verified, ")
+    assert out.endswith(": none damaged\n")
+    assert "verifying" in err
+    store = brdfdb.open(root)
+    (store.path("foam") / "brdf" / "c" / "0" / "0" / "0").unlink()
+    (store.path("mirror") / "zarr.json").write_bytes(b"")
+    assert run(root, "verify") == 2
+    out, err = capsys.readouterr()
+    assert ": 2 damaged\n" in out
+    assert "brdfdb: foam r000002 is damaged: brdf/c/0/0/0 is missing\n" in err
+    assert "brdfdb: mirror r000001 is damaged: zarr.json has 0 bytes, not " in err
+    assert run(root, "verify", "blue-plastic") == 0
+
+
+def test_gc_says_what_it_removed(root: Path, capsys: Captured) -> None:
+    (root / ".staging" / "foam" / "0123456789abcdef").mkdir(parents=True)
+    assert run(root, "gc") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "removed .staging/foam/0123456789abcdef"
+    assert lines[1] == f"0 B freed in {root}"
+    assert run(root, "gc", "--keep", "1") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "removed materials/foam/r000001" in lines
+    assert "removed materials/blue-plastic/r000001" in lines
+    assert run(root, "verify") == 0

@@ -1,0 +1,166 @@
+"""Where builds run: processes and a dask cluster give the tables that threads give, and outlive a worker."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import brdfdb
+from brdfdb_pipelines import cli, workers
+from brdfdb_pipelines.build import build
+from brdfdb_pipelines.recipe import load
+
+START_S = 60.0
+
+Captured = pytest.CaptureFixture[str]
+
+
+def chunks(root: Path, name: str) -> dict[str, bytes]:
+    group = brdfdb.open(root).path(name)
+    return {str(path.relative_to(group)): path.read_bytes() for path in group.rglob("c/**/*") if path.is_file()}
+
+
+def test_processes_build_what_threads_build(recipe: Path, built: Path, tmp_path: Path, names: list[str]) -> None:
+    assert cli.main(["build", str(recipe), "--store", str(tmp_path), "--processes", "--jobs", "2"]) == 0
+    assert all(chunks(tmp_path, name) == chunks(built, name) for name in names)
+    assert not list((tmp_path / ".staging").iterdir())
+
+
+def kill(*_: Any) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_process_that_is_killed_is_one_sentence_and_the_build_resumes(recipe: Path, tmp_path: Path) -> None:
+    with workers.processes(1) as at:
+        at.executor.submit(kill)
+        said = r"^the workers are gone, killed or out of memory; build again to resume$"
+        with pytest.raises(ChildProcessError, match=said):
+            build(load(recipe), tmp_path, at)
+    with workers.threads(1) as at:
+        assert {b.state for b in build(load(recipe), tmp_path, at)} == {"published"}
+
+
+ORPHAN = """
+import sys, time
+from brdfdb_pipelines import workers
+if __name__ == "__main__":
+    with workers.processes(1) as at:
+        print(at.executor.submit(__import__("os").getpid).result(), flush=True)
+        at.executor.submit(time.sleep, 600)
+        time.sleep(600)
+"""
+
+
+def test_processes_leave_when_their_builder_was_killed(tmp_path: Path) -> None:
+    script = tmp_path / "orphan.py"
+    script.write_text(ORPHAN)
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True) as builder:
+        assert builder.stdout is not None
+        worker = int(builder.stdout.readline())
+        builder.kill()
+    deadline = time.monotonic() + START_S
+    while Path(f"/proc/{worker}").exists() and "\nState:\tZ" not in Path(f"/proc/{worker}/status").read_text():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+# A dask cluster
+
+
+def dask(*arguments: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "distributed.cli." + str(arguments[0]), *map(str, arguments[1:])]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+    """The address of a scheduler on loopback, and its two workers, each with one thread and no nanny."""
+    where = tmp_path_factory.mktemp("dask")
+    told = where / "scheduler.json"
+    scheduler = dask("dask_scheduler", "--host", "127.0.0.1", "--port", 0, "--no-dashboard", "--scheduler-file", told)
+    processes = [scheduler]
+    try:
+        deadline = time.monotonic() + START_S
+        while not told.is_file() or not told.read_text():
+            assert time.monotonic() < deadline, "no scheduler"
+            time.sleep(0.05)
+        address = json.loads(told.read_text())["address"]
+        options = ("--nthreads", 1, "--no-nanny", "--no-dashboard", "--host", "127.0.0.1", "--local-directory", where)
+        processes += [dask("dask_worker", address, *options) for _ in range(2)]
+        with workers.cluster(address) as at:
+            while at.slots() < 2:
+                assert time.monotonic() < deadline, "no workers"
+                time.sleep(0.2)
+        yield address, processes[1:]
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def test_a_cluster_builds_what_threads_build_and_a_worker_that_is_killed_does_not_matter(
+    cluster: tuple[str, list[subprocess.Popen[str]]],
+    recipe: Path,
+    built: Path,
+    tmp_path: Path,
+    names: list[str],
+    capsys: Captured,
+) -> None:
+    address, processes = cluster
+    root = tmp_path / "store"
+    assert cli.main(["build", str(recipe), "--store", str(root), "--scheduler", address, "--json"]) == 0
+    assert '"event": "done", "tables": 5, "published": 5' in capsys.readouterr().out
+    assert all(chunks(root, name) == chunks(built, name) for name in names)
+    large = tmp_path / "large.toml"
+    fine = "[{ start = 0, stop = 89, step = 0.25 }]"
+    text = recipe.read_text(encoding="utf-8").replace("[{ start = 0, stop = 80, step = 10 }, 85, 89.5]", fine)
+    text = text.replace('"foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"', '"wall-plaster"')
+    large.write_text(text.replace("step = 15", "step = 1"), encoding="utf-8")
+    (job,) = load(large).jobs()
+    assert len(job.layout().blocks) > 20
+    seen = []
+
+    def report(event: dict[str, Any]) -> None:
+        if event["event"] == "block":
+            seen.append(event)
+            if len(seen) == 3:
+                processes[0].kill()
+
+    with workers.cluster(address) as at:
+        (done,) = build(load(large), root, at, report)
+    assert (done.state, len(seen)) == ("published", len(job.layout().blocks))
+    brdfdb.open(root).verify("wall-plaster")
+    with ThreadPoolExecutor(2) as executor:
+        (other,) = build(load(large), tmp_path / "threads", executor)
+    assert chunks(root, "wall-plaster") == chunks(tmp_path / "threads", "wall-plaster")
+    assert other.stored_bytes == done.stored_bytes
+
+
+def test_a_scheduler_that_is_not_there_is_one_sentence(
+    recipe: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "_CONNECT_S", 0.5)
+    root = tmp_path / "store"
+    assert cli.main(["build", str(recipe), "--store", str(root), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.splitlines()[-1] == "brdfdb: no dask scheduler answers at tcp://127.0.0.1:9"
+    assert not root.exists()
+
+
+def test_without_dask_the_scheduler_option_says_what_to_install(
+    recipe: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert cli.main(["build", str(recipe), "--store", str(tmp_path), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    assert capsys.readouterr().err == "brdfdb: --scheduler needs dask: pip install 'brdfdb[dask]'\n"
