@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from brdfdb import accuracy
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Floats, Lobe
+from brdfdb.quadrature import reflected_share
 
 Verdict = Literal["passes", "known published excess", "violates"]
 
@@ -24,13 +26,46 @@ ENERGY_TOLERANCE = 1e-6
 MODEL_RECIPROCITY_TOLERANCE = 1e-11
 # float32 rounds two values that differ by that to the same number or to neighbours, 6e-8 apart: measured 0
 TABLE_RECIPROCITY_TOLERANCE = 1e-6
+# Sums of the same numbers in another order, of f_r with the offset of its logarithm: TODO
+LOOKUP_RECIPROCITY_TOLERANCE = 1e-12
 MODEL_RECIPROCITY_PAIRS = 2000
+_SEED = 1994
+_POLAR = ("theta_i", "theta_r", "theta_h", "theta_d")
+
+# More cannot be asked of a planner: a table that states more is judged as if it stated this
+MOST_ERROR = 0.5
+# Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
+QUADRATURE_TOLERANCE = 2e-5
+_MOST_PANELS = 1000
+# Lights for which such a table is integrated [degree]; by symmetry the phi_i stand for those of all quadrants
+THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=np.float64)
+PHI_I_DEG = np.array([0.0, 30.0, 60.0, 90.0])
+_BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
+_NOT_FINITE = 1e30  # stands for an albedo that is not finite
+_LOOKED_UP = 250  # directions of each band of theta_i, half of them in the lobe, where values are looked at
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
+class Bands(BaseModel):
+    """What a table that states its error is judged by: the mean of the albedo over bands of theta_i."""
+
+    model_config = _STRICT
+
+    theta_i_deg: list[float] = Field(description="edges of the bands")
+    albedo: list[list[float | None]] = Field(description="[band][wavelength], Dirac part included; null: not finite")
+    stated_error: list[list[float]] = Field(
+        description="[band][wavelength], of what the Dirac part leaves: integral of abs(error) cos theta_r over that of "
+        "f_r cos theta_r"
+    )
+
+
 class Energy(BaseModel):
-    """Directional albedo of the table, Dirac part included: what leaves, of unit flux from theta_i."""
+    """Directional albedo of the table, Dirac part included: what leaves, of unit flux from theta_i.
+
+    A table that states its error does so over bands of theta_i, relative to what is reflected there. Its mean over a
+    band may exceed 1, or what is known of the material, by that error, and no more.
+    """
 
     model_config = _STRICT
 
@@ -41,12 +76,19 @@ class Energy(BaseModel):
         "null: not finite"
     )
     specular: list[list[float | None]] = Field(description="[theta_i][wavelength], the share of the Dirac part in it")
+    integration_error: float | None = Field(
+        description="of the albedo, the largest estimate; 0: the exact integral of the interpolant; null: not finite"
+    )
+    bands: Bands | None = Field(description="null: the table states no error, and is allowed none")
     max_albedo: float | None = Field(description="null: not finite")
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
     exceeds_1_from_theta_i_deg: float | None
+    exceeds_1_beyond_error_from_theta_i_deg: float | None = Field(
+        description="where neither the stated error nor that of the integration explains it"
+    )
     verdict: Verdict
-    reason: str
+    reason: str = Field(description="also where a table passes because of the error that it states")
 
 
 class Asymmetry(BaseModel):
@@ -66,19 +108,24 @@ class Reciprocity(BaseModel):
     model_config = _STRICT
 
     model: Asymmetry = Field(description="over random pairs of directions")
-    table: Asymmetry = Field(description="over every pair that the grid holds both ways round")
+    table: Asymmetry = Field(
+        description="over every pair that the grid holds both ways round; of tables that hold other numbers than f_r, "
+        "or hold them over half and difference vectors, over pairs that are looked up, too, to whose f_r the offset of "
+        "the logarithms is added"
+    )
     verdict: Verdict
 
 
 class Values(BaseModel):
-    """The stored values themselves."""
+    """The stored values themselves, and those of f_r that come of them."""
 
     model_config = _STRICT
 
-    count: int
-    smallest: float | None = Field(description="of f_r; null: no value is finite")
-    negative: int
-    not_finite: int
+    count: int = Field(description="of stored values")
+    looked_up: int = Field(description="directions between the nodes where f_r was looked up; 0: linear between nodes")
+    smallest: float | None = Field(description="of f_r at the nodes and where it was looked up; null: none is finite")
+    negative: int = Field(description="of those of f_r, and of the Dirac part")
+    not_finite: int = Field(description="of those, and of what is stored in place of f_r")
     positivity: Verdict
     finiteness: Verdict
 
@@ -103,13 +150,13 @@ class AuditReport(BaseModel):
     model_config = _STRICT
 
     format: Literal["brdfdb-audit"] = "brdfdb-audit"
-    version: Literal[1] = 1
+    version: Literal[2] = 2
     materials: list[MaterialAudit]
     violations: list[str] = Field(description="names of the materials that violate something not known as published")
 
 
 def audit(table: Table) -> MaterialAudit:
-    """Audit one table: what it says of energy, positivity and finiteness holds for its stored values, interpolated.
+    """Audit one table: what it says of energy, positivity and finiteness holds for what is looked up in it.
 
     Parameters
     ----------
@@ -121,10 +168,13 @@ def audit(table: Table) -> MaterialAudit:
     MaterialAudit
         The findings. The verdict on energy is "known published excess" where the albedo exceeds 1 no further than
         the material's attribute ``known_excess``, or its model, says, and "violates" where it exceeds 1 otherwise.
+        Of a table that states its error, that error is taken off the albedo first.
     """
-    energy = _energy(table)
-    reciprocity = _reciprocity(table)
-    values = _values(table)
+    material, plain = _material(table), _plain(table)
+    looked_up = None if plain else _look_up(table, material)
+    energy = _energy(table, material)
+    reciprocity = _reciprocity(table, material, looked_up)
+    values = _values(table, looked_up)
     found = (energy.verdict, reciprocity.verdict, values.positivity, values.finiteness)
     worst: Verdict = "passes"
     for verdict in ("known published excess", "violates"):
@@ -146,32 +196,103 @@ def report(audits: list[MaterialAudit]) -> AuditReport:
     return AuditReport(materials=audits, violations=[a.material for a in audits if a.verdict == "violates"])
 
 
-def directional_albedo(table: Table) -> Floats:
-    """Integral of the table's interpolant times cos theta_r over the hemisphere, without the Dirac part.
+class TableAlbedo(NamedTuple):
+    """The directional albedo of a table, without the Dirac part.
+
+    Attributes
+    ----------
+    theta_i_deg : array [degree]
+        The lights.
+    albedo : array [1]
+        Over theta_i (and phi_i, of anisotropic tables) and, last, the wavelengths; length 1 there for grey tables.
+    error : array (theta_i,) [1]
+        Estimate of its absolute error, over phi_i and wavelengths the largest; 0 where it is exact.
+    """
+
+    theta_i_deg: Axis
+    albedo: Floats
+    error: Floats
+
+
+def directional_albedo(table: Table) -> TableAlbedo:
+    """Integral of f_r cos theta_r over the hemisphere, as the table gives f_r between its nodes.
 
     Parameters
     ----------
     table : Table
-        Any decoded table.
+        Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the model.
 
     Returns
     -------
-    array [1]
-        Over theta_i (and phi_i, if the table has it) and, last, the wavelengths; length 1 there for grey tables.
+    TableAlbedo
+        At the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and `PHI_I_DEG`; at nodes
+        and `THETA_I_DEG`, but not 90 degrees, if a planner chose the nodes: the attribute ``reason`` says so.
 
     Notes
     -----
-    Exact for what `Table.lookup` returns: between nodes that is linear in each angle, so that the integral is a sum
-    of the stored values with the integrals of the hat functions of their axes as weights.
+    Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
+    stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
+    quadrature of `brdfdb.quadrature`, which follows the lobe of the model, to `QUADRATURE_TOLERANCE`.
     """
+    if not _plain(table):
+        return _integrated(table, _material(table))
+    nodes = table.axes_deg["theta_i"]
     theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
     if table.anisotropic:
         phi_weights = _trapezoid_weights(radians(table.axes_deg["phi_r"]))
         brdf = table.brdf.reshape(*table.brdf.shape[:4], -1)
-        return np.asarray(np.einsum("ipjkw,j,k->ipw", brdf, theta_weights, phi_weights, optimize=True))
-    phi_weights = 2.0 * _trapezoid_weights(radians(table.axes_deg["delta_phi"]))  # the other half by symmetry
-    brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
-    return np.asarray(np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True))
+        albedo = np.einsum("ipjkw,j,k->ipw", brdf, theta_weights, phi_weights, optimize=True)
+    else:
+        phi_weights = 2.0 * _trapezoid_weights(radians(table.axes_deg["delta_phi"]))  # the other half by symmetry
+        brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
+        albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)
+    if table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
+        lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
+        matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
+        nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
+    return TableAlbedo(nodes, np.asarray(albedo), np.zeros(nodes.size))
+
+
+def _plain(table: Table) -> bool:
+    """Whether the table is f_r over light and viewer, linear in each angle between its nodes."""
+    return table.values_are_brdf and not table.grid.half_difference and not table.interpolation.cubic
+
+
+def _wavelengths(table: Table) -> int:
+    return 1 if table.wavelength_nm is None else table.wavelength_nm.size
+
+
+def _integrated(table: Table, material: Material) -> TableAlbedo:
+    """The albedo by quadrature of lookups, at all wavelengths at once."""
+    width = _wavelengths(table)
+    phi_i_deg = PHI_I_DEG if table.anisotropic else np.zeros(1)
+    albedo, error = np.empty((THETA_I_DEG.size, phi_i_deg.size, width)), np.empty((THETA_I_DEG.size, phi_i_deg.size))
+    arguments = material.arguments(table.wavelength_nm)
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        return table.lookup_vectors(wi, wr).reshape(*wr.shape[:-1], width)
+
+    for t, p in np.ndindex(*error.shape):
+        theta_i = radians(THETA_I_DEG[t])
+        albedo[t, p], error[t, p] = reflected_share(
+            brdf,
+            theta_i,
+            radians(phi_i_deg[p]),
+            _narrowest(material, np.cos(theta_i), arguments),
+            tolerance=QUADRATURE_TOLERANCE,
+            most_panels=_MOST_PANELS,
+            width=width,
+            mirrored=not table.anisotropic,
+        )
+    return TableAlbedo(THETA_I_DEG, albedo if table.anisotropic else albedo[:, 0], error.max(axis=1))
+
+
+def _narrowest(material: Material, cos_i: float, arguments: Mapping[str, Any]) -> Lobe | None:
+    """The lobe of a model at the wavelength where it is narrowest: panels that resolve it resolve the others."""
+    if material.spec.lobe is None:
+        return None
+    share, alpha_x, alpha_y = material.spec.lobe(cos_i, **arguments)
+    return Lobe(np.max(share), np.min(alpha_x), np.min(alpha_y))
 
 
 def _trapezoid_weights(nodes: Axis) -> Axis:
@@ -197,38 +318,120 @@ def _theta_weights(nodes: Axis) -> Axis:
     return weights
 
 
-def _energy(table: Table) -> Energy:
-    diffuse = directional_albedo(table)
+class _Judged(NamedTuple):
+    """Albedos that are compared with 1, over rows and wavelengths, less what may be wrong with them.
+
+    Each row stands for some of the theta_i, as `covers`, of shape (rows, theta_i), says.
+    """
+
+    certain: Floats
+    covers: NDArray[np.bool_]
+    bands: Bands | None
+
+
+def _energy(table: Table, material: Material) -> Energy:
+    theta_i, diffuse, integration = directional_albedo(table)
     if table.anisotropic:
         diffuse = diffuse.max(axis=1)
-    specular = np.zeros_like(diffuse) if table.specular is None else table.specular.reshape(diffuse.shape)
+    specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
-    theta_i = table.axes_deg["theta_i"]
+    judged = _judged(table, theta_i, diffuse, specular, np.minimum(integration, QUADRATURE_TOLERANCE))
     finite = np.where(np.isfinite(albedo), albedo, np.inf)
     worst_theta, worst_wavelength = np.unravel_index(np.argmax(finite), finite.shape)
     largest = float(finite[worst_theta, worst_wavelength])
-    exceeding = theta_i[np.any(finite > 1.0 + ENERGY_TOLERANCE, axis=1)]
-    known: Mapping[str, Any] = table.attrs.get("known_excess") or MODELS[str(table.attrs["model"])].known_excess or {}
+    above = finite > 1.0 + ENERGY_TOLERANCE
+    beyond = above & (judged.covers.T.astype(int) @ (judged.certain > 1.0 + ENERGY_TOLERANCE) > 0)
+    exceeding, unexplained = (theta_i[np.any(each, axis=1)] for each in (above, beyond))
+    known: Mapping[str, Any] = table.attrs.get("known_excess") or material.spec.known_excess or {}
     verdict: Verdict
-    if exceeding.size == 0:
-        verdict, reason = "passes", ""
-    elif known and largest <= known["max_albedo"] and exceeding[0] >= known["from_theta_i_deg"]:
+    if unexplained.size == 0:
+        verdict, reason = "passes", _excuse(judged, theta_i, finite) if exceeding.size else ""
+    elif known and judged.certain.max() <= known["max_albedo"] and unexplained[0] >= known["from_theta_i_deg"]:
         verdict, reason = "known published excess", str(known["citation"])
     else:
-        share = f"{largest:.4g}" if np.isfinite(largest) else "no finite share"
-        verdict, reason = "violates", f"reflects {share} of what arrives at {theta_i[worst_theta]:g} degrees"
+        verdict, reason = "violates", _reflects(theta_i, finite) + _stated(judged)
     return Energy(
         theta_i_deg=theta_i.tolist(),
         wavelength_nm=None if table.wavelength_nm is None else table.wavelength_nm.tolist(),
         albedo=_json(albedo),
         specular=_json(specular),
+        integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else None,
+        bands=judged.bands,
         max_albedo=largest if np.isfinite(largest) else None,
         max_at_theta_i_deg=float(theta_i[worst_theta]),
         max_at_wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength]),
         exceeds_1_from_theta_i_deg=float(exceeding[0]) if exceeding.size else None,
+        exceeds_1_beyond_error_from_theta_i_deg=float(unexplained[0]) if unexplained.size else None,
         verdict=verdict,
         reason=reason,
     )
+
+
+def _judged(table: Table, theta_i_deg: Axis, diffuse: Floats, specular: Floats, integration: Axis) -> _Judged:
+    """Each theta_i of a table without a stated error; of others the mean over bands, over which they state it.
+
+    In a band, the table reflects 1 + l1 of what the model does, at most, besides the Dirac part.
+    """
+    if table.error is None:
+        return _Judged(_known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None)
+    edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
+    means = _band_means(theta_i_deg, edges)
+    reflected, mirrored = means @ _known(diffuse), means @ _known(specular)
+    found = means @ _known(diffuse + specular)
+    bands = Bands(
+        theta_i_deg=edges.tolist(),
+        albedo=_json(np.where(found < _NOT_FINITE * 1e-6, found, np.nan)),
+        stated_error=l1.tolist(),
+    )
+    within = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
+    return _Judged((reflected - means @ integration[:, np.newaxis]) / (1.0 + l1) + mirrored, within, bands)
+
+
+def _known(values: Floats) -> Floats:
+    """Values of which those that are not finite are replaced by one that exceeds everything."""
+    return np.where(np.isfinite(values), values, _NOT_FINITE)
+
+
+def _band_means(theta_i_deg: Axis, edges: Axis) -> Floats:
+    """Weights, (bands, theta_i), of the mean over each band of what is linear between theta_i and the same beyond."""
+    share = (np.arange(_BAND_POINTS) + 0.5) / _BAND_POINTS
+    inside = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * share
+    return np.stack([np.interp(inside, theta_i_deg, one).mean(axis=1) for one in np.eye(theta_i_deg.size)], axis=1)
+
+
+def _reflects(theta_i_deg: Axis, albedo: Floats) -> str:
+    """The largest albedo in words."""
+    theta, wavelength = np.unravel_index(np.argmax(albedo), albedo.shape)
+    largest = albedo[theta, wavelength]
+    share = f"{largest:.4g}" if np.isfinite(largest) else "no finite share"
+    return f"reflects {share} of what arrives at {theta_i_deg[theta]:g} degrees"
+
+
+def _stated(judged: _Judged) -> str:
+    """What remains of the band that exceeds 1 most, in words; nothing of a table that states no error."""
+    if judged.bands is None:
+        return ""
+    band, wavelength = np.unravel_index(np.argmax(judged.certain), judged.certain.shape)
+    low, high = judged.bands.theta_i_deg[band : band + 2]
+    mean, error = judged.bands.albedo[band][wavelength], judged.bands.stated_error[band][wavelength]
+    share = "no finite share" if mean is None else f"{mean:.6g}"
+    return f"; of {low:g} to {high:g} degrees {share}, where the table states an error of {error:.3g}"
+
+
+def _excuse(judged: _Judged, theta_i_deg: Axis, albedo: Floats) -> str:
+    """Why an albedo above 1 is not held against a table."""
+    if judged.bands is None:
+        return f"{_reflects(theta_i_deg, albedo)}, within the error of its integration"
+    return f"{_reflects(theta_i_deg, albedo)}: within the error that the table states{_stated(judged)}"
+
+
+def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats:
+    """The reflectance of the Dirac part, over theta_i and wavelength."""
+    if table.specular is None:
+        return np.zeros(shape)
+    if table.specular_theta_deg is None and np.array_equal(theta_i_deg, table.axes_deg["theta_i"]):
+        return table.specular.reshape(shape)
+    return table.specular_reflectance(radians(theta_i_deg)).reshape(shape)
 
 
 def _json(values: Floats) -> list[list[float | None]]:
@@ -236,22 +439,57 @@ def _json(values: Floats) -> list[list[float | None]]:
     return [[float(f"{v:.7g}") if np.isfinite(v) else None for v in row] for row in values.tolist()]
 
 
-def _reciprocity(table: Table) -> Reciprocity:
-    rng = np.random.default_rng(1994)
+class _LookedUp(NamedTuple):
+    """Values of f_r between the nodes: with light and viewer exchanged, too."""
+
+    forward: Floats
+    backward: Floats
+
+
+def _look_up(table: Table, material: Material) -> _LookedUp:
+    """f_r, shape (N, L), of pairs of directions above the horizon, half of them in the lobe."""
+    drawn = accuracy.draw(material, table.wavelength_nm, _LOOKED_UP, _SEED)
+    wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
+    shape = (len(wi), _wavelengths(table))
+    return _LookedUp(table.lookup_vectors(wi, wr).reshape(shape), table.lookup_vectors(wr, wi).reshape(shape))
+
+
+def _reciprocity(table: Table, material: Material, looked_up: _LookedUp | None) -> Reciprocity:
+    rng = np.random.default_rng(_SEED)
     # uniform over the cosine up to the last node of the table
-    lowest = np.cos(radians(min(table.axes_deg["theta_i"][-1], table.axes_deg["theta_r"][-1])))
+    lowest = np.cos(radians(min(table.axes_deg[name][-1] for name in table.axes_deg if name in _POLAR)))
     theta_i, theta_r = np.arccos(rng.uniform(lowest, 1.0, (2, MODEL_RECIPROCITY_PAIRS)))
     phi_i, phi_r = rng.uniform(0.0, 2.0 * np.pi, (2, MODEL_RECIPROCITY_PAIRS))
     forward, backward = (theta_i, phi_i, theta_r, phi_r), (theta_r, phi_r, theta_i, phi_i)
+    wavelengths = table.wavelength_nm
     model = _asymmetry(
-        _model(table, forward), _model(table, backward), MODEL_RECIPROCITY_PAIRS, MODEL_RECIPROCITY_TOLERANCE
+        _model(material, wavelengths, forward),
+        _model(material, wavelengths, backward),
+        MODEL_RECIPROCITY_PAIRS,
+        MODEL_RECIPROCITY_TOLERANCE,
     )
-    stored = _table_asymmetry(table)
+    stored = _table_asymmetry(table, looked_up)
     good = model.max <= model.tolerance and stored.max <= stored.tolerance
     return Reciprocity(model=model, table=stored, verdict="passes" if good else "violates")
 
 
-def _table_asymmetry(table: Table) -> Asymmetry:
+def _table_asymmetry(table: Table, looked_up: _LookedUp | None) -> Asymmetry:
+    """The pairs that a grid holds both ways round, and those that were looked up."""
+    found = []
+    if not table.grid.half_difference:
+        found.append(_node_asymmetry(table))
+    if looked_up is not None and (table.grid.half_difference or table.grid.reciprocal):
+        # what is interpolated is the logarithm of f_r with an offset: of f_r far below it, rounding alone is left
+        forward, backward = (each + table.interpolation.offset for each in looked_up)
+        found.append(_asymmetry(forward, backward, len(forward), LOOKUP_RECIPROCITY_TOLERANCE))
+    worst = max(found, key=lambda each: each.max / each.tolerance)
+    pairs = sum(each.pairs for each in found)
+    return worst.model_copy(
+        update={"pairs": pairs, "mean": sum(each.mean * each.pairs for each in found) / max(pairs, 1)}
+    )
+
+
+def _node_asymmetry(table: Table) -> Asymmetry:
     """Stored values against stored values: an interpolant is as symmetric as its nodes, if the axes are the same."""
     axes = table.axes_deg
     _, i, r = np.intersect1d(axes["theta_i"], axes["theta_r"], return_indices=True)
@@ -262,23 +500,26 @@ def _table_asymmetry(table: Table) -> Asymmetry:
     else:
         f = table.brdf[np.ix_(i, r)]  # exchanging them turns delta_phi to -delta_phi, where the table is the same
         swapped = np.swapaxes(f, 0, 1)
-    pairs = f.size if table.wavelength_nm is None else f.size // table.wavelength_nm.size
-    return _asymmetry(f, swapped, pairs, TABLE_RECIPROCITY_TOLERANCE)
+    return _asymmetry(f, swapped, f.size // _wavelengths(table), TABLE_RECIPROCITY_TOLERANCE)
 
 
-def _model(table: Table, angles: tuple[NDArray[np.float64], ...]) -> Floats:
-    """The model behind a table, at the table's wavelengths, from what the table says of itself."""
+def _material(table: Table) -> Material:
+    """The material behind a table, from what the table says of itself."""
     fields = ("title", "model", "parameters", "source")
-    material = Material.from_table(
+    return Material.from_table(
         table.name,
         {
             **{field: table.attrs[field] for field in fields},
             "refractive_index": table.attrs["refractive_index"] or None,
         },
     )
-    if table.wavelength_nm is not None:
+
+
+def _model(material: Material, wavelength_nm: Axis | None, angles: tuple[NDArray[np.float64], ...]) -> Floats:
+    """The model behind a table, at the table's wavelengths."""
+    if wavelength_nm is not None:
         angles = tuple(angle[:, np.newaxis] for angle in angles)
-    return material.spec.evaluate(*angles, **material.arguments(table.wavelength_nm))
+    return material.spec.evaluate(*angles, **material.arguments(wavelength_nm))
 
 
 def _asymmetry(f: Floats, swapped: Floats, pairs: int, tolerance: float) -> Asymmetry:
@@ -291,15 +532,19 @@ def _asymmetry(f: Floats, swapped: Floats, pairs: int, tolerance: float) -> Asym
     return Asymmetry(pairs=pairs, mean=mean, max=largest, tolerance=tolerance)
 
 
-def _values(table: Table) -> Values:
-    stored = [table.brdf] if table.specular is None else [table.brdf, table.specular]
-    finite = [np.isfinite(array) for array in stored]
-    kept = [array[good] for array, good in zip(stored, finite, strict=True) if good.any()]
-    negative = sum(int(np.count_nonzero(array < 0.0)) for array in kept)
-    not_finite = sum(int(good.size - np.count_nonzero(good)) for good in finite)
+def _values(table: Table, looked_up: _LookedUp | None) -> Values:
+    brdf = [table.brdf] if looked_up is None else [table.brdf, looked_up.forward]
+    reflected = brdf if table.specular is None else [*brdf, table.specular]
+    apart = [array for array in (table.spectra, table.uniform) if array is not None]
+    others = apart if table.values_are_brdf else [table.values, *apart]
+    not_finite = sum(array.size - int(np.count_nonzero(np.isfinite(array))) for array in (*reflected, *others))
+    # -inf is not finite, and counted as that
+    negative = sum(int(np.count_nonzero((array < 0.0) & np.isfinite(array))) for array in reflected)
+    smallest = min(float(np.min(array, initial=np.inf, where=np.isfinite(array))) for array in brdf)
     return Values(
-        count=sum(array.size for array in stored),
-        smallest=float(np.min(table.brdf[finite[0]])) if finite[0].any() else None,
+        count=sum(array.size for array in (table.values, *apart)) + (0 if table.specular is None else table.specular.size),
+        looked_up=0 if looked_up is None else len(looked_up.forward),
+        smallest=smallest if np.isfinite(smallest) else None,
         negative=negative,
         not_finite=not_finite,
         positivity="violates" if negative else "passes",

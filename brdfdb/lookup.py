@@ -378,7 +378,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
     how = dict(attrs.get("interpolation", {}))
     variable = "brdf" if "brdf" in arrays else "parts"
-    # a grid of half and difference vectors may come with a theta_i for its Dirac part
+    # an anisotropic grid of half and difference vectors has the axes of an isotropic one, too
     names = next(kind for kind in reversed(KINDS) if set(kind) <= set(arrays))
     specular = arrays.get("specular_reflectance")
     uniform = arrays.get("uniform")
@@ -390,7 +390,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         wavelength_nm=arrays.get("wavelength"),
         values=arrays[variable],
         specular=None if specular is None else specular.astype(np.float32),
-        specular_theta_deg=arrays.get("theta_i"),
+        specular_theta_deg=arrays.get("specular_theta_i"),
         interpolation=Interpolation(**how),
         spectra=arrays.get("spectra"),
         uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),

@@ -1,4 +1,4 @@
-"""The directional albedo of a model, by quadrature that follows its lobe, with an estimate of its error."""
+"""The directional albedo of a model or a table, by quadrature that follows its lobe, with an estimate of its error."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _W_KRONROD = np.concatenate([_KRONROD[:0:-1], _KRONROD])
 _W_GAUSS = np.concatenate([_GAUSS[:0:-1], _GAUSS])
 
 _SAFETY = 4.0  # an edge inside a panel may hide from the difference of two rules: up to 1.6 times that was measured
-_BATCH = 2000  # panels that are evaluated at a time, of 225 points each
+_BATCH = 2000  # panels that are evaluated at a time, of 225 points each; fewer where a point has several values
 MOST_PANELS = 40_000  # where the quadrature gives up, with the error that it has
 
 
@@ -166,25 +166,95 @@ def _albedo(
     def reflected(wr: Array) -> Array:
         with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
             f_r = spec.vectors(wi, wr, **parameters)
-        return np.asarray(f_r * np.maximum(wr[..., 2], 0.0), dtype=np.float64)
+        return np.asarray(f_r * np.maximum(wr[..., 2], 0.0), dtype=np.float64)[..., np.newaxis]
 
-    if spec.lobe is None:
-        return _adaptive(*_over_the_hemisphere(reflected, theta_i, phi_i), tolerance)
-    return _adaptive(*_over_the_slopes(reflected, wi, spec.lobe(wi[2], **parameters)), tolerance)
+    lobe = None if spec.lobe is None else spec.lobe(wi[2], **parameters)
+    panels = _panels_of(reflected, wi, theta_i, phi_i, lobe)
+    albedo, error = _adaptive(*panels, tolerance)
+    return float(albedo[0]), error
+
+
+def reflected_share(
+    brdf: Callable[[Array, Array], Floats],
+    theta_i: float,
+    phi_i: float,
+    lobe: Lobe | None,
+    *,
+    tolerance: float,
+    most_panels: int,
+    width: int = 1,
+    mirrored: bool = False,
+) -> Albedo:
+    """The directional albedo of any function of unit vectors that gives several values of f_r at once.
+
+    Parameters
+    ----------
+    brdf : callable
+        ``brdf(wi, wr)`` for a light (3,) and viewers (..., 3): f_r [1/sr] of shape (..., width).
+    theta_i, phi_i : float [rad]
+        Direction of the light, theta below pi/2.
+    lobe : Lobe or None
+        Of one light; where to look for what all values have in common, None if for nothing.
+    tolerance : float
+        The absolute error to stay below, for the worst of the values.
+    most_panels : int
+        Where to give up.
+    width : int
+        How many values brdf gives.
+    mirrored : bool
+        Whether f_r is the same on both sides of the plane of incidence: half of it is then integrated.
+
+    Returns
+    -------
+    Albedo
+        Albedo of shape (width,), and one estimate of the error for all of them: not below the tolerance where the
+        quadrature gave up.
+    """
+    wi = unit_vector(theta_i, phi_i)
+
+    def reflected(wr: Array) -> Array:
+        return np.asarray(brdf(wi, wr) * np.maximum(wr[..., 2:], 0.0), dtype=np.float64)
+
+    panels = _panels_of(reflected, wi, theta_i, phi_i, lobe, mirrored)
+    albedo, error = _adaptive(*panels, tolerance, most_panels, width)
+    return Albedo(albedo, np.float64(error))
+
+
+def _panels_of(
+    reflected: Callable[[Array], Array],
+    wi: Array,
+    theta_i: float,
+    phi_i: float,
+    lobe: Lobe | None,
+    mirrored: bool = False,
+) -> tuple[Integrand, Array]:
+    """The integrand and its first panels: on one side of the plane of incidence, twice, where the other is the same."""
+    if lobe is None:
+        integrand, panels = _over_the_hemisphere(reflected, theta_i, phi_i)
+        begin = phi_i
+    else:
+        integrand, panels, begin = _over_the_slopes(reflected, wi, lobe)
+    if not mirrored:
+        return integrand, panels
+    side = (panels[:, 1] > begin) & (panels[:, 1] < begin + np.pi)
+    return (lambda x, psi: 2.0 * integrand(x, psi)), panels[side]
 
 
 def _over_the_hemisphere(reflected: Callable[[Array], Array], theta_i: float, phi_i: float) -> tuple[Integrand, Array]:
     """The integrand over theta_r and phi_r, and panels with edges where Oren and Nayar's model has its own."""
 
     def integrand(theta: Array, phi: Array) -> Array:
-        return reflected(unit_vector(theta, phi)) * np.sin(theta)
+        return reflected(unit_vector(theta, phi)) * np.sin(theta)[..., np.newaxis]
 
     thetas = [0.0, theta_i, HALF_PI] if 0.0 < theta_i < HALF_PI else [0.0, HALF_PI / 2.0, HALF_PI]
     return integrand, _panels(np.array(thetas), phi_i + HALF_PI * np.arange(5))
 
 
-def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe) -> tuple[Integrand, Array]:
-    """The integrand over x in [0, 1], how far out on a ray, and psi, the azimuth on the ellipse of the lobe."""
+def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe) -> tuple[Integrand, Array, float]:
+    """The integrand over x in [0, 1], how far out on a ray, and psi, the azimuth on the ellipse of the lobe.
+
+    Last, where one side of the plane of incidence begins, of a lobe that is round.
+    """
     x_i, y_i, cos_i = wi
     sin2_i = x_i**2 + y_i**2
     alpha_x, alpha_y = (float(np.clip(alpha, 1e-9, 10.0)) for alpha in (lobe.alpha_x, lobe.alpha_y))
@@ -205,11 +275,12 @@ def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe)
         h_i = (cos_i + t * p) * cos_h
         wr = 2.0 * h_i[..., np.newaxis] * h - wi
         # d omega_r = 4 (h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
-        return np.asarray(reflected(wr) * 4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian)
+        measure = 4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian
+        return np.asarray(reflected(wr) * measure[..., np.newaxis])
 
     # a quarter turn away from the light, at grazing, the horizon leaps: an edge of panels
     across = np.arctan2(alpha_x * x_i, -alpha_y * y_i) if sin2_i > 0.0 else HALF_PI  # p = 0
-    return integrand, _panels(np.linspace(0.0, 1.0, 5), across + HALF_PI * np.arange(5))
+    return integrand, _panels(np.linspace(0.0, 1.0, 5), across + HALF_PI * np.arange(5)), float(across) + HALF_PI
 
 
 def _panels(first: Floats, second: Floats) -> Array:
@@ -225,11 +296,13 @@ def _panels(first: Floats, second: Floats) -> Array:
     )
 
 
-def _adaptive(integrand: Integrand, panels: Array, tolerance: float) -> tuple[float, float]:
-    """The integral over rectangles, halved where the error is large until it is below the tolerance in all."""
-    values, errors = _rules(integrand, panels)
+def _adaptive(
+    integrand: Integrand, panels: Array, tolerance: float, most_panels: int = MOST_PANELS, width: int = 1
+) -> tuple[Array, float]:
+    """The integrals, of shape (width,), over rectangles, halved where the error is large until all are good enough."""
+    values, errors = _rules(integrand, panels, width)
     done = 0
-    while errors.sum() > tolerance and done < MOST_PANELS:
+    while errors.sum() > tolerance and done < most_panels:
         # the largest errors, as many as stand for all but a part of the tolerance
         total = errors.sum(axis=1)
         order = np.argsort(total)[::-1]
@@ -237,11 +310,11 @@ def _adaptive(integrand: Integrand, panels: Array, tolerance: float) -> tuple[fl
         chosen = order[: 1 + int(np.count_nonzero(rest > 0.5 * tolerance))]
         kept = np.setdiff1d(np.arange(total.size), chosen)
         halved = _halved(panels[chosen], errors[chosen])
-        new_values, new_errors = _rules(integrand, halved)
+        new_values, new_errors = _rules(integrand, halved, width)
         panels = np.concatenate([panels[kept], halved])
         values, errors = np.concatenate([values[kept], new_values]), np.concatenate([errors[kept], new_errors])
         done += len(halved)
-    return float(values.sum()), float(errors.sum())
+    return values.sum(axis=0), float(errors.sum())
 
 
 def _halved(panels: Array, errors: Array) -> Array:
@@ -256,15 +329,21 @@ def _halved(panels: Array, errors: Array) -> Array:
     return np.concatenate([low, high])
 
 
-def _rules(integrand: Integrand, panels: Array) -> tuple[Array, Array]:
-    """Integral over each panel, and by how much it changes with Gauss's rule in the first or the second variable."""
-    values, errors = np.empty(len(panels)), np.empty((len(panels), 2))
-    for start in range(0, len(panels), _BATCH):
-        batch = slice(start, start + _BATCH)
+def _rules(integrand: Integrand, panels: Array, width: int) -> tuple[Array, Array]:
+    """Integrals over each panel, and by how much the worst changes with Gauss's rule in the first or second variable.
+
+    The integrand gives `width` values a point, in a last axis.
+    """
+    values, errors = np.empty((len(panels), width)), np.empty((len(panels), 2))
+    step = max(1, _BATCH // width)
+    for start in range(0, len(panels), step):
+        batch = slice(start, start + step)
         c_1, c_2, h_1, h_2 = (column[:, np.newaxis, np.newaxis] for column in panels[batch].T)
-        f = integrand(*np.broadcast_arrays(c_1 + h_1 * _X[:, np.newaxis], c_2 + h_2 * _X)) * (h_1 * h_2)
-        by_first, by_second = f @ _W_KRONROD, _W_KRONROD @ f
-        values[batch] = by_first @ _W_KRONROD
-        errors[batch, 0] = _SAFETY * np.abs(values[batch] - by_first @ _W_GAUSS)
-        errors[batch, 1] = _SAFETY * np.abs(values[batch] - by_second @ _W_GAUSS)
+        f = integrand(*np.broadcast_arrays(c_1 + h_1 * _X[:, np.newaxis], c_2 + h_2 * _X))
+        by_first = _W_KRONROD @ f  # over the last variable but one: (panels, 15, width)
+        by_second = (_W_KRONROD @ f.reshape(*f.shape[:2], -1)).reshape(by_first.shape)
+        area = (h_1 * h_2)[:, 0]
+        values[batch] = area * (_W_KRONROD @ by_first)
+        errors[batch, 0] = _SAFETY * np.max(np.abs(values[batch] - area * (_W_GAUSS @ by_first)), axis=1)
+        errors[batch, 1] = _SAFETY * np.max(np.abs(values[batch] - area * (_W_GAUSS @ by_second)), axis=1)
     return values, errors

@@ -18,8 +18,10 @@ from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
-_CONTINUED = np.deg2rad(15.0)  # how far beyond the horizon numbers go on with it
-SPECULAR_THETA_DEG = np.append(np.arange(0.0, 89.0, 1.0), np.arange(89.0, 90.01, 0.1).round(1))  # without theta_i
+_POLE_END = np.deg2rad(89.9)  # of light and viewer, where the pole of a model is tabulated as it is
+_CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
+# Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner's has few nodes, none for it
+SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
 
 
@@ -31,7 +33,8 @@ def tabulate(layout: Layout) -> xr.Dataset:
     Dataset
         ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says: float32, over
         the axes of the grid and, last, ``wavelength`` or ``part``; for models with a Dirac part
-        ``specular_reflectance`` [1] over theta_i and wavelength; for spectral materials ``n`` and ``k`` as used.
+        ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
+        ``k`` as used.
         Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
     """
     values = np.concatenate([block(layout, rows) for rows in layout.blocks])
@@ -52,7 +55,8 @@ def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
         else:
             numbers = node_numbers(layout, here)
             if layout.spectra is not None:
-                numbers = numbers @ layout.spectra.T
+                # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
+                numbers = np.einsum("...w,pw->...p", numbers, layout.spectra)
             values[at] = numbers.reshape(here.stop - here.start, *layout.shape[1:])
     return rounded(values, layout.bits)
 
@@ -120,14 +124,14 @@ def _numbers(layout: Layout, evaluate: Callable[[dict[str, Any]], Floats], mu: F
 def node_numbers(layout: Layout, rows: slice) -> Floats:
     """`numbers` at some rows of nodes, continued beyond the horizon on a grid of half and difference vectors.
 
-    There theta_d is held at its largest value, where light or viewer is at the horizon; from there the numbers go on
-    along theta_d with the slope that they arrive with.
+    There theta_d is held at its largest value, where light or viewer is at the horizon, or at 89.9 degrees if the
+    numbers have a pole there; from there they go on along theta_d with the slope that they arrive with.
     """
     grid = layout.grid
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        return _numbers(layout, lambda arguments: layout.material.spec.evaluate(*angles, **arguments), mu)
+        return _numbers(layout, lambda arguments: _evaluated(layout, rows, arguments), mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
     axes[0] = axes[0][rows]
     nodes = np.ix_(*axes)
@@ -137,7 +141,12 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
 
 def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
     """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
-    largest = np.arctan2(np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d)))
+    lowest = 0.0  # cosine of light and viewer
+    if layout.material.spec.grazing_pole and layout.interpolation.power == 0.0:
+        lowest, theta_h = np.cos(_POLE_END), np.minimum(theta_h, _POLE_END)
+    # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
+    along, across = np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d))
+    largest = np.arccos(np.minimum(lowest / np.hypot(along, across), 1.0)) - np.arctan2(across, along)
     largest = np.maximum(largest * (1.0 - 1e-12), 0.0)
     held = np.minimum(theta_d, largest)
     values = numbers(layout, *_half_vectors(theta_h, phi_h, held, phi_d))
@@ -145,7 +154,7 @@ def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, p
     if np.any(beyond > 0.0):
         step = np.minimum(_SLOPE_STEP, 0.5 * largest)
         inside = numbers(layout, *_half_vectors(theta_h, phi_h, np.maximum(held - step, 0.0), phi_d))
-        share = np.minimum(beyond, _CONTINUED) / np.broadcast_to(np.maximum(step, 1e-9), beyond.shape)
+        share = np.minimum(beyond / np.broadcast_to(np.maximum(step, 1e-9), beyond.shape), _CONTINUED)
         values += share[..., np.newaxis] * (values - inside)
     return values
 
@@ -181,11 +190,13 @@ def frame(layout: Layout) -> xr.Dataset:
     if layout.uniform is not None:
         variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])
     if spec.specular is not None:
-        theta_i_deg = grid.axes.get("theta_i", SPECULAR_THETA_DEG)
-        coordinates["theta_i"] = _coordinate("theta_i", theta_i_deg)
+        given = "theta_i" in grid.axes and not layout.reason
+        name = "theta_i" if given else "specular_theta_i"
+        theta_i_deg = grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
+        coordinates[name] = _coordinate(name, theta_i_deg)
         theta_i = radians(theta_i_deg)
         variables["specular_reflectance"] = (
-            ("theta_i", *spectral),
+            (name, *spectral),
             spec.specular(
                 theta_i[:, np.newaxis] if spectral else theta_i,
                 **{name: arguments[name] for name in spec.specular_parameters},
@@ -251,6 +262,7 @@ def _attributes(material: Material) -> dict[str, Any]:
 
 _LONG_NAMES = {
     "theta_i": "polar angle of the light",
+    "specular_theta_i": "polar angle of the light, of the Dirac part",
     "theta_r": "polar angle of the viewer",
     "phi_i": "azimuth of the light",
     "phi_r": "azimuth of the viewer",
