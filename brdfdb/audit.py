@@ -14,7 +14,6 @@ from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
-from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, Lobe
 from brdfdb.quadrature import reflected_share
 
@@ -373,7 +372,9 @@ def _judged(table: Table, theta_i_deg: Axis, diffuse: Floats, specular: Floats, 
     In a band, the table reflects 1 + l1 of what the model does, at most, besides the Dirac part.
     """
     if table.error is None:
-        return _Judged(_known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None)
+        return _Judged(
+            _known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None
+        )
     edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     reflected, mirrored = means @ _known(diffuse), means @ _known(specular)
@@ -542,7 +543,8 @@ def _values(table: Table, looked_up: _LookedUp | None) -> Values:
     negative = sum(int(np.count_nonzero((array < 0.0) & np.isfinite(array))) for array in reflected)
     smallest = min(float(np.min(array, initial=np.inf, where=np.isfinite(array))) for array in brdf)
     return Values(
-        count=sum(array.size for array in (table.values, *apart)) + (0 if table.specular is None else table.specular.size),
+        count=sum(array.size for array in (table.values, *apart))
+        + (0 if table.specular is None else table.specular.size),
         looked_up=0 if looked_up is None else len(looked_up.forward),
         smallest=smallest if np.isfinite(smallest) else None,
         negative=negative,

@@ -367,10 +367,10 @@ def rebuilt(
 
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
-    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((2, len(wi)))
+    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
     rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0)
     flat = [np.ascontiguousarray(w, dtype=np.float64).reshape(-1) for w in (wi, wr)]
-    _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], 0, len(wi), x, mu, scratch)
+    _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
     return x
 
 
