@@ -2,9 +2,9 @@
 
 Random directions, float32 tables. The three first lines are what is promised: 80 million a second trilinear over light
 and viewer, 30 million over half and difference vectors from unit vectors, 15 million cubic, each 20 times
-`scipy.interpolate.RegularGridInterpolator` on the same table from the same directions in the same run, which numpy brings
-to coordinates for it. Machines are shared and noisy: medians of nine calls of the public methods, with their checks and a
-new array each.
+`scipy.interpolate.RegularGridInterpolator` on the same table from the same directions in the same run, with numpy to
+bring them to coordinates. Machines are shared and noisy: medians of nine calls of the public methods, with their checks
+and a new array each.
 """
 
 from __future__ import annotations
