@@ -191,7 +191,7 @@ class Table:
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
         given = [np.asarray(angle) for angle in (theta_i, phi_i, theta_r, phi_r)]
         if self.grid.half_difference:
-            return self._by_half_vectors(given, low, weight, wavelength_shape)
+            return self._by_half_vectors((theta_i, phi_i, theta_r, phi_r), low, weight, wavelength_shape)
         dtype = asked_for(theta_i, phi_i, theta_r, phi_r)
         if any(angle.dtype.kind not in "iuf" for angle in given):
             checked_angles(*given)
@@ -250,9 +250,13 @@ class Table:
         return np.asarray(found if tail else found[..., 0])[()]
 
     def _by_half_vectors(
-        self, given: list[NDArray[Any]], low: NDArray[np.int64], weight: NDArray[np.float64], tail: tuple[int, ...]
+        self,
+        given: tuple[ArrayLike, ...],
+        low: NDArray[np.int64],
+        weight: NDArray[np.float64],
+        tail: tuple[int, ...],
     ) -> Floats:
-        """Values on a grid of half and difference vectors, of angles."""
+        """Values on a grid of half and difference vectors, of angles as they were given."""
         angles = checked_angles(*given)
         flat = [np.ravel(a) for a in np.broadcast_arrays(angles.theta_i, angles.phi_i, angles.theta_r, angles.phi_r)]
         values = np.empty((flat[0].size, weight.size))
@@ -263,15 +267,17 @@ class Table:
             _lookup_kernels.by_vectors(
                 *self._kernel, low, weight, wi.reshape(-1), wr.reshape(-1), values[some].reshape(-1)
             )
-        shape = np.broadcast_shapes(*(angle.shape for angle in given))
+        shape = np.broadcast_shapes(*(np.shape(angle) for angle in given))
         return finished(values.reshape(*shape, weight.size), angles, trailing=1).reshape(shape + tail)[()]
 
     @functools.cached_property
     def _kernel(self) -> _Ready:
         """What kernels need to know of the table."""
         grid, how = self.grid, self.interpolation
+        # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
+        overshoots = how.logarithm or how.cubic or grid.half_difference
         rule = _lookup_kernels.Rule(
-            grid.half_difference, grid.copies, how.logarithm, float(how.offset), float(how.power)
+            grid.half_difference, grid.copies, how.logarithm, float(how.offset), float(how.power), overshoots
         )
         axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
         channels = self.values.size // int(np.prod(grid.shape))
@@ -368,7 +374,7 @@ def rebuilt(
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
     x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((2, len(wi)))
-    rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0)
+    rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False)
     flat = [np.ascontiguousarray(w, dtype=np.float64).reshape(-1) for w in (wi, wr)]
     _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], 0, len(wi), x, mu, scratch)
     return x
