@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb import accuracy
+from brdfdb.albedo import (
+    QUADRATURE_TOLERANCE,
+    directional_albedo,
+    linear_in_angles,
+    material_of,
+    wavelengths_of,
+)
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
-from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, Lobe
-from brdfdb.quadrature import reflected_share
+from brdfdb.parameters import Floats
 
 Verdict = Literal["passes", "known published excess", "violates"]
 
@@ -34,12 +39,6 @@ _POLAR = ("theta_i", "theta_r", "theta_h", "theta_d")
 
 # More cannot be asked of a planner: a table that states more is judged as if it stated this
 MOST_ERROR = 0.5
-# Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
-QUADRATURE_TOLERANCE = 2e-5
-_MOST_PANELS = 1000
-# Lights for which such a table is integrated [degree]; by symmetry the phi_i stand for those of all quadrants
-THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=np.float64)
-PHI_I_DEG = np.array([0.0, 30.0, 60.0, 90.0])
 _BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
 _NOT_FINITE = 1e30  # stands for an albedo that is not finite
 _LOOKED_UP = 250  # directions of each band of theta_i, half of them in the lobe, where values are looked at
@@ -170,7 +169,7 @@ def audit(table: Table) -> MaterialAudit:
         the material's attribute ``known_excess``, or its model, says, and "violates" where it exceeds 1 otherwise.
         Of a table that states its error, that error is taken off the albedo first.
     """
-    material, plain = _material(table), _plain(table)
+    material, plain = material_of(table), linear_in_angles(table)
     looked_up = None if plain else _look_up(table, material)
     energy = _energy(table, material)
     reciprocity = _reciprocity(table, material, looked_up)
@@ -196,128 +195,6 @@ def report(audits: list[MaterialAudit]) -> AuditReport:
     return AuditReport(materials=audits, violations=[a.material for a in audits if a.verdict == "violates"])
 
 
-class TableAlbedo(NamedTuple):
-    """The directional albedo of a table, without the Dirac part.
-
-    Attributes
-    ----------
-    theta_i_deg : array [degree]
-        The lights.
-    albedo : array [1]
-        Over theta_i (and phi_i, of anisotropic tables) and, last, the wavelengths; length 1 there for grey tables.
-    error : array (theta_i,) [1]
-        Estimate of its absolute error, over phi_i and wavelengths the largest; 0 where it is exact.
-    """
-
-    theta_i_deg: Axis
-    albedo: Floats
-    error: Floats
-
-
-def directional_albedo(table: Table) -> TableAlbedo:
-    """Integral of f_r cos theta_r over the hemisphere, as the table gives f_r between its nodes.
-
-    Parameters
-    ----------
-    table : Table
-        Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the model.
-
-    Returns
-    -------
-    TableAlbedo
-        At the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and `PHI_I_DEG`; at nodes
-        and `THETA_I_DEG`, but not 90 degrees, if a planner chose the nodes: the attribute ``reason`` says so.
-
-    Notes
-    -----
-    Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
-    stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
-    quadrature of `brdfdb.quadrature`, which follows the lobe of the model, to `QUADRATURE_TOLERANCE`.
-    """
-    if not _plain(table):
-        return _integrated(table, _material(table))
-    nodes = table.axes_deg["theta_i"]
-    theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
-    if table.anisotropic:
-        phi_weights = _trapezoid_weights(radians(table.axes_deg["phi_r"]))
-        brdf = table.brdf.reshape(*table.brdf.shape[:4], -1)
-        albedo = np.einsum("ipjkw,j,k->ipw", brdf, theta_weights, phi_weights, optimize=True)
-    else:
-        phi_weights = 2.0 * _trapezoid_weights(radians(table.axes_deg["delta_phi"]))  # the other half by symmetry
-        brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
-        albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)
-    if table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
-        lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
-        matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
-        nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
-    return TableAlbedo(nodes, np.asarray(albedo), np.zeros(nodes.size))
-
-
-def _plain(table: Table) -> bool:
-    """Whether the table is f_r over light and viewer, linear in each angle between its nodes."""
-    return table.values_are_brdf and not table.grid.half_difference and not table.interpolation.cubic
-
-
-def _wavelengths(table: Table) -> int:
-    return 1 if table.wavelength_nm is None else table.wavelength_nm.size
-
-
-def _integrated(table: Table, material: Material) -> TableAlbedo:
-    """The albedo by quadrature of lookups, at all wavelengths at once."""
-    width = _wavelengths(table)
-    phi_i_deg = PHI_I_DEG if table.anisotropic else np.zeros(1)
-    albedo, error = np.empty((THETA_I_DEG.size, phi_i_deg.size, width)), np.empty((THETA_I_DEG.size, phi_i_deg.size))
-    arguments = material.arguments(table.wavelength_nm)
-
-    def brdf(wi: Floats, wr: Floats) -> Floats:
-        return table.lookup_vectors(wi, wr).reshape(*wr.shape[:-1], width)
-
-    for t, p in np.ndindex(*error.shape):
-        theta_i = radians(THETA_I_DEG[t])
-        albedo[t, p], error[t, p] = reflected_share(
-            brdf,
-            theta_i,
-            radians(phi_i_deg[p]),
-            _narrowest(material, np.cos(theta_i), arguments),
-            tolerance=QUADRATURE_TOLERANCE,
-            most_panels=_MOST_PANELS,
-            width=width,
-            mirrored=not table.anisotropic,
-        )
-    return TableAlbedo(THETA_I_DEG, albedo if table.anisotropic else albedo[:, 0], error.max(axis=1))
-
-
-def _narrowest(material: Material, cos_i: float, arguments: Mapping[str, Any]) -> Lobe | None:
-    """The lobe of a model at the wavelength where it is narrowest: panels that resolve it resolve the others."""
-    if material.spec.lobe is None:
-        return None
-    share, alpha_x, alpha_y = material.spec.lobe(cos_i, **arguments)
-    return Lobe(np.max(share), np.min(alpha_x), np.min(alpha_y))
-
-
-def _trapezoid_weights(nodes: Axis) -> Axis:
-    steps = np.diff(nodes)
-    weights = np.zeros(nodes.size)
-    weights[:-1] += steps / 2.0
-    weights[1:] += steps / 2.0
-    return weights
-
-
-def _theta_weights(nodes: Axis) -> Axis:
-    """Integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat held constant up to pi/2.
-
-    With F = sin^2 / 2 and its integral G = theta / 4 - sin(2 theta) / 8, the rising half over [a, b] gives
-    F(b) - (G(b) - G(a)) / (b - a).
-    """
-    F = np.sin(nodes) ** 2 / 2.0
-    slope = np.diff(nodes / 4.0 - np.sin(2.0 * nodes) / 8.0) / np.diff(nodes)
-    weights = np.zeros(nodes.size)
-    weights[1:] += F[1:] - slope
-    weights[:-1] += slope - F[:-1]
-    weights[-1] += 0.5 - F[-1]
-    return weights
-
-
 class _Judged(NamedTuple):
     """Albedos that are compared with 1, over rows and wavelengths, less what may be wrong with them.
 
@@ -330,9 +207,8 @@ class _Judged(NamedTuple):
 
 
 def _energy(table: Table, material: Material) -> Energy:
-    theta_i, diffuse, integration = directional_albedo(table)
-    if table.anisotropic:
-        diffuse = diffuse.max(axis=1)
+    theta_i, _, each_azimuth, integration = directional_albedo(table)
+    diffuse = each_azimuth.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
     judged = _judged(table, theta_i, diffuse, specular, np.minimum(integration, QUADRATURE_TOLERANCE))
@@ -346,7 +222,12 @@ def _energy(table: Table, material: Material) -> Energy:
     verdict: Verdict
     if unexplained.size == 0:
         verdict, reason = "passes", _excuse(judged, theta_i, finite) if exceeding.size else ""
-    elif known and judged.certain.max() <= known["max_albedo"] and unexplained[0] >= known["from_theta_i_deg"]:
+    elif (
+        known
+        and np.isfinite(largest)
+        and judged.certain.max() <= known["max_albedo"]
+        and unexplained[0] >= known["from_theta_i_deg"]
+    ):
         verdict, reason = "known published excess", str(known["citation"])
     else:
         verdict, reason = "violates", _reflects(theta_i, finite) + _stated(judged)
@@ -373,7 +254,9 @@ def _judged(table: Table, theta_i_deg: Axis, diffuse: Floats, specular: Floats, 
     In a band, the table reflects 1 + l1 of what the model does, at most, besides the Dirac part.
     """
     if table.error is None:
-        return _Judged(_known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None)
+        return _Judged(
+            _known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None
+        )
     edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     reflected, mirrored = means @ _known(diffuse), means @ _known(specular)
@@ -450,7 +333,7 @@ def _look_up(table: Table, material: Material) -> _LookedUp:
     """f_r, shape (N, L), of pairs of directions above the horizon, half of them in the lobe."""
     drawn = accuracy.draw(material, table.wavelength_nm, _LOOKED_UP, _SEED)
     wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
-    shape = (len(wi), _wavelengths(table))
+    shape = (len(wi), wavelengths_of(table))
     return _LookedUp(table.lookup_vectors(wi, wr).reshape(shape), table.lookup_vectors(wr, wi).reshape(shape))
 
 
@@ -500,19 +383,7 @@ def _node_asymmetry(table: Table) -> Asymmetry:
     else:
         f = table.brdf[np.ix_(i, r)]  # exchanging them turns delta_phi to -delta_phi, where the table is the same
         swapped = np.swapaxes(f, 0, 1)
-    return _asymmetry(f, swapped, f.size // _wavelengths(table), TABLE_RECIPROCITY_TOLERANCE)
-
-
-def _material(table: Table) -> Material:
-    """The material behind a table, from what the table says of itself."""
-    fields = ("title", "model", "parameters", "source")
-    return Material.from_table(
-        table.name,
-        {
-            **{field: table.attrs[field] for field in fields},
-            "refractive_index": table.attrs["refractive_index"] or None,
-        },
-    )
+    return _asymmetry(f, swapped, f.size // wavelengths_of(table), TABLE_RECIPROCITY_TOLERANCE)
 
 
 def _model(material: Material, wavelength_nm: Axis | None, angles: tuple[NDArray[np.float64], ...]) -> Floats:
@@ -542,7 +413,8 @@ def _values(table: Table, looked_up: _LookedUp | None) -> Values:
     negative = sum(int(np.count_nonzero((array < 0.0) & np.isfinite(array))) for array in reflected)
     smallest = min(float(np.min(array, initial=np.inf, where=np.isfinite(array))) for array in brdf)
     return Values(
-        count=sum(array.size for array in (table.values, *apart)) + (0 if table.specular is None else table.specular.size),
+        count=sum(array.size for array in (table.values, *apart))
+        + (0 if table.specular is None else table.specular.size),
         looked_up=0 if looked_up is None else len(looked_up.forward),
         smallest=smallest if np.isfinite(smallest) else None,
         negative=negative,

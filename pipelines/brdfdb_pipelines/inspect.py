@@ -77,12 +77,11 @@ def _print_albedo(table: Table) -> None:
     """Directional albedo of the table at a few angles: the first, the middle and the last wavelength."""
     import numpy as np
 
-    from brdfdb.audit import directional_albedo
+    from brdfdb.albedo import directional_albedo
     from brdfdb.geometry import radians
 
-    diffuse = directional_albedo(table)
-    if table.anisotropic:
-        diffuse = diffuse.mean(axis=1)
+    found = directional_albedo(table)
+    diffuse = found.mean
     wavelength = table.wavelength_nm
     columns = sorted({0, diffuse.shape[1] // 2, diffuse.shape[1] - 1})
     print(
@@ -93,7 +92,7 @@ def _print_albedo(table: Table) -> None:
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
-        values = np.interp(ALBEDO_ANGLES_DEG, table.axes_deg["theta_i"], diffuse[:, w]) + specular
+        values = np.interp(ALBEDO_ANGLES_DEG, found.theta_i_deg, diffuse[:, w]) + specular
         print(f"    {'grey' if at is None else f'{at:g} nm':<10}" + "".join(f"{value:9.4f}" for value in values))
 
 
