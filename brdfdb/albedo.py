@@ -126,12 +126,12 @@ def _integrated(table: Table, material: Material) -> TableAlbedo:
         return table.lookup_vectors(wi, wr).reshape(*wr.shape[:-1], width)
 
     for t, p in np.ndindex(*error.shape):
-        theta_i = radians(THETA_I_DEG[t])
+        theta_i = float(radians(THETA_I_DEG[t]))
         albedo[t, p], error[t, p] = reflected_share(
             brdf,
             theta_i,
-            radians(phi_i_deg[p]),
-            _narrowest(material, np.cos(theta_i), arguments),
+            float(radians(phi_i_deg[p])),
+            _narrowest(material, float(np.cos(theta_i)), arguments),
             tolerance=QUADRATURE_TOLERANCE,
             most_panels=_MOST_PANELS,
             width=width,
@@ -145,7 +145,7 @@ def _narrowest(material: Material, cos_i: float, arguments: Mapping[str, Any]) -
     if material.spec.lobe is None:
         return None
     share, alpha_x, alpha_y = material.spec.lobe(cos_i, **arguments)
-    return Lobe(np.max(share), np.min(alpha_x), np.min(alpha_y))
+    return Lobe(*(np.asarray(value) for value in (np.max(share), np.min(alpha_x), np.min(alpha_y))))
 
 
 def _trapezoid_weights(nodes: Axis) -> Axis:

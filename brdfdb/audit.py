@@ -54,8 +54,8 @@ class Bands(BaseModel):
     theta_i_deg: list[float] = Field(description="edges of the bands")
     albedo: list[list[float | None]] = Field(description="[band][wavelength], Dirac part included; null: not finite")
     stated_error: list[list[float]] = Field(
-        description="[band][wavelength], of what the Dirac part leaves: integral of abs(error) cos theta_r over that of "
-        "f_r cos theta_r"
+        description="[band][wavelength], of all but the Dirac part: integral of abs(error) cos theta_r over that of f_r "
+        "cos theta_r"
     )
 
 
@@ -218,17 +218,11 @@ def _energy(table: Table, material: Material) -> Energy:
     above = finite > 1.0 + ENERGY_TOLERANCE
     beyond = above & (judged.covers.T.astype(int) @ (judged.certain > 1.0 + ENERGY_TOLERANCE) > 0)
     exceeding, unexplained = (theta_i[np.any(each, axis=1)] for each in (above, beyond))
-    known: Mapping[str, Any] = table.attrs.get("known_excess") or material.spec.known_excess or {}
     verdict: Verdict
     if unexplained.size == 0:
         verdict, reason = "passes", _excuse(judged, theta_i, finite) if exceeding.size else ""
-    elif (
-        known
-        and np.isfinite(largest)
-        and judged.certain.max() <= known["max_albedo"]
-        and unexplained[0] >= known["from_theta_i_deg"]
-    ):
-        verdict, reason = "known published excess", str(known["citation"])
+    elif np.isfinite(largest) and _is_known(table, material, judged.certain.max(), unexplained[0]):
+        verdict, reason = "known published excess", str(_known_excess(table, material)["citation"])
     else:
         verdict, reason = "violates", _reflects(theta_i, finite) + _stated(judged)
     return Energy(
@@ -246,6 +240,16 @@ def _energy(table: Table, material: Material) -> Energy:
         verdict=verdict,
         reason=reason,
     )
+
+
+def _known_excess(table: Table, material: Material) -> Mapping[str, Any]:
+    """What is known of the material, or of its model, in the keys of `brdfdb.materials.KnownExcess`."""
+    return table.attrs.get("known_excess") or material.spec.known_excess or {}
+
+
+def _is_known(table: Table, material: Material, largest: float, from_theta_i_deg: float) -> bool:
+    known = _known_excess(table, material)
+    return bool(known) and largest <= known["max_albedo"] and from_theta_i_deg >= known["from_theta_i_deg"]
 
 
 def _judged(table: Table, theta_i_deg: Axis, diffuse: Floats, specular: Floats, integration: Axis) -> _Judged:
@@ -404,9 +408,10 @@ def _asymmetry(f: Floats, swapped: Floats, pairs: int, tolerance: float) -> Asym
 
 
 def _values(table: Table, looked_up: _LookedUp | None) -> Values:
-    brdf = [table.brdf] if looked_up is None else [table.brdf, looked_up.forward]
-    reflected = brdf if table.specular is None else [*brdf, table.specular]
-    apart = [array for array in (table.spectra, table.uniform) if array is not None]
+    brdf: list[Floats] = [table.brdf] if looked_up is None else [table.brdf, looked_up.forward]
+    dirac: list[Floats] = [] if table.specular is None else [table.specular]
+    reflected = [*brdf, *dirac]
+    apart: list[Floats] = [array for array in (table.spectra, table.uniform) if array is not None]
     others = apart if table.values_are_brdf else [table.values, *apart]
     not_finite = sum(array.size - int(np.count_nonzero(np.isfinite(array))) for array in (*reflected, *others))
     # -inf is not finite, and counted as that
