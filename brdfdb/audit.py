@@ -17,6 +17,7 @@ from brdfdb.albedo import (
     material_of,
     wavelengths_of,
 )
+from brdfdb.error import Error
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
@@ -31,8 +32,8 @@ ENERGY_TOLERANCE = 1e-6
 MODEL_RECIPROCITY_TOLERANCE = 1e-11
 # float32 rounds two values that differ by that to the same number or to neighbours, 6e-8 apart: measured 0
 TABLE_RECIPROCITY_TOLERANCE = 1e-6
-# Sums of the same numbers in another order, of f_r with the offset of its logarithm: TODO
-LOOKUP_RECIPROCITY_TOLERANCE = 1e-12
+# Sums of the same numbers in another order, of f_r with the offset of its logarithm: measured 1.6e-14
+LOOKUP_RECIPROCITY_TOLERANCE = 5e-14
 MODEL_RECIPROCITY_PAIRS = 2000
 _SEED = 1994
 _POLAR = ("theta_i", "theta_r", "theta_h", "theta_d")
@@ -40,30 +41,35 @@ _POLAR = ("theta_i", "theta_r", "theta_h", "theta_d")
 # More cannot be asked of a planner: a table that states more is judged as if it stated this
 MOST_ERROR = 0.5
 _BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
-_NOT_FINITE = 1e30  # stands for an albedo that is not finite
+_NOT_FINITE, _FINITE = 1e30, 1e20  # what stands for an albedo that is not finite, and what is below any mean of it
 _LOOKED_UP = 250  # directions of each band of theta_i, half of them in the lobe, where values are looked at
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
 class Bands(BaseModel):
-    """What a table that states its error is judged by: the mean of the albedo over bands of theta_i."""
+    """What a table that states its error is judged by: what exceeds 1, on average over bands of theta_i."""
 
     model_config = _STRICT
 
     theta_i_deg: list[float] = Field(description="edges of the bands")
-    albedo: list[list[float | None]] = Field(description="[band][wavelength], Dirac part included; null: not finite")
     stated_error: list[list[float]] = Field(
-        description="[band][wavelength], of all but the Dirac part: integral of abs(error) cos theta_r over that of f_r "
-        "cos theta_r"
+        description="[band][wavelength], of all but the Dirac part: integral of abs(error) cos theta_r over that of "
+        "f_r cos theta_r"
+    )
+    explained: list[list[float | None]] = Field(
+        description="[band][wavelength], by how much that error can raise the mean albedo at most; null: not finite"
+    )
+    excess: list[list[float | None]] = Field(
+        description="[band][wavelength], mean of what exceeds 1, Dirac part included; null: not finite"
     )
 
 
 class Energy(BaseModel):
     """Directional albedo of the table, Dirac part included: what leaves, of unit flux from theta_i.
 
-    A table that states its error does so over bands of theta_i, relative to what is reflected there. Its mean over a
-    band may exceed 1, or what is known of the material, by that error, and no more.
+    A table that states its error does so over bands of theta_i. What exceeds 1, or what is known of the material, may
+    be as much of a band as that error explains, and no more.
     """
 
     model_config = _STRICT
@@ -167,7 +173,7 @@ def audit(table: Table) -> MaterialAudit:
     MaterialAudit
         The findings. The verdict on energy is "known published excess" where the albedo exceeds 1 no further than
         the material's attribute ``known_excess``, or its model, says, and "violates" where it exceeds 1 otherwise.
-        Of a table that states its error, that error is taken off the albedo first.
+        A table that states its error may exceed either by what that error explains.
     """
     material, plain = material_of(table), linear_in_angles(table)
     looked_up = None if plain else _look_up(table, material)
@@ -195,15 +201,26 @@ def report(audits: list[MaterialAudit]) -> AuditReport:
     return AuditReport(materials=audits, violations=[a.material for a in audits if a.verdict == "violates"])
 
 
-class _Judged(NamedTuple):
-    """Albedos that are compared with 1, over rows and wavelengths, less what may be wrong with them.
+class _Judge(NamedTuple):
+    """What is averaged before an albedo is held against a table, and by how much it then may exceed.
 
-    Each row stands for some of the theta_i, as `covers`, of shape (rows, theta_i), says.
+    `means` (rows, theta_i) are weights of averages, `covers`, of that shape, which theta_i a row is about, and
+    `explained` (rows, wavelengths) what the error that a table states can explain.
     """
 
-    certain: Floats
+    means: Floats
     covers: NDArray[np.bool_]
-    bands: Bands | None
+    explained: Floats
+
+    def excess(self, albedo: Floats, limit: Floats) -> Floats:
+        """What is above a limit, over rows and wavelengths; the limit is over theta_i."""
+        return np.asarray(self.means @ np.maximum(albedo - limit[:, np.newaxis], 0.0))
+
+    def unexplained(self, albedo: Floats, limit: Floats) -> NDArray[np.bool_]:
+        """At which theta_i a limit is exceeded, and nothing explains it."""
+        rows = self.excess(albedo, limit) > self.explained
+        both = (albedo > limit[:, np.newaxis]) & (self.covers.T.astype(int) @ rows.astype(int) > 0)
+        return np.asarray(np.any(both, axis=1))
 
 
 def _energy(table: Table, material: Material) -> Energy:
@@ -211,27 +228,35 @@ def _energy(table: Table, material: Material) -> Energy:
     diffuse = each_azimuth.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
-    judged = _judged(table, theta_i, diffuse, specular, np.minimum(integration, QUADRATURE_TOLERANCE))
     finite = np.where(np.isfinite(albedo), albedo, np.inf)
     worst_theta, worst_wavelength = np.unravel_index(np.argmax(finite), finite.shape)
     largest = float(finite[worst_theta, worst_wavelength])
-    above = finite > 1.0 + ENERGY_TOLERANCE
-    beyond = above & (judged.covers.T.astype(int) @ (judged.certain > 1.0 + ENERGY_TOLERANCE) > 0)
-    exceeding, unexplained = (theta_i[np.any(each, axis=1)] for each in (above, beyond))
+    judge = _judge(table, theta_i, _known(diffuse))
+    certain = _known(albedo - np.minimum(integration, QUADRATURE_TOLERANCE)[:, np.newaxis])
+    one = np.full(theta_i.size, 1.0 + ENERGY_TOLERANCE)
+    exceeding = theta_i[np.any(finite > one[:, np.newaxis], axis=1)]
+    unexplained = theta_i[judge.unexplained(certain, one)]
+    known: Mapping[str, Any] = table.attrs.get("known_excess") or material.spec.known_excess or {}
+    bands = None if table.error is None else _bands(table.error, judge, judge.excess(certain, one))
     verdict: Verdict
+    reason = f"reflects {_share(largest)} of what arrives at {theta_i[worst_theta]:g} degrees"
     if unexplained.size == 0:
-        verdict, reason = "passes", _excuse(judged, theta_i, finite) if exceeding.size else ""
-    elif np.isfinite(largest) and _is_known(table, material, judged.certain.max(), unexplained[0]):
-        verdict, reason = "known published excess", str(_known_excess(table, material)["citation"])
+        verdict = "passes"
+        why = "its integration has" if bands is None else "the table states"
+        reason = f"{reason}, within the error that {why}" if exceeding.size else ""
+    elif known and np.isfinite(largest) and not np.any(judge.unexplained(certain, _known_limit(known, theta_i, one))):
+        verdict, reason = "known published excess", str(known["citation"])
     else:
-        verdict, reason = "violates", _reflects(theta_i, finite) + _stated(judged)
+        verdict = "violates"
+        if bands is not None:
+            reason += ", more than the error that the table states explains"
     return Energy(
         theta_i_deg=theta_i.tolist(),
         wavelength_nm=None if table.wavelength_nm is None else table.wavelength_nm.tolist(),
         albedo=_json(albedo),
         specular=_json(specular),
         integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else None,
-        bands=judged.bands,
+        bands=bands,
         max_albedo=largest if np.isfinite(largest) else None,
         max_at_theta_i_deg=float(theta_i[worst_theta]),
         max_at_wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength]),
@@ -242,36 +267,33 @@ def _energy(table: Table, material: Material) -> Energy:
     )
 
 
-def _known_excess(table: Table, material: Material) -> Mapping[str, Any]:
-    """What is known of the material, or of its model, in the keys of `brdfdb.materials.KnownExcess`."""
-    return table.attrs.get("known_excess") or material.spec.known_excess or {}
+def _share(albedo: float) -> str:
+    return f"{albedo:.4g}" if np.isfinite(albedo) else "no finite share"
 
 
-def _is_known(table: Table, material: Material, largest: float, from_theta_i_deg: float) -> bool:
-    known = _known_excess(table, material)
-    return bool(known) and largest <= known["max_albedo"] and from_theta_i_deg >= known["from_theta_i_deg"]
+def _known_limit(known: Mapping[str, Any], theta_i_deg: Axis, one: Axis) -> Axis:
+    """What an albedo may be by what is known: 1 up to an angle, and a published excess from there on."""
+    return np.where(theta_i_deg >= known["from_theta_i_deg"], known["max_albedo"], one)
 
 
-def _judged(table: Table, theta_i_deg: Axis, diffuse: Floats, specular: Floats, integration: Axis) -> _Judged:
+def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
     """Each theta_i of a table without a stated error; of others the mean over bands, over which they state it.
 
-    In a band, the table reflects 1 + l1 of what the model does, at most, besides the Dirac part.
+    The integral of abs(table - model) over a band, l1 of what the model reflects there, is at least that of what is
+    above a limit that the model keeps to; and the model reflects 1 / (1 - l1) of what the table does, at most.
     """
     if table.error is None:
-        return _Judged(
-            _known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None
-        )
+        each = np.eye(theta_i_deg.size)
+        return _Judge(each, each.astype(bool), np.zeros((theta_i_deg.size, 1)))
     edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
-    reflected, mirrored = means @ _known(diffuse), means @ _known(specular)
-    found = means @ _known(diffuse + specular)
-    bands = Bands(
-        theta_i_deg=edges.tolist(),
-        albedo=_json(np.where(found < _NOT_FINITE * 1e-6, found, np.nan)),
-        stated_error=l1.tolist(),
-    )
-    within = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
-    return _Judged((reflected - means @ integration[:, np.newaxis]) / (1.0 + l1) + mirrored, within, bands)
+    covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
+    return _Judge(means, covers, l1 / (1.0 - l1) * (means @ diffuse))
+
+
+def _bands(error: Error, judge: _Judge, excess: Floats) -> Bands:
+    explained, above = (_json(np.where(each < _FINITE, each, np.nan)) for each in (judge.explained, excess))
+    return Bands(theta_i_deg=error.theta_i_deg, stated_error=error.l1, explained=explained, excess=above)
 
 
 def _known(values: Floats) -> Floats:
@@ -284,32 +306,6 @@ def _band_means(theta_i_deg: Axis, edges: Axis) -> Floats:
     share = (np.arange(_BAND_POINTS) + 0.5) / _BAND_POINTS
     inside = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * share
     return np.stack([np.interp(inside, theta_i_deg, one).mean(axis=1) for one in np.eye(theta_i_deg.size)], axis=1)
-
-
-def _reflects(theta_i_deg: Axis, albedo: Floats) -> str:
-    """The largest albedo in words."""
-    theta, wavelength = np.unravel_index(np.argmax(albedo), albedo.shape)
-    largest = albedo[theta, wavelength]
-    share = f"{largest:.4g}" if np.isfinite(largest) else "no finite share"
-    return f"reflects {share} of what arrives at {theta_i_deg[theta]:g} degrees"
-
-
-def _stated(judged: _Judged) -> str:
-    """What remains of the band that exceeds 1 most, in words; nothing of a table that states no error."""
-    if judged.bands is None:
-        return ""
-    band, wavelength = np.unravel_index(np.argmax(judged.certain), judged.certain.shape)
-    low, high = judged.bands.theta_i_deg[band : band + 2]
-    mean, error = judged.bands.albedo[band][wavelength], judged.bands.stated_error[band][wavelength]
-    share = "no finite share" if mean is None else f"{mean:.6g}"
-    return f"; of {low:g} to {high:g} degrees {share}, where the table states an error of {error:.3g}"
-
-
-def _excuse(judged: _Judged, theta_i_deg: Axis, albedo: Floats) -> str:
-    """Why an albedo above 1 is not held against a table."""
-    if judged.bands is None:
-        return f"{_reflects(theta_i_deg, albedo)}, within the error of its integration"
-    return f"{_reflects(theta_i_deg, albedo)}: within the error that the table states{_stated(judged)}"
 
 
 def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats:
