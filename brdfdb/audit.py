@@ -204,13 +204,19 @@ def report(audits: list[MaterialAudit]) -> AuditReport:
 class _Judge(NamedTuple):
     """What is averaged before an albedo is held against a table, and by how much it then may exceed.
 
-    `means` (rows, theta_i) are weights of averages, `covers`, of that shape, which theta_i a row is about, and
-    `explained` (rows, wavelengths) what the error that a table states can explain.
+    `means` (rows, theta_i) are weights of averages, `covers`, of that shape, which theta_i a row is about, `l1` (rows,
+    wavelengths) the error that a table states, and `reflected`, of that shape, a mean of the albedo without the Dirac
+    part that a model may have if that error is true.
     """
 
     means: Floats
     covers: NDArray[np.bool_]
-    explained: Floats
+    l1: Floats
+    reflected: Floats
+
+    def explained(self, limit: Floats) -> Floats:
+        """The integral of abs(table - model), in means: l1 of what the model reflects, which keeps to the limit."""
+        return self.l1 * np.minimum(self.reflected, (self.means @ limit)[:, np.newaxis])
 
     def excess(self, albedo: Floats, limit: Floats) -> Floats:
         """What is above a limit, over rows and wavelengths; the limit is over theta_i."""
@@ -218,7 +224,7 @@ class _Judge(NamedTuple):
 
     def unexplained(self, albedo: Floats, limit: Floats) -> NDArray[np.bool_]:
         """At which theta_i a limit is exceeded, and nothing explains it."""
-        rows = self.excess(albedo, limit) > self.explained
+        rows = self.excess(albedo, limit) > self.explained(limit)
         both = (albedo > limit[:, np.newaxis]) & (self.covers.T.astype(int) @ rows.astype(int) > 0)
         return np.asarray(np.any(both, axis=1))
 
@@ -237,7 +243,7 @@ def _energy(table: Table, material: Material) -> Energy:
     exceeding = theta_i[np.any(finite > one[:, np.newaxis], axis=1)]
     unexplained = theta_i[judge.unexplained(certain, one)]
     known: Mapping[str, Any] = table.attrs.get("known_excess") or material.spec.known_excess or {}
-    bands = None if table.error is None else _bands(table.error, judge, judge.excess(certain, one))
+    bands = None if table.error is None else _bands(table.error, judge.explained(one), judge.excess(certain, one))
     verdict: Verdict
     reason = f"reflects {_share(largest)} of what arrives at {theta_i[worst_theta]:g} degrees"
     if unexplained.size == 0:
@@ -279,21 +285,22 @@ def _known_limit(known: Mapping[str, Any], theta_i_deg: Axis, one: Axis) -> Axis
 def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
     """Each theta_i of a table without a stated error; of others the mean over bands, over which they state it.
 
-    The integral of abs(table - model) over a band, l1 of what the model reflects there, is at least that of what is
-    above a limit that the model keeps to; and the model reflects 1 / (1 - l1) of what the table does, at most.
+    What is above a limit that the model keeps to is wrong, and no more of a band can be wrong than l1 of what the model
+    reflects there: 1 / (1 - l1) of what the table does, at most.
     """
     if table.error is None:
         each = np.eye(theta_i_deg.size)
-        return _Judge(each, each.astype(bool), np.zeros((theta_i_deg.size, 1)))
+        nothing = np.zeros((theta_i_deg.size, 1))
+        return _Judge(each, each.astype(bool), nothing, nothing)
     edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
-    return _Judge(means, covers, l1 / (1.0 - l1) * (means @ diffuse))
+    return _Judge(means, covers, l1, (means @ diffuse) / (1.0 - l1))
 
 
-def _bands(error: Error, judge: _Judge, excess: Floats) -> Bands:
-    explained, above = (_json(np.where(each < _FINITE, each, np.nan)) for each in (judge.explained, excess))
-    return Bands(theta_i_deg=error.theta_i_deg, stated_error=error.l1, explained=explained, excess=above)
+def _bands(error: Error, explained: Floats, excess: Floats) -> Bands:
+    known, above = (_json(np.where(each < _FINITE, each, np.nan)) for each in (explained, excess))
+    return Bands(theta_i_deg=error.theta_i_deg, stated_error=error.l1, explained=known, excess=above)
 
 
 def _known(values: Floats) -> Floats:

@@ -16,12 +16,12 @@ from brdfdb.materials import Material
 from brdfdb.plan import plan
 from brdfdb.tabulate import tabulate
 
-WAVELENGTHS = np.array([400.0, 500.0, 600.0, 700.0])
+WAVELENGTHS = np.linspace(400.0, 700.0, 13)
 
 # On each kind of grid, with and without parts, an offset, a power, and a lobe
 PLANNED: dict[str, tuple[str, dict[str, float], NDArray[np.float64] | None]] = {
     "polar": ("oren_nayar", {"rho": 0.6, "sigma_deg": 30.0}, None),
-    "polar-parts": ("he_torrance", {"sigma_0_um": 0.3, "tau_um": 3.0, "a": 0.1}, WAVELENGTHS),
+    "polar-parts": ("he_torrance", {"sigma_0_um": 0.13, "tau_um": 1.2}, WAVELENGTHS),
     "polar-anisotropic": ("oren_nayar_unidirectional", {"rho": 0.6, "theta_a_deg": 20.0, "phi_a_deg": 20.0}, None),
     "half-difference": ("ward", {"rho_d": 0.2, "rho_s": 0.2, "alpha_x": 0.2, "alpha_y": 0.2}, None),
     "half-difference-anisotropic": ("ward", {"rho_d": 0.2, "rho_s": 0.2, "alpha_x": 0.3, "alpha_y": 0.15}, None),
@@ -82,7 +82,7 @@ def test_the_albedo_is_that_of_the_model(kind: str) -> None:
     np.testing.assert_array_equal(found.theta_i_deg, THETA_I_DEG)
     for at in (0, 9, 16):
         theta_i, phi_i = np.deg2rad(found.theta_i_deg[at]), np.deg2rad(found.phi_i_deg)
-        for w in range(found.albedo.shape[2]):
+        for w in range(0, found.albedo.shape[2], 6):
             one = None if table.wavelength_nm is None else table.wavelength_nm[w]
             exact, _ = quadrature.directional_albedo(
                 material.spec, theta_i, phi_i, tolerance=1e-6, **material.arguments(one)

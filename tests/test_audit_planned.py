@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from brdfdb.audit import LOOKUP_RECIPROCITY_TOLERANCE, MaterialAudit, _band_means, audit
+from brdfdb.layout import Interpolation, Layout
 from brdfdb.lookup import Table
+from brdfdb.tabulate import tabulate
 from tests.test_albedo import KINDS, planned, table_of
-from tests.test_audit import known, verdicts, written
+from tests.test_audit import ISOTROPIC, known, material, verdicts, written
 
 
 def scaled(table: Table, factor: float) -> Table:
@@ -87,10 +89,11 @@ def test_a_negative_uniform_part_violates() -> None:
 
 
 def test_a_negative_node_violates_even_if_lookups_stop_at_0() -> None:
-    table = table_of("polar")
-    values = table.values.copy()
+    cubic = Layout(material("lambert", {"rho": 0.5}), ISOTROPIC, interpolation=Interpolation("cubic"))
+    dataset = tabulate(cubic)
+    values = dataset["brdf"].values
     values[2, 3, 1] = values[3, 2, 1] = -1e-3
-    found = audit(replace(table, values=values))
+    found = audit(replace(Table.of(cubic, values), attrs=dataset.attrs))
     assert (found.values.positivity, found.values.negative) == ("violates", 2)
     assert found.values.smallest == np.float32(-1e-3)
 
