@@ -28,8 +28,8 @@ PLANNED: dict[str, tuple[str, dict[str, float], NDArray[np.float64] | None]] = {
 }
 KINDS = pytest.mark.parametrize("kind", PLANNED)
 
-# Between 0 and 80 degrees, of albedos up to 0.9; worst measured, ACROSS, of the table on 4D polar angles
-MODEL_TOLERANCE = 4e-3
+# At 0, 45 and 80 degrees, of tables with an error of 0.02; worst measured 1.1e-3, of the spectra in parts
+MODEL_TOLERANCE = 1.5e-3
 
 
 def planned(model: str, parameters: dict[str, float], wavelength_nm: Any = None, tolerance: float = 0.02) -> Table:

@@ -26,10 +26,10 @@ def list_store(root: Path) -> None:
         head = store.summary(name)
         rows.append((name, head["title"], head["model"], terminal.error(head.get("error_p99")), head["revision"]))
     terminal.print_table(
-        f"{len(rows)} materials in {root} (error: 99 of 100 values are within it of the model)",
-        ("material", "title", "model", "error", "revision"),
+        f"{len(rows)} materials in {root}",
+        ("material", "title", "model", "error (p99)", "revision"),
         rows,
-        numbers=("error",),
+        numbers=("error (p99)",),
     )
 
 
