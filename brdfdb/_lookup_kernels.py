@@ -37,6 +37,8 @@ class Rule(NamedTuple):
         ... of values to which this was added.
     power : float
         What was tabulated is f_r times (cos theta_i cos theta_r) to this power.
+    overshoots : bool
+        Whether what is interpolated may fall below 0 where no node is: it is 0 there.
     """
 
     half_difference: bool
@@ -44,6 +46,7 @@ class Rule(NamedTuple):
     logarithm: bool
     offset: float
     power: float
+    overshoots: bool
 
 
 @kernel
@@ -247,8 +250,11 @@ def finished(
     if channels == 1 and low.size == 1 and spectra.size == 0:
         if rule.logarithm:
             for j in range(count):
-                value = exp(numbers[j]) - rule.offset
-                numbers[j] = value if value > 0.0 else 0.0 * value  # nan stays nan
+                numbers[j] = exp(numbers[j]) - rule.offset
+        if rule.overshoots:
+            for j in range(count):
+                value = numbers[j]
+                numbers[j] = 0.0 if value < 0.0 else value  # nan stays nan
         for j in range(count):
             out[j] = numbers[j] * mu[j] + uniform[0]
         return
@@ -264,7 +270,8 @@ def finished(
                         value += numbers[j * channels + channel] * spectra[channel, w]
                 else:
                     value = numbers[j * channels + w]
-                value = max(exp(value) - rule.offset, 0.0) if rule.logarithm else value
+                value = exp(value) - rule.offset if rule.logarithm else value
+                value = 0.0 if rule.overshoots and value < 0.0 else value  # nan stays nan
                 value = part * (value * mu[j] + uniform[w])
                 at = j * wavelengths + m
                 out[at] = value if side == 0 else out[at] + value

@@ -126,6 +126,7 @@ def _parser() -> argparse.ArgumentParser:
         lookup.add_argument(angle, type=float, metavar=angle.upper(), help="degrees")
     lookup.add_argument("--wavelength-nm", type=float, nargs="+", metavar="NM", help="default: all of the table")
     lookup.add_argument("--json", action="store_true", help="print JSON")
+    lookup.add_argument("--with-error", action="store_true", help="print the error that the table states, too")
 
     listing = command("list", _list, "List the materials of the store, or the built-in presets.")
     listing.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")
@@ -255,7 +256,14 @@ def _lookup(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import inspect
 
     angles = (options.theta_i, options.phi_i, options.theta_r, options.phi_r)
-    inspect.lookup(options.store, options.name, angles, options.wavelength_nm, as_json=options.json)
+    inspect.lookup(
+        options.store,
+        options.name,
+        angles,
+        options.wavelength_nm,
+        as_json=options.json,
+        with_error=options.with_error,
+    )
     return 0
 
 
