@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import BLOCK, arcsin, cosine, exp
+from brdfdb._elementary import BLOCK, arcsin, cos, cosine, exp, sine
 from brdfdb._numba import kernel, loop
 from brdfdb.interpolation import Axes, locate, tricubic, trilinear, weighted
 
@@ -119,7 +119,7 @@ def points_of_angles(
             x[3, j] = _folded(other, TURN)
     if rule.power != 0.0:
         for j in range(count):
-            mu[j] = cosine(np.cos(np.float64(theta_i[j]))) * cosine(np.cos(np.float64(theta_r[j])))
+            mu[j] = cosine(cos(np.float64(theta_i[j]))) * cosine(cos(np.float64(theta_r[j])))
 
 
 @loop
@@ -277,6 +277,19 @@ def finished(
                 out[at] = value if side == 0 else out[at] + value
 
 
+@loop
+def vectors_of_angles(theta: Array, phi: Array, count: int, w: Array) -> None:
+    """Unit vectors, three numbers each, of directions by angles [rad]."""
+    for j in range(count):
+        w[3 * j + 2] = sine(np.float64(theta[j]))
+    for j in range(count):
+        w[3 * j] = w[3 * j + 2] * cos(np.float64(phi[j]))
+    for j in range(count):
+        w[3 * j + 1] = w[3 * j + 2] * sine(np.float64(phi[j]))
+    for j in range(count):
+        w[3 * j + 2] = cos(np.float64(theta[j]))
+
+
 @kernel
 def by_angles(
     rule: Rule,
@@ -294,8 +307,9 @@ def by_angles(
     horizon: float,
     out: Array,
 ) -> bool:
-    """f_r of directions by angles [rad] on a grid of light and viewer; False where an angle is not what it may be."""
-    x, mu = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK)
+    """f_r of directions by angles [rad] on either kind of grid; False where an angle is not what it may be."""
+    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
+    wi, wr = np.empty(3 * BLOCK), np.empty(3 * BLOCK)
     numbers = np.empty(BLOCK * channels)
     good = True
     for start in range(0, theta_i.size, BLOCK):
@@ -303,7 +317,12 @@ def by_angles(
         here = slice(start, start + count)  # an index that starts at 0 is known not to be negative: loops vectorise
         t_i, p_i, t_r, p_r = theta_i[here], phi_i[here], theta_r[here], phi_r[here]
         f_r = out[start * low.size : (start + count) * low.size]
-        points_of_angles(rule, t_i, p_i, t_r, p_r, count, x, mu)
+        if rule.half_difference:
+            vectors_of_angles(t_i, p_i, count, wi)
+            vectors_of_angles(t_r, p_r, count, wr)
+            points_of_vectors(rule, wi, wr, count, x, mu, scratch)
+        else:
+            points_of_angles(rule, t_i, p_i, t_r, p_r, count, x, mu)
         interpolated(axes, table, channels, x, count, numbers)
         finished(rule, numbers, channels, mu, spectra, uniform, low, weight, count, f_r)
         odd = 0

@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb import _lookup_kernels
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.error import Error, stated
-from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, finished, radians, unit_vector
+from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, finished, radians
 from brdfdb.grids import Axis, Grid, axes_among
 from brdfdb.interpolation import Axes, prepared
 from brdfdb.layout import PLAIN, Interpolation, Layout
 from brdfdb.parameters import Floats
-
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
 _Ready = tuple[_lookup_kernels.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]

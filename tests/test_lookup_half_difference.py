@@ -16,7 +16,8 @@ from brdfdb.tabulate import tabulate
 from tests.test_albedo import KINDS, planned, table_of
 from tests.test_audit import ISOTROPIC, material
 
-# Azimuths are folded, which rounds them, and f_r far below the offset of its logarithm is what is left: measured 1.8e-13
+# Azimuths are folded, which rounds them, and f_r far below the offset of its logarithm is what is left;
+# measured 1.8e-13
 FOLDED = 4e-13
 # Of the Dirac part, linear over nodes 0.5 and 0.1 degrees apart; worst measured 9e-6, below 60 degrees
 DIRAC_TOLERANCE = 2e-5
