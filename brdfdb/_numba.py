@@ -7,6 +7,7 @@ would go on running the old code when that file changes.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import threading
@@ -54,9 +55,19 @@ def _shared_digest() -> bytes:
 
 
 def _stamp(cache: Any) -> None:
-    """Let compiled code in numba's cache count as old when a file of `SHARED` has changed, too."""
+    """Let compiled code in numba's cache count as old when a file of `SHARED` has changed, too.
+
+    A cache that cannot be written, on a disk that is full, costs time and not the result.
+    """
     file = cache._cache_file
     file._source_stamp += _shared_digest()
+    save = cache.save_overload
+
+    def try_to_save(*arguments: Any) -> None:
+        with contextlib.suppress(OSError):
+            save(*arguments)
+
+    cache.save_overload = try_to_save
 
 
 def elementwise(function: F) -> Callable[..., Any]:

@@ -14,7 +14,7 @@ from brdfdb import _lookup_kernels
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.error import Error, stated
 from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, finished, radians, unit_vector
-from brdfdb.grids import KINDS, Axis, Grid
+from brdfdb.grids import Axis, Grid, axes_among
 from brdfdb.interpolation import Axes, prepared
 from brdfdb.layout import PLAIN, Interpolation, Layout
 from brdfdb.parameters import Floats
@@ -373,10 +373,10 @@ def rebuilt(
 
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
-    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((2, len(wi)))
+    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
     rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False)
     flat = [np.ascontiguousarray(w, dtype=np.float64).reshape(-1) for w in (wi, wr)]
-    _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], 0, len(wi), x, mu, scratch)
+    _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
     return x
 
 
@@ -384,15 +384,13 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
     how = dict(attrs.get("interpolation", {}))
     variable = "brdf" if "brdf" in arrays else "parts"
-    # an anisotropic grid of half and difference vectors has the axes of an isotropic one, too
-    names = next(kind for kind in reversed(KINDS) if set(kind) <= set(arrays))
     specular = arrays.get("specular_reflectance")
     uniform = arrays.get("uniform")
     return Table(
         name=name,
         revision=revision,
         attrs=attrs,
-        grid=Grid({axis: arrays[axis] for axis in names}),
+        grid=Grid({axis: arrays[axis] for axis in axes_among(arrays)}),
         wavelength_nm=arrays.get("wavelength"),
         values=arrays[variable],
         specular=None if specular is None else specular.astype(np.float32),

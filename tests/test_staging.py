@@ -21,6 +21,7 @@ import xarray as xr
 import brdfdb
 from brdfdb import layout as layouts
 from brdfdb import manifest, staging
+from brdfdb.accuracy import measure
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout, digest
 from brdfdb.manifest import StoreError, check_manifest
@@ -208,8 +209,12 @@ def test_blocks_and_frame_make_the_table_of_tabulate(tmp_path: Path, four_blocks
     assert sorted(contents(store.path("white"))) == sorted(files)
     assert stored == sum(len(data) for data in contents(store.path("white")).values())
     with store.dataset("white") as found:
-        expected = lambert(0.75).assign_attrs(request=REQUEST, request_sha256=digest(REQUEST))
+        error = found.attrs["error"]
+        expected = lambert(0.75).assign_attrs(request=REQUEST, request_sha256=digest(REQUEST), error=error)
         xr.testing.assert_identical(found.load(), expected)
+    layout = Layout.from_document(json.loads(four_blocks))
+    assert error == measure(layout, lambda rows: lambert(0.75)["brdf"].values[rows]).model_dump(mode="json")
+    assert store.summary("white")["error_p99"] == error["overall"]["p99"]
     assert (revision, store["white"].revision, rho(tmp_path)) == ("r000001", "r000001", 0.75)
     assert staged(tmp_path) == []
 

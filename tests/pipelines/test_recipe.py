@@ -13,6 +13,7 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import Material, presets
+from brdfdb.plan import PLAN_VERSION
 from brdfdb_pipelines import cli
 from brdfdb_pipelines.recipe import Range, RecipeError, load
 
@@ -225,13 +226,33 @@ def test_every_preset_is_a_job_of_the_default_recipe() -> None:
     assert [job.material.name for job in jobs] == list(presets())
     assert len(jobs) == 59
     for job in jobs:
-        assert job.grid.anisotropic == job.material.anisotropic
+        assert (job.grid, job.tolerance) == (None, 0.01)
         assert (job.wavelength_nm is not None) == job.material.spectral
-        assert job.grid.axes["theta_i"].tolist() == job.grid.axes["theta_r"].tolist()
         stated = job.material.wavelengths_nm
         if job.wavelength_nm is not None:
             wavelengths = np.arange(380.0, 781.0, 10.0) if stated is None else np.array(stated)
             assert job.wavelength_nm.tolist() == wavelengths.tolist()
+
+
+@pytest.mark.parametrize("grids", [True, False], ids=["both", "neither"])
+def test_a_recipe_names_either_a_tolerance_or_grids(tmp_path: Path, grids: bool) -> None:
+    text = "tolerance = 0.01\n" + GOOD if grids else GOOD[: GOOD.index("[grids")]
+    with pytest.raises(RecipeError, match=r"recipe\.toml: tolerance, grids: give one of the two$"):
+        load(recipe_of(tmp_path, text))
+
+
+@pytest.mark.parametrize("tolerance", ["0", "0.00001", "0.9", "-1", "nan", '"small"'])
+def test_a_tolerance_out_of_range_is_refused(tmp_path: Path, tolerance: str) -> None:
+    with pytest.raises(RecipeError, match=r"recipe\.toml: tolerance: "):
+        load(recipe_of(tmp_path, f"tolerance = {tolerance}\n" + GOOD[: GOOD.index("[grids")]))
+
+
+def test_a_tolerance_is_a_plan_that_is_made_when_the_table_is_laid_out(tmp_path: Path) -> None:
+    (job,) = load(recipe_of(tmp_path, "tolerance = 0.05\n" + GOOD[: GOOD.index("[grids")])).jobs()
+    assert (job.grid, job.tolerance) == (None, 0.05)
+    assert job.request["grid"] is None
+    assert job.request["plan_version"] == PLAN_VERSION
+    assert job.layout().reason.startswith("for a tolerance of 0.05, ")
 
 
 def test_the_kind_of_a_material_chooses_its_grid(tmp_path: Path) -> None:
