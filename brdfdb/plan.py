@@ -207,6 +207,15 @@ def _task(material: Material, wavelength_nm: NDArray[np.float64] | None, toleran
     return _Task(material, some, drawn, accuracy.model_values(material, some, drawn.wi, drawn.wr), tolerance)
 
 
+def offset_of(material: Material, wavelength_nm: NDArray[np.float64] | None) -> float:
+    """What is added to f_r [1/sr] before logarithms are taken: half the floor of its relative error."""
+    return _offset(_task(material, wavelength_nm, 0.01))
+
+
+def _offset(task: _Task) -> float:
+    return float(max(0.5 * accuracy.floor_of(task.truth, task.drawn).min(), 1e-12))
+
+
 def coarsest(material: Material) -> Grid:
     """The smallest grid that suits a material."""
     names = ANISOTROPIC_AXES if material.anisotropic else ISOTROPIC_AXES
@@ -229,8 +238,7 @@ def _end(material: Material, name: str) -> float:
 def _candidates(task: _Task) -> Iterator[_Candidate]:
     """Kinds of tables, each with the number of values that it is likely to take; simple ones first."""
     material, spec = task.material, task.material.spec
-    floor = accuracy.floor_of(task.truth, task.drawn)
-    offset = float(max(0.5 * floor.min(), 1e-12))
+    offset = _offset(task)
     kinds: list[tuple[str, ...]]
     if material.anisotropic:
         kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if spec.lobe_axes else [ANISOTROPIC_AXES]

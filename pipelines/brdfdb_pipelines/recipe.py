@@ -7,16 +7,16 @@ import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 from brdfdb.grids import Axis, Grid, check_wavelengths
-from brdfdb.layout import TABLE_VERSION, Layout
+from brdfdb.layout import TABLE_VERSION, Interpolation, Layout
 from brdfdb.materials import Material, presets
-from brdfdb.plan import PLAN_VERSION, coarsest, plan
+from brdfdb.plan import PLAN_VERSION, coarsest, offset_of, plan
 
 _STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 _MOST_NODES = 100_000  # of a range: far above any axis, far below what fills the memory
@@ -73,14 +73,50 @@ class AnisotropicGrid(BaseModel):
     phi_r_deg: Nodes
 
 
-class Grids(BaseModel):
-    """The grid for each kind of material."""
+class HalfDifferenceGrid(BaseModel):
+    """Axes of half and difference vectors, of a table of an isotropic material."""
 
     model_config = _STRICT
 
-    isotropic: IsotropicGrid
-    spectral: IsotropicGrid
-    anisotropic: AnisotropicGrid
+    theta_h_deg: Nodes
+    theta_d_deg: Nodes
+    phi_d_deg: Nodes
+
+
+class AnisotropicHalfDifferenceGrid(BaseModel):
+    """Axes of half and difference vectors, of a table of an anisotropic material."""
+
+    model_config = _STRICT
+
+    theta_h_deg: Nodes
+    phi_h_deg: Nodes
+    theta_d_deg: Nodes
+    phi_d_deg: Nodes
+
+
+def _meant(grid: Any) -> str:
+    """Which kind of grid a table of a recipe is meant to be."""
+    half = isinstance(grid, BaseModel | dict) and "theta_h_deg" in (grid if isinstance(grid, dict) else dict(grid))
+    return "half" if half else "plain"
+
+
+AnyIsotropicGrid = Annotated[
+    Annotated[IsotropicGrid, Tag("plain")] | Annotated[HalfDifferenceGrid, Tag("half")], Discriminator(_meant)
+]
+AnyAnisotropicGrid = Annotated[
+    Annotated[AnisotropicGrid, Tag("plain")] | Annotated[AnisotropicHalfDifferenceGrid, Tag("half")],
+    Discriminator(_meant),
+]
+
+
+class Grids(BaseModel):
+    """The grid for each kind of material, over light and viewer or over half and difference vectors."""
+
+    model_config = _STRICT
+
+    isotropic: AnyIsotropicGrid
+    spectral: AnyIsotropicGrid
+    anisotropic: AnyAnisotropicGrid
 
 
 @dataclass(frozen=True)
@@ -91,11 +127,15 @@ class Job:
     wavelength_nm: NDArray[np.float64] | None
     grid: Grid | None
     tolerance: float | None
+    interpolation: str = "linear"
 
     def layout(self) -> Layout:
         """What the table is going to be; to a tolerance, this takes the planner a second or more."""
         if self.grid is not None:
-            return Layout(self.material, self.grid, self.wavelength_nm)
+            method, logarithm = self.interpolation.removeprefix("log-"), self.interpolation.startswith("log-")
+            offset = offset_of(self.material, self.wavelength_nm) if logarithm else 0.0
+            how = Interpolation(method, logarithm, offset)
+            return Layout(self.material, self.grid, self.wavelength_nm, interpolation=how)
         assert self.tolerance is not None
         return plan(self.material, self.wavelength_nm, self.tolerance)
 
@@ -113,6 +153,7 @@ class Job:
             "material": self.material.model_dump(mode="json"),
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
             "grid": None if self.grid is None else {name: nodes.tolist() for name, nodes in self.grid.axes.items()},
+            "interpolation": None if self.grid is None else self.interpolation,
             "tolerance": self.tolerance,
             "plan_version": None if self.tolerance is None else PLAN_VERSION,
         }
@@ -130,6 +171,9 @@ class Recipe(BaseModel):
         default=None, ge=1e-4, le=0.5, description="99th percentile of the relative error, instead of grids"
     )
     grids: Grids | None = None
+    interpolation: Literal["linear", "cubic", "log-linear", "log-cubic"] | None = Field(
+        default=None, description="between the nodes of grids, of f_r or of its logarithm; by default linear"
+    )
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
 
     def jobs(self) -> list[Job]:
@@ -142,6 +186,8 @@ class Recipe(BaseModel):
         """
         if (self.tolerance is None) == (self.grids is None):
             raise RecipeError("tolerance, grids: give one of the two")
+        if self.interpolation is not None and self.grids is None:
+            raise RecipeError("interpolation: goes with grids; to a tolerance, the planner chooses")
         grids = {} if self.grids is None else {name: self._grid(self.grids, name) for name in Grids.model_fields}
         try:
             wavelengths = check_wavelengths(_nodes("wavelengths_nm", self.wavelengths_nm))
@@ -155,7 +201,7 @@ class Recipe(BaseModel):
                 wavelength_nm = wavelengths if stated is None else np.array(stated)
             several = wavelength_nm is not None and wavelength_nm.size > 1
             kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
-            job = Job(material, wavelength_nm, grids.get(kind), self.tolerance)
+            job = Job(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear")
             try:
                 job.check()
             except ValueError as error:
@@ -217,7 +263,7 @@ def load(path: Path | None = None) -> Recipe:
         # and the names of the branches are not names of the recipe
         found = error.errors(include_url=False)
         first = next(item for item in found if not (item["loc"][-1] == "float" and isinstance(item["input"], dict)))
-        field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range"))
+        field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
         said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
         raise RecipeError(f"{source}: {field}: {said}") from None
     return recipe

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.grids import HALF_DIFFERENCE_AXES
 from brdfdb.materials import Material, presets
 from brdfdb.plan import PLAN_VERSION
 from brdfdb_pipelines import cli
@@ -238,6 +240,61 @@ def test_every_preset_is_a_job_of_the_default_recipe() -> None:
 def test_a_recipe_names_either_a_tolerance_or_grids(tmp_path: Path, grids: bool) -> None:
     text = "tolerance = 0.01\n" + GOOD if grids else GOOD[: GOOD.index("[grids")]
     with pytest.raises(RecipeError, match=r"recipe\.toml: tolerance, grids: give one of the two$"):
+        load(recipe_of(tmp_path, text))
+
+
+HALF = """\
+title = "one"
+materials = ["glossy-grey-paper", "rolled-brass", "scene-copper-sphere"]
+wavelengths_nm = [500, 550]
+interpolation = "log-cubic"
+[grids.isotropic]
+theta_h_deg = [0, 2, 5, 10, 20, 45, 90]
+theta_d_deg = [0, 45, 90]
+phi_d_deg = [0, 45, 90]
+[grids.spectral]
+theta_i_deg = [0, 40]
+theta_r_deg = [0, 40]
+delta_phi_deg = [0, 90, 180]
+[grids.anisotropic]
+theta_h_deg = [0, 5, 90]
+phi_h_deg = [0, 45, 90]
+theta_d_deg = [0, 90]
+phi_d_deg = [0, 90, 180]
+"""
+
+
+def test_grids_may_be_of_half_and_difference_vectors_and_cubic(tmp_path: Path) -> None:
+    paper, brass, copper = load(recipe_of(tmp_path, HALF)).jobs()
+    assert paper.grid is not None
+    assert brass.grid is not None
+    assert (paper.grid.names, brass.grid.copies) == (HALF_DIFFERENCE_AXES, 4)
+    for job in (paper, brass, copper):
+        how = job.layout().interpolation
+        assert (how.method, how.logarithm, how.power) == ("cubic", True, 0.0)
+        assert 0.0 < how.offset < 1e-3
+        assert job.request["interpolation"] == "log-cubic"
+    plain = load(recipe_of(tmp_path, HALF.replace('interpolation = "log-cubic"\n', ""))).jobs()
+    assert all(job.layout().plain for job in plain)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"log-cubic"', '"quintic"', "interpolation: Input should be 'linear', 'cubic', 'log-linear' or 'log-cubic'"),
+        ("phi_d_deg = [0, 45, 90]", "phi_d_deg = [0, 45, 91]", "grids.isotropic.phi_d_deg: ends at 91 degrees, must"),
+        ("phi_d_deg = [0, 45, 90]\n", "", "grids.isotropic.phi_d_deg: Field required"),
+        ("theta_d_deg = [0, 90]", "theta_r_deg = [0, 90]", "grids.anisotropic.theta_d_deg: Field required"),
+    ],
+)
+def test_what_is_wrong_with_such_a_recipe_is_one_sentence(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(RecipeError, match=rf"recipe\.toml: {re.escape(said)}"):
+        load(recipe_of(tmp_path, HALF.replace(old, new)))
+
+
+def test_an_interpolation_without_grids_is_refused(tmp_path: Path) -> None:
+    text = 'tolerance = 0.01\ninterpolation = "cubic"\n' + GOOD[: GOOD.index("[grids")]
+    with pytest.raises(RecipeError, match=r"interpolation: goes with grids"):
         load(recipe_of(tmp_path, text))
 
 
