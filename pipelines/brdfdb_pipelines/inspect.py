@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import brdfdb
-from brdfdb_pipelines import terminal
+from brdfdb_pipelines import families, terminal
 
 if TYPE_CHECKING:
     from brdfdb.lookup import Table
@@ -18,13 +18,14 @@ ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
 
 def list_store(root: Path) -> None:
-    """Print a line for each material of a store."""
+    """Print a line for each material of a store, and for each family."""
     store = brdfdb.open(root)
     rows = []
     for name in store:
         head = store.summary(name)
         rows.append((name, head["title"], head["model"], head["revision"]))
     terminal.print_table(f"{len(rows)} materials in {root}", ("material", "title", "model", "revision"), rows)
+    families.print_list(store)
 
 
 def list_presets() -> None:
@@ -36,8 +37,11 @@ def list_presets() -> None:
 
 
 def show(root: Path, name: str) -> None:
-    """Print what a store knows of a material."""
+    """Print what a store knows of a material or a family."""
     store = brdfdb.open(root)
+    if families.is_family(store, name):
+        families.show(store.family(name))
+        return
     table = store[name]
     attributes = table.attrs
     print(f"{name}: {attributes['title']}")
@@ -102,9 +106,18 @@ def _stored(path: Path) -> int:
 
 
 def lookup(
-    root: Path, name: str, angles_deg: Sequence[float], wavelength_nm: Sequence[float] | None, *, as_json: bool
+    root: Path,
+    name: str,
+    angles_deg: Sequence[float],
+    wavelength_nm: Sequence[float] | None,
+    *,
+    settings: Sequence[str] = (),
+    as_json: bool,
 ) -> None:
-    """Print f_r at theta_i, phi_i, theta_r, phi_r [degree], and the Dirac part's reflectance if the model has one."""
+    """Print f_r at theta_i, phi_i, theta_r, phi_r [degree], and the Dirac part's reflectance if the model has one.
+
+    Of a family, at the parameters of `settings`, each ``name=value``.
+    """
     import numpy as np
 
     from brdfdb.geometry import radians
@@ -115,7 +128,13 @@ def lookup(
             raise ValueError(f"{angle}: {value} is not a number of degrees")
         if angle.startswith("theta") and not 0.0 <= value <= 180.0:
             raise ValueError(f"{angle}: {value:g} is outside [0, 180] degrees")
-    table = brdfdb.open(root)[name]
+    store = brdfdb.open(root)
+    if families.is_family(store, name):
+        families.lookup(store.family(name), angles_deg, wavelength_nm, settings, as_json=as_json)
+        return
+    table = store[name]
+    if settings:
+        raise ValueError(f"--set {settings[0]}: {name} is a material, whose parameters are fixed")
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
     brdf = np.atleast_1d(table.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm))
     specular = np.atleast_1d(table.specular_reflectance(theta_i, wavelength_nm))
