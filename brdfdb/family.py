@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +30,7 @@ FORMAT = "brdfdb-family"
 FORMAT_VERSION: Literal[1] = 1
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
-_SAME = 1e-12  # of a cell, or of a value: closer to a member is at the member
+_SAME = 1e-12  # of the largest value: as close to one of a member is at the member
 
 
 class Sweep(BaseModel):
@@ -62,15 +63,21 @@ class Sweep(BaseModel):
 
 
 class Blend(BaseModel):
-    """How values between members are found: multilinear over the parameters."""
+    """How values between members are found: by polynomials, in one parameter after the other."""
 
     model_config = _STRICT
 
+    method: Literal["linear", "cubic"] = Field(
+        description="between the two values next to a parameter, or by the cubic through the four around it, fewer if "
+        "there are no more"
+    )
+    powers: dict[str, Literal[-2, -1, 0, 1, 2]] = Field(
+        description="of each swept parameter, in which these are polynomials; 0: its logarithm"
+    )
     offset: float | None = Field(
         description="1/sr; what is interpolated is the logarithm of f_r plus this. null: f_r itself"
     )
     specular_offset: float | None = Field(description="the same of the reflectance of the Dirac part")
-    logarithmic_axes: list[str] = Field(description="parameters along whose logarithm it is linear")
     reason: str = Field(description="what this and the other ways were measured to leave")
 
 
@@ -129,7 +136,7 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
     """
     wavelengths: list[Axis | None] = []
 
-    @functools.lru_cache(maxsize=max(8, 2 << len(sweep.axes)))
+    @functools.lru_cache(maxsize=2 * math.prod(min(4, len(values)) for values in sweep.axes.values()))
     def load(number: int) -> Table:
         name = sweep.members[number]
         table = tables[name]
@@ -153,22 +160,32 @@ def _same(one: Axis | None, other: Axis | None) -> bool:
     return one is other if one is None or other is None else np.array_equal(one, other)
 
 
-def share_of(low: float, high: float, value: float, *, logarithmic: bool) -> float:
-    """How far a value is from one node to the next, in [0, 1], along an axis or its logarithm."""
-    share = np.log(value / low) / np.log(high / low) if logarithmic else (value - low) / (high - low)
-    return 0.0 if share < _SAME else 1.0 if share > 1.0 - _SAME else float(share)
+def stencil(nodes: Axis, value: float, power: int, *, cubic: bool) -> tuple[int, Floats]:
+    """Which values of a parameter count for one between them: the number of the first, and the weight of each.
+
+    Lagrange's polynomial through 2 of them, or 4 (3 if there are no more), in a power of the parameter or its logarithm
+    (power 0). At a node its weight is exactly 1, that of others 0.
+    """
+    width = min(4 if cubic else 2, nodes.size)
+    cell = int(np.searchsorted(nodes, value, side="right")) - 1
+    first = min(max(cell - (width - 2) // 2, 0), nodes.size - width)
+    some = nodes[first : first + width]
+    x, at = (np.log(some), np.log(value)) if power == 0 else (some ** float(power), value ** float(power))
+    others = ~np.eye(width, dtype=bool)
+    return first, np.prod(np.divide(at - x, x[:, np.newaxis] - x, out=np.ones((width, width)), where=others), axis=1)
 
 
 def blended(values: Sequence[Floats], weights: Sequence[ArrayLike], offset: float | None) -> Floats:
-    """The weighted mean of values, or of the logarithms of values plus `offset`; exactly 0 where all of them are."""
-    plain = sum(np.asarray(weight) * value for weight, value in zip(weights, values, strict=True))
+    """The weighted mean of values, or of the logarithms of values plus `offset`; nothing below 0, 0 where all are."""
     if offset is None:
-        return np.asarray(plain)
+        mean = sum(np.asarray(weight) * value for weight, value in zip(weights, values, strict=True))
+        return np.maximum(mean, 0.0)
     logarithms = sum(
         np.asarray(weight) * np.log(np.maximum(value, 0.0) + offset)
         for weight, value in zip(weights, values, strict=True)
     )
-    return np.where(np.equal(plain, 0.0), 0.0, np.maximum(np.exp(logarithms) - offset, 0.0))
+    black = np.logical_and.reduce([np.equal(value, 0.0) for value in values])
+    return np.where(black, 0.0, np.maximum(np.exp(logarithms) - offset, 0.0))
 
 
 class _Part(NamedTuple):
@@ -204,8 +221,7 @@ class Family:
             replace(parameter, low=float(self.axes[parameter.name][0]), high=float(self.axes[parameter.name][-1]))
             for parameter in record.parameters.values()
         ]
-        logarithmic = record.interpolation.logarithmic_axes
-        self._logarithmic = [written in logarithmic for written in record.axes]
+        self._powers = [record.interpolation.powers[written] for written in record.axes]
 
     @property
     def name(self) -> str:
@@ -385,13 +401,12 @@ class Family:
                     f"{', '.join(names)}"
                 )
         around = []
-        for limits, nodes, logarithmic in zip(self._limits, self.axes.values(), self._logarithmic, strict=True):
+        cubic = self.record.interpolation.method == "cubic"
+        for limits, nodes, power in zip(self._limits, self.axes.values(), self._powers, strict=True):
             if limits.name not in parameters:
                 raise ValueError(f"{limits.name}: missing, {self.name} needs a value in {limits.interval}")
-            value = _checked(limits, parameters[limits.name])
-            low = int(np.clip(np.searchsorted(nodes, value, side="right") - 1, 0, nodes.size - 2))
-            share = share_of(nodes[low], nodes[low + 1], value, logarithmic=logarithmic)
-            around.append([(low + k, w) for k, w in enumerate((1.0 - share, share)) if w > 0.0])
+            first, weights = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
+            around.append([(first + k, w) for k, w in enumerate(weights) if w != 0.0])
         shape = [nodes.size for nodes in self.axes.values()]
         parts = []
         for corner in itertools.product(*around):
@@ -400,13 +415,13 @@ class Family:
         return parts
 
 
-def _checked(limits: Parameter, value: Any) -> float:
-    """One number within limits, or next to them by the rounding of degrees to radians; ValueError else."""
+def _checked(limits: Parameter, nodes: Axis, value: Any) -> float:
+    """One number within limits, that of a node if it is one but for rounding, as of degrees to radians."""
     if np.ndim(value) != 0:
         raise ValueError(f"{limits.name}: {value!r} is not one number in {limits.interval}")
     given: NDArray[Any] = np.asarray(value)
     if given.dtype.kind in "iuf":
-        nearest = np.clip(given, limits.low, limits.high)
-        if abs(nearest - given) <= _SAME * max(abs(limits.low), abs(limits.high)):
+        nearest = nodes[np.argmin(np.abs(nodes - given))]
+        if abs(nearest - given) <= _SAME * np.abs(nodes).max():
             return float(nearest)
     return float(limits.check(value))

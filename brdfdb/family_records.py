@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,8 @@ from brdfdb.family import (
     member_loader,
     path_of,
     read_record,
-    share_of,
     stale,
+    stencil,
 )
 from brdfdb.geometry import degrees, radians
 from brdfdb.lookup import Table
@@ -31,6 +31,8 @@ from brdfdb.parameters import Floats
 from brdfdb.staging import Lock, writing
 from brdfdb.store import Store, UnknownMaterialError
 
+Power = Literal[-2, -1, 0, 1, 2]
+
 SEED = 1991
 POINTS = 64  # parameters at which a family is measured, at least
 _DIRECTIONS = 100  # of a band of theta_i at each of them
@@ -38,6 +40,9 @@ _FEWEST_DIRECTIONS = 10
 _CORNER_VALUES = 20_000_000  # that are held at a time: of more, fewer directions are drawn
 _THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # where the Dirac part is measured
 _SPECULAR_OFFSET = 1e-6
+_POWERS: tuple[Power, ...] = (-2, -1, 0, 1, 2)
+_MOST_CORNERS = 64  # of a cubic: of more swept parameters than three, it is not tried
+_THINNED = 4  # of so many directions one is looked at to choose the interpolation
 
 
 class _Point(NamedTuple):
@@ -47,12 +52,26 @@ class _Point(NamedTuple):
     within: Floats
 
 
+class _Way(NamedTuple):
+    """A way to interpolate: the fields of a `Blend`."""
+
+    method: Literal["linear", "cubic"]
+    offset: float | None
+    powers: tuple[Power, ...]
+
+    def said(self, sweep: Sweep) -> str:
+        """In words."""
+        along = {-2: "1/{}^2", -1: "1/{}", 0: "ln {}", 1: "{}", 2: "{}^2"}
+        axes = ", ".join(along[power].format(name) for name, power in zip(sweep.axes, self.powers, strict=True))
+        return f"{self.method} in {'f_r' if self.offset is None else 'logarithms'} along {axes}"
+
+
 class _Measured(NamedTuple):
     """What is known at the points: members around them, the model, directions."""
 
     points: list[_Point]
     parameters: list[dict[str, float]]  # in the units of the model
-    corners: Floats  # f_r of the members around, of shape (points, corners, directions, wavelengths)
+    corners: Floats  # f_r of the members that a cubic is made of, of shape (points, corners, directions, wavelengths)
     truth: Floats  # (points, directions, wavelengths)
     drawn: list[accuracy.Draw]
     specular_corners: Floats | None  # (points, corners, angles, wavelengths)
@@ -101,10 +120,9 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     truth = found.truth.reshape(-1, found.truth.shape[-1])
     floor = accuracy.floor_of(truth, drawn)
     ways = _ways(sweep, found, drawn, floor)
-    blend = min(ways, key=lambda way: ways[way])
-    offset, logarithmic = blend
-    value = _interpolated(sweep, found, found.corners, offset, logarithmic)
-    specular_offset, specular_error = _specular(sweep, found, logarithmic)
+    best = min(ways, key=lambda way: ways[way])
+    value = blended(*_weighted(sweep, found, found.corners, best), best.offset)
+    specular_offset, specular_error = _specular(sweep, found, best)
     p99 = [
         float(np.percentile(accuracy.relative(v, t, floor)[d.above], 99.0, axis=0).max())
         for v, t, d in zip(value, found.truth, found.drawn, strict=True)
@@ -113,11 +131,12 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     return FamilyRecord(
         **sweep.model_dump(),
         interpolation=Blend(
-            offset=offset,
+            method=best.method,
+            powers=dict(zip(sweep.axes, best.powers, strict=True)),
+            offset=best.offset,
             specular_offset=specular_offset,
-            logarithmic_axes=list(logarithmic),
             reason="; ".join(
-                f"{'logarithms' if way[0] else 'f_r'}{''.join(f', along ln {x}' for x in way[1])}: p99 {left:.3g}"
+                f"{way.said(sweep)}: p99 about {left:.2g}"
                 for way, left in sorted(ways.items(), key=lambda item: item[1])
             ),
         ),
@@ -137,7 +156,8 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int) -> _Measured:
     wavelength_nm = member(0).wavelength_nm
     points = parameter_points(shape, seed)
     bands = accuracy.BANDS_DEG.size - 1
-    values = len(points) * bands * (1 << len(shape)) * (1 if wavelength_nm is None else wavelength_nm.size)
+    stencils = tuple(min(_width(shape), nodes) for nodes in shape)
+    values = len(points) * bands * math.prod(stencils) * (1 if wavelength_nm is None else wavelength_nm.size)
     count = max(_FEWEST_DIRECTIONS, min(_DIRECTIONS, _CORNER_VALUES // values))
     spec = base.spec
     parameters, corners, truth, draws, specular_corners, specular_truth = [], [], [], [], [], []
@@ -147,9 +167,8 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int) -> _Measured:
             for (name, axis), i, t in zip(nodes.items(), cell, within, strict=True)
         }
         material = base.model_copy(update={"parameters": {**base.parameters, **at}})
-        around = [
-            member(int(np.ravel_multi_index(np.add(cell, corner), shape))) for corner in np.ndindex(*(2,) * len(shape))
-        ]
+        first = [stencil(axis, at[name], 1, cubic=_width(shape) == 4)[0] for name, axis in nodes.items()]
+        around = [member(int(np.ravel_multi_index(np.add(first, corner), shape))) for corner in np.ndindex(*stencils)]
         drawn = accuracy.draw(material, wavelength_nm, count, seed + 1 + number)
         parameters.append(at)
         draws.append(drawn)
@@ -176,64 +195,69 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int) -> _Measured:
     )
 
 
-_Way = tuple[float | None, tuple[str, ...]]  # the offset of logarithms or None, and the axes that are logarithmic
+def _width(shape: tuple[int, ...]) -> int:
+    """How many values of each parameter the interpolation is made of at most."""
+    return 4 if math.prod(min(4, nodes) for nodes in shape) <= _MOST_CORNERS else 2
 
 
 def _ways(sweep: Sweep, found: _Measured, drawn: accuracy.Draw, floor: Floats) -> dict[_Way, float]:
-    """The 99th percentile of the error of each way to interpolate: f_r and logarithms, axis by axis."""
-    truth = found.truth.reshape(-1, found.truth.shape[-1])
-    positive = [written for written, values in sweep.axes.items() if values[0] > 0.0]
+    """The best powers of each method, in f_r and in logarithms, with the 99th percentile of the error they leave."""
+    corners, truth = found.corners[:, :, ::_THINNED], found.truth[:, ::_THINNED]
+    above = drawn.above.reshape(found.truth.shape[:2])[:, ::_THINNED]
+    shape = tuple(map(len, sweep.axes.values()))
     offsets: list[float | None] = [None]
     if floor.max() > 0.0:
         offsets.append(float(f"{0.5 * floor[floor > 0.0].min():.6g}"))
-    ways: dict[_Way, float] = {}
+    methods: list[Literal["linear", "cubic"]] = ["linear", "cubic"]
 
     def left(way: _Way) -> float:
-        if way not in ways:
-            value = _interpolated(sweep, found, found.corners, *way).reshape(truth.shape)
-            error = accuracy.relative(value, truth, floor)[drawn.above]
-            ways[way] = float(np.percentile(error, 99.0, axis=0).max())
-        return ways[way]
+        value = blended(*_weighted(sweep, found, corners, way), way.offset)
+        return float(np.percentile(accuracy.relative(value, truth, floor)[above], 99.0, axis=0).max())
 
-    for offset in offsets:
-        best: _Way = (offset, ())
-        left(best)
-        for written in positive:
-            if left((offset, (*best[1], written))) < ways[best]:
-                best = (offset, (*best[1], written))
+    ways: dict[_Way, float] = {}
+    for method in methods if _width(shape) == 4 and max(shape) > 2 else methods[:1]:
+        for offset in offsets:
+            one: Power = 1
+            best = _Way(method, offset, (one,) * len(shape))
+            least = left(best)
+            for axis, values in enumerate(sweep.axes.values()):
+                for power in _POWERS if values[0] > 0.0 else (1, 2) if values[0] == 0.0 else (1,):
+                    other = best._replace(powers=(*best.powers[:axis], power, *best.powers[axis + 1 :]))
+                    if other != best and (there := left(other)) < least:
+                        best, least = other, there
+            ways[best] = least
     return ways
 
 
-def _interpolated(
-    sweep: Sweep, found: _Measured, corners: Floats, offset: float | None, logarithmic: tuple[str, ...]
-) -> Floats:
-    """Values at the points from those of the members around: (points, corners, ...) to (points, ...)."""
-    weights = _weights(sweep, found, logarithmic)
-    spread = weights.reshape(*weights.shape, *(1,) * (corners.ndim - 2))
-    many = range(corners.shape[1])
-    return blended([corners[:, c] for c in many], [spread[:, c] for c in many], offset)
-
-
-def _weights(sweep: Sweep, found: _Measured, logarithmic: tuple[str, ...]) -> NDArray[np.float64]:
-    """The weights of the members around each point, of shape (points, corners)."""
+def _weighted(
+    sweep: Sweep, found: _Measured, corners: Floats, way: _Way
+) -> tuple[list[Floats], list[NDArray[np.float64]]]:
+    """The values of the members around the points, corner by corner, and their weights, which broadcast to them."""
     nodes = sweep.nodes
+    shape = tuple(axis.size for axis in nodes.values())
     rows = []
-    for (cell, _), at in zip(found.points, found.parameters, strict=True):
+    for at in found.parameters:
         weight = np.ones(1)
-        for (name, axis), written, i in zip(nodes.items(), sweep.axes, cell, strict=True):
-            share = share_of(axis[i], axis[i + 1], at[name], logarithmic=written in logarithmic)
-            weight = np.outer(weight, [1.0 - share, share]).reshape(-1)
+        for (name, axis), power in zip(nodes.items(), way.powers, strict=True):
+            base, ones = stencil(axis, at[name], 1, cubic=_width(shape) == 4)
+            first, some = stencil(axis, at[name], power, cubic=way.method == "cubic")
+            along = np.zeros(ones.size)
+            along[first - base : first - base + some.size] = some
+            weight = np.outer(weight, along).reshape(-1)
         rows.append(weight)
-    return np.array(rows)
+    weights = np.array(rows)
+    used = np.flatnonzero(np.any(weights != 0.0, axis=0))
+    spread = (slice(None), *(np.newaxis,) * (corners.ndim - 2))
+    return [corners[:, c] for c in used], [weights[:, c][spread] for c in used]
 
 
-def _specular(sweep: Sweep, found: _Measured, logarithmic: tuple[str, ...]) -> tuple[float | None, float | None]:
+def _specular(sweep: Sweep, found: _Measured, way: _Way) -> tuple[float | None, float | None]:
     """How the reflectance of the Dirac part is interpolated, offset or None, and its largest error; None without."""
     if found.specular_corners is None or found.specular_truth is None:
         return None, None
     left: dict[float | None, float] = {}
     for offset in (None, _SPECULAR_OFFSET):
-        value = _interpolated(sweep, found, found.specular_corners, offset, logarithmic)
+        value = blended(*_weighted(sweep, found, found.specular_corners, way), offset)
         left[offset] = float(np.abs(value - found.specular_truth).max())
     best = min(left, key=lambda offset: left[offset])
     return best, float(f"{left[best]:.3g}")

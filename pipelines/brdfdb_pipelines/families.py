@@ -52,8 +52,8 @@ def show(family: Family) -> None:
         print(f"    {written:<16}{len(values)} values, {values[0]:g} to {values[-1]:g}")
     how = record.interpolation
     what = "f_r" if how.offset is None else f"logarithms of f_r + {how.offset:.3g}/sr"
-    along = ", ".join(f"ln {x}" if x in how.logarithmic_axes else x for x in record.axes)
-    print(f"  between     multilinear in {what} along {along}")
+    along = ", ".join({0: f"ln {x}", 1: x}.get(power, f"{x}^{power}") for x, power in how.powers.items())
+    print(f"  between     {how.method} in {what} along {along}")
     print(f"  measured    {how.reason}")
     overall = record.error.overall
     print(
