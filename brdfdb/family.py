@@ -153,7 +153,10 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
 
 def stale(family: str, member: str) -> str:
     """The sentence about a family whose member is not the one that its record was made of."""
-    return f"the family {family} is out of date: {member} was built anew since; build its recipe again"
+    return (
+        f"the family {family} is out of date: {member} is another table than it was measured with; "
+        "build its recipe again"
+    )
 
 
 def _same(one: Axis | None, other: Axis | None) -> bool:

@@ -129,7 +129,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     ]
     worst = int(np.argmax(p99))
     return FamilyRecord(
-        **sweep.model_dump(),
+        **sweep.model_dump(include=set(Sweep.model_fields)),
         interpolation=Blend(
             method=best.method,
             powers=dict(zip(sweep.axes, best.powers, strict=True)),
