@@ -98,7 +98,7 @@ class FamilyRecord(Sweep):
     interpolation: Blend
     error: Error = Field(
         description="of interpolated f_r against the model, over directions and parameters: all points pooled, as many "
-        "in each cell between members, spread evenly in it; of more than 64 cells one point in each of 64 drawn at "
+        "in each cell between members, spread evenly in it; of more than 256 cells one point in each of 256 drawn at "
         "random. 99 of 100 values of the family are within p99"
     )
     points: int = Field(description="parameters at which the error was measured")
@@ -134,7 +134,7 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
     It raises StoreError for a member that was built anew for another request, and for one at other wavelengths than
     another one.
     """
-    wavelengths: list[Axis | None] = []
+    shared: dict[str, Axis | None] = {}
 
     @functools.lru_cache(maxsize=2 * math.prod(min(4, len(values)) for values in sweep.axes.values()))
     def load(number: int) -> Table:
@@ -142,10 +142,8 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
         table = tables[name]
         if table.attrs.get("request_sha256") != sweep.request_sha256[number]:
             raise StoreError(stale(sweep.name, name))
-        wavelengths.append(table.wavelength_nm)
-        if not _same(wavelengths[0], wavelengths[-1]):
+        if not _same(shared.setdefault("wavelength_nm", table.wavelength_nm), table.wavelength_nm):
             raise StoreError(f"the family {sweep.name}: {name} is at other wavelengths than another member")
-        del wavelengths[1:]
         return table
 
     return load

@@ -34,15 +34,15 @@ from brdfdb.store import Store, UnknownMaterialError
 Power = Literal[-2, -1, 0, 1, 2]
 
 SEED = 1991
-POINTS = 64  # parameters at which a family is measured, at least
-_DIRECTIONS = 100  # of a band of theta_i at each of them
+POINTS = 256  # parameters at which a family is measured, at least
+_DIRECTIONS = 50  # of a band of theta_i at each of them
 _FEWEST_DIRECTIONS = 10
-_CORNER_VALUES = 20_000_000  # that are held at a time: of more, fewer directions are drawn
+_CORNER_VALUES = 10_000_000  # that are held at a time: of more, fewer directions are drawn
 _THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # where the Dirac part is measured
 _SPECULAR_OFFSET = 1e-6
 _POWERS: tuple[Power, ...] = (-2, -1, 0, 1, 2)
 _MOST_CORNERS = 64  # of a cubic: of more swept parameters than three, it is not tried
-_THINNED = 4  # of so many directions one is looked at to choose the interpolation
+_THINNED = 4  # of so many directions one is looked at to choose powers
 
 
 class _Point(NamedTuple):
@@ -81,8 +81,8 @@ class _Measured(NamedTuple):
 def parameter_points(shape: tuple[int, ...], seed: int) -> list[_Point]:
     """Where a family of so many values along each axis is measured.
 
-    The same number of points in each cell, 64 in all or the next multiple; of more than 64 cells, one point in each of
-    64. They follow a sequence that fills the cells evenly, from a random start.
+    The same number of points in each cell, 256 in all or the next multiple; of more than 256 cells, one point in each
+    of 256. They follow a sequence that fills the cells evenly, from a random start.
     """
     rng = np.random.default_rng(seed)
     cells = tuple(nodes - 1 for nodes in shape)
@@ -136,8 +136,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
             offset=best.offset,
             specular_offset=specular_offset,
             reason="; ".join(
-                f"{way.said(sweep)}: p99 about {left:.2g}"
-                for way, left in sorted(ways.items(), key=lambda item: item[1])
+                f"{way.said(sweep)}: p99 {left:.3g}" for way, left in sorted(ways.items(), key=lambda item: item[1])
             ),
         ),
         error=accuracy.compare(value.reshape(truth.shape), truth, drawn, seed),
@@ -202,30 +201,31 @@ def _width(shape: tuple[int, ...]) -> int:
 
 def _ways(sweep: Sweep, found: _Measured, drawn: accuracy.Draw, floor: Floats) -> dict[_Way, float]:
     """The best powers of each method, in f_r and in logarithms, with the 99th percentile of the error they leave."""
-    corners, truth = found.corners[:, :, ::_THINNED], found.truth[:, ::_THINNED]
-    above = drawn.above.reshape(found.truth.shape[:2])[:, ::_THINNED]
+    above = drawn.above.reshape(found.truth.shape[:2])
     shape = tuple(map(len, sweep.axes.values()))
     offsets: list[float | None] = [None]
     if floor.max() > 0.0:
         offsets.append(float(f"{0.5 * floor[floor > 0.0].min():.6g}"))
     methods: list[Literal["linear", "cubic"]] = ["linear", "cubic"]
 
-    def left(way: _Way) -> float:
-        value = blended(*_weighted(sweep, found, corners, way), way.offset)
-        return float(np.percentile(accuracy.relative(value, truth, floor)[above], 99.0, axis=0).max())
+    def left(way: _Way, thinned: int = 1) -> float:
+        some = slice(None, None, thinned)
+        value = blended(*_weighted(sweep, found, found.corners[:, :, some], way), way.offset)
+        error = accuracy.relative(value, found.truth[:, some], floor)[above[:, some]]
+        return float(np.percentile(error, 99.0, axis=0).max())
 
     ways: dict[_Way, float] = {}
     for method in methods if _width(shape) == 4 and max(shape) > 2 else methods[:1]:
         for offset in offsets:
             one: Power = 1
             best = _Way(method, offset, (one,) * len(shape))
-            least = left(best)
-            for axis, values in enumerate(sweep.axes.values()):
+            least = left(best, _THINNED)
+            for axis, values in [*enumerate(sweep.axes.values())] * 2:  # the best of one depends on the others
                 for power in _POWERS if values[0] > 0.0 else (1, 2) if values[0] == 0.0 else (1,):
                     other = best._replace(powers=(*best.powers[:axis], power, *best.powers[axis + 1 :]))
-                    if other != best and (there := left(other)) < least:
+                    if other != best and (there := left(other, _THINNED)) < least:
                         best, least = other, there
-            ways[best] = least
+            ways[best] = left(best)
     return ways
 
 

@@ -20,7 +20,7 @@ from brdfdb.manifest import StoreError
 from brdfdb.materials import Material
 from brdfdb.tabulate import tabulate
 
-AGREEMENT = 0.2  # promised, between a stated p99 and one measured afresh; measured: 0.05 at most
+AGREEMENT = 0.2  # promised, between a stated p99 and one measured afresh; measured: 0.03 at most
 FLOAT32 = 2e-7  # relative, of tables that are float32; measured: 6e-8
 ROUNDING = 2e-12  # of weights that are differences of powers; measured: 3e-13
 WAVELENGTHS = np.array([450.0, 550.0, 650.0])
@@ -150,7 +150,6 @@ def test_the_stated_error_and_one_measured_afresh_agree(name: str, families: Fam
         found.append(family.lookup_vectors(drawn.wi, drawn.wr, **at).reshape(truth[-1].shape))
     whole = accuracy.Draw(*(np.concatenate(parts) for parts in zip(*draws, strict=True)))
     afresh = accuracy.compare(np.concatenate(found), np.concatenate(truth), whole)
-    print("AGREE", name, afresh.overall.p99, family.error.overall, family.record.interpolation.reason)
     assert afresh.overall.p99 == pytest.approx(family.error.overall.p99, rel=AGREEMENT)
     assert family.error.overall.p99 > 1e-3
     assert family.record.worst.p99 >= family.error.overall.p99
@@ -167,7 +166,6 @@ def test_the_dirac_part_is_as_far_off_as_stated(families: Families) -> None:
         arguments = {name: base[name] for name in ("wavelength_nm", "n", "k")}
         truth = models.he_torrance_specular(theta_i[:, np.newaxis], sigma_0_um=sigma_0_um, tau_um=tau_um, **arguments)
         worst = max(worst, float(np.abs(found - truth).max()))
-    print("SPEC", worst, family.record.specular_error)
     assert family.record.specular_error is not None
     assert 0.0 < worst < 1.2 * family.record.specular_error
 
@@ -221,10 +219,10 @@ def test_means_are_not_below_0_and_0_where_all_are() -> None:
 def test_points_fill_the_cells_evenly() -> None:
     points = parameter_points((3, 4), 1)
     cells = [point.cell for point in points]
-    assert [cells.count(cell) for cell in itertools.product(range(2), range(3))] == [11] * 6
+    assert [cells.count(cell) for cell in itertools.product(range(2), range(3))] == [43] * 6
     within = np.array([point.within for point in points])
     assert np.all((within >= 0.0) & (within < 1.0))
-    assert np.all(np.histogram(within, bins=4, range=(0.0, 1.0))[0] > 20)
+    assert np.all(np.histogram(within, bins=4, range=(0.0, 1.0))[0] > 120)
     many = [point.cell for point in parameter_points((101, 11), 1)]
     assert len(set(many)) == len(many) == POINTS
     assert many != [point.cell for point in parameter_points((101, 11), 2)]
