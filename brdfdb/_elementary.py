@@ -1,4 +1,4 @@
-"""What the inside of kernels is made of: exp, log, arcsin, erfc without branches, so that loops over them vectorise.
+"""What the inside of kernels is made of: exp, log, sine, arcsin, erfc without branches, so that their loops vectorise.
 
 libm's do not vectorise without SVML, which pip wheels do not ship. Kernels of any file may call these: `_numba.kernel`
 knows this file, and compiles its callers anew when it changes.
@@ -18,6 +18,10 @@ _LN2_HIGH = 0.6931471805598903  # has 20 bits to spare: n times it is exact
 _LN2_LOW = 5.497923018708371e-14
 _ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it leaves the nearest integer in the low bits of the float
 _EXP_UNDERFLOW = -708.0  # below is 0: no subnormal numbers
+_TWO_OVER_PI = 0.6366197723675814
+_HALF_PI_HIGH = 1.5707963267341256  # has 20 bits to spare
+_HALF_PI_MIDDLE = 6.077100506303966e-11  # too
+_HALF_PI_LOW = 2.0222662487959506e-21
 _SQRT_HALF = np.int64(0x3FE6A09E667F3BCD)
 
 
@@ -114,6 +118,48 @@ def arcsin(x: float) -> float:
     p = p * u + 0.0749999999990911
     p = p * u + 0.16666666666667013
     return x + x * u * p
+
+
+@kernel
+def _quarter_turns(x: float) -> tuple[float, float, float]:
+    """Of how many quarter turns x [rad] is, rounded, as a whole number, modulo 4; the sine and cosine of the rest."""
+    shifted = x * _TWO_OVER_PI + _ROUND
+    n = shifted - _ROUND
+    r = ((x - n * _HALF_PI_HIGH) - n * _HALF_PI_MIDDLE) - n * _HALF_PI_LOW
+    u = r * r
+    # Taylor series, |r| <= pi / 4: the first terms left out are below 5e-17
+    s = -7.647163731819816e-13
+    s = s * u + 1.6059043836821613e-10
+    s = s * u - 2.505210838544172e-08
+    s = s * u + 2.7557319223985893e-06
+    s = s * u - 0.0001984126984126984
+    s = s * u + 0.008333333333333333
+    s = s * u - 0.16666666666666666
+    c = 4.779477332387385e-14
+    c = c * u - 1.1470745597729725e-11
+    c = c * u + 2.08767569878681e-09
+    c = c * u - 2.755731922398589e-07
+    c = c * u + 2.48015873015873e-05
+    c = c * u - 0.001388888888888889
+    c = c * u + 0.041666666666666664
+    c = c * u - 0.5
+    return n - 4.0 * np.floor(0.25 * n), r + r * u * s, 1.0 + u * c
+
+
+@kernel
+def sine(x: float) -> float:
+    """The sine of x [rad], within 2e-16 for abs(x) < 1e5 and within 2e-16 abs(x) beyond; nan for nan."""
+    quarter, s, c = _quarter_turns(x)
+    value = s if (quarter == 0.0) | (quarter == 2.0) else c
+    return -value if quarter >= 2.0 else value
+
+
+@kernel
+def cos(x: float) -> float:
+    """The cosine of x [rad], within 2e-16 for abs(x) < 1e5 and within 2e-16 abs(x) beyond; nan for nan."""
+    quarter, s, c = _quarter_turns(x)
+    value = c if (quarter == 0.0) | (quarter == 2.0) else s
+    return -value if (quarter == 1.0) | (quarter == 2.0) else value
 
 
 @kernel

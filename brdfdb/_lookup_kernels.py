@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb._elementary import BLOCK, arcsin, cosine, exp
+from brdfdb._elementary import BLOCK, arcsin, cos, cosine, exp, sine
 from brdfdb._numba import kernel, loop
 from brdfdb.interpolation import Axes, locate, tricubic, trilinear, weighted
 
@@ -37,6 +37,8 @@ class Rule(NamedTuple):
         ... of values to which this was added.
     power : float
         What was tabulated is f_r times (cos theta_i cos theta_r) to this power.
+    overshoots : bool
+        Whether what is interpolated may fall below 0 where no node is: it is 0 there.
     """
 
     half_difference: bool
@@ -44,6 +46,7 @@ class Rule(NamedTuple):
     logarithm: bool
     offset: float
     power: float
+    overshoots: bool
 
 
 @kernel
@@ -97,83 +100,111 @@ def _halved(phi_h: float, phi_d: float, copies: int) -> tuple[float, float]:
 
 @loop
 def points_of_angles(
-    rule: Rule, theta_i: Array, phi_i: Array, theta_r: Array, phi_r: Array, start: int, count: int, x: Array, mu: Array
+    rule: Rule, theta_i: Array, phi_i: Array, theta_r: Array, phi_r: Array, count: int, x: Array, mu: Array
 ) -> None:
     """Points on a grid of light and viewer, and mu = cos theta_i cos theta_r, which is needed of some rules only."""
     if x.shape[0] == 3:
         for j in range(count):
-            d = np.float64(phi_r[start + j]) - np.float64(phi_i[start + j])
+            d = np.float64(phi_r[j]) - np.float64(phi_i[j])
             d -= np.floor(d * (1.0 / TURN) + 0.5) * TURN
-            x[0, j] = theta_i[start + j]
-            x[1, j] = theta_r[start + j]
+            x[0, j] = theta_i[j]
+            x[1, j] = theta_r[j]
             x[2, j] = abs(d)
     else:
         for j in range(count):
-            phi, other = _turned(np.float64(phi_i[start + j]), np.float64(phi_r[start + j]), rule.copies)
-            x[0, j] = theta_i[start + j]
+            phi, other = _turned(np.float64(phi_i[j]), np.float64(phi_r[j]), rule.copies)
+            x[0, j] = theta_i[j]
             x[1, j] = phi
-            x[2, j] = theta_r[start + j]
+            x[2, j] = theta_r[j]
             x[3, j] = _folded(other, TURN)
     if rule.power != 0.0:
         for j in range(count):
-            mu[j] = cosine(np.cos(np.float64(theta_i[start + j]))) * cosine(np.cos(np.float64(theta_r[start + j])))
+            mu[j] = cosine(cos(np.float64(theta_i[j]))) * cosine(cos(np.float64(theta_r[j])))
 
 
 @loop
-def points_of_vectors(
-    rule: Rule, wi: Array, wr: Array, start: int, count: int, x: Array, mu: Array, scratch: Array
-) -> None:
-    """Points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r."""
-    axes = x.shape[0]
-    ui, ur = wi[3 * start :], wr[3 * start :]
+def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu: Array, scratch: Array) -> None:
+    """Points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r.
+
+    `scratch` holds four rows. One loop for the products and one for each angle: all in one would not vectorise.
+    """
+    if rule.half_difference:
+        _half_difference(ui, ur, count, x[0], x[x.shape[0] - 2], x[x.shape[0] - 1], scratch)
+        if x.shape[0] == 4:
+            for j in range(count):
+                phi_h = _full_turn(scratch[3, j], scratch[2, j])
+                x[1, j], x[3, j] = _halved(phi_h, _full_turn(scratch[1, j], scratch[0, j]), rule.copies)
+    elif x.shape[0] == 3:
+        _light_and_viewer(ui, ur, count, x[0], x[1], x[2], scratch)
+    else:
+        for j in range(count):
+            phi_i, phi_r = _full_turn(ui[3 * j + 1], ui[3 * j]), _full_turn(ur[3 * j + 1], ur[3 * j])
+            phi, other = _turned(phi_i, phi_r, rule.copies)
+            x[0, j] = _polar(ui[3 * j], ui[3 * j + 1], ui[3 * j + 2])
+            x[1, j] = phi
+            x[2, j] = _polar(ur[3 * j], ur[3 * j + 1], ur[3 * j + 2])
+            x[3, j] = _folded(other, TURN)
     for j in range(count):
         mu[j] = cosine(np.float64(ui[3 * j + 2])) * cosine(np.float64(ur[3 * j + 2]))
-    if rule.half_difference:
-        along, across = scratch[0], scratch[1]  # of the difference vector, about the half vector
-        for j in range(count):
-            x_i, y_i, z_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1]), np.float64(ui[3 * j + 2])
-            x_r, y_r, z_r = np.float64(ur[3 * j]), np.float64(ur[3 * j + 1]), np.float64(ur[3 * j + 2])
-            h_x, h_y, h_z = x_i + x_r, y_i + y_r, z_i + z_r
-            d_x, d_y, d_z = x_i - x_r, y_i - y_r, z_i - z_r
-            flat = np.sqrt(h_x * h_x + h_y * h_y)
-            h = np.sqrt(flat * flat + h_z * h_z)
-            d = np.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
-            pole = flat < 1e-14 * h
-            e_x = 1.0 if pole else h_x / (1.0 if pole else flat)
-            e_y = 0.0 if pole else h_y / (1.0 if pole else flat)
-            whole = h if h > 0.0 else 1.0
-            # the frame of the half vector: along theta_h, and along phi_h
-            along[j] = (d_x * e_x + d_y * e_y) * (h_z / whole) - d_z * (flat / whole)
-            across[j] = d_y * e_x - d_x * e_y
-            x[0, j] = angle(flat, abs(h_z))
-            x[axes - 2, j] = angle(d, h)
-            if axes == 4:
-                x[1, j] = h_x
-                x[3, j] = h_y
-        if axes == 3:
-            for j in range(count):
-                x[2, j] = angle(abs(across[j]), abs(along[j]))
-        else:
-            for j in range(count):
-                phi_h = 0.0 if abs(x[1, j]) + abs(x[3, j]) < 1e-14 else _full_turn(x[3, j], x[1, j])
-                x[1, j], x[3, j] = _halved(phi_h, _full_turn(across[j], along[j]), rule.copies)
-        return
+
+
+@kernel
+def _polar(x: float, y: float, z: float) -> float:
+    return angle(np.sqrt(x * x + y * y), abs(z))
+
+
+@kernel
+def _half_difference(
+    ui: Array, ur: Array, count: int, theta_h: Array, theta_d: Array, phi_d: Array, scratch: Array
+) -> None:
+    """theta_h, theta_d, and phi_d in the first quadrant.
+
+    `scratch` gets the difference vector along theta_h and along phi_h, both times one positive number, and the
+    horizontal half vector; where that is nothing, the frame is that of phi_h = 0.
+    """
+    along, across, x_h, y_h = scratch[0], scratch[1], scratch[2], scratch[3]
     for j in range(count):
         x_i, y_i, z_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1]), np.float64(ui[3 * j + 2])
         x_r, y_r, z_r = np.float64(ur[3 * j]), np.float64(ur[3 * j + 1]), np.float64(ur[3 * j + 2])
-        theta_i = angle(np.sqrt(x_i * x_i + y_i * y_i), abs(z_i))
-        theta_r = angle(np.sqrt(x_r * x_r + y_r * y_r), abs(z_r))
-        x[0, j] = theta_i
-        if axes == 3:
-            dot, cross = x_i * x_r + y_i * y_r, x_i * y_r - y_i * x_r
-            turn = angle(abs(cross), abs(dot))
-            x[1, j] = theta_r
-            x[2, j] = PI - turn if dot < 0.0 else turn
-        else:
-            phi, other = _turned(_full_turn(y_i, x_i), _full_turn(y_r, x_r), rule.copies)
-            x[1, j] = phi
-            x[2, j] = theta_r
-            x[3, j] = _folded(other, TURN)
+        h_x, h_y, h_z = x_i + x_r, y_i + y_r, z_i + z_r
+        d_x, d_y, d_z = x_i - x_r, y_i - y_r, z_i - z_r
+        flat2 = h_x * h_x + h_y * h_y
+        h2 = flat2 + h_z * h_z
+        pole = flat2 < 1e-28 * h2
+        along[j] = d_x if pole else (d_x * h_x + d_y * h_y) * h_z - d_z * flat2
+        across[j] = d_y if pole else (d_y * h_x - d_x * h_y) * np.sqrt(h2)
+        x_h[j] = 1.0 if pole else h_x
+        y_h[j] = 0.0 if pole else h_y
+        theta_h[j] = np.sqrt(flat2)
+        theta_d[j] = np.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
+        phi_d[j] = h2
+    for j in range(count):
+        theta_d[j] = angle(theta_d[j], np.sqrt(phi_d[j]))
+    for j in range(count):
+        h_z = np.float64(ui[3 * j + 2]) + np.float64(ur[3 * j + 2])
+        theta_h[j] = angle(theta_h[j], abs(h_z))
+    for j in range(count):
+        phi_d[j] = angle(abs(across[j]), abs(along[j]))
+
+
+@kernel
+def _light_and_viewer(
+    ui: Array, ur: Array, count: int, theta_i: Array, theta_r: Array, delta_phi: Array, scratch: Array
+) -> None:
+    """theta_i, theta_r and delta_phi."""
+    dot, cross = scratch[0], scratch[1]
+    for j in range(count):
+        x_i, y_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1])
+        x_r, y_r = np.float64(ur[3 * j]), np.float64(ur[3 * j + 1])
+        dot[j], cross[j] = x_i * x_r + y_i * y_r, x_i * y_r - y_i * x_r
+        theta_i[j], theta_r[j] = np.sqrt(x_i * x_i + y_i * y_i), np.sqrt(x_r * x_r + y_r * y_r)
+    for j in range(count):
+        theta_i[j] = angle(theta_i[j], abs(np.float64(ui[3 * j + 2])))
+    for j in range(count):
+        theta_r[j] = angle(theta_r[j], abs(np.float64(ur[3 * j + 2])))
+    for j in range(count):
+        turn = angle(abs(cross[j]), abs(dot[j]))
+        delta_phi[j] = PI - turn if dot[j] < 0.0 else turn
 
 
 @loop
@@ -200,7 +231,6 @@ def finished(
     uniform: Array,
     low: NDArray[np.int64],
     weight: Array,
-    start: int,
     count: int,
     out: Array,
 ) -> None:
@@ -220,10 +250,13 @@ def finished(
     if channels == 1 and low.size == 1 and spectra.size == 0:
         if rule.logarithm:
             for j in range(count):
-                value = exp(numbers[j]) - rule.offset
-                numbers[j] = value if value > 0.0 else 0.0 * value  # nan stays nan
+                numbers[j] = exp(numbers[j]) - rule.offset
+        if rule.overshoots:
+            for j in range(count):
+                value = numbers[j]
+                numbers[j] = 0.0 if value < 0.0 else value  # nan stays nan
         for j in range(count):
-            out[start + j] = numbers[j] * mu[j] + uniform[0]
+            out[j] = numbers[j] * mu[j] + uniform[0]
         return
     wavelengths = low.size
     for m in range(wavelengths):
@@ -237,10 +270,24 @@ def finished(
                         value += numbers[j * channels + channel] * spectra[channel, w]
                 else:
                     value = numbers[j * channels + w]
-                value = max(exp(value) - rule.offset, 0.0) if rule.logarithm else value
+                value = exp(value) - rule.offset if rule.logarithm else value
+                value = 0.0 if rule.overshoots and value < 0.0 else value  # nan stays nan
                 value = part * (value * mu[j] + uniform[w])
-                at = (start + j) * wavelengths + m
+                at = j * wavelengths + m
                 out[at] = value if side == 0 else out[at] + value
+
+
+@loop
+def vectors_of_angles(theta: Array, phi: Array, count: int, w: Array) -> None:
+    """Unit vectors, three numbers each, of directions by angles [rad]."""
+    for j in range(count):
+        w[3 * j + 2] = sine(np.float64(theta[j]))
+    for j in range(count):
+        w[3 * j] = w[3 * j + 2] * cos(np.float64(phi[j]))
+    for j in range(count):
+        w[3 * j + 1] = w[3 * j + 2] * sine(np.float64(phi[j]))
+    for j in range(count):
+        w[3 * j + 2] = cos(np.float64(theta[j]))
 
 
 @kernel
@@ -260,26 +307,34 @@ def by_angles(
     horizon: float,
     out: Array,
 ) -> bool:
-    """f_r of directions by angles [rad] on a grid of light and viewer; False where an angle is not what it may be."""
-    x, mu = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK)
+    """f_r of directions by angles [rad] on either kind of grid; False where an angle is not what it may be."""
+    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
+    wi, wr = np.empty(3 * BLOCK), np.empty(3 * BLOCK)
     numbers = np.empty(BLOCK * channels)
     good = True
     for start in range(0, theta_i.size, BLOCK):
         count = min(BLOCK, theta_i.size - start)
-        points_of_angles(rule, theta_i, phi_i, theta_r, phi_r, start, count, x, mu)
+        here = slice(start, start + count)  # an index that starts at 0 is known not to be negative: loops vectorise
+        t_i, p_i, t_r, p_r = theta_i[here], phi_i[here], theta_r[here], phi_r[here]
+        f_r = out[start * low.size : (start + count) * low.size]
+        if rule.half_difference:
+            vectors_of_angles(t_i, p_i, count, wi)
+            vectors_of_angles(t_r, p_r, count, wr)
+            points_of_vectors(rule, wi, wr, count, x, mu, scratch)
+        else:
+            points_of_angles(rule, t_i, p_i, t_r, p_r, count, x, mu)
         interpolated(axes, table, channels, x, count, numbers)
-        finished(rule, numbers, channels, mu, spectra, uniform, low, weight, start, count, out)
+        finished(rule, numbers, channels, mu, spectra, uniform, low, weight, count, f_r)
         odd = 0
         for j in range(count):
-            t_i, t_r, p_i, p_r = theta_i[start + j], theta_r[start + j], phi_i[start + j], phi_r[start + j]
-            usual = (t_i >= 0.0) & (t_i <= horizon) & (t_r >= 0.0) & (t_r <= horizon)
-            odd += int(not (usual & (abs(p_i) <= PHI_MAX) & (abs(p_r) <= PHI_MAX)))
+            usual = (t_i[j] >= 0.0) & (t_i[j] <= horizon) & (t_r[j] >= 0.0) & (t_r[j] <= horizon)
+            odd += int(not (usual & (abs(p_i[j]) <= PHI_MAX) & (abs(p_r[j]) <= PHI_MAX)))
         if odd > 0:
             for j in range(count):
-                t_i, t_r, p_i, p_r = theta_i[start + j], theta_r[start + j], phi_i[start + j], phi_r[start + j]
-                bad = t_i < 0.0 or t_i > PI or t_r < 0.0 or t_r > PI or abs(p_i) > PHI_MAX or abs(p_r) > PHI_MAX
-                good = good and not bad
-                _outside(t_i + t_r + p_i + p_r, t_i > horizon or t_r > horizon, start + j, low.size, out)
+                bad = t_i[j] < 0.0 or t_i[j] > PI or t_r[j] < 0.0 or t_r[j] > PI
+                good = good and not (bad or abs(p_i[j]) > PHI_MAX or abs(p_r[j]) > PHI_MAX)
+                below = t_i[j] > horizon or t_r[j] > horizon
+                _outside(t_i[j] + t_r[j] + p_i[j] + p_r[j], below, j, low.size, f_r)
     return good
 
 
@@ -306,15 +361,16 @@ def by_vectors(
     out: Array,
 ) -> None:
     """f_r of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
-    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((2, BLOCK))
+    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
     numbers = np.empty(BLOCK * channels)
     points = wi.size // 3
     for start in range(0, points, BLOCK):
         count = min(BLOCK, points - start)
-        points_of_vectors(rule, wi, wr, start, count, x, mu, scratch)
+        ui, ur = wi[3 * start : 3 * (start + count)], wr[3 * start : 3 * (start + count)]
+        f_r = out[start * low.size : (start + count) * low.size]
+        points_of_vectors(rule, ui, ur, count, x, mu, scratch)
         interpolated(axes, table, channels, x, count, numbers)
-        finished(rule, numbers, channels, mu, spectra, uniform, low, weight, start, count, out)
-        ui, ur = wi[3 * start :], wr[3 * start :]
+        finished(rule, numbers, channels, mu, spectra, uniform, low, weight, count, f_r)
         odd = 0
         for j in range(count):
             flat = abs(ui[3 * j]) + abs(ui[3 * j + 1]) + abs(ur[3 * j]) + abs(ur[3 * j + 1])
@@ -322,4 +378,4 @@ def by_vectors(
         if odd > 0:
             for j in range(count):
                 direction = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]
-                _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, start + j, low.size, out)
+                _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, j, low.size, f_r)

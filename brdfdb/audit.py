@@ -10,13 +10,19 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb import accuracy
+from brdfdb.albedo import (
+    QUADRATURE_TOLERANCE,
+    directional_albedo,
+    linear_in_angles,
+    material_of,
+    wavelengths_of,
+)
+from brdfdb.error import Error
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
-from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, Lobe
-from brdfdb.quadrature import reflected_share
+from brdfdb.parameters import Floats
 
 Verdict = Literal["passes", "known published excess", "violates"]
 
@@ -26,45 +32,44 @@ ENERGY_TOLERANCE = 1e-6
 MODEL_RECIPROCITY_TOLERANCE = 1e-11
 # float32 rounds two values that differ by that to the same number or to neighbours, 6e-8 apart: measured 0
 TABLE_RECIPROCITY_TOLERANCE = 1e-6
-# Sums of the same numbers in another order, of f_r with the offset of its logarithm: TODO
-LOOKUP_RECIPROCITY_TOLERANCE = 1e-12
+# Sums of the same numbers in another order, of f_r with the offset of its logarithm: measured 1.6e-14
+LOOKUP_RECIPROCITY_TOLERANCE = 5e-14
 MODEL_RECIPROCITY_PAIRS = 2000
 _SEED = 1994
 _POLAR = ("theta_i", "theta_r", "theta_h", "theta_d")
 
 # More cannot be asked of a planner: a table that states more is judged as if it stated this
 MOST_ERROR = 0.5
-# Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
-QUADRATURE_TOLERANCE = 2e-5
-_MOST_PANELS = 1000
-# Lights for which such a table is integrated [degree]; by symmetry the phi_i stand for those of all quadrants
-THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=np.float64)
-PHI_I_DEG = np.array([0.0, 30.0, 60.0, 90.0])
 _BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
-_NOT_FINITE = 1e30  # stands for an albedo that is not finite
+_NOT_FINITE, _FINITE = 1e30, 1e20  # what stands for an albedo that is not finite, and what is below any mean of it
 _LOOKED_UP = 250  # directions of each band of theta_i, half of them in the lobe, where values are looked at
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
 class Bands(BaseModel):
-    """What a table that states its error is judged by: the mean of the albedo over bands of theta_i."""
+    """What a table that states its error is judged by: what exceeds 1, on average over bands of theta_i."""
 
     model_config = _STRICT
 
     theta_i_deg: list[float] = Field(description="edges of the bands")
-    albedo: list[list[float | None]] = Field(description="[band][wavelength], Dirac part included; null: not finite")
     stated_error: list[list[float]] = Field(
-        description="[band][wavelength], of what the Dirac part leaves: integral of abs(error) cos theta_r over that of "
+        description="[band][wavelength], of all but the Dirac part: integral of abs(error) cos theta_r over that of "
         "f_r cos theta_r"
+    )
+    explained: list[list[float | None]] = Field(
+        description="[band][wavelength], by how much that error can raise the mean albedo at most; null: not finite"
+    )
+    excess: list[list[float | None]] = Field(
+        description="[band][wavelength], mean of what exceeds 1, Dirac part included; null: not finite"
     )
 
 
 class Energy(BaseModel):
     """Directional albedo of the table, Dirac part included: what leaves, of unit flux from theta_i.
 
-    A table that states its error does so over bands of theta_i, relative to what is reflected there. Its mean over a
-    band may exceed 1, or what is known of the material, by that error, and no more.
+    A table that states its error does so over bands of theta_i. What exceeds 1, or what is known of the material, may
+    be as much of a band as that error explains, and no more.
     """
 
     model_config = _STRICT
@@ -168,9 +173,9 @@ def audit(table: Table) -> MaterialAudit:
     MaterialAudit
         The findings. The verdict on energy is "known published excess" where the albedo exceeds 1 no further than
         the material's attribute ``known_excess``, or its model, says, and "violates" where it exceeds 1 otherwise.
-        Of a table that states its error, that error is taken off the albedo first.
+        A table that states its error may exceed either by what that error explains.
     """
-    material, plain = _material(table), _plain(table)
+    material, plain = material_of(table), linear_in_angles(table)
     looked_up = None if plain else _look_up(table, material)
     energy = _energy(table, material)
     reciprocity = _reciprocity(table, material, looked_up)
@@ -196,167 +201,68 @@ def report(audits: list[MaterialAudit]) -> AuditReport:
     return AuditReport(materials=audits, violations=[a.material for a in audits if a.verdict == "violates"])
 
 
-class TableAlbedo(NamedTuple):
-    """The directional albedo of a table, without the Dirac part.
+class _Judge(NamedTuple):
+    """What is averaged before an albedo is held against a table, and by how much it then may exceed.
 
-    Attributes
-    ----------
-    theta_i_deg : array [degree]
-        The lights.
-    albedo : array [1]
-        Over theta_i (and phi_i, of anisotropic tables) and, last, the wavelengths; length 1 there for grey tables.
-    error : array (theta_i,) [1]
-        Estimate of its absolute error, over phi_i and wavelengths the largest; 0 where it is exact.
+    `means` (rows, theta_i) are weights of averages, `covers`, of that shape, which theta_i a row is about, `l1` (rows,
+    wavelengths) the error that a table states, and `reflected`, of that shape, a mean of the albedo without the Dirac
+    part that a model may have if that error is true.
     """
 
-    theta_i_deg: Axis
-    albedo: Floats
-    error: Floats
-
-
-def directional_albedo(table: Table) -> TableAlbedo:
-    """Integral of f_r cos theta_r over the hemisphere, as the table gives f_r between its nodes.
-
-    Parameters
-    ----------
-    table : Table
-        Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the model.
-
-    Returns
-    -------
-    TableAlbedo
-        At the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and `PHI_I_DEG`; at nodes
-        and `THETA_I_DEG`, but not 90 degrees, if a planner chose the nodes: the attribute ``reason`` says so.
-
-    Notes
-    -----
-    Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
-    stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
-    quadrature of `brdfdb.quadrature`, which follows the lobe of the model, to `QUADRATURE_TOLERANCE`.
-    """
-    if not _plain(table):
-        return _integrated(table, _material(table))
-    nodes = table.axes_deg["theta_i"]
-    theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
-    if table.anisotropic:
-        phi_weights = _trapezoid_weights(radians(table.axes_deg["phi_r"]))
-        brdf = table.brdf.reshape(*table.brdf.shape[:4], -1)
-        albedo = np.einsum("ipjkw,j,k->ipw", brdf, theta_weights, phi_weights, optimize=True)
-    else:
-        phi_weights = 2.0 * _trapezoid_weights(radians(table.axes_deg["delta_phi"]))  # the other half by symmetry
-        brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
-        albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)
-    if table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
-        lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
-        matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
-        nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
-    return TableAlbedo(nodes, np.asarray(albedo), np.zeros(nodes.size))
-
-
-def _plain(table: Table) -> bool:
-    """Whether the table is f_r over light and viewer, linear in each angle between its nodes."""
-    return table.values_are_brdf and not table.grid.half_difference and not table.interpolation.cubic
-
-
-def _wavelengths(table: Table) -> int:
-    return 1 if table.wavelength_nm is None else table.wavelength_nm.size
-
-
-def _integrated(table: Table, material: Material) -> TableAlbedo:
-    """The albedo by quadrature of lookups, at all wavelengths at once."""
-    width = _wavelengths(table)
-    phi_i_deg = PHI_I_DEG if table.anisotropic else np.zeros(1)
-    albedo, error = np.empty((THETA_I_DEG.size, phi_i_deg.size, width)), np.empty((THETA_I_DEG.size, phi_i_deg.size))
-    arguments = material.arguments(table.wavelength_nm)
-
-    def brdf(wi: Floats, wr: Floats) -> Floats:
-        return table.lookup_vectors(wi, wr).reshape(*wr.shape[:-1], width)
-
-    for t, p in np.ndindex(*error.shape):
-        theta_i = radians(THETA_I_DEG[t])
-        albedo[t, p], error[t, p] = reflected_share(
-            brdf,
-            theta_i,
-            radians(phi_i_deg[p]),
-            _narrowest(material, np.cos(theta_i), arguments),
-            tolerance=QUADRATURE_TOLERANCE,
-            most_panels=_MOST_PANELS,
-            width=width,
-            mirrored=not table.anisotropic,
-        )
-    return TableAlbedo(THETA_I_DEG, albedo if table.anisotropic else albedo[:, 0], error.max(axis=1))
-
-
-def _narrowest(material: Material, cos_i: float, arguments: Mapping[str, Any]) -> Lobe | None:
-    """The lobe of a model at the wavelength where it is narrowest: panels that resolve it resolve the others."""
-    if material.spec.lobe is None:
-        return None
-    share, alpha_x, alpha_y = material.spec.lobe(cos_i, **arguments)
-    return Lobe(np.max(share), np.min(alpha_x), np.min(alpha_y))
-
-
-def _trapezoid_weights(nodes: Axis) -> Axis:
-    steps = np.diff(nodes)
-    weights = np.zeros(nodes.size)
-    weights[:-1] += steps / 2.0
-    weights[1:] += steps / 2.0
-    return weights
-
-
-def _theta_weights(nodes: Axis) -> Axis:
-    """Integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat held constant up to pi/2.
-
-    With F = sin^2 / 2 and its integral G = theta / 4 - sin(2 theta) / 8, the rising half over [a, b] gives
-    F(b) - (G(b) - G(a)) / (b - a).
-    """
-    F = np.sin(nodes) ** 2 / 2.0
-    slope = np.diff(nodes / 4.0 - np.sin(2.0 * nodes) / 8.0) / np.diff(nodes)
-    weights = np.zeros(nodes.size)
-    weights[1:] += F[1:] - slope
-    weights[:-1] += slope - F[:-1]
-    weights[-1] += 0.5 - F[-1]
-    return weights
-
-
-class _Judged(NamedTuple):
-    """Albedos that are compared with 1, over rows and wavelengths, less what may be wrong with them.
-
-    Each row stands for some of the theta_i, as `covers`, of shape (rows, theta_i), says.
-    """
-
-    certain: Floats
+    means: Floats
     covers: NDArray[np.bool_]
-    bands: Bands | None
+    l1: Floats
+    reflected: Floats
+
+    def explained(self, limit: Floats) -> Floats:
+        """The integral of abs(table - model), in means: l1 of what the model reflects, which keeps to the limit."""
+        return self.l1 * np.minimum(self.reflected, (self.means @ limit)[:, np.newaxis])
+
+    def excess(self, albedo: Floats, limit: Floats) -> Floats:
+        """What is above a limit, over rows and wavelengths; the limit is over theta_i."""
+        return np.asarray(self.means @ np.maximum(albedo - limit[:, np.newaxis], 0.0))
+
+    def unexplained(self, albedo: Floats, limit: Floats) -> NDArray[np.bool_]:
+        """At which theta_i a limit is exceeded, and nothing explains it."""
+        rows = self.excess(albedo, limit) > self.explained(limit)
+        both = (albedo > limit[:, np.newaxis]) & (self.covers.T.astype(int) @ rows.astype(int) > 0)
+        return np.asarray(np.any(both, axis=1))
 
 
 def _energy(table: Table, material: Material) -> Energy:
-    theta_i, diffuse, integration = directional_albedo(table)
-    if table.anisotropic:
-        diffuse = diffuse.max(axis=1)
+    theta_i, _, each_azimuth, integration = directional_albedo(table)
+    diffuse = each_azimuth.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
-    judged = _judged(table, theta_i, diffuse, specular, np.minimum(integration, QUADRATURE_TOLERANCE))
     finite = np.where(np.isfinite(albedo), albedo, np.inf)
     worst_theta, worst_wavelength = np.unravel_index(np.argmax(finite), finite.shape)
     largest = float(finite[worst_theta, worst_wavelength])
-    above = finite > 1.0 + ENERGY_TOLERANCE
-    beyond = above & (judged.covers.T.astype(int) @ (judged.certain > 1.0 + ENERGY_TOLERANCE) > 0)
-    exceeding, unexplained = (theta_i[np.any(each, axis=1)] for each in (above, beyond))
+    judge = _judge(table, theta_i, _known(diffuse))
+    certain = _known(albedo - np.minimum(integration, QUADRATURE_TOLERANCE)[:, np.newaxis])
+    one = np.full(theta_i.size, 1.0 + ENERGY_TOLERANCE)
+    exceeding = theta_i[np.any(finite > one[:, np.newaxis], axis=1)]
+    unexplained = theta_i[judge.unexplained(certain, one)]
     known: Mapping[str, Any] = table.attrs.get("known_excess") or material.spec.known_excess or {}
+    bands = None if table.error is None else _bands(table.error, judge.explained(one), judge.excess(certain, one))
     verdict: Verdict
+    reason = f"reflects {_share(largest)} of what arrives at {theta_i[worst_theta]:g} degrees"
     if unexplained.size == 0:
-        verdict, reason = "passes", _excuse(judged, theta_i, finite) if exceeding.size else ""
-    elif known and judged.certain.max() <= known["max_albedo"] and unexplained[0] >= known["from_theta_i_deg"]:
+        verdict = "passes"
+        why = "its integration has" if bands is None else "the table states"
+        reason = f"{reason}, within the error that {why}" if exceeding.size else ""
+    elif known and np.isfinite(largest) and not np.any(judge.unexplained(certain, _known_limit(known, theta_i, one))):
         verdict, reason = "known published excess", str(known["citation"])
     else:
-        verdict, reason = "violates", _reflects(theta_i, finite) + _stated(judged)
+        verdict = "violates"
+        if bands is not None:
+            reason += ", more than the error that the table states explains"
     return Energy(
         theta_i_deg=theta_i.tolist(),
         wavelength_nm=None if table.wavelength_nm is None else table.wavelength_nm.tolist(),
         albedo=_json(albedo),
         specular=_json(specular),
         integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else None,
-        bands=judged.bands,
+        bands=bands,
         max_albedo=largest if np.isfinite(largest) else None,
         max_at_theta_i_deg=float(theta_i[worst_theta]),
         max_at_wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength]),
@@ -367,24 +273,34 @@ def _energy(table: Table, material: Material) -> Energy:
     )
 
 
-def _judged(table: Table, theta_i_deg: Axis, diffuse: Floats, specular: Floats, integration: Axis) -> _Judged:
+def _share(albedo: float) -> str:
+    return f"{albedo:.4g}" if np.isfinite(albedo) else "no finite share"
+
+
+def _known_limit(known: Mapping[str, Any], theta_i_deg: Axis, one: Axis) -> Axis:
+    """What an albedo may be by what is known: 1 up to an angle, and a published excess from there on."""
+    return np.where(theta_i_deg >= known["from_theta_i_deg"], known["max_albedo"], one)
+
+
+def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
     """Each theta_i of a table without a stated error; of others the mean over bands, over which they state it.
 
-    In a band, the table reflects 1 + l1 of what the model does, at most, besides the Dirac part.
+    What is above a limit that the model keeps to is wrong, and no more of a band can be wrong than l1 of what the model
+    reflects there: 1 / (1 - l1) of what the table does, at most.
     """
     if table.error is None:
-        return _Judged(_known(diffuse - integration[:, np.newaxis] + specular), np.eye(theta_i_deg.size, dtype=bool), None)
+        each = np.eye(theta_i_deg.size)
+        nothing = np.zeros((theta_i_deg.size, 1))
+        return _Judge(each, each.astype(bool), nothing, nothing)
     edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
-    reflected, mirrored = means @ _known(diffuse), means @ _known(specular)
-    found = means @ _known(diffuse + specular)
-    bands = Bands(
-        theta_i_deg=edges.tolist(),
-        albedo=_json(np.where(found < _NOT_FINITE * 1e-6, found, np.nan)),
-        stated_error=l1.tolist(),
-    )
-    within = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
-    return _Judged((reflected - means @ integration[:, np.newaxis]) / (1.0 + l1) + mirrored, within, bands)
+    covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
+    return _Judge(means, covers, l1, (means @ diffuse) / (1.0 - l1))
+
+
+def _bands(error: Error, explained: Floats, excess: Floats) -> Bands:
+    known, above = (_json(np.where(each < _FINITE, each, np.nan)) for each in (explained, excess))
+    return Bands(theta_i_deg=error.theta_i_deg, stated_error=error.l1, explained=known, excess=above)
 
 
 def _known(values: Floats) -> Floats:
@@ -397,32 +313,6 @@ def _band_means(theta_i_deg: Axis, edges: Axis) -> Floats:
     share = (np.arange(_BAND_POINTS) + 0.5) / _BAND_POINTS
     inside = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * share
     return np.stack([np.interp(inside, theta_i_deg, one).mean(axis=1) for one in np.eye(theta_i_deg.size)], axis=1)
-
-
-def _reflects(theta_i_deg: Axis, albedo: Floats) -> str:
-    """The largest albedo in words."""
-    theta, wavelength = np.unravel_index(np.argmax(albedo), albedo.shape)
-    largest = albedo[theta, wavelength]
-    share = f"{largest:.4g}" if np.isfinite(largest) else "no finite share"
-    return f"reflects {share} of what arrives at {theta_i_deg[theta]:g} degrees"
-
-
-def _stated(judged: _Judged) -> str:
-    """What remains of the band that exceeds 1 most, in words; nothing of a table that states no error."""
-    if judged.bands is None:
-        return ""
-    band, wavelength = np.unravel_index(np.argmax(judged.certain), judged.certain.shape)
-    low, high = judged.bands.theta_i_deg[band : band + 2]
-    mean, error = judged.bands.albedo[band][wavelength], judged.bands.stated_error[band][wavelength]
-    share = "no finite share" if mean is None else f"{mean:.6g}"
-    return f"; of {low:g} to {high:g} degrees {share}, where the table states an error of {error:.3g}"
-
-
-def _excuse(judged: _Judged, theta_i_deg: Axis, albedo: Floats) -> str:
-    """Why an albedo above 1 is not held against a table."""
-    if judged.bands is None:
-        return f"{_reflects(theta_i_deg, albedo)}, within the error of its integration"
-    return f"{_reflects(theta_i_deg, albedo)}: within the error that the table states{_stated(judged)}"
 
 
 def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats:
@@ -450,7 +340,7 @@ def _look_up(table: Table, material: Material) -> _LookedUp:
     """f_r, shape (N, L), of pairs of directions above the horizon, half of them in the lobe."""
     drawn = accuracy.draw(material, table.wavelength_nm, _LOOKED_UP, _SEED)
     wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
-    shape = (len(wi), _wavelengths(table))
+    shape = (len(wi), wavelengths_of(table))
     return _LookedUp(table.lookup_vectors(wi, wr).reshape(shape), table.lookup_vectors(wr, wi).reshape(shape))
 
 
@@ -500,19 +390,7 @@ def _node_asymmetry(table: Table) -> Asymmetry:
     else:
         f = table.brdf[np.ix_(i, r)]  # exchanging them turns delta_phi to -delta_phi, where the table is the same
         swapped = np.swapaxes(f, 0, 1)
-    return _asymmetry(f, swapped, f.size // _wavelengths(table), TABLE_RECIPROCITY_TOLERANCE)
-
-
-def _material(table: Table) -> Material:
-    """The material behind a table, from what the table says of itself."""
-    fields = ("title", "model", "parameters", "source")
-    return Material.from_table(
-        table.name,
-        {
-            **{field: table.attrs[field] for field in fields},
-            "refractive_index": table.attrs["refractive_index"] or None,
-        },
-    )
+    return _asymmetry(f, swapped, f.size // wavelengths_of(table), TABLE_RECIPROCITY_TOLERANCE)
 
 
 def _model(material: Material, wavelength_nm: Axis | None, angles: tuple[NDArray[np.float64], ...]) -> Floats:
@@ -533,16 +411,18 @@ def _asymmetry(f: Floats, swapped: Floats, pairs: int, tolerance: float) -> Asym
 
 
 def _values(table: Table, looked_up: _LookedUp | None) -> Values:
-    brdf = [table.brdf] if looked_up is None else [table.brdf, looked_up.forward]
-    reflected = brdf if table.specular is None else [*brdf, table.specular]
-    apart = [array for array in (table.spectra, table.uniform) if array is not None]
+    brdf: list[Floats] = [table.brdf] if looked_up is None else [table.brdf, looked_up.forward]
+    dirac: list[Floats] = [] if table.specular is None else [table.specular]
+    reflected = [*brdf, *dirac]
+    apart: list[Floats] = [array for array in (table.spectra, table.uniform) if array is not None]
     others = apart if table.values_are_brdf else [table.values, *apart]
     not_finite = sum(array.size - int(np.count_nonzero(np.isfinite(array))) for array in (*reflected, *others))
     # -inf is not finite, and counted as that
     negative = sum(int(np.count_nonzero((array < 0.0) & np.isfinite(array))) for array in reflected)
     smallest = min(float(np.min(array, initial=np.inf, where=np.isfinite(array))) for array in brdf)
     return Values(
-        count=sum(array.size for array in (table.values, *apart)) + (0 if table.specular is None else table.specular.size),
+        count=sum(array.size for array in (table.values, *apart))
+        + (0 if table.specular is None else table.specular.size),
         looked_up=0 if looked_up is None else len(looked_up.forward),
         smallest=smallest if np.isfinite(smallest) else None,
         negative=negative,

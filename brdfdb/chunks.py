@@ -143,7 +143,7 @@ def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, 
     """
     files = dict(others)
     for name, variable in dataset.variables.items():
-        values = np.ascontiguousarray(variable.values)
+        values = np.asarray(variable.values)
         written = _array_files(
             tuple(map(str, variable.dims)),
             values.shape,

@@ -263,7 +263,8 @@ def write(path: str | os.PathLike[str], image: Slice, table: Table, half: bool =
     cover the visible range, else all three are the value, averaged over the wavelengths.
 
     The attributes begin with ``brdf:``. Angles and wavelengths are strings, as OpenEXR rounds a number to 32 bits; the
-    pixel centres are a pair of 64 bit floats.
+    pixel centres are a pair of 64 bit floats. ``brdf:error_p99`` is the relative error against the model that 99 of
+    100 values of the table stay within, as the table states it.
     """
     path = Path(path)
     rgb, rgb_meaning = _rgb(image)
@@ -315,6 +316,7 @@ def _attributes(image: Slice, table: Table) -> dict[str, Any]:
         "brdf:quantity": QUANTITY,
         "brdf:unit": UNIT,
         "brdf:dirac": "none" if table.specular is None else _dirac(table.specular),
+        "brdf:error_p99": "not measured" if table.error is None else repr(table.error.overall.p99),
         "brdf:slice": image.kind,
         "brdf:description": image.description,
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -155,6 +155,15 @@ def directions(names: tuple[str, ...], nodes: Sequence[Axis]) -> tuple[NDArray[n
     if names == ANISOTROPIC_HALF_DIFFERENCE_AXES:
         return directions_from_half_difference(*on_axes)
     return directions_from_half_difference(on_axes[0], 0.0, on_axes[1], on_axes[2])
+
+
+def axes_among(names: Iterable[Any]) -> tuple[str, ...]:
+    """The axes of a grid among the names of arrays or dimensions.
+
+    An anisotropic grid of half and difference vectors has the axes of an isotropic one, too.
+    """
+    known = set(names)
+    return next(kind for kind in reversed(KINDS) if set(kind) <= known)
 
 
 def _checked(names: tuple[str, ...], name: str, nodes: Any) -> Axis:

@@ -13,14 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb import _lookup_kernels
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.error import Error, stated
-from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, finished, radians, unit_vector
-from brdfdb.grids import KINDS, Axis, Grid
+from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, finished, radians
+from brdfdb.grids import Axis, Grid, axes_among
 from brdfdb.interpolation import Axes, prepared
 from brdfdb.layout import PLAIN, Interpolation, Layout
 from brdfdb.parameters import Floats
-
-_VECTORS = 1 << 15  # directions that are turned into unit vectors at a time
-
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
 _Ready = tuple[_lookup_kernels.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
@@ -190,8 +187,6 @@ class Table:
             return Stated(brdf, self._stated(np.asarray(theta_i), brdf, wavelength_nm))
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
         given = [np.asarray(angle) for angle in (theta_i, phi_i, theta_r, phi_r)]
-        if self.grid.half_difference:
-            return self._by_half_vectors(given, low, weight, wavelength_shape)
         dtype = asked_for(theta_i, phi_i, theta_r, phi_r)
         if any(angle.dtype.kind not in "iuf" for angle in given):
             checked_angles(*given)
@@ -257,29 +252,14 @@ class Table:
         found = np.maximum(*(stated(error, theta, values, at) for at in (low, low + (weight > 0.0))))
         return np.asarray(found if tail else found[..., 0])[()]
 
-    def _by_half_vectors(
-        self, given: list[NDArray[Any]], low: NDArray[np.int64], weight: NDArray[np.float64], tail: tuple[int, ...]
-    ) -> Floats:
-        """Values on a grid of half and difference vectors, of angles."""
-        angles = checked_angles(*given)
-        flat = [np.ravel(a) for a in np.broadcast_arrays(angles.theta_i, angles.phi_i, angles.theta_r, angles.phi_r)]
-        values = np.empty((flat[0].size, weight.size))
-        for start in range(0, flat[0].size, _VECTORS):
-            some = slice(start, start + _VECTORS)
-            theta_i, phi_i, theta_r, phi_r = (angle[some] for angle in flat)
-            wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
-            _lookup_kernels.by_vectors(
-                *self._kernel, low, weight, wi.reshape(-1), wr.reshape(-1), values[some].reshape(-1)
-            )
-        shape = np.broadcast_shapes(*(angle.shape for angle in given))
-        return finished(values.reshape(*shape, weight.size), angles, trailing=1).reshape(shape + tail)[()]
-
     @functools.cached_property
     def _kernel(self) -> _Ready:
         """What kernels need to know of the table."""
         grid, how = self.grid, self.interpolation
+        # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
+        overshoots = how.logarithm or how.cubic or grid.half_difference
         rule = _lookup_kernels.Rule(
-            grid.half_difference, grid.copies, how.logarithm, float(how.offset), float(how.power)
+            grid.half_difference, grid.copies, how.logarithm, float(how.offset), float(how.power), overshoots
         )
         axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
         channels = self.values.size // int(np.prod(grid.shape))
@@ -375,10 +355,10 @@ def rebuilt(
 
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
-    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((2, len(wi)))
-    rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0)
+    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
+    rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False)
     flat = [np.ascontiguousarray(w, dtype=np.float64).reshape(-1) for w in (wi, wr)]
-    _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], 0, len(wi), x, mu, scratch)
+    _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
     return x
 
 
@@ -386,15 +366,13 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
     how = dict(attrs.get("interpolation", {}))
     variable = "brdf" if "brdf" in arrays else "parts"
-    # an anisotropic grid of half and difference vectors has the axes of an isotropic one, too
-    names = next(kind for kind in reversed(KINDS) if set(kind) <= set(arrays))
     specular = arrays.get("specular_reflectance")
     uniform = arrays.get("uniform")
     return Table(
         name=name,
         revision=revision,
         attrs=attrs,
-        grid=Grid({axis: arrays[axis] for axis in names}),
+        grid=Grid({axis: arrays[axis] for axis in axes_among(arrays)}),
         wavelength_nm=arrays.get("wavelength"),
         values=arrays[variable],
         specular=None if specular is None else specular.astype(np.float32),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections import Counter
 from collections.abc import Iterator
@@ -40,7 +41,8 @@ _SEED = 1994
 _LINES = 100
 _POINTS = 145  # of a line
 _COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112, 137)  # nodes of an axis
-_ENOUGH = 0.05  # of the tolerance: numbers of nodes that leave less are not looked at
+_HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
+_SMOOTHED = 9  # points of a line that the density of nodes is averaged over
 _EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
 _BITS = range(9, 24)
 _WORTH_ROUNDING = 4096  # values: of smaller tables nothing is rounded
@@ -61,14 +63,41 @@ _LINE = {
 _POLE_END = 89.9  # of theta axes where the pole of a model is tabulated as it is
 
 
-class _Need(NamedTuple):
-    """What an axis needs: where its nodes go, and the error that so many of them leave."""
+class _Need:
+    """What an axis needs: where its nodes go, and the error that so many of them leave on lines along it."""
 
-    density: Floats  # of nodes, over the points of the lines, its integral 1
-    error: dict[int, float]
+    def __init__(self, layout: Layout, axis: int, numbers: Floats, weight: Floats) -> None:
+        order = 4 if layout.interpolation.cubic else 2
+        count, size, wavelengths = numbers.shape
+        self.layout, self.axis = layout, axis
+        self.rows = np.moveaxis(numbers, 2, 1).reshape(count * wavelengths, size)
+        self.weights = np.moveaxis(weight, 2, 1).reshape(count * wavelengths, size)
+        self.known: dict[int, float] = {}
+        left = np.abs(np.diff(self.rows, order, axis=1)) * self.weights[:, order // 2 : size - order // 2]
+        peak = np.pad(np.percentile(left, 98, axis=0) ** (1.0 / order), order // 2, mode="edge")
+        smooth = np.convolve(
+            np.pad(peak, _SMOOTHED // 2, mode="edge"), np.full(_SMOOTHED, 1.0 / _SMOOTHED), mode="valid"
+        )
+        density = smooth + _EASED * smooth.mean() + 1e-30
+        self.density = density / density.sum()
+        self.counts = [n for n in _COUNTS if _spread(self.density, n) is not None]
+
+    def left(self, count: int) -> float:
+        """The error that a number of nodes leaves."""
+        if count not in self.known:
+            at = _spread(self.density, count)
+            assert at is not None
+            self.known[count] = _left(self.layout, self.axis, at, self.rows, self.weights)
+        return self.known[count]
+
+    def count(self, error: float) -> float:
+        """The smallest number of nodes that leaves no more than an error; infinite if none known does."""
+        at = bisect.bisect_left(self.counts, True, key=lambda count: self.left(count) <= error)
+        return self.counts[at] if at < len(self.counts) else math.inf
 
 
-_Candidate = tuple[float, Layout, dict[str, _Need]]  # likely number of values, kind of table, needs of its axes
+# Likely number of values, kind of table, needs of its axes: none where the number is only a bound
+_Candidate = tuple[float, Layout, dict[str, _Need]]
 
 
 class _Task(NamedTuple):
@@ -127,12 +156,21 @@ def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, toleranc
     )
 
 
+def _order(candidate: _Candidate) -> tuple[float, int]:
+    """The fewest values first, and of as many, the simplest."""
+    size, layout, _ = candidate
+    how = layout.interpolation
+    return size, how.cubic + how.logarithm + (how.power != 0.0)
+
+
 def _smallest(task: _Task, candidates: list[_Candidate]) -> Layout | None:
     """The smallest table of some kinds that keeps to the tolerance of the task."""
     best: Layout | None = None
     tried: Counter[tuple[str, ...]] = Counter()
-    for size, layout, needs in sorted(candidates, key=lambda candidate: candidate[0]):
+    for size, layout, needs in sorted(candidates, key=_order):
         tried[layout.grid.names] += 1
+        if not needs:
+            continue
         if tried[layout.grid.names] <= _TRIED and (best is None or size < best.size):
             best = _refined(task, layout, needs, MOST_VALUES if best is None else best.size) or best
     return best
@@ -142,12 +180,13 @@ def _reason(layout: Layout, tolerance: float, candidates: list[_Candidate]) -> s
     """Why a table is laid out so, in words: what it takes, and what the other grid and the simplest table would."""
     chosen, nodes = _kind(layout), math.prod(layout.grid.shape)
     said = [f"for a tolerance of {tolerance:g}, {chosen} takes {nodes} nodes"]
-    ranked = sorted(candidates, key=lambda candidate: candidate[0])
+    ranked = sorted(candidates, key=_order)
     simplest = [c for c in ranked if c[1].interpolation.plain and not c[1].interpolation.cubic]
     others = [c for c in ranked if c[1].grid.names != layout.grid.names][:1] + simplest[:1]
-    for size, other, _ in others:
+    for size, other, needs in others:
         if _kind(other) != chosen:
-            said.append(f"{_kind(other)} {f'about {size:.2g}' if size < MOST_VALUES else f'more than {MOST_VALUES}'}")
+            bound = "about" if needs else "more than"
+            said.append(f"{_kind(other)} was expected to take {bound} {min(size, MOST_VALUES):.2g}")
     if layout.spectra is not None:
         said.append(f"{layout.spectra.shape[1]} wavelengths are made of {len(layout.spectra)} parts")
     return "; ".join(said)
@@ -197,9 +236,10 @@ def _candidates(task: _Task) -> Iterator[_Candidate]:
         kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if spec.lobe_axes else [ANISOTROPIC_AXES]
     else:
         kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if spec.lobe else [ISOTROPIC_AXES]
+    fewest = float(MOST_VALUES)
     for names in kinds:
-        for power in (0.0, 0.5, 1.0) if spec.grazing_pole else (0.0,):
-            for logarithm in (False, True):
+        for power in (0.5, 1.0, 0.0) if spec.grazing_pole else (0.0,):
+            for logarithm in (True, False):
                 ends = {name: _end(material, name) for name in names}
                 if spec.grazing_pole and power == 0.0:
                     ends |= {name: _POLE_END for name in ("theta_i", "theta_r") if name in names}
@@ -210,16 +250,23 @@ def _candidates(task: _Task) -> Iterator[_Candidate]:
                     task.wavelength_nm,
                     interpolation=Interpolation("linear", logarithm, offset if logarithm else 0.0, power),
                 )
-                lines = {name: _lines(task, layout, axis) for axis, name in enumerate(names)}
-                for method in ("linear", "cubic"):
+                lines: dict[str, tuple[Floats, Floats]] = {}
+                for method in ("cubic", "linear"):
                     chosen = replace(layout, interpolation=replace(layout.interpolation, method=method))
-                    needs = {
-                        name: _need(chosen, axis, *lines[name], enough=_ENOUGH * task.tolerance)
-                        for axis, name in enumerate(names)
-                    }
-                    if names == ISOTROPIC_AXES:
-                        needs["theta_r"] = needs["theta_i"]
-                    size = math.prod(_count(need, task.tolerance) for need in needs.values())
+                    needs: dict[str, _Need] = {}
+                    size = 1.0
+                    for axis, name in enumerate(names):
+                        if name == "theta_r" and not material.anisotropic:
+                            needs[name] = needs["theta_i"]  # reciprocity
+                        else:
+                            if name not in lines:
+                                lines[name] = _lines(task, layout, axis)
+                            needs[name] = _Need(chosen, axis, *lines[name])
+                        size *= needs[name].count(task.tolerance)
+                        if size > _HOPELESS * fewest:
+                            needs = {}
+                            break
+                    fewest = min(fewest, size if needs else math.inf)
                     yield size, chosen, needs
 
 
@@ -264,30 +311,6 @@ def _lines(task: _Task, layout: Layout, axis: int) -> tuple[Floats, Floats]:
     return numbers, weight
 
 
-def _need(layout: Layout, axis: int, numbers: Floats, weight: Floats, enough: float) -> _Need:
-    """How to spread nodes on an axis, and the error that so many of them leave on the lines, while it is not small."""
-    order = 4 if layout.interpolation.cubic else 2
-    lines, points, wavelengths = numbers.shape
-    rows = np.moveaxis(numbers, 2, 1).reshape(lines * wavelengths, points)
-    weights = np.moveaxis(weight, 2, 1).reshape(lines * wavelengths, points)
-    left = np.abs(np.diff(rows, order, axis=1)) * weights[:, order // 2 : points - order // 2]
-    peak = np.percentile(left, 98, axis=0) ** (1.0 / order)
-    peak = np.pad(peak, order // 2, mode="edge")
-    width = 9
-    smooth = np.convolve(np.pad(peak, width // 2, mode="edge"), np.full(width, 1.0 / width), mode="valid")
-    density = smooth + _EASED * smooth.mean() + 1e-30
-    density /= density.sum()
-    error = {}
-    for count in _COUNTS:
-        at = _spread(density, count)
-        if at is None:
-            break
-        error[count] = _left(layout, axis, at, rows, weights)
-        if error[count] < enough:
-            break
-    return _Need(density, error)
-
-
 def _spread(density: Floats, count: int) -> NDArray[np.int64] | None:
     """The points of a line that are nodes of an axis with so many; None if two would be the same."""
     at = np.round(_quantiles(density, count) * (density.size - 1)).astype(np.int64)
@@ -324,16 +347,11 @@ def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weight
     return float(np.percentile(error[weights > 0.0], 99)) if np.any(weights > 0.0) else 0.0
 
 
-def _count(need: _Need, error: float) -> float:
-    """The smallest number of nodes of an axis that leaves no more than an error; infinite if none known does."""
-    return next((count for count, left in need.error.items() if left <= error), math.inf)
-
-
 def _with_axes(layout: Layout, needs: dict[str, _Need], error: float) -> Layout | None:
     """The layout with the axes that leave an error each; None if no known number of nodes does."""
     axes = {}
     for name, need in needs.items():
-        count = _count(need, error)
+        count = need.count(error)
         if count == math.inf:
             return None
         end = layout.grid.axes[name][-1]

@@ -217,7 +217,7 @@ def reflected_share(
 
     panels = _panels_of(reflected, wi, theta_i, phi_i, lobe, mirrored)
     albedo, error = _adaptive(*panels, tolerance, most_panels, width)
-    return Albedo(albedo, np.float64(error))
+    return Albedo(albedo, np.asarray(error))
 
 
 def _panels_of(
@@ -340,7 +340,7 @@ def _rules(integrand: Integrand, panels: Array, width: int) -> tuple[Array, Arra
         batch = slice(start, start + step)
         c_1, c_2, h_1, h_2 = (column[:, np.newaxis, np.newaxis] for column in panels[batch].T)
         f = integrand(*np.broadcast_arrays(c_1 + h_1 * _X[:, np.newaxis], c_2 + h_2 * _X))
-        by_first = _W_KRONROD @ f  # over the last variable but one: (panels, 15, width)
+        by_first = _W_KRONROD @ f  # over the second variable: (panels, 15, width)
         by_second = (_W_KRONROD @ f.reshape(*f.shape[:2], -1)).reshape(by_first.shape)
         area = (h_1 * h_2)[:, 0]
         values[batch] = area * (_W_KRONROD @ by_first)

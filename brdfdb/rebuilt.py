@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from brdfdb.grids import KINDS, directions
+from brdfdb.grids import axes_among, directions
 from brdfdb.layout import Interpolation
 from brdfdb.lookup import rebuilt
 from brdfdb.tabulate import VARIABLES
@@ -33,7 +33,7 @@ class _Rebuilt(BackendArray):
         self._spectra = dataset["spectra"].values if "spectra" in dataset else None
         self._uniform = np.atleast_1d(dataset["uniform"].values) if "uniform" in dataset else None
         self._interpolation = Interpolation(**dataset.attrs["interpolation"])
-        self._names = next(kind for kind in KINDS if set(kind) <= set(self._parts.dims))
+        self._names = axes_among(self._parts.dims)
         self._nodes = [dataset[name].values for name in self._names]
         spectral = ("wavelength",) if "wavelength" in dataset.sizes else ()
         self.dims = (*self._names, *spectral)

@@ -20,7 +20,7 @@ from brdfdb.parameters import Floats
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 _POLE_END = np.deg2rad(89.9)  # of light and viewer, where the pole of a model is tabulated as it is
 _CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
-# Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner's has few nodes, none for it
+# Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
 

@@ -14,7 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb import audit as module
-from brdfdb.audit import AuditReport, MaterialAudit, audit, directional_albedo, report
+from brdfdb.albedo import directional_albedo, material_of
+from brdfdb.audit import AuditReport, MaterialAudit, audit, report
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
@@ -68,7 +69,7 @@ def tabulated(made_up: Material, grid: Grid, wavelengths: NDArray[np.float64] | 
     dataset = tabulate(Layout(made_up, grid, wavelengths))
     specular = dataset["specular_reflectance"].values.astype(np.float32) if "specular_reflectance" in dataset else None
     brdf = dataset["brdf"].values
-    return Table(made_up.name, "r000001", dataset.attrs, grid.axes, wavelengths, brdf, specular)
+    return Table(made_up.name, "r000001", dataset.attrs, grid, wavelengths, brdf, specular)
 
 
 def lambert(rho: float, grid: Grid = ISOTROPIC, **more: Any) -> Table:
@@ -101,8 +102,8 @@ def written(audits: list[MaterialAudit]) -> dict[str, Any]:
 @pytest.mark.parametrize("rho", [0.0, 0.1, 0.5, 1.0])
 def test_a_lambertian_reflects_rho_at_every_angle(rho: float, grid: Grid) -> None:
     table = lambert(rho, grid)
-    shape = (*table.brdf.shape[: 2 if table.anisotropic else 1], 1)
-    albedo = directional_albedo(table)
+    shape = (*(table.brdf.shape[:2] if table.anisotropic else (table.brdf.shape[0], 1)), 1)
+    albedo = directional_albedo(table).albedo
     assert albedo.shape == shape
     np.testing.assert_allclose(albedo, rho, rtol=FLOAT32)
     found = audit(table)
@@ -123,7 +124,7 @@ def random_table(grid: Grid, wavelengths: NDArray[np.float64] | None) -> Table:
     if grid.anisotropic:
         brdf[:, -1] = brdf[:, 0]
         brdf[:, :, :, -1] = brdf[:, :, :, 0]
-    return Table("random", "r000001", {}, grid.axes, wavelengths, brdf, None)
+    return Table("random", "r000001", {}, grid, wavelengths, brdf, None)
 
 
 def gauss_legendre(edges: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -146,7 +147,7 @@ def test_albedo_is_the_integral_of_what_lookup_returns(grid: Grid, wavelengths: 
     theta_i, phi_i, theta, phi = np.ix_(np.deg2rad(grid.axes["theta_i"]), phi_i_nodes, theta_r, phi_r)
     values = table.lookup(theta_i, phi_i, theta, phi)
     brute = np.einsum("iptq...,tq->ip...", values, weight)
-    albedo = directional_albedo(table)
+    albedo = directional_albedo(table).albedo
     assert albedo.std() > 0.01
     np.testing.assert_allclose(albedo.ravel(), brute.ravel(), rtol=QUADRATURE_TOLERANCE)
 
@@ -180,7 +181,7 @@ def node(table: Table, value: float) -> Table:
     brdf = table.brdf.copy()
     index = (1, 1, 2, 2) if table.anisotropic else (1, 2, 1)
     brdf[index] = value
-    return replace(table, brdf=brdf)
+    return replace(table, values=brdf)
 
 
 TABLES = pytest.mark.parametrize(
@@ -229,7 +230,7 @@ def test_an_albedo_that_is_not_finite_is_null_in_the_report(table: Table, value:
 
 def test_a_table_of_nan_alone_has_no_smallest_value() -> None:
     table = lambert(0.5)
-    found = audit(replace(table, brdf=np.full_like(table.brdf, np.nan)))
+    found = audit(replace(table, values=np.full_like(table.brdf, np.nan)))
     assert found.values.smallest is None
     assert found.values.not_finite == found.values.count
     assert found.reciprocity.table.max == 1.0
@@ -242,7 +243,7 @@ def test_a_table_of_nan_alone_has_no_smallest_value() -> None:
 def test_one_value_that_the_exchange_of_light_and_viewer_changes_violates(table: Table, factor: float) -> None:
     index = (1, 1, 2, 2) if table.anisotropic else (1, 2, 1)
     changed = node(table, 1.0)
-    changed.brdf[index] = table.brdf[index] * np.float32(factor)
+    changed.values[index] = table.brdf[index] * np.float32(factor)
     found = audit(changed)
     assert (found.verdict, found.reciprocity.verdict) == ("violates", "violates")
     expected = abs(factor - 1.0) / (abs(factor) + 1.0) if np.isfinite(factor) else 1.0
@@ -262,7 +263,7 @@ def test_rounding_is_no_violation() -> None:
     table = lambert(0.5)
     brdf = np.nextafter(table.brdf, np.float32(1), where=np.random.default_rng(0).random(table.brdf.shape) < 0.5,
                         out=table.brdf.copy())  # fmt: skip
-    found = audit(replace(table, brdf=brdf))
+    found = audit(replace(table, values=brdf))
     assert 0.0 < found.reciprocity.table.max < 1e-7
     assert found.verdict == "passes"
 
@@ -270,7 +271,7 @@ def test_rounding_is_no_violation() -> None:
 @pytest.mark.parametrize("grid", [ISOTROPIC, ANISOTROPIC], ids=["isotropic", "anisotropic"])
 def test_more_light_out_than_in_violates(grid: Grid) -> None:
     table = lambert(1.0, grid)
-    found = audit(replace(table, brdf=table.brdf * np.float32(1.01)))
+    found = audit(replace(table, values=table.brdf * np.float32(1.01)))
     assert verdicts(found) == {"energy": "violates"}
     assert found.energy.max_albedo == pytest.approx(1.01, rel=1e-6)
     assert found.energy.exceeds_1_from_theta_i_deg == 0.0
@@ -287,7 +288,7 @@ def test_an_albedo_of_1_may_be_off_by_what_float32_rounds(albedo: float, verdict
 
 def test_one_azimuth_of_the_light_is_enough_to_violate() -> None:
     table = lambert(0.9, ANISOTROPIC)
-    table.brdf[1, 2] *= np.float32(1.2)
+    table.values[1, 2] *= np.float32(1.2)
     found = audit(table)
     assert found.energy.verdict == "violates"
     assert found.energy.max_albedo == pytest.approx(1.08, rel=1e-6)
@@ -310,8 +311,8 @@ def test_the_wavelength_of_the_largest_albedo_is_named() -> None:
     table = lambert(0.5)
     brdf = np.repeat(table.brdf[..., np.newaxis], 3, axis=-1)
     brdf[..., 1] *= np.float32(1.5)
-    spectral = replace(table, wavelength_nm=WAVELENGTHS, brdf=brdf)
-    found = module._energy(spectral)
+    spectral = replace(table, wavelength_nm=WAVELENGTHS, values=brdf)
+    found = module._energy(spectral, material_of(spectral))
     assert (found.max_at_wavelength_nm, found.wavelength_nm) == (500.0, WAVELENGTHS.tolist())
     assert found.albedo[0] == pytest.approx([0.5, 0.75, 0.5], rel=1e-6)
 
@@ -423,16 +424,16 @@ def test_oren_nayar_with_rho_1_conserves_energy_on_a_rough_surface() -> None:
 def test_the_report_names_the_violations_and_nothing_else() -> None:
     good, bad = lambert(0.5), node(lambert(0.5), -1.0)
     excused = replace(lambert(1.0), name="excused", attrs=lambert(1.0, known_excess=known(1.2, 0.0)).attrs)
-    excused = replace(excused, brdf=excused.brdf * np.float32(1.1))
+    excused = replace(excused, values=excused.brdf * np.float32(1.1))
     audits = [audit(table) for table in (replace(good, name="good"), replace(bad, name="bad"), excused)]
     document = written(audits)
-    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 1, ["bad"])
+    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 2, ["bad"])
     assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]
     assert AuditReport.model_validate(document) == report(audits)
 
 
 def test_an_empty_report_is_a_report() -> None:
-    assert written([]) == {"format": "brdfdb-audit", "version": 1, "materials": [], "violations": []}
+    assert written([]) == {"format": "brdfdb-audit", "version": 2, "materials": [], "violations": []}
 
 
 @pytest.mark.parametrize(

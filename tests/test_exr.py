@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb import exr, spectra
+from brdfdb.error import Error, Overall
 from brdfdb.geometry import unit_vector
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class FakeTable:
         self.lobe = lobe
         self.wavelength_nm = wavelength_nm
         self.spectrum = spectrum
+        self.error = None
 
     def lookup(self, theta_i: Floats, phi_i: Floats, theta_r: Floats, phi_r: Floats) -> Floats:
         angles = np.broadcast_arrays(theta_i, phi_i, theta_r, phi_r)
@@ -363,6 +365,7 @@ def test_export_writes_three_files_with_their_attributes(tmp_path: Path) -> None
             "quantity": "f_r",
             "unit": "1/sr",
             "dirac": "none",
+            "error_p99": "not measured",
             "slice": kind,
             "rgb": "linear sRGB, D65",
             "wavelength_nm": " ".join(f"{wavelength:.1f}" for wavelength in VISIBLE_NM),
@@ -378,6 +381,23 @@ def test_an_image_says_what_it_leaves_out_of_a_table_with_a_dirac_part(tmp_path:
     exr.write(tmp_path / "lobe.exr", exr.lobe_map(source), source)
     header, _ = read(tmp_path / "lobe.exr")
     assert header["brdf:dirac"] == "not in this image: up to 0.5 of the light leaves in the exact mirror direction"
+
+
+def test_an_image_says_the_error_that_its_table_states(tmp_path: Path) -> None:
+    numbers = [[0.01, 0.02]]
+    overall = {"l1": 0.003, "median": 0.001, "p95": 0.006, "p99": 0.0123, "max": 0.4}
+    source = table(ward_like)
+    cast(Any, source).error = Error(
+        theta_i_deg=[0.0, 90.0],
+        directions=10,
+        seed=1,
+        floor=[1e-4],
+        overall=Overall(**overall),
+        **dict.fromkeys(overall, numbers),
+    )
+    exr.write(tmp_path / "lobe.exr", exr.lobe_map(source), source)
+    header, _ = read(tmp_path / "lobe.exr")
+    assert header["brdf:error_p99"] == "0.0123"
 
 
 def test_export_in_half_replaces_the_files(tmp_path: Path) -> None:

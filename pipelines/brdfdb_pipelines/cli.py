@@ -129,6 +129,7 @@ def _parser() -> argparse.ArgumentParser:
         "--set", action="append", default=[], metavar="X=VALUE", help="a parameter of a family, as recipes write it"
     )
     lookup.add_argument("--json", action="store_true", help="print JSON")
+    lookup.add_argument("--with-error", action="store_true", help="print the error that the table states, too")
 
     listing = command("list", _list, "List the materials and families of the store, or the built-in presets.")
     listing.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")
@@ -259,7 +260,13 @@ def _lookup(options: argparse.Namespace) -> int:
 
     angles = (options.theta_i, options.phi_i, options.theta_r, options.phi_r)
     inspect.lookup(
-        options.store, options.name, angles, options.wavelength_nm, settings=options.set, as_json=options.json
+        options.store,
+        options.name,
+        angles,
+        options.wavelength_nm,
+        settings=options.set,
+        as_json=options.json,
+        with_error=options.with_error,
     )
     return 0
 

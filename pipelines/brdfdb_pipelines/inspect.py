@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Sequence
@@ -12,6 +13,8 @@ import brdfdb
 from brdfdb_pipelines import families, terminal
 
 if TYPE_CHECKING:
+    from brdfdb.error import Error
+    from brdfdb.family import Family
     from brdfdb.lookup import Table
 
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
@@ -23,8 +26,13 @@ def list_store(root: Path) -> None:
     rows = []
     for name in store:
         head = store.summary(name)
-        rows.append((name, head["title"], head["model"], head["revision"]))
-    terminal.print_table(f"{len(rows)} materials in {root}", ("material", "title", "model", "revision"), rows)
+        rows.append((name, head["title"], head["model"], terminal.error(head.get("error_p99")), head["revision"]))
+    terminal.print_table(
+        f"{len(rows)} materials in {root}",
+        ("material", "title", "model", "error (p99)", "revision"),
+        rows,
+        numbers=("error (p99)",),
+    )
     families.print_list(store)
 
 
@@ -40,7 +48,10 @@ def show(root: Path, name: str) -> None:
     """Print what a store knows of a material or a family."""
     store = brdfdb.open(root)
     if families.is_family(store, name):
-        families.show(store.family(name))
+        family = store.family(name)
+        families.show(family)
+        _print_error(family.error)
+        families.show_worst(family)
         return
     table = store[name]
     attributes = table.attrs
@@ -63,30 +74,72 @@ def show(root: Path, name: str) -> None:
         print(f"  note        {attributes['note']}")
     if attributes["known_excess"]:
         print(f"  excess      {attributes['known_excess']['citation']}")
+    _print_grid(table)
+    _print_error(table.error)
+    _print_albedo(table)
+    print(f"  files       {store.path(name)} (zarr v3, {terminal.size(_stored(store.path(name)))})")
+
+
+def _print_grid(table: Table) -> None:
+    """Axes, how many values are stored and how, and how f_r comes of them."""
+    attributes, wavelength = table.attrs, table.wavelength_nm
     print("  grid")
     for axis, nodes in table.axes_deg.items():
         print(f"    {axis:<16}{nodes.size} nodes, {nodes[0]:g} to {nodes[-1]:g} degrees")
-    if table.wavelength_nm is None:
+    if wavelength is None:
         print(f"    {'wavelength':<16}none, the table is grey")
-    elif table.wavelength_nm.size == 1:
-        print(f"    {'wavelength':<16}{table.wavelength_nm[0]:g} nm only")
+    elif wavelength.size == 1:
+        print(f"    {'wavelength':<16}{wavelength[0]:g} nm only")
     else:
-        wavelength = table.wavelength_nm
         print(f"    {'wavelength':<16}{wavelength.size} nodes, {wavelength[0]:g} to {wavelength[-1]:g} nm")
-    _print_albedo(table)
-    print(f"  files       {store.path(name)} (zarr v3, {terminal.size(_stored(store.path(name)))})")
+    if table.spectra is not None:
+        print(f"    {'parts':<16}{table.spectra.shape[0]}, of which each spectrum is a sum")
+    bits = attributes.get("bits", 23)
+    stored = "all 23 bits of their mantissas" if bits == 23 else f"{bits} of 23 bits of their mantissas"
+    print(f"    {'values':<16}{table.values.size}, {stored}")
+    print(f"    {'interpolation':<16}{_interpolation(table)}")
+    if attributes.get("reason"):
+        print(f"    {'reason':<16}{attributes['reason']}")
+    if attributes.get("reconstruction"):
+        print(f"  f_r         {attributes['reconstruction']}")
+
+
+def _interpolation(table: Table) -> str:
+    """How a table is interpolated, in words."""
+    how = table.interpolation
+    what = "f_r" if how.power == 0.0 else f"f_r (cos theta_i cos theta_r)^{how.power:g}"
+    if table.uniform is not None:
+        what = what.replace("f_r", "(f_r - uniform)", 1)
+    if how.logarithm:
+        what = f"the logarithm of {what} + {how.offset:.3g}"
+    return f"{how.method}, of {what}"
+
+
+def _print_error(error: Error | None) -> None:
+    """The error that is stated: overall, and for each band of theta_i at the wavelength where it is largest."""
+    if error is None:
+        print("  error       not measured")
+        return
+    overall = error.overall
+    print(
+        f"  error       {terminal.error(overall.p99)} of f_r against the model, in 99 of 100 of {error.directions} "
+        f"directions (median {overall.median:.2g}, largest {overall.max:.2g}, of what is reflected {overall.l1:.2g})"
+    )
+    edges = error.theta_i_deg
+    print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
+    for label, rows in (("99 of 100", error.p99), ("reflected", error.l1)):
+        print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in rows))
 
 
 def _print_albedo(table: Table) -> None:
     """Directional albedo of the table at a few angles: the first, the middle and the last wavelength."""
     import numpy as np
 
-    from brdfdb.audit import directional_albedo
+    from brdfdb.albedo import directional_albedo
     from brdfdb.geometry import radians
 
-    diffuse = directional_albedo(table)
-    if table.anisotropic:
-        diffuse = diffuse.mean(axis=1)
+    found = directional_albedo(table)
+    diffuse = found.mean
     wavelength = table.wavelength_nm
     columns = sorted({0, diffuse.shape[1] // 2, diffuse.shape[1] - 1})
     print(
@@ -97,7 +150,7 @@ def _print_albedo(table: Table) -> None:
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
-        values = np.interp(ALBEDO_ANGLES_DEG, table.axes_deg["theta_i"], diffuse[:, w]) + specular
+        values = np.interp(ALBEDO_ANGLES_DEG, found.theta_i_deg, diffuse[:, w]) + specular
         print(f"    {'grey' if at is None else f'{at:g} nm':<10}" + "".join(f"{value:9.4f}" for value in values))
 
 
@@ -113,10 +166,12 @@ def lookup(
     *,
     settings: Sequence[str] = (),
     as_json: bool,
+    with_error: bool = False,
 ) -> None:
     """Print f_r at theta_i, phi_i, theta_r, phi_r [degree], and the Dirac part's reflectance if the model has one.
 
-    Of a family, at the parameters of `settings`, each ``name=value``.
+    With the error that the table states beside each value, if asked for. Of a family, at the parameters of `settings`,
+    each ``name=value``.
     """
     import numpy as np
 
@@ -129,32 +184,42 @@ def lookup(
         if angle.startswith("theta") and not 0.0 <= value <= 180.0:
             raise ValueError(f"{angle}: {value:g} is outside [0, 180] degrees")
     store = brdfdb.open(root)
+    source: Table | Family
+    point: dict[str, Any] = {}
     if families.is_family(store, name):
-        families.lookup(store.family(name), angles_deg, wavelength_nm, settings, as_json=as_json)
-        return
-    table = store[name]
-    if settings:
-        raise ValueError(f"--set {settings[0]}: {name} is a material, whose parameters are fixed")
+        source = store.family(name)
+        written = families.written(source, settings)
+        point = families.in_units_of_the_model(source, written)
+        head: dict[str, Any] = {"family": name, "parameters": written}
+        dirac = source.record.specular_error is not None
+    else:
+        source = store[name]
+        if settings:
+            raise ValueError(f"--set {settings[0]}: {name} is a material, whose parameters are fixed")
+        head = {"material": name, "revision": source.revision}
+        dirac = source.specular is not None
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
-    brdf = np.atleast_1d(table.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm))
-    specular = np.atleast_1d(table.specular_reflectance(theta_i, wavelength_nm))
-    wavelengths = table.wavelength_nm if wavelength_nm is None else wavelength_nm
+    error = None
+    if with_error:
+        stated = source.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, with_error=True, **point)
+        brdf, error = (np.atleast_1d(values) for values in stated)
+    else:
+        brdf = np.atleast_1d(source.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, **point))
+    specular = np.atleast_1d(source.specular_reflectance(theta_i, wavelength_nm, **point))
+    wavelengths = source.wavelength_nm if wavelength_nm is None else wavelength_nm
     if as_json:
-        answer: dict[str, Any] = {
-            "material": name,
-            "revision": table.revision,
+        answer = {
+            **head,
             "unit": "1/sr",
             "wavelength_nm": None if wavelengths is None else list(wavelengths),
             "brdf": brdf.tolist(),
+            **({} if error is None else {"error": error.tolist()}),
             "specular_reflectance": specular.tolist(),
         }
         print(json.dumps(answer))
         return
     for index, value in enumerate(brdf):
         at = "" if wavelengths is None else f"{wavelengths[index]:g} nm  "
-        dirac = (
-            f"  and {specular[index]:.6g} of the light in the exact mirror direction"
-            if table.specular is not None
-            else ""
-        )
-        print(f"{at}{value:.6g} /sr{dirac}")
+        mirrored = f"  and {specular[index]:.6g} of the light in the exact mirror direction" if dirac else ""
+        within = "" if error is None else f" +- {error[index]:.2g}"
+        print(f"{at}{value:.6g}{within} /sr{mirrored}")

@@ -98,7 +98,7 @@ class Bars:
             self._tables[name] = self._progress.add_task(f"  measuring {name}", total=None, rate="")
         elif (task := self._tables.pop(name, None)) is not None:
             self._progress.remove_task(task)
-            text = f"family {name}: {event['members']} tables, p99 between them {event['error_p99']:.2g}"
+            text = f"family {name}: {event['members']} tables, {terminal.error(event['error_p99'])} between them (p99)"
             self._progress.console.print(text, markup=False)
 
     def _block(self, event: Event) -> None:

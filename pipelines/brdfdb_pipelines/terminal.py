@@ -70,3 +70,10 @@ def size(count: float) -> str:
             return f"{count:.3g} {unit}"
         count /= 1000.0
     return f"{count:.3g} GB"
+
+
+def error(p99: float | None) -> str:
+    """A relative error that a table states, as a human reads it."""
+    if p99 is None:
+        return "not measured"
+    return f"{100.0 * p99:#.2g}".rstrip(".") + " %" if p99 >= 1e-5 else "< 0.001 %"

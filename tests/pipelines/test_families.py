@@ -20,7 +20,7 @@ from brdfdb.layout import Layout
 from brdfdb.materials import Material
 from brdfdb.store import Store, UnknownFamilyError
 from brdfdb_pipelines import build as module
-from brdfdb_pipelines import cli
+from brdfdb_pipelines import cli, terminal
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe import load
 
@@ -180,14 +180,16 @@ def test_a_family_is_listed_shown_and_looked_up(copper: Path, capsys: Captured) 
     out = capsys.readouterr().out
     assert "  tables      4, rough-copper-001 to rough-copper-004\n" in out
     assert "    sigma_0_um      2 values, 0.1 to 0.12\n" in out
-    assert f"  error       p99 {p99:.3g}, " in out
-    assert f"theta_i 80 to 90: p99 {max(family.error.p99[-1]):.3g}\n" in out
+    assert f"  error       {terminal.error(p99)} of f_r against the model, in 99 of 100 of " in out
+    assert f"{max(family.error.p99[-1]):9.2g}\n" in out
+    assert f"  worst       {terminal.error(family.record.worst.p99)} at sigma_0_um " in out
     assert "  Dirac part  within " in out
     asked = ("lookup", "rough-copper", 30, 0, 40, 170, "--set", "sigma_0_um=0.104", "--set", "tau_um=1.05")
     assert run(copper, *asked) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in lines] == [["450", "nm"], ["550", "nm"], ["650", "nm"]]
-    assert run(copper, *asked, "--wavelength-nm", 500, "--json") == 0
+    assert all(line.endswith(" of the light in the exact mirror direction") for line in lines)
+    assert run(copper, *asked, "--wavelength-nm", 500, "--json", "--with-error") == 0
     answer = json.loads(capsys.readouterr().out)
     angles = np.deg2rad([30.0, 0.0, 40.0, 170.0])
     stated = family.lookup(*angles, [500.0], with_error=True, sigma_0_um=0.104, tau_um=1.05)
@@ -295,7 +297,7 @@ def test_a_family_is_told_on_the_terminal(tmp_path: Path, capsys: Captured) -> N
     recipe.write_text(GREY, encoding="utf-8")
     assert run(tmp_path / "store", "build", recipe) == 0
     p99 = brdfdb.open(tmp_path / "store").family("grey").error.overall.p99
-    assert f"family grey: 4 tables, p99 between them {p99:.2g}" in capsys.readouterr().err
+    assert f"family grey: 4 tables, {terminal.error(p99)} between them (p99)" in capsys.readouterr().err
     assert run(tmp_path / "store", "build", recipe, "--json") == 0
     events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert of_family(events) == ["unchanged"]

@@ -1,0 +1,94 @@
+"""What list, show and lookup tell of planned tables: the grid, how f_r comes of it, and the error that is stated."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb_pipelines import cli, terminal
+
+RECIPE = """\
+materials = ["rolled-brass", "scene-copper-sphere"]
+wavelengths_nm = [{ start = 400, stop = 700, step = 25 }]
+tolerance = 0.05
+"""
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("planned")
+    (folder / "recipe.toml").write_text(RECIPE, encoding="utf-8")
+    assert run("build", folder / "recipe.toml", "--store", folder / "store", "--jobs", "1") == 0
+    return folder / "store"
+
+
+def run(*arguments: object) -> int:
+    return cli.main([str(argument) for argument in arguments])
+
+
+def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured) -> None:
+    capsys.readouterr()
+    assert run("list", "--store", planned) == 0
+    _, head, *lines = capsys.readouterr().out.splitlines()
+    assert "error (p99)" in head
+    store = brdfdb.open(planned)
+    assert len(lines) == 2
+    for line in lines:
+        error = store[line.split()[0]].error
+        assert error is not None
+        assert f" {terminal.error(error.overall.p99)}  " in line
+
+
+@pytest.mark.parametrize(
+    ("p99", "text"),
+    [(None, "not measured"), (0.0101, "1.0 %"), (0.00946, "0.95 %"), (0.2, "20 %"), (4e-8, "< 0.001 %")],
+)
+def test_errors_in_percent(p99: float | None, text: str) -> None:
+    assert terminal.error(p99) == text
+
+
+@pytest.mark.parametrize("name", ["rolled-brass", "scene-copper-sphere"])
+def test_show_tells_grid_numbers_and_error_of_a_planned_table(name: str, planned: Path, capsys: Captured) -> None:
+    assert run("show", name, "--store", planned) == 0
+    out = capsys.readouterr().out
+    table = brdfdb.open(planned)[name]
+    for axis, nodes in table.axes_deg.items():
+        assert f"    {axis:<16}{nodes.size} nodes, 0 to {nodes[-1]:g} degrees" in out
+    assert ("parts   " in out) == (table.spectra is not None)
+    assert f"    values          {table.values.size}, " in out
+    assert f"{table.interpolation.method}, of " in out
+    assert table.attrs["reason"] in out
+    assert table.attrs["reconstruction"] in out
+    assert table.error is not None
+    assert f"  error       {terminal.error(table.error.overall.p99)} of f_r" in out
+    (reflected,) = re.findall(r"^    reflected +(.*)$", out, flags=re.MULTILINE)
+    assert [float(text) for text in reflected.split()] == [float(f"{max(row):.2g}") for row in table.error.l1]
+
+
+def test_lookup_prints_the_stated_error_beside_each_value(planned: Path, capsys: Captured) -> None:
+    assert run("lookup", "rolled-brass", 30, 10, 20, 200, "--with-error", "--store", planned) == 0
+    found = brdfdb.open(planned)["rolled-brass"].lookup(*np.deg2rad([30.0, 10.0, 20.0, 200.0]), with_error=True)
+    assert capsys.readouterr().out == f"{found.brdf:.6g} +- {found.error:.2g} /sr\n"
+
+
+def test_lookup_as_json_has_the_stated_error_if_asked(planned: Path, capsys: Captured) -> None:
+    command = ("lookup", "scene-copper-sphere", 30, 0, 20, 180, "--json", "--store", planned)
+    assert run(*command) == 0
+    without = json.loads(capsys.readouterr().out)
+    assert run(*command, "--with-error") == 0
+    answer = json.loads(capsys.readouterr().out)
+    table = brdfdb.open(planned)["scene-copper-sphere"]
+    found = table.lookup(*np.deg2rad([30.0, 0.0, 20.0, 180.0]), with_error=True)
+    assert answer.pop("error") == found.error.tolist()
+    assert answer == without
+
+
+def test_planned_tables_pass_their_audit(planned: Path, capsys: Captured) -> None:
+    assert run("audit", "--store", planned) == 0
+    assert "2 audited: 2 pass, 0 exceed 1" in capsys.readouterr().out
