@@ -40,7 +40,7 @@ def open(root: str | os.PathLike[str]) -> Store:
 
 
 _LOADED_WHEN_USED = (
-    *("audit", "energy", "exr", "fresnel", "geometry", "grids", "lookup", "materials", "misprints", "models"),
+    *("audit", "energy", "exr", "family", "fresnel", "geometry", "grids", "lookup", "materials", "misprints", "models"),
     *("quadrature", "roughness", "sampling", "spectra", "store", "tabulate"),
 )
 

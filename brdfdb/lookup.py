@@ -235,13 +235,21 @@ class Table:
         return values.reshape(shape[:-1] + wavelength_shape)[()]
 
     def _stated(self, theta_i: NDArray[Any], brdf: Floats, wavelength_nm: ArrayLike | None) -> Floats:
-        """The error stated for values looked up, in their shape; between wavelengths the larger of the two."""
         if self.error is None:
             raise ValueError(f"with_error: the table of {self.name} states no error; build it anew")
+        return self.stated_by(self.error, theta_i, brdf, wavelength_nm)
+
+    def stated_by(
+        self, error: Error, theta_i: NDArray[Any], brdf: Floats, wavelength_nm: ArrayLike | None = None
+    ) -> Floats:
+        """What an error at the wavelengths of the table says [1/sr] of values at theta_i [rad], in their shape.
+
+        Between wavelengths it is the larger of the two.
+        """
         low, weight, tail = self._wavelengths(wavelength_nm)
         values = brdf if tail else np.asarray(brdf)[..., np.newaxis]
         theta = np.broadcast_to(theta_i, values.shape[:-1])
-        found = np.maximum(*(stated(self.error, theta, values, at) for at in (low, low + (weight > 0.0))))
+        found = np.maximum(*(stated(error, theta, values, at) for at in (low, low + (weight > 0.0))))
         return np.asarray(found if tail else found[..., 0])[()]
 
     @functools.cached_property

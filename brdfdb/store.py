@@ -4,6 +4,7 @@ ROOT/brdfdb.json                     format name and version
 ROOT/materials/NAME/r000001/         a self-contained zarr v3 group, never modified
 ROOT/materials/NAME/r000001.MANIFEST.json   size and sha256 of its files; beside it, zarr warns of strangers inside
 ROOT/materials/NAME/HEAD.json        current revision, digest of its manifest, and what lists show; swapped atomically
+ROOT/families/NAME.json              which materials make a family, and how well it interpolates (`brdfdb.family`)
 ROOT/.staging/NAME/                  a build in progress or broken off (`brdfdb.staging`)
 
 ROOT is not itself a zarr group: xarray would rewrite a shared root file, and stale metadata hides groups.
@@ -26,9 +27,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.chunks import Whole
+    from brdfdb.family import Family
     from brdfdb.lookup import Table
 
-__all__ = ["FORMAT", "FORMAT_VERSION", "Store", "StoreError", "UnknownMaterialError"]
+__all__ = ["FORMAT", "FORMAT_VERSION", "Store", "StoreError", "UnknownFamilyError", "UnknownMaterialError"]
 
 FORMAT = "brdfdb"
 FORMAT_VERSION = 1
@@ -48,6 +50,8 @@ class UnknownMaterialError(KeyError):
         Up to five names that are close to it.
     """
 
+    kind = "material"
+
     def __init__(self, name: str, names: list[str]) -> None:
         super().__init__(name)
         self.name = name
@@ -55,7 +59,13 @@ class UnknownMaterialError(KeyError):
 
     def __str__(self) -> str:
         hint = f"; closest: {', '.join(self.closest)}" if self.closest else ""
-        return f"no material {self.name!r} in the store{hint}"
+        return f"no {self.kind} {self.name!r} in the store{hint}"
+
+
+class UnknownFamilyError(UnknownMaterialError):
+    """A name that is not that of a family in the store."""
+
+    kind = "family"
 
 
 class Store(Mapping[str, "Table"]):
@@ -168,6 +178,33 @@ class Store(Mapping[str, "Table"]):
         group, digest = self.location(name)
         check_manifest(group, digest, contents=False)
         return dict(read_json(group / "zarr.json")["attributes"])
+
+    def families(self) -> list[str]:
+        """The names of the families, sorted."""
+        try:
+            found = sorted(os.listdir(f"{self.root}/families"))
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise StoreError(f"cannot read {self.root}/families: {error.strerror}") from error
+        names = (name.removesuffix(".json") for name in found if name.endswith(".json"))
+        return [name for name in names if _NAME.fullmatch(name)]
+
+    def family(self, name: str) -> Family:
+        """A family: its model at any parameters between those of its members.
+
+        Raises
+        ------
+        UnknownFamilyError
+            If the store has no such family.
+        StoreError
+            If its record cannot be read.
+        """
+        from brdfdb.family import Family, path_of, read_record
+
+        if name not in self.families():
+            raise UnknownFamilyError(name, self.families())
+        return Family(read_record(path_of(self.root, name)), self)
 
     def dataset(self, name: str) -> xr.Dataset:
         """The current revision as a lazy xarray Dataset.

@@ -226,13 +226,18 @@ def _presets() -> dict[str, Material]:
     return materials
 
 
+def written_name(parameter: Parameter) -> str:
+    """The name of a parameter in files: that of an angle, which they give in degrees, ends in ``_deg``."""
+    return f"{parameter.name}_deg" if parameter.unit == "rad" else parameter.name
+
+
 def _as_written(parameter: Parameter) -> Parameter:
     """A parameter as it appears in files: an angle in degrees, under a name that ends in ``_deg``."""
     if parameter.unit != "rad":
         return parameter
     return replace(
         parameter,
-        name=f"{parameter.name}_deg",
+        name=written_name(parameter),
         unit="degree",
         low=float(degrees(parameter.low)),
         high=float(degrees(parameter.high)),

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from brdfdb.family import FamilyRecord, Sweep
+from brdfdb.family_records import recorded, write_family
 from brdfdb.layout import Layout
 from brdfdb.manifest import Entry, StoreError
 from brdfdb.revisions import Standing, standing
@@ -142,7 +144,7 @@ def build(
     *,
     memory: int | None = None,
 ) -> list[Built]:
-    """Build what is missing of the tables of a recipe.
+    """Build what is missing of the tables of a recipe, and measure its families.
 
     Parameters
     ----------
@@ -173,15 +175,22 @@ def build(
         of the same recipe goes on from there. Any other error of a table lets the others be built first.
     """
     jobs = recipe.jobs()
+    sweeps = recipe.sweeps(jobs)
     make_store(root)
-    return _Builder(jobs, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory).run()
+    return _Builder(jobs, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory).run()
 
 
 class _Builder:
     def __init__(
-        self, jobs: list[Job], root: Path, at: Workers, report: Callable[[Event], None], memory: int | None
+        self,
+        jobs: list[Job],
+        sweeps: list[Sweep],
+        root: Path,
+        at: Workers,
+        report: Callable[[Event], None],
+        memory: int | None,
     ) -> None:
-        self.jobs, self.root, self.at, self.report, self.memory = jobs, root, at, report, memory
+        self.jobs, self.sweeps, self.root, self.at, self.report, self.memory = jobs, sweeps, root, at, report, memory
         self.task_bytes = _TASK_BYTES
         self.running: dict[Future[Any], Callable[[Future[Any]], None]] = {}
         self.surveys: dict[str, Survey] = {}
@@ -199,6 +208,7 @@ class _Builder:
         try:
             self._survey()
             self._tabulate()
+            self._measure_families()
         finally:
             self._leave()
         if self.error is not None:
@@ -384,6 +394,38 @@ class _Builder:
                 {"event": "published", "material": table.name, "revision": revision, "bytes": stored, "why": why}
             )
         self._close(table)
+
+    # Families
+
+    def _measure_families(self) -> None:
+        """Record the families whose members are all current, where no record says so yet."""
+        sweeps = deque(sweep for sweep in self.sweeps if all(name in self.built for name in sweep.members))
+        while sweeps or self.running:
+            while sweeps and self._room:
+                sweep = sweeps.popleft()
+                if (record := recorded(self.root, sweep)) is not None:
+                    self._family(record, "unchanged")
+                    continue
+
+                def then(future: Future[FamilyRecord], name: str = sweep.name) -> None:
+                    if (found := self._result(name, future)) is not None:
+                        self._family(found, "published")
+
+                self.report({"event": "family", "family": sweep.name, "state": "measuring"})
+                self._submit(then, write_family, str(self.root), sweep)
+            if self.running:
+                self._wait()
+
+    def _family(self, record: FamilyRecord, state: str) -> None:
+        self.report(
+            {
+                "event": "family",
+                "family": record.name,
+                "state": state,
+                "members": len(record.members),
+                "error_p99": record.error.overall.p99,
+            }
+        )
 
     def _result(self, name: str, future: Future[Any]) -> Any:
         """What a task returned; None if it failed, which takes no table with it but its own."""

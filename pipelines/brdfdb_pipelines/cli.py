@@ -120,18 +120,21 @@ def _parser() -> argparse.ArgumentParser:
     )
     exr.add_argument("--half", action="store_true", help="16-bit floats, to look at; default 32-bit, for data")
 
-    lookup = command("lookup", _lookup, "Print f_r [1/sr] of a material at one pair of directions, in degrees.")
+    lookup = command("lookup", _lookup, "Print f_r [1/sr] of a material, or a family, at one pair of directions.")
     lookup.add_argument("name", metavar="NAME")
     for angle in ("theta_i", "phi_i", "theta_r", "phi_r"):
         lookup.add_argument(angle, type=float, metavar=angle.upper(), help="degrees")
     lookup.add_argument("--wavelength-nm", type=float, nargs="+", metavar="NM", help="default: all of the table")
+    lookup.add_argument(
+        "--set", action="append", default=[], metavar="X=VALUE", help="a parameter of a family, as recipes write it"
+    )
     lookup.add_argument("--json", action="store_true", help="print JSON")
     lookup.add_argument("--with-error", action="store_true", help="print the error that the table states, too")
 
-    listing = command("list", _list, "List the materials of the store, or the built-in presets.")
+    listing = command("list", _list, "List the materials and families of the store, or the built-in presets.")
     listing.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")
 
-    show = command("show", _show, "Show parameters, sources, grid, albedo and files of a material.")
+    show = command("show", _show, "Show parameters, sources, grid, albedo and files of a material, or a family.")
     show.add_argument("name", metavar="NAME")
 
     history = command("history", _history, "List the revisions of a material.")
@@ -144,9 +147,9 @@ def _parser() -> argparse.ArgumentParser:
     verify = command(
         "verify",
         _verify,
-        "Verify tables: sizes, sha256, each chunk with its crc32c, dimensions and attributes.",
+        "Verify tables: sizes, sha256, each chunk with its crc32c, dimensions and attributes; and families.",
     )
-    verify.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
+    verify.add_argument("names", nargs="*", metavar="NAME", help="materials and families (default: all)")
 
     gc = command(
         "gc",
@@ -261,6 +264,7 @@ def _lookup(options: argparse.Namespace) -> int:
         options.name,
         angles,
         options.wavelength_nm,
+        settings=options.set,
         as_json=options.json,
         with_error=options.with_error,
     )

@@ -13,11 +13,17 @@ from typing import Any
 from pydantic import BaseModel
 
 from brdfdb.audit import AuditReport
+from brdfdb.family import FamilyRecord
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
 from brdfdb_pipelines.recipe import Recipe
 
-SCHEMAS: dict[str, type[BaseModel]] = {"audit": AuditReport, "material": Material, "recipe": Recipe}
+SCHEMAS: dict[str, type[BaseModel]] = {
+    "audit": AuditReport,
+    "family": FamilyRecord,
+    "material": Material,
+    "recipe": Recipe,
+}
 
 TABLE_BEGIN, TABLE_END = "<!-- generated: models -->", "<!-- end -->"
 

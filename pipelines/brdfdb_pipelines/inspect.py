@@ -10,16 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import brdfdb
-from brdfdb_pipelines import terminal
+from brdfdb_pipelines import families, terminal
 
 if TYPE_CHECKING:
+    from brdfdb.error import Error
+    from brdfdb.family import Family
     from brdfdb.lookup import Table
 
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
 
 def list_store(root: Path) -> None:
-    """Print a line for each material of a store."""
+    """Print a line for each material of a store, and for each family."""
     store = brdfdb.open(root)
     rows = []
     for name in store:
@@ -31,6 +33,7 @@ def list_store(root: Path) -> None:
         rows,
         numbers=("error (p99)",),
     )
+    families.print_list(store)
 
 
 def list_presets() -> None:
@@ -42,8 +45,14 @@ def list_presets() -> None:
 
 
 def show(root: Path, name: str) -> None:
-    """Print what a store knows of a material."""
+    """Print what a store knows of a material or a family."""
     store = brdfdb.open(root)
+    if families.is_family(store, name):
+        family = store.family(name)
+        families.show(family)
+        _print_error(family.error)
+        families.show_worst(family)
+        return
     table = store[name]
     attributes = table.attrs
     print(f"{name}: {attributes['title']}")
@@ -66,7 +75,7 @@ def show(root: Path, name: str) -> None:
     if attributes["known_excess"]:
         print(f"  excess      {attributes['known_excess']['citation']}")
     _print_grid(table)
-    _print_error(table)
+    _print_error(table.error)
     _print_albedo(table)
     print(f"  files       {store.path(name)} (zarr v3, {terminal.size(_stored(store.path(name)))})")
 
@@ -106,9 +115,8 @@ def _interpolation(table: Table) -> str:
     return f"{how.method}, of {what}"
 
 
-def _print_error(table: Table) -> None:
-    """The error that a table states: overall, and for each band of theta_i at the wavelength where it is largest."""
-    error = table.error
+def _print_error(error: Error | None) -> None:
+    """The error that is stated: overall, and for each band of theta_i at the wavelength where it is largest."""
     if error is None:
         print("  error       not measured")
         return
@@ -156,12 +164,14 @@ def lookup(
     angles_deg: Sequence[float],
     wavelength_nm: Sequence[float] | None,
     *,
+    settings: Sequence[str] = (),
     as_json: bool,
     with_error: bool = False,
 ) -> None:
     """Print f_r at theta_i, phi_i, theta_r, phi_r [degree], and the Dirac part's reflectance if the model has one.
 
-    With the error that the table states beside each value, if asked for.
+    With the error that the table states beside each value, if asked for. Of a family, at the parameters of `settings`,
+    each ``name=value``.
     """
     import numpy as np
 
@@ -173,20 +183,33 @@ def lookup(
             raise ValueError(f"{angle}: {value} is not a number of degrees")
         if angle.startswith("theta") and not 0.0 <= value <= 180.0:
             raise ValueError(f"{angle}: {value:g} is outside [0, 180] degrees")
-    table = brdfdb.open(root)[name]
+    store = brdfdb.open(root)
+    source: Table | Family
+    point: dict[str, Any] = {}
+    if families.is_family(store, name):
+        source = store.family(name)
+        written = families.written(source, settings)
+        point = families.in_units_of_the_model(source, written)
+        head: dict[str, Any] = {"family": name, "parameters": written}
+        dirac = source.record.specular_error is not None
+    else:
+        source = store[name]
+        if settings:
+            raise ValueError(f"--set {settings[0]}: {name} is a material, whose parameters are fixed")
+        head = {"material": name, "revision": source.revision}
+        dirac = source.specular is not None
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
     error = None
     if with_error:
-        stated = table.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, with_error=True)
+        stated = source.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, with_error=True, **point)
         brdf, error = (np.atleast_1d(values) for values in stated)
     else:
-        brdf = np.atleast_1d(table.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm))
-    specular = np.atleast_1d(table.specular_reflectance(theta_i, wavelength_nm))
-    wavelengths = table.wavelength_nm if wavelength_nm is None else wavelength_nm
+        brdf = np.atleast_1d(source.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, **point))
+    specular = np.atleast_1d(source.specular_reflectance(theta_i, wavelength_nm, **point))
+    wavelengths = source.wavelength_nm if wavelength_nm is None else wavelength_nm
     if as_json:
-        answer: dict[str, Any] = {
-            "material": name,
-            "revision": table.revision,
+        answer = {
+            **head,
             "unit": "1/sr",
             "wavelength_nm": None if wavelengths is None else list(wavelengths),
             "brdf": brdf.tolist(),
@@ -197,10 +220,6 @@ def lookup(
         return
     for index, value in enumerate(brdf):
         at = "" if wavelengths is None else f"{wavelengths[index]:g} nm  "
-        dirac = (
-            f"  and {specular[index]:.6g} of the light in the exact mirror direction"
-            if table.specular is not None
-            else ""
-        )
+        mirrored = f"  and {specular[index]:.6g} of the light in the exact mirror direction" if dirac else ""
         within = "" if error is None else f" +- {error[index]:.2g}"
-        print(f"{at}{value:.6g}{within} /sr{dirac}")
+        print(f"{at}{value:.6g}{within} /sr{mirrored}")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import brdfdb
-from brdfdb import revisions
+from brdfdb import family_records, revisions
 from brdfdb.store import StoreError, UnknownMaterialError
 from brdfdb_pipelines import terminal
 
@@ -41,24 +41,27 @@ def rollback(root: Path, name: str, revision: str) -> None:
 
 
 def verify(root: Path, names: Sequence[str]) -> int:
-    """Verify materials, by default all of a store; print what is damaged, and return how many materials are."""
+    """Verify materials and families, by default all of a store; print what is damaged, and return how many are."""
     store = brdfdb.open(root)
-    wanted = list(dict.fromkeys(names)) or list(store)
+    families = store.families()
+    wanted = list(dict.fromkeys(names)) or [*store, *(name for name in families if name not in store)]
     for name in wanted:
-        if name not in store:
-            raise UnknownMaterialError(name, list(store))
+        if name not in store and name not in families:
+            raise UnknownMaterialError(name, [*store, *families])
     damaged, total = [], 0
     with terminal.progress() as bar:
         task = bar.add_task("verifying", total=len(wanted))
         for name in wanted:
             try:
-                total += revisions.verify(root, name)
+                total += revisions.verify(root, name) if name in store else family_records.verify_family(root, name)
             except StoreError as error:
                 damaged.append(str(error))
             bar.advance(task)
     for sentence in damaged:
         print(f"brdfdb: {sentence}", file=sys.stderr)
-    print(f"{len(wanted)} materials verified, {terminal.size(total)}: {len(damaged) or 'none'} damaged")
+    among = sum(name not in store for name in wanted)
+    what = f"{len(wanted) - among} materials" + (f" and {among} families" if among else "")
+    print(f"{what} verified, {terminal.size(total)}: {len(damaged) or 'none'} damaged")
     if damaged:
         print("`brdfdb build` with their recipe repairs them")
     return len(damaged)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import fnmatch
+import itertools
+import math
 import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -11,15 +14,19 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, TypeAdapter, ValidationError
 
+from brdfdb.family import Sweep
 from brdfdb.grids import Axis, Grid, check_wavelengths
-from brdfdb.layout import TABLE_VERSION, Interpolation, Layout
-from brdfdb.materials import Material, presets
+from brdfdb.layout import TABLE_VERSION, Interpolation, Layout, digest
+from brdfdb.materials import Material, presets, written_name
+from brdfdb.models import MODELS
 from brdfdb.plan import PLAN_VERSION, coarsest, offset_of, plan
 
 _STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 _MOST_NODES = 100_000  # of a range: far above any axis, far below what fills the memory
+_MOST_MEMBERS = 100_000  # of a family
+_MOST_SWEPT = 6  # parameters of a family: a lookup is made of two members for each, 64 in all
 
 
 class RecipeError(ValueError):
@@ -46,6 +53,7 @@ class Range(BaseModel):
 
 
 Nodes = Annotated[list[float | Range], Field(min_length=1)]
+_VALUES: TypeAdapter[list[float | Range]] = TypeAdapter(Nodes, config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
 def _nodes(name: str, parts: list[float | Range]) -> Axis:
@@ -121,13 +129,14 @@ class Grids(BaseModel):
 
 @dataclass(frozen=True)
 class Job:
-    """One table to build: on a grid, or to a tolerance, of which one is None."""
+    """One table to build: on a grid, or to a tolerance, of which one is None; `family` says what it is a member of."""
 
     material: Material
     wavelength_nm: NDArray[np.float64] | None
     grid: Grid | None
     tolerance: float | None
     interpolation: str = "linear"
+    family: Mapping[str, Any] | None = None
 
     def layout(self) -> Layout:
         """What the table is going to be; to a tolerance, this takes the planner a second or more."""
@@ -147,7 +156,9 @@ class Job:
     @property
     def request(self) -> dict[str, Any]:
         """All that decides the table, ready for JSON: the same request makes the same table."""
+        member = {} if self.family is None else {"family": dict(self.family)}
         return {
+            **member,
             "table_version": TABLE_VERSION,
             "model_version": self.material.spec.version,
             "material": self.material.model_dump(mode="json"),
@@ -175,6 +186,9 @@ class Recipe(BaseModel):
         default=None, description="between the nodes of grids, of f_r or of its logarithm; by default linear"
     )
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
+    sweep: dict[str, dict[str, Any]] = Field(
+        default={}, description="families of materials: written like a material, with lists as values of parameters"
+    )
 
     def jobs(self) -> list[Job]:
         """Every table that the recipe asks for.
@@ -194,14 +208,14 @@ class Recipe(BaseModel):
         except ValueError as error:
             raise RecipeError(str(error)) from None
         jobs = []
-        for material in self._selected():
+        for material, family in self._selected():
             wavelength_nm = None
             if material.spectral:
                 stated = material.wavelengths_nm
                 wavelength_nm = wavelengths if stated is None else np.array(stated)
             several = wavelength_nm is not None and wavelength_nm.size > 1
             kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
-            job = Job(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear")
+            job = Job(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear", family)
             try:
                 job.check()
             except ValueError as error:
@@ -222,20 +236,102 @@ class Recipe(BaseModel):
             axis, _, said = str(error).partition(":")
             raise RecipeError(f"grids.{name}.{axis}_deg:{said}") from None
 
-    def _selected(self) -> list[Material]:
-        known = dict(presets())
+    def sweeps(self, jobs: Sequence[Job]) -> list[Sweep]:
+        """The families all of whose members are among the jobs."""
+        found = []
+        for name, table in self.sweep.items():
+            axes = _swept(name, table)
+            members = sorted((j for j in jobs if j.family and j.family["name"] == name), key=lambda j: j.material.name)
+            if len(members) == math.prod(map(len, axes.values())):
+                found.append(
+                    Sweep(
+                        name=name,
+                        title=table["title"],
+                        model=table["model"],
+                        axes=axes,
+                        members=[job.material.name for job in members],
+                        request_sha256=[digest(job.request) for job in members],
+                    )
+                )
+        return found
+
+    def _selected(self) -> list[tuple[Material, dict[str, Any] | None]]:
+        """The materials, and of which family each is a member."""
+        known: dict[str, tuple[Material, dict[str, Any] | None]] = {n: (m, None) for n, m in presets().items()}
         for name, table in self.define.items():
             try:
-                known[name] = Material.from_table(name, table)
+                known[name] = Material.from_table(name, table), None
             except ValueError as error:
                 raise RecipeError(f"define.{error}") from None
-        chosen: dict[str, Material] = {}
+        families: dict[str, list[str]] = {}
+        for name, table in self.sweep.items():
+            members = {material.name: (material, family) for material, family in _members(name, table)}
+            for taken in (name, *members):
+                if taken in known or taken in families:
+                    raise RecipeError(f"sweep.{name}: {taken!r} is the name of another material or family")
+            known |= members
+            families[name] = list(members)
+        chosen: dict[str, tuple[Material, dict[str, Any] | None]] = {}
         for pattern in self.materials:
             matches = fnmatch.filter(known, pattern)
+            for family in fnmatch.filter(families, pattern):
+                matches += families[family]
             if not matches:
                 raise RecipeError(f"materials: {pattern!r} matches no material; `brdfdb list --presets` names them")
             chosen |= {name: known[name] for name in matches}
         return list(chosen.values())
+
+
+def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
+    """The parameters of a sweep that are lists, in the order of the model, each with its values."""
+    parameters, model = table.get("parameters"), table.get("model")
+    where = f"sweep.{name}.parameters"
+    lists = {x: v for x, v in parameters.items() if isinstance(v, list)} if isinstance(parameters, dict) else {}
+    if not lists:
+        raise RecipeError(f"{where}: give a list of numbers for one of them at least")
+    if len(lists) > _MOST_SWEPT:
+        raise RecipeError(f"{where}: {len(lists)} are lists, at most {_MOST_SWEPT} may be")
+    known = [written_name(p) for p in MODELS[model].parameters] if isinstance(model, str) and model in MODELS else []
+    axes = {}
+    for x in sorted(lists, key=lambda x: known.index(x) if x in known else len(known)):
+        try:
+            parts = _VALUES.validate_python(lists[x])
+        except ValidationError as error:
+            field, said = _first(error)
+            raise RecipeError(f"{where}.{x}{field and f'.{field}'}: {said}") from None
+        values = [float(f"{value:.12g}") for value in _nodes(f"{where}.{x}", parts)]  # 0.3, not 0.1 + 0.1 + 0.1
+        if len(values) < 2:
+            raise RecipeError(f"{where}.{x}: needs a list of at least two values")
+        if not all(low < high for low, high in itertools.pairwise(values)):
+            raise RecipeError(f"{where}.{x}: the values must increase strictly")
+        axes[x] = values
+    count = math.prod(map(len, axes.values()))
+    if count > _MOST_MEMBERS:
+        raise RecipeError(f"{where}: the lists make {count} members, more than {_MOST_MEMBERS}")
+    return axes
+
+
+def _members(name: str, table: Mapping[str, Any]) -> list[tuple[Material, dict[str, Any]]]:
+    """The materials of a sweep, the last of its lists running fastest, each with what it is in its family."""
+    axes = _swept(name, table)
+    width = max(3, len(str(math.prod(map(len, axes.values())))))
+    members = []
+    for number, values in enumerate(itertools.product(*axes.values()), start=1):
+        member, at = f"{name}-{number:0{width}d}", dict(zip(axes, values, strict=True))
+        fields = {**table, "parameters": {**table["parameters"], **at}}
+        if isinstance(title := table.get("title"), str) and title:
+            fields["title"] = ", ".join([title, *(f"{x} {value:.12g}" for x, value in at.items())])
+        try:
+            members.append((Material.from_table(member, fields), {"name": name, "parameters": at}))
+        except ValueError as error:
+            said = str(error).removeprefix(f"{member}: ")
+            field = said.partition(":")[0]
+            written = (
+                [written_name(p) for p in MODELS[table["model"]].parameters] if table.get("model") in MODELS else []
+            )
+            inside = ".parameters." if field in (*table["parameters"], *written) else ": "
+            raise RecipeError(f"sweep.{name}{inside}{said}") from None
+    return members
 
 
 def load(path: Path | None = None) -> Recipe:
@@ -259,11 +355,16 @@ def load(path: Path | None = None) -> Recipe:
     except RecipeError as error:
         raise RecipeError(f"{source}: {error}") from None
     except ValidationError as error:
-        # pydantic lists each branch of number | range: a table was meant as a range, whatever else is wrong with it,
-        # and the names of the branches are not names of the recipe
-        found = error.errors(include_url=False)
-        first = next(item for item in found if not (item["loc"][-1] == "float" and isinstance(item["input"], dict)))
-        field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
-        said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+        field, said = _first(error)
         raise RecipeError(f"{source}: {field}: {said}") from None
     return recipe
+
+
+def _first(error: ValidationError) -> tuple[str, str]:
+    """The first field that pydantic finds fault with, and what it says."""
+    # pydantic lists each branch of number | range: a table was meant as a range, whatever else is wrong with it,
+    # and the names of the branches are not names of the recipe
+    found = error.errors(include_url=False)
+    first = next(item for item in found if not ("float" in item["loc"][-1:] and isinstance(item["input"], dict)))
+    field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
+    return field, "unknown key" if first["type"] == "extra_forbidden" else first["msg"]

@@ -86,9 +86,20 @@ class Bars:
                 self._progress.console.print(f"{event['material']} failed: {event['error']}", markup=False)
             case "block":
                 self._block(event)
+            case "family":
+                self._family(event)
             case "published" | "adopted" | "unchanged":
                 if (task := self._tables.pop(event["material"], None)) is not None:
                     self._progress.remove_task(task)
+
+    def _family(self, event: Event) -> None:
+        name = event["family"]
+        if event["state"] == "measuring":
+            self._tables[name] = self._progress.add_task(f"  measuring {name}", total=None, rate="")
+        elif (task := self._tables.pop(name, None)) is not None:
+            self._progress.remove_task(task)
+            text = f"family {name}: {event['members']} tables, {terminal.error(event['error_p99'])} between them (p99)"
+            self._progress.console.print(text, markup=False)
 
     def _block(self, event: Event) -> None:
         name = event["material"]

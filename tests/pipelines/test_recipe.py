@@ -14,6 +14,7 @@ import pytest
 
 import brdfdb
 from brdfdb.grids import HALF_DIFFERENCE_AXES
+from brdfdb.layout import digest
 from brdfdb.materials import Material, presets
 from brdfdb.plan import PLAN_VERSION
 from brdfdb_pipelines import cli
@@ -48,6 +49,20 @@ rho_s = 0.2
 alpha_x = 0.3
 alpha_y = 0.3
 """
+SWEPT = (
+    GOOD.replace('["foam"]', '["mine"]')
+    + """\
+[sweep.mine]
+title = "My own"
+model = "ward"
+source = "me"
+[sweep.mine.parameters]
+alpha_x = [0.1, { start = 0.2, stop = 0.3, step = 0.1 }]
+rho_d = 0.1
+rho_s = [0.2, 0.4]
+alpha_y = 0.3
+"""
+)
 COPPER = GOOD.replace("foam", "scene-copper-sphere")
 
 
@@ -143,6 +158,36 @@ BAD = [
     changed('"ward"', '"wart"', "define.mine: model: 'wart' is not one of lambert, ", GOOD + DEFINED),
     changed('"ward"', '"he_torrance"', "define.mine: rho_d: 0.1 given, but the parameters of he_tor", GOOD + DEFINED),
     changed("[define.mine]", '[define."../x"]\nmodel = "lambert"\n[define.mine]', "define.../x: ", GOOD + DEFINED),
+    # sweeps
+    changed("[0.2, 0.4]", "[]", "sweep.mine.parameters.rho_s: List should have at least 1 item", SWEPT),
+    changed("[0.2, 0.4]", "[0.2]", "sweep.mine.parameters.rho_s: needs a list of at least two values", SWEPT),
+    changed("[0.2, 0.4]", "[0.4, 0.2]", "sweep.mine.parameters.rho_s: the values must increase strictly", SWEPT),
+    changed("[0.2, 0.4]", "[0.2, 0.2]", "sweep.mine.parameters.rho_s: the values must increase strictly", SWEPT),
+    changed("[0.2, 0.4]", '[0.2, "0.4"]', "sweep.mine.parameters.rho_s.1: Input should be a valid number", SWEPT),
+    changed("[0.2, 0.4]", "[0.2, nan]", "sweep.mine.parameters.rho_s.1: Input should be a finite number", SWEPT),
+    changed("[0.2, 0.4]", "[0.2, true]", "sweep.mine.parameters.rho_s.1: Input should be a valid number", SWEPT),
+    changed("[0.2, 0.4]", "[0.2, [0.4]]", "sweep.mine.parameters.rho_s.1: ", SWEPT),
+    changed("[0.2, 0.4]", "[0.2, 1.4]", "sweep.mine.parameters.rho_s: 1.4 is outside [0, 1]", SWEPT),
+    changed("[0.2, 0.4]", "{ start = 0.2, stop = 0.4, step = 0.1 }", "sweep.mine.parameters.rho_s: {'start'", SWEPT),
+    changed("step = 0.1", "step = 0.07", "sweep.mine.parameters.alpha_x: steps of 0.07 from 0.2 do not end", SWEPT),
+    changed("step = 0.1", "steps = 2", "sweep.mine.parameters.alpha_x.1.step: Field required", SWEPT),
+    changed("step = 0.1", "step = 1e-7", "sweep.mine.parameters.alpha_x: steps of 1e-07 make more than the", SWEPT),
+    changed("step = 0.1", "step = 2e-6", "sweep.mine.parameters: the lists make 100004 members, more than", SWEPT),
+    changed("rho_s = [0.2, 0.4]\n", "", "sweep.mine.parameters.rho_s: missing, ward needs a value in [0, 1]", SWEPT),
+    changed("rho_d = 0.1", "rho_d = -1", "sweep.mine.parameters.rho_d: -1 is outside [0, 1]", SWEPT),
+    changed("rho_d = 0.1", "rho_d = 0.1\nrho_x = [1, 2]", "sweep.mine.parameters.rho_x: 1.0 given, but the par", SWEPT),
+    changed('"ward"', '"wart"', "sweep.mine: model: 'wart' is not one of lambert, ", SWEPT),
+    changed('"ward"', "5", "sweep.mine: model: Input should be a valid string", SWEPT),
+    changed('title = "My own"\n', "", "sweep.mine: title: Field required", SWEPT),
+    changed('source = "me"\n', "", "sweep.mine: source: Field required", SWEPT),
+    changed('source = "me"', 'source = "me"\ncolour = 5', "sweep.mine: colour: ", SWEPT),
+    changed("[sweep.mine]", '[sweep."../x"]\n[sweep.mine]', "sweep.../x.parameters: give a list of numbers", SWEPT),
+    changed("[sweep.mine]", "[sweep.Mine]\n[sweep.mine]", "sweep.Mine.parameters: give a list of numbers", SWEPT),
+    changed("[sweep.mine.parameters]", "[sweep.mine.values]", "sweep.mine.parameters: give a list of numbers", SWEPT),
+    changed("[sweep.mine.parameters]", "parameters = 5\n[sweep.mine.x]", "sweep.mine.parameters: give a list", SWEPT),
+    changed("[sweep.mine]", DEFINED + "[sweep.mine]", "sweep.mine: 'mine' is the name of another material", SWEPT),
+    changed("[sweep.mine]", DEFINED.replace("mine", "mine-002") + "[sweep.mine]", "sweep.mine: 'mine-002' is", SWEPT),
+    changed('title = "one"', "sweep = 5", "sweep: "),
     # not TOML
     changed('title = "one"', "title = ", "not TOML: "),
     changed('title = "one"', 'title = "one', "not TOML: "),
@@ -355,6 +400,70 @@ def test_a_defined_material_is_what_was_written(tmp_path: Path) -> None:
     assert job.material.parameters == {"rho_d": 0.1, "rho_s": 0.2, "alpha_x": 0.3, "alpha_y": 0.3}
     assert (job.material.title, job.material.source) == ("My own", "me")
     assert job.grid.shape == (3, 2, 2)
+
+
+def test_a_sweep_is_a_material_for_each_of_its_values(tmp_path: Path) -> None:
+    recipe = load(recipe_of(tmp_path, SWEPT))
+    jobs = recipe.jobs()
+    assert [job.material.name for job in jobs] == [f"mine-{number:03d}" for number in range(1, 7)]
+    # in the order of the model's parameters, not of the file's: the last runs fastest
+    assert [(job.material.parameters["rho_s"], job.material.parameters["alpha_x"]) for job in jobs] == [
+        (0.2, 0.1), (0.2, 0.2), (0.2, 0.3), (0.4, 0.1), (0.4, 0.2), (0.4, 0.3),
+    ]  # fmt: skip
+    assert jobs[1].material.title == "My own, rho_s 0.2, alpha_x 0.2"
+    assert jobs[1].request["family"] == {"name": "mine", "parameters": {"rho_s": 0.2, "alpha_x": 0.2}}
+    assert [job.material.anisotropic for job in jobs] == [True, True, False] * 2
+    (sweep,) = recipe.sweeps(jobs)
+    assert sweep.axes == {"rho_s": [0.2, 0.4], "alpha_x": [0.1, 0.2, 0.3]}
+    assert sweep.members == [job.material.name for job in jobs]
+    assert sweep.request_sha256 == [digest(job.request) for job in jobs]
+
+
+@pytest.mark.parametrize(
+    ("patterns", "members", "whole"),
+    [
+        (["mine"], 6, True),
+        (["m?ne"], 6, True),
+        (["mine-*"], 6, True),
+        (["mine-004", "mine"], 6, True),
+        (["mine-00[1-3]"], 3, False),
+        (["foam"], 0, False),
+    ],
+)
+def test_the_name_of_a_family_chooses_all_members(
+    patterns: list[str], members: int, whole: bool, tmp_path: Path
+) -> None:
+    recipe = load(recipe_of(tmp_path, SWEPT.replace('["mine"]', str(patterns))))
+    jobs = recipe.jobs()
+    assert sum(job.family is not None for job in jobs) == members
+    sweeps = recipe.sweeps(jobs)
+    assert len(sweeps) == whole
+    assert all(sweep.members == sorted(sweep.members) for sweep in sweeps)
+
+
+def test_angles_of_a_sweep_are_degrees_and_numbers_are_what_was_meant(tmp_path: Path) -> None:
+    text = SWEPT[: SWEPT.index("[sweep.mine.parameters]")].replace("ward", "oren_nayar") + (
+        "[sweep.mine.parameters]\nrho = [{ start = 0.1, stop = 0.7, step = 0.1 }]\nsigma_deg = [0, 20]\n"
+    )
+    recipe = load(recipe_of(tmp_path, text))
+    jobs = recipe.jobs()
+    assert jobs[-1].material.parameters["sigma"] == np.deg2rad(20.0)
+    assert jobs[-1].material.title == "My own, rho 0.7, sigma_deg 20"
+    assert recipe.sweeps(jobs)[0].axes == {
+        "rho": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], "sigma_deg": [0.0, 20.0]
+    }  # fmt: skip
+
+
+def test_what_a_material_that_is_no_member_asks_for_does_not_say_family(tmp_path: Path) -> None:
+    (job,) = load(recipe_of(tmp_path, GOOD)).jobs()
+    assert "family" not in job.request
+
+
+def test_more_lists_than_a_lookup_can_take_are_refused(tmp_path: Path) -> None:
+    lists = "".join(f"x{number} = [0, 1]\n" for number in range(7))
+    text = SWEPT.replace("rho_s = [0.2, 0.4]\n", lists).replace("[0.1, {", "0.1 # [0.1, {")
+    with pytest.raises(RecipeError, match=r"sweep\.mine\.parameters: 7 are lists, at most 6 may be$"):
+        load(recipe_of(tmp_path, text))
 
 
 def test_a_defined_material_that_nobody_asked_for_is_checked_and_not_built(tmp_path: Path) -> None:
