@@ -27,6 +27,8 @@ class Axes(NamedTuple):
         Nodes, and the inverse of the step to the next one.
     uniform : bool (axes,)
         Whether the steps of an axis are equal: its cells are found without a search.
+    crowded : bool (axes,)
+        Whether a bucket of an axis may hold more than one node.
     scale : float64 (axes,)
         Cells or buckets for one unit along the axis.
     bucket, bucket_first : int64
@@ -44,6 +46,7 @@ class Axes(NamedTuple):
     nodes: Array
     inverse: Array
     uniform: NDArray[np.bool_]
+    crowded: NDArray[np.bool_]
     scale: Array
     bucket: NDArray[np.int64]
     bucket_first: NDArray[np.int64]
@@ -75,6 +78,9 @@ def prepared(axes: Sequence[Array], ends: Sequence[tuple[str, str]], *, cubic: b
         nodes=np.concatenate(axes),
         inverse=np.concatenate([np.append(1.0 / np.diff(nodes), 0.0) for nodes in axes]),
         uniform=np.array([uniform for _, _, uniform in tables]),
+        crowded=np.array(
+            [scale * np.diff(nodes).min() < 1.0 for nodes, (_, scale, _) in zip(axes, tables, strict=True)]
+        ),
         scale=np.array([scale for _, scale, _ in tables]),
         bucket=np.concatenate([bucket for bucket, _, _ in tables]),
         bucket_first=np.cumsum(sizes) - sizes,
@@ -170,12 +176,18 @@ def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64],
         share[j] = y
         cell[j] = np.int64((y - low) * scale)
     one = np.uint64(1)
+    if axes.crowded[axis]:  # more nodes than buckets
+        for j in range(count):
+            c = np.uint64(axes.bucket[buckets + np.uint64(cell[j])])
+            while share[j] > axes.nodes[first + c + one]:
+                c += one
+            share[j] = (share[j] - axes.nodes[first + c]) * axes.inverse[first + c]
+            cell[j] = np.int64(c)
+        return
     for j in range(count):
         y = share[j]
         c = np.uint64(axes.bucket[buckets + np.uint64(cell[j])])
         c += np.uint64(y > axes.nodes[first + c + one])
-        while y > axes.nodes[first + c + one]:  # of axes with more nodes than buckets
-            c += one
         share[j] = (y - axes.nodes[first + c]) * axes.inverse[first + c]
         cell[j] = np.int64(c)
 
