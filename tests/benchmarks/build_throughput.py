@@ -1,8 +1,9 @@
 """A build end to end, against its kernels alone and its codec alone: ``python tests/benchmarks/build_throughput.py``.
 
-All three in one run, on the same threads, of the same tables: those of the default recipe, or of the models that are
-named. Prints values a second and what share of the slower of the two the build reaches. By default it writes to memory
-(/dev/shm), so that the disk, which every block is synced to, has no part in it; ``--dir`` names a directory on one.
+All three in one run, on the same threads, of the same tables: every preset on plain grids, or those of the models that
+are named. Prints values a second and what share of the slower of the two the build reaches. By default it writes to
+memory (/dev/shm), so that the disk, which every block is synced to, has no part in it; ``--dir`` names a directory on
+one.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from plain import plain_recipe
 
 from brdfdb.chunks import encoded
 from brdfdb.layout import Layout
 from brdfdb.tabulate import block
 from brdfdb_pipelines.build import build
-from brdfdb_pipelines.recipe import Recipe, load
 from brdfdb_pipelines.workers import Workers
 
 
@@ -32,9 +33,7 @@ def main() -> None:
     parser.add_argument("--dir", type=Path, default=Path("/dev/shm") if Path("/dev/shm").is_dir() else None)
     parser.add_argument("--repeat", type=int, default=3)
     options = parser.parse_args()
-    recipe = load()
-    names = [job.material.name for job in recipe.jobs() if not options.models or job.material.model in options.models]
-    recipe = Recipe.model_validate({**recipe.model_dump(), "materials": names})
+    recipe = plain_recipe(options.models)
     tasks = [(job.layout(), number) for job in recipe.jobs() for number in range(len(job.layout().blocks))]
     tasks.sort(key=lambda task: task[0].size, reverse=True)
     total = sum(job.layout().size for job in recipe.jobs())

@@ -1,4 +1,4 @@
-"""How fast one core tabulates the default recipe, model by model: ``python tests/benchmarks/tabulation.py``.
+"""How fast one core tabulates the presets on plain grids: ``python tests/benchmarks/tabulation.py``.
 
 Machines are shared and noisy: compare models or commits in one run, not numbers of different days.
 """
@@ -9,13 +9,14 @@ import sys
 import time
 from collections import defaultdict
 
+from plain import plain_recipe
+
 from brdfdb.tabulate import tabulate
-from brdfdb_pipelines.recipe import load
 
 
 def main(wanted: list[str]) -> None:
-    """Time every table of the default recipe, or those of the models that are named."""
-    jobs = [job for job in load().jobs() if not wanted or job.material.model in wanted]
+    """Time every table on its plain grid, or those of the models that are named."""
+    jobs = [job for job in plain_recipe().jobs() if not wanted or job.material.model in wanted]
     for first in {job.material.model: job for job in jobs}.values():  # compile before the clock runs
         tabulate(first.layout())
     totals: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
