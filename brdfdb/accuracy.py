@@ -20,7 +20,7 @@ from brdfdb.sampling import lobe_of, mirrored_in_lobe, mixture_density
 BANDS_DEG = np.linspace(0.0, 90.0, 10)  # of theta_i
 FLOOR = 1e-3  # of the Lambertian BRDF with the albedo of the material
 DIRECTIONS = 6000  # of each band; of more than _FEW wavelengths, each with errors of its own, fewer
-_FEW, _FEWER_DIRECTIONS = 4, 2500
+_FEW, _FEWER_DIRECTIONS = 4, 4000
 SEED = 1991
 _WINDOW = 1 << 21  # values of a table that are held at a time
 _MODEL = 1 << 16  # directions at which the model is evaluated at a time
@@ -103,7 +103,7 @@ def measure(
     read : callable
         Gives some rows of the first axis of the stored array. Large tables are read piece by piece.
     count : int, optional
-        Directions a band of theta_i, by default 6000, or 2500 of more than four wavelengths.
+        Directions a band of theta_i, by default 6000, or 4000 of more than four wavelengths.
     seed : int
         Of the directions.
 
