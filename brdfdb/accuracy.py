@@ -14,13 +14,14 @@ from brdfdb.grids import Grid
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table, points
 from brdfdb.materials import Material
-from brdfdb.parameters import Floats
+from brdfdb.parameters import Floats, Lobe
 from brdfdb.sampling import lobe_of, mirrored_in_lobe, mixture_density
 
 BANDS_DEG = np.linspace(0.0, 90.0, 10)  # of theta_i
 FLOOR = 1e-3  # of the Lambertian BRDF with the albedo of the material
-DIRECTIONS = 6000  # of each band; of more than _FEW wavelengths, each with errors of its own, fewer
-_FEW, _FEWER_DIRECTIONS = 4, 4000
+WIDTHS = (1.0, 2.0)  # of the lobes that directions are drawn in, of the material's own
+DIRECTIONS = 4000  # of each band; of more than _FEW wavelengths, each with errors of its own, fewer
+_FEW, _FEWER_DIRECTIONS = 4, 3000
 SEED = 1991
 _WINDOW = 1 << 21  # values of a table that are held at a time
 _MODEL = 1 << 16  # directions at which the model is evaluated at a time
@@ -47,8 +48,9 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
     """`count` pairs of directions a band, half of the viewers over the hemisphere and half in the lobe.
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
-    light is mirrored in half vectors that follow `ModelSpec.lobe`, of the wavelengths in turn. Viewers of a model
-    without a lobe are all drawn over the hemisphere.
+    light is mirrored in half vectors that follow `ModelSpec.lobe`, of the wavelengths in turn, or a lobe twice as wide:
+    its own Gaussian hardly ever reaches the shoulder where the lobe ends. Viewers of a model without a lobe are all
+    drawn over the hemisphere.
     """
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
@@ -61,10 +63,13 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
     turns = np.arange(band.size) % (1 if wavelength_nm is None else wavelength_nm.size)
     spectrum = material.arguments(wavelength_nm)
     lobe = lobe_of(material.spec, wi, {name: v[turns] if np.ndim(v) else v for name, v in spectrum.items()})
-    lobe = lobe._replace(share=np.ones(1))
-    in_lobe = rng.random(band.size) < 0.5
-    wr = np.where(in_lobe[:, np.newaxis], mirrored_in_lobe(u, angle, wi, lobe), over)
-    density = 0.5 * mixture_density(lobe, wi, wr) + 0.5 / (2.0 * np.pi)
+    lobes = [Lobe(np.ones(1), width * lobe.alpha_x, width * lobe.alpha_y) for width in WIDTHS]
+    which = rng.random(band.size) * 2 * len(lobes)  # one half over the hemisphere, the other among the lobes
+    wr = over
+    for number, drawn in enumerate(lobes):
+        chosen = (which >= number) & (which < number + 1)
+        wr = np.where(chosen[:, np.newaxis], mirrored_in_lobe(u, angle, wi, drawn), wr)
+    density = 0.5 / (2.0 * np.pi) + 0.5 * np.mean([mixture_density(drawn, wi, wr) for drawn in lobes], axis=0)
     return Draw(wi, wr, band, np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density)
 
 
@@ -103,7 +108,7 @@ def measure(
     read : callable
         Gives some rows of the first axis of the stored array. Large tables are read piece by piece.
     count : int, optional
-        Directions a band of theta_i, by default 6000, or 4000 of more than four wavelengths.
+        Directions a band of theta_i, by default 4000, or 3000 of more than four wavelengths.
     seed : int
         Of the directions.
 
@@ -123,22 +128,23 @@ def measure(
 def compare(found: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:
     """The error of values of f_r, shape (N, L), against the truth at the directions of a draw."""
     floor = floor_of(truth, drawn)
-    error = relative(found, truth, floor)
-    above, weight = drawn.above, drawn.weight[:, np.newaxis]
-
-    def statistics(chosen: NDArray[np.bool_]) -> Floats:
-        percentiles = np.percentile(error[chosen & above], [50.0, 95.0, 99.0, 100.0], axis=0)
-        wrong = np.sum((weight * np.abs(found - truth))[chosen], axis=0)
-        whole = np.sum((weight * truth)[chosen], axis=0)
-        l1 = np.divide(wrong, whole, out=np.zeros_like(wrong), where=whole > 0.0)
-        return np.concatenate([l1[np.newaxis], percentiles])
-
-    bands = np.stack([statistics(drawn.band == band) for band in range(BANDS_DEG.size - 1)], axis=1)
-    worst = statistics(np.ones(above.shape, dtype=bool)).max(axis=-1)
+    count = BANDS_DEG.size - 1
+    # rows of weights: each band of theta_i, then all of them
+    weights = np.concatenate(
+        [np.where(drawn.band == np.arange(count)[:, np.newaxis], drawn.weight, 0.0), [drawn.weight]]
+    )
+    wrong, whole = weights @ np.abs(found - truth), weights @ truth
+    l1 = np.divide(wrong, whole, out=np.zeros_like(wrong), where=whole > 0.0)
+    error = np.ascontiguousarray(relative(found, truth, floor).T)
+    chosen = [drawn.above & (drawn.band == band) for band in range(count)] + [drawn.above]
+    percentiles = [np.percentile(error[:, rows], [50.0, 95.0, 99.0, 100.0], axis=1) for rows in chosen]
+    # [statistic][band][wavelength]
+    bands = np.stack([l1[:-1], *np.moveaxis(np.stack(percentiles[:-1]), 1, 0)])
+    worst = np.concatenate([[l1[-1].max()], percentiles[-1].max(axis=-1)])
     names = tuple(Overall.model_fields)
     return Error(
         theta_i_deg=BANDS_DEG.tolist(),
-        directions=int(np.count_nonzero(above)),
+        directions=int(np.count_nonzero(drawn.above)),
         seed=seed,
         floor=_short(floor),
         overall=Overall(**dict(zip(names, _short(worst), strict=True))),

@@ -82,6 +82,21 @@ def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
     return data + checksum.to_bytes(4, "little")
 
 
+def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
+    """The block in the bytes of its file: the inverse of `encoded`.
+
+    Raises
+    ------
+    StoreError
+        If the checksum is not that of the bytes.
+    """
+    if google_crc32c.value(data[:-4]) != int.from_bytes(data[-4:], "little"):
+        raise StoreError(f"{layout.material.name}: the checksum of {chunk_name(layout, number)} is wrong")
+    rows = layout.blocks[number]
+    whole = np.frombuffer(_BLOSC.decode(data[:-4]), dtype="<f4").reshape(layout.block_rows, *layout.shape[1:])
+    return whole[: rows.stop - rows.start]
+
+
 def array_metadata(layout: Layout) -> bytes:
     """The metadata of the array that holds the blocks."""
     rest = tuple(layout.shape[1:])

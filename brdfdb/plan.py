@@ -34,13 +34,16 @@ MOST_VALUES = 10_000_000  # of a table: a tolerance that takes more is refused
 _TRIED = 2  # ways to interpolate on each kind of grid, those that promise to be smallest
 _ROUNDS = 8  # of finer and coarser axes
 _MARGIN = 0.88  # of the tolerance: other directions than the planner's find other errors
-_STRICTER = (1.0, 0.75, 0.5, 0.3)  # tolerances at a few wavelengths, of that at all of them
+_STRICTER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)  # tolerances at a few wavelengths, of that at all of them
+_OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band of theta_i may be
 _WAVELENGTHS = 4  # that the axes are chosen for; the finished table is measured at all
 _DRAWS, _FINAL_DRAWS = 700, 2000  # directions of a band of theta_i, for the axes and for the finished table
 _SEED = 1994
 _LINES = 100
 _POINTS = 145  # of a line
 _COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112, 137)  # nodes of an axis
+_MOST_NODES = 400  # of an axis
+_BEYOND = 4.0  # times as many nodes as lines tell take numbers that vary where a grid goes beyond the horizon
 _HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
 _SMOOTHED = 9  # points of a line that the density of nodes is averaged over
 _EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
@@ -69,7 +72,7 @@ class _Need:
     def __init__(self, layout: Layout, axis: int, numbers: Floats, weight: Floats) -> None:
         order = 4 if layout.interpolation.cubic else 2
         count, size, wavelengths = numbers.shape
-        self.layout, self.axis = layout, axis
+        self.layout, self.axis, self.order = layout, axis, order
         self.rows = np.moveaxis(numbers, 2, 1).reshape(count * wavelengths, size)
         self.weights = np.moveaxis(weight, 2, 1).reshape(count * wavelengths, size)
         self.known: dict[int, float] = {}
@@ -91,9 +94,15 @@ class _Need:
         return self.known[count]
 
     def count(self, error: float) -> float:
-        """The smallest number of nodes that leaves no more than an error; infinite if none known does."""
+        """The smallest number of nodes that leaves no more than an error; infinite if no sensible one does.
+
+        More nodes than lines have points are guessed, from the order of the interpolation.
+        """
         at = bisect.bisect_left(self.counts, True, key=lambda count: self.left(count) <= error)
-        return self.counts[at] if at < len(self.counts) else math.inf
+        if at < len(self.counts):
+            return self.counts[at]
+        guessed = math.ceil(self.counts[-1] * (self.left(self.counts[-1]) / error) ** (1.0 / self.order))
+        return guessed if guessed <= _MOST_NODES else math.inf
 
 
 # Likely number of values, kind of table, needs of its axes: none where the number is only a bound
@@ -121,7 +130,8 @@ def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, toleranc
         For spectral materials, and only for them.
     tolerance : float
         The 99th percentile of the relative error of f_r against the model, over the directions that `accuracy.draw`
-        describes, at the worst wavelength; in [1e-4, 0.5]. The l1 error keeps to it, too.
+        describes, at the worst wavelength; in [1e-4, 0.5]. The l1 error keeps to it, too, and each band of theta_i to
+        thirty times as much.
 
     Returns
     -------
@@ -145,9 +155,11 @@ def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, toleranc
     task = _task(material, wavelength_nm, tolerance)
     if not task.truth.any():
         return Layout(material, coarsest(material), wavelength_nm, reason="f_r is 0: all light is in the Dirac part")
-    candidates = list(_candidates(task))
+    candidates = tried = list(_candidates(task))
     for stricter in _STRICTER:
-        layout = _smallest(task._replace(tolerance=stricter * tolerance), candidates)
+        layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
+        if layout is not None:
+            tried = [candidate for candidate in candidates if _kind(candidate[1]) == _kind(layout)]
         finished = None if layout is None else _finished(layout, wavelength_nm, tolerance)
         if finished is not None:
             return replace(finished, reason=_reason(finished, tolerance, candidates))
@@ -165,15 +177,18 @@ def _order(candidate: _Candidate) -> tuple[float, int]:
 
 def _smallest(task: _Task, candidates: list[_Candidate]) -> Layout | None:
     """The smallest table of some kinds that keeps to the tolerance of the task."""
-    best: Layout | None = None
-    tried: Counter[tuple[str, ...]] = Counter()
-    for size, layout, needs in sorted(candidates, key=_order):
-        tried[layout.grid.names] += 1
-        if not needs:
-            continue
-        if tried[layout.grid.names] <= _TRIED and (best is None or size < best.size):
-            best = _refined(task, layout, needs, MOST_VALUES if best is None else best.size) or best
-    return best
+    ranked = [candidate for candidate in sorted(candidates, key=_order) if candidate[2]]
+    for most in (0.5 * _HOPELESS * ranked[0][0], math.inf):  # nodes: a kind that takes many more than it seemed is left
+        best: Layout | None = None
+        tried: Counter[tuple[str, ...]] = Counter()
+        for size, layout, needs in ranked:
+            tried[layout.grid.names] += 1
+            if tried[layout.grid.names] <= _TRIED and (best is None or size < math.prod(best.grid.shape)):
+                values = min(MOST_VALUES, most * layout.size / math.prod(layout.grid.shape))
+                best = _refined(task, layout, needs, values if best is None else best.size) or best
+        if best is not None:
+            return best
+    return None
 
 
 def _reason(layout: Layout, tolerance: float, candidates: list[_Candidate]) -> str:
@@ -271,6 +286,8 @@ def _candidates(task: _Task) -> Iterator[_Candidate]:
                                 lines[name] = _lines(task, layout, axis)
                             needs[name] = _Need(chosen, axis, *lines[name])
                         size *= needs[name].count(task.tolerance)
+                        if name == "theta_h" and power == 0.0:
+                            size *= _BEYOND
                         if size > _HOPELESS * fewest:
                             needs = {}
                             break
@@ -369,22 +386,27 @@ def _with_axes(layout: Layout, needs: dict[str, _Need], error: float) -> Layout 
 
 
 def _error(layout: Layout, values: NDArray[np.float32], drawn: accuracy.Draw, truth: Floats) -> float:
-    """99th percentile of the relative error at the worst wavelength, or the l1 error if that is larger.
+    """99th percentile of the relative error at the worst wavelength, or what else is to keep to the tolerance.
 
-    A few values that are off by orders of magnitude, as next to a pole, escape any percentile.
+    That is the l1 error, as a few values that are off by orders of magnitude, next to a pole, escape any percentile,
+    and the 99th percentile of each band of theta_i over `_OF_A_BAND`: grazing light is a ninth of the directions.
     """
     found = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
     error = accuracy.relative(found, truth, accuracy.floor_of(truth, drawn))
     wrong = drawn.weight @ np.abs(found - truth)
     l1 = np.divide(wrong, drawn.weight @ truth, out=np.zeros_like(wrong), where=wrong > 0.0)
-    return float(max(np.percentile(error[drawn.above], 99, axis=0).max(), l1.max()))
+    worst = max(np.percentile(error[drawn.above], 99, axis=0).max(), l1.max())
+    for band in np.unique(drawn.band):
+        here = error[drawn.above & (drawn.band == band)]
+        worst = max(worst, np.percentile(here, 99, axis=0).max() / _OF_A_BAND)
+    return float(worst)
 
 
 def _values(layout: Layout) -> NDArray[np.float32]:
     return np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
 
 
-def _refined(task: _Task, layout: Layout, needs: dict[str, _Need], most: int) -> Layout | None:
+def _refined(task: _Task, layout: Layout, needs: dict[str, _Need], most: float) -> Layout | None:
     """The coarsest axes that keep to the tolerance, of those tried; None if none of less than `most` values does."""
     goal, error, best = _MARGIN * task.tolerance, task.tolerance, None
     known: dict[tuple[int, ...], float] = {}

@@ -26,6 +26,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb import tabulate
 from brdfdb.layout import Layout, digest
@@ -292,13 +293,20 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
 
 def _measured(layout: Layout, table: Path) -> dict[str, Any]:
     """Attributes that only the finished blocks in the group `table` can tell: the error against the model."""
-    import zarr
-
     from brdfdb.accuracy import measure
+    from brdfdb.chunks import chunk_name, decoded
 
-    stored: Any = zarr.open_array(table / layout.variable, mode="r")
-    error = measure(layout, lambda rows: np.asarray(stored[rows], dtype=np.float32))
-    return {"error": error.model_dump(mode="json")}
+    @lru_cache(maxsize=4)
+    def block(number: int) -> NDArray[np.float32]:
+        return decoded(layout, number, (table / chunk_name(layout, number)).read_bytes())
+
+    def read(rows: slice) -> NDArray[np.float32]:
+        first, last = rows.start // layout.block_rows, (rows.stop - 1) // layout.block_rows
+        start = first * layout.block_rows
+        blocks = np.concatenate([block(number) for number in range(first, last + 1)])
+        return blocks[rows.start - start : rows.stop - start]
+
+    return {"error": measure(layout, read).model_dump(mode="json")}
 
 
 def publish(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) -> tuple[str, int]:

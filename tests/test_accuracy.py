@@ -52,14 +52,16 @@ def test_the_weights_of_a_draw_integrate(name: str) -> None:
     assert np.bincount(drawn.band).tolist() == [40_000] * 9
 
 
-def test_half_of_a_draw_is_in_the_lobe() -> None:
+def test_half_of_a_draw_is_in_the_lobe_and_on_its_shoulder() -> None:
     paper = presets()["glossy-grey-paper"]
-    drawn = draw(paper, None, 2000, 7)
+    drawn = draw(paper, None, 4000, 7)
     half = drawn.wi + drawn.wr
-    slope = np.hypot(half[:, 0], half[:, 1]) / half[:, 2]
-    # of the Gaussian of slopes, exp(-4) lies beyond two alphas; of the hemisphere, a few percent within
-    inside = np.mean(slope < 2.0 * paper.parameters["alpha_x"])
-    assert 0.49 < inside < 0.56
+    slope = np.hypot(half[:, 0], half[:, 1]) / half[:, 2] / paper.parameters["alpha_x"]
+    # a quarter follows exp(-slope**2), a quarter exp(-(slope / 2)**2); of the hemisphere, a few percent are within
+    quarters = 0.25 * (1.0 - np.exp(-4.0)) + 0.25 * (1.0 - np.exp(-1.0))
+    assert quarters < np.mean(slope < 2.0) < quarters + 0.05
+    shoulder = 0.25 * (np.exp(-4.0) - np.exp(-12.25)) + 0.25 * (np.exp(-1.0) - np.exp(-49.0 / 16.0))
+    assert shoulder < np.mean((slope > 2.0) & (slope < 3.5)) < shoulder + 0.08
 
 
 def test_what_the_numbers_mean() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import brdfdb
+from brdfdb.manifest import StoreError
 from brdfdb_pipelines import families, terminal
 
 if TYPE_CHECKING:
@@ -23,9 +24,13 @@ ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 def list_store(root: Path) -> None:
     """Print a line for each material of a store, and for each family."""
     store = brdfdb.open(root)
-    rows = []
+    rows, damaged = [], []
     for name in store:
-        head = store.summary(name)
+        try:
+            head = store.summary(name)
+        except StoreError as error:
+            damaged.append(str(error))
+            continue
         rows.append((name, head["title"], head["model"], terminal.error(head.get("error_p99")), head["revision"]))
     terminal.print_table(
         f"{len(rows)} materials in {root}",
@@ -34,6 +39,8 @@ def list_store(root: Path) -> None:
         numbers=("error (p99)",),
     )
     families.print_list(store)
+    if damaged:
+        raise StoreError("; ".join(damaged))
 
 
 def list_presets() -> None:

@@ -259,6 +259,8 @@ class Recipe(BaseModel):
         """The materials, and of which family each is a member."""
         known: dict[str, tuple[Material, dict[str, Any] | None]] = {n: (m, None) for n, m in presets().items()}
         for name, table in self.define.items():
+            if name in known:
+                raise RecipeError(f"define.{name}: is the name of a built-in material; give yours another")
             try:
                 known[name] = Material.from_table(name, table), None
             except ValueError as error:

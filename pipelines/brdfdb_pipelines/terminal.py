@@ -76,4 +76,6 @@ def error(p99: float | None) -> str:
     """A relative error that a table states, as a human reads it."""
     if p99 is None:
         return "not measured"
-    return f"{100.0 * p99:#.2g}".rstrip(".") + " %" if p99 >= 1e-5 else "< 0.001 %"
+    if p99 < 1e-5:
+        return "< 0.001 %"
+    return f"{100.0 * p99:.0f} %" if p99 >= 0.995 else f"{100.0 * p99:#.2g}".rstrip(".") + " %"

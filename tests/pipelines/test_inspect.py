@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -45,9 +46,29 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
         assert f" {terminal.error(error.overall.p99)}  " in line
 
 
+def test_list_goes_on_past_what_is_damaged_and_fails(planned: Path, tmp_path: Path, capsys: Captured) -> None:
+    root = tmp_path / "store"
+    shutil.copytree(planned, root)
+    first, second = list(brdfdb.open(root))
+    (root / "materials" / first / "HEAD.json").write_text('{"rev')
+    assert cli.main(["list", "--store", str(root)]) == 2
+    out, err = capsys.readouterr()
+    assert second in out
+    assert f"{first}/HEAD.json" in err
+    assert "Traceback" not in err
+
+
 @pytest.mark.parametrize(
     ("p99", "text"),
-    [(None, "not measured"), (0.0101, "1.0 %"), (0.00946, "0.95 %"), (0.2, "20 %"), (4e-8, "< 0.001 %")],
+    [
+        (None, "not measured"),
+        (0.0101, "1.0 %"),
+        (0.00946, "0.95 %"),
+        (0.2, "20 %"),
+        (1.5, "150 %"),
+        (0.998, "100 %"),
+        (4e-8, "< 0.001 %"),
+    ],
 )
 def test_errors_in_percent(p99: float | None, text: str) -> None:
     assert terminal.error(p99) == text
