@@ -279,15 +279,23 @@ def finished(
 
 @loop
 def vectors_of_angles(theta: Array, phi: Array, count: int, w: Array) -> None:
-    """Unit vectors, three numbers each, of directions by angles [rad]."""
+    """Unit vectors, three numbers each, of directions by angles [rad]; below the horizon, at the horizon.
+
+    The float32 nearest pi/2 lies above pi/2, and is the horizon.
+    """
     for j in range(count):
-        w[3 * j + 2] = sine(np.float64(theta[j]))
+        w[3 * j + 2] = sine(_held(theta[j]))
     for j in range(count):
         w[3 * j] = w[3 * j + 2] * cos(np.float64(phi[j]))
     for j in range(count):
         w[3 * j + 1] = w[3 * j + 2] * sine(np.float64(phi[j]))
     for j in range(count):
-        w[3 * j + 2] = cos(np.float64(theta[j]))
+        w[3 * j + 2] = cos(_held(theta[j]))
+
+
+@kernel
+def _held(theta: float) -> float:
+    return np.float64(theta) if theta < HALF_PI else HALF_PI
 
 
 @kernel
