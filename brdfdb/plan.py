@@ -262,7 +262,8 @@ def _candidates(task: _Task) -> Iterator[_Candidate]:
     fewest = float(MOST_VALUES)
     for names in kinds:
         for power in (0.5, 1.0, 0.0) if spec.grazing_pole else (0.0,):
-            for logarithm in (True, False):
+            # what goes on beyond the horizon may fall below 0, which a logarithm does not
+            for logarithm in (True,) if "theta_h" in names else (True, False):
                 ends = {name: _end(material, name) for name in names}
                 if spec.grazing_pole and power == 0.0:
                     ends |= {name: _POLE_END for name in ("theta_i", "theta_r") if name in names}

@@ -12,6 +12,7 @@ from brdfdb import accuracy, tabulate
 from brdfdb.error import Error
 from brdfdb.grids import ANISOTROPIC_HALF_DIFFERENCE_AXES, HALF_DIFFERENCE_AXES, ISOTROPIC_AXES
 from brdfdb.layout import Layout
+from brdfdb.lookup import Table
 from brdfdb.materials import Material, presets
 from brdfdb.plan import plan
 
@@ -59,6 +60,14 @@ def test_a_planned_table_keeps_to_its_tolerance_in_few_bytes(name: str, planned:
     assert found.overall.p99 <= TOLERANCE
     part = 4 * math.prod(layout.grid.shape)
     assert part <= (ANISOTROPIC_BYTES if layout.grid.anisotropic else ISOTROPIC_BYTES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_node_of_a_planned_table_is_below_0(name: str, planned: dict[str, Layout]) -> None:
+    layout = planned[name]
+    values = np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
+    assert Table.of(layout, values).brdf.min() >= 0.0
+    assert layout.interpolation.logarithm or values.min() >= 0.0
 
 
 def test_the_kind_of_table_suits_the_material(planned: dict[str, Layout]) -> None:
