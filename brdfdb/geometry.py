@@ -245,11 +245,6 @@ def spherical_angles(w: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.floa
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
-def fold_delta_phi(delta_phi: ArrayLike) -> NDArray[np.float64]:
-    """An azimuth difference [rad] folded to [0, pi] by its period and by the mirror symmetry of isotropic surfaces."""
-    return np.abs(np.remainder(np.asarray(delta_phi, dtype=np.float64) + np.pi, 2.0 * np.pi) - np.pi)
-
-
 def directions_from_half_difference(
     theta_h: ArrayLike, phi_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:

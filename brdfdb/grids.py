@@ -161,9 +161,17 @@ def axes_among(names: Iterable[Any]) -> tuple[str, ...]:
     """The axes of a grid among the names of arrays or dimensions.
 
     An anisotropic grid of half and difference vectors has the axes of an isotropic one, too.
+
+    Raises
+    ------
+    ValueError
+        If there are none.
     """
     known = set(names)
-    return next(kind for kind in reversed(KINDS) if set(kind) <= known)
+    for kind in reversed(KINDS):
+        if set(kind) <= known:
+            return kind
+    raise ValueError(f"grid axes: none of {', '.join(map(str, KINDS))} is among {', '.join(sorted(map(str, known)))}")
 
 
 def _checked(names: tuple[str, ...], name: str, nodes: Any) -> Axis:

@@ -12,7 +12,6 @@ from brdfdb._numba import kernel
 
 Array = NDArray[np.float64]
 
-MOST_AXES = 4
 _MOST_BUCKETS = 1 << 15  # of an axis: nodes closer together than a part in this share a bucket
 
 

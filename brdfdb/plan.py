@@ -27,6 +27,7 @@ from brdfdb.layout import Interpolation, Layout
 from brdfdb.lookup import Table, points
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
+from brdfdb.tabulate import POLE_END_DEG
 
 PLAN_VERSION = 1
 
@@ -63,7 +64,6 @@ _LINE = {
     "phi_h": (180.0, 1.0),
     "phi_d": (90.0, 1.0),
 }
-_POLE_END = 89.9  # of theta axes where the pole of a model is tabulated as it is
 
 
 class _Need:
@@ -234,10 +234,10 @@ def _offset(task: _Task) -> float:
 def coarsest(material: Material) -> Grid:
     """The smallest grid that suits a material."""
     names = ANISOTROPIC_AXES if material.anisotropic else ISOTROPIC_AXES
-    pole = material.spec.grazing_pole
-    return Grid(
-        {name: [0.0, _POLE_END if pole and name in ("theta_i", "theta_r") else _end(material, name)] for name in names}
-    )
+    ends = {name: _end(material, name) for name in names}
+    if material.spec.grazing_pole:
+        ends |= {"theta_i": POLE_END_DEG, "theta_r": POLE_END_DEG}
+    return Grid({name: [0.0, end] for name, end in ends.items()})
 
 
 def _end(material: Material, name: str) -> float:
@@ -266,7 +266,7 @@ def _candidates(task: _Task) -> Iterator[_Candidate]:
             for logarithm in (True,) if "theta_h" in names else (True, False):
                 ends = {name: _end(material, name) for name in names}
                 if spec.grazing_pole and power == 0.0:
-                    ends |= {name: _POLE_END for name in ("theta_i", "theta_r") if name in names}
+                    ends |= {name: POLE_END_DEG for name in ("theta_i", "theta_r") if name in names}
                 grid = Grid({name: [0.0, end] for name, end in ends.items()})
                 layout = Layout(
                     material,

@@ -18,7 +18,7 @@ from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
-_POLE_END = np.deg2rad(89.9)  # of light and viewer, where the pole of a model is tabulated as it is
+POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
 _CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
 # Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
@@ -143,7 +143,8 @@ def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, p
     """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
     lowest = 0.0  # cosine of light and viewer
     if layout.material.spec.grazing_pole and layout.interpolation.power == 0.0:
-        lowest, theta_h = np.cos(_POLE_END), np.minimum(theta_h, _POLE_END)
+        end = radians(POLE_END_DEG)
+        lowest, theta_h = float(np.cos(end)), np.minimum(theta_h, end)
     # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
     along, across = np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d))
     largest = np.arccos(np.minimum(lowest / np.hypot(along, across), 1.0)) - np.arctan2(across, along)

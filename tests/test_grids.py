@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.grids import KINDS, Grid, check_wavelengths
+from brdfdb.grids import KINDS, Grid, axes_among, check_wavelengths
 
 ISOTROPIC = {"theta_i": [0, 30, 80], "theta_r": [0, 89.5], "delta_phi": [0, 7, 90, 180]}
 ANISOTROPIC = {"theta_i": [0, 80], "phi_i": [0, 120, 240, 360], "theta_r": [0, 10, 80], "phi_r": [0, 180, 360]}
@@ -137,6 +137,13 @@ def test_grids_of_half_and_difference_vectors_say_what_they_are() -> None:
 def test_an_axis_of_half_and_difference_vectors_ends_where_symmetry_takes_over(name: str, nodes: list[float]) -> None:
     with pytest.raises(ValueError, match=rf"^{name}: (starts|ends) at \d+ degrees, must"):
         Grid(HALF | {name: nodes})
+
+
+@pytest.mark.parametrize("axes", [ISOTROPIC, ANISOTROPIC, HALF, TURNED_HALF])
+def test_the_axes_of_a_grid_are_found_among_other_names(axes: dict[str, list[float]]) -> None:
+    assert axes_among([*axes, "wavelength", "part"]) == tuple(axes)
+    with pytest.raises(ValueError, match=r"^grid axes: none of .* is among theta_i, wavelength$"):
+        axes_among(["wavelength", "theta_i"])
 
 
 @pytest.mark.parametrize("axes", [ISOTROPIC, ANISOTROPIC, HALF, TURNED_HALF])
