@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb import audit as module
 from brdfdb.albedo import directional_albedo, material_of
 from brdfdb.audit import AuditReport, MaterialAudit, audit, report
+from brdfdb.audit.energy import energy_of
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
@@ -312,7 +312,7 @@ def test_the_wavelength_of_the_largest_albedo_is_named() -> None:
     brdf = np.repeat(table.brdf[..., np.newaxis], 3, axis=-1)
     brdf[..., 1] *= np.float32(1.5)
     spectral = replace(table, wavelength_nm=WAVELENGTHS, values=brdf)
-    found = module._energy(spectral, material_of(spectral))
+    found = energy_of(spectral, material_of(spectral))
     assert (found.max_at_wavelength_nm, found.wavelength_nm) == (500.0, WAVELENGTHS.tolist())
     assert found.albedo[0] == pytest.approx([0.5, 0.75, 0.5], rel=1e-6)
 
@@ -427,13 +427,14 @@ def test_the_report_names_the_violations_and_nothing_else() -> None:
     excused = replace(excused, values=excused.brdf * np.float32(1.1))
     audits = [audit(table) for table in (replace(good, name="good"), replace(bad, name="bad"), excused)]
     document = written(audits)
-    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 2, ["bad"])
+    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 3, ["bad"])
     assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]
     assert AuditReport.model_validate(document) == report(audits)
 
 
 def test_an_empty_report_is_a_report() -> None:
-    assert written([]) == {"format": "brdfdb-audit", "version": 2, "materials": [], "violations": []}
+    empty: dict[str, list[Any]] = {"materials": [], "atlas": [], "gallery": [], "violations": []}
+    assert written([]) == {"format": "brdfdb-audit", "version": 3, **empty}
 
 
 @pytest.mark.parametrize(

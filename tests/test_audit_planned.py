@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.audit import LOOKUP_RECIPROCITY_TOLERANCE, MaterialAudit, _band_means, audit
+from brdfdb.audit import MaterialAudit, audit
+from brdfdb.audit.energy import _band_means
+from brdfdb.audit.reciprocity import LOOKUP_RECIPROCITY_TOLERANCE
 from brdfdb.layout import Interpolation, Layout
 from brdfdb.lookup import Table
 from brdfdb.tabulate import tabulate

@@ -1,0 +1,128 @@
+"""What an audit finds, as data: the types of the report."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from brdfdb.figure import Figure
+
+Verdict = Literal["passes", "known published excess", "violates"]
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class Bands(BaseModel):
+    """What a table that states its error is judged by: what exceeds 1, on average over bands of theta_i."""
+
+    model_config = _STRICT
+
+    theta_i_deg: list[float] = Field(description="edges of the bands")
+    stated_error: list[list[float]] = Field(
+        description="[band][wavelength], of all but the Dirac part: integral of abs(error) cos theta_r over that of "
+        "f_r cos theta_r"
+    )
+    explained: list[list[float | None]] = Field(
+        description="[band][wavelength], by how much that error can raise the mean albedo at most; null: not finite"
+    )
+    excess: list[list[float | None]] = Field(
+        description="[band][wavelength], mean of what exceeds 1, Dirac part included; null: not finite"
+    )
+
+
+class Energy(BaseModel):
+    """Directional albedo of the table, Dirac part included: what leaves, of unit flux from theta_i.
+
+    A table that states its error does so over bands of theta_i. What exceeds 1, or what is known of the material, may
+    be as much of a band as that error explains, and no more.
+    """
+
+    model_config = _STRICT
+
+    theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: the table is grey")
+    albedo: list[list[float | None]] = Field(
+        description="[theta_i][wavelength]; over the azimuths of the light the largest, if the table is anisotropic; "
+        "null: not finite"
+    )
+    specular: list[list[float | None]] = Field(description="[theta_i][wavelength], the share of the Dirac part in it")
+    integration_error: float | None = Field(
+        description="of the albedo, the largest estimate; 0: the exact integral of the interpolant; null: not finite"
+    )
+    bands: Bands | None = Field(description="null: the table states no error, and is allowed none")
+    max_albedo: float | None = Field(description="null: not finite")
+    max_at_theta_i_deg: float
+    max_at_wavelength_nm: float | None
+    exceeds_1_from_theta_i_deg: float | None
+    exceeds_1_beyond_error_from_theta_i_deg: float | None = Field(
+        description="where neither the stated error nor that of the integration explains it"
+    )
+    verdict: Verdict
+    reason: str = Field(description="also where a table passes because of the error that it states")
+
+
+class Asymmetry(BaseModel):
+    """abs(f - f') / (abs(f) + abs(f')) over pairs of directions, f' with light and viewer exchanged."""
+
+    model_config = _STRICT
+
+    pairs: int
+    mean: float
+    max: float
+    tolerance: float
+
+
+class Reciprocity(BaseModel):
+    """Asymmetry of the model at the parameters of the table, and of the table."""
+
+    model_config = _STRICT
+
+    model: Asymmetry = Field(description="over random pairs of directions")
+    table: Asymmetry = Field(
+        description="over every pair that the grid holds both ways round; of tables that hold other numbers than f_r, "
+        "or hold them over half and difference vectors, over pairs that are looked up, too, to whose f_r the offset of "
+        "the logarithms is added"
+    )
+    verdict: Verdict
+
+
+class Values(BaseModel):
+    """The stored values themselves, and those of f_r that come of them."""
+
+    model_config = _STRICT
+
+    count: int = Field(description="of stored values")
+    looked_up: int = Field(description="directions between the nodes where f_r was looked up; 0: linear between nodes")
+    smallest: float | None = Field(description="of f_r at the nodes and where it was looked up; null: none is finite")
+    negative: int = Field(description="of those of f_r, and of the Dirac part")
+    not_finite: int = Field(description="of those, and of what is stored in place of f_r")
+    positivity: Verdict
+    finiteness: Verdict
+
+
+class MaterialAudit(BaseModel):
+    """All findings on one revision of one material."""
+
+    model_config = _STRICT
+
+    material: str
+    revision: str
+    model: str
+    energy: Energy
+    reciprocity: Reciprocity
+    values: Values
+    verdict: Verdict = Field(description="the worst of the findings")
+
+
+class AuditReport(BaseModel):
+    """The audit of a store."""
+
+    model_config = _STRICT
+
+    format: Literal["brdfdb-audit"] = "brdfdb-audit"
+    version: Literal[3] = 3
+    materials: list[MaterialAudit]
+    atlas: list[Figure] = Field(description="where methods fail: forms of the models against high-precision values")
+    gallery: list[Figure] = Field(description="the figures of the papers, computed")
+    violations: list[str] = Field(description="names of the materials that violate something not known as published")

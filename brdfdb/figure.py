@@ -1,0 +1,95 @@
+"""What a plot shows, as data: curves, maps and pictures, and beside them what a paper says one sees."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict, Field
+
+Numbers = list[float | None]
+Role = Literal["ours", "printed", "textbook", "truth", "other"]
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class Curve(BaseModel):
+    """One line of a panel."""
+
+    model_config = _STRICT
+
+    label: str
+    x: list[float]
+    y: Numbers = Field(description="null: a gap")
+    role: Role = Field(default="other", description="which form is drawn; what the same role has looks the same")
+
+
+class Panel(BaseModel):
+    """Curves over common axes; of a polar panel x is the angle from the normal in degrees, -90 to 90, y the radius."""
+
+    model_config = _STRICT
+
+    kind: Literal["curves", "polar"] = "curves"
+    title: str = ""
+    x_label: str
+    y_label: str
+    curves: list[Curve]
+    log_x: bool = False
+    log_y: bool = False
+
+
+class Map(BaseModel):
+    """Values over two axes, as colours."""
+
+    model_config = _STRICT
+
+    kind: Literal["map"] = "map"
+    title: str = ""
+    x_label: str
+    y_label: str
+    value_label: str
+    x: list[float]
+    y: list[float]
+    values: list[Numbers] = Field(description="[y][x]; null: none")
+    log: bool = Field(default=False, description="whether colours are those of the logarithms")
+
+
+class Picture(BaseModel):
+    """A rendered image."""
+
+    model_config = _STRICT
+
+    kind: Literal["picture"] = "picture"
+    title: str = ""
+    radiance: list[Numbers] = Field(description="[row][column] from the top, linear, 1 is white; null: background")
+
+
+class Statement(BaseModel):
+    """What is said of a figure, and what is seen in ours."""
+
+    model_config = _STRICT
+
+    says: str = Field(description="what the paper says one sees, or what is known of the form")
+    where: str = Field(description="where it says so")
+    seen: str = Field(description="what was computed, with its numbers")
+    holds: bool
+
+
+class Figure(BaseModel):
+    """Panels with a caption, and the statements that they are held against."""
+
+    model_config = _STRICT
+
+    key: str = Field(description="unique, of lower-case letters, digits and hyphens")
+    paper: str = Field(description="key in references.bib")
+    title: str
+    caption: str = Field(description="what is drawn, with the parameters")
+    panels: list[Panel | Map | Picture]
+    statements: list[Statement]
+
+
+def numbers(values: ArrayLike, digits: int = 5) -> Numbers:
+    """A list of numbers to that many significant digits; what is not finite becomes None."""
+    flat = np.asarray(values, dtype=np.float64).ravel()
+    return [float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in flat.tolist()]

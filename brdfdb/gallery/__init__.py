@@ -1,0 +1,1 @@
+"""The figures of the three papers, computed, with what the papers say one sees in them."""
