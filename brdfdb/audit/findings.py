@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.figure import Figure
+from brdfdb.figure import Figure, Map, Numbers
 
 Verdict = Literal["passes", "known published excess", "violates"]
 
@@ -99,6 +99,128 @@ class Values(BaseModel):
     not_finite: int = Field(description="of those, and of what is stored in place of f_r")
     positivity: Verdict
     finiteness: Verdict
+
+
+EnergyVerdict = Literal["conserves", "loses", "known published excess", "violates"]
+Standing = Literal["inside", "at the edge", "outside"]
+
+
+class Furnace(BaseModel):
+    """The white furnace: the model made lossless, in light that is the same from everywhere; an ideal one shows 1."""
+
+    model_config = _STRICT
+
+    lossless: str = Field(description="which parameters were set to what")
+    theta_i_deg: list[float]
+    albedo: list[Numbers] = Field(description="[theta_i][wavelength], Dirac part included")
+    hemispherical: Numbers = Field(description="[wavelength], the mean over uniform light")
+    smallest: float
+    smallest_at_theta_i_deg: float
+    largest: float
+    largest_at_theta_i_deg: float
+
+
+class UniformBound(BaseModel):
+    """The largest uniform diffuse part a(lambda) that conserves energy at all angles, against the material's own."""
+
+    model_config = _STRICT
+
+    wavelength_nm: list[float]
+    largest: Numbers
+    preset: Numbers
+    keeps: bool = Field(description="whether the material's own is no larger at any wavelength")
+
+
+class ModelEnergy(BaseModel):
+    """Directional albedo of the model behind a table, by adaptive quadrature, Dirac part included."""
+
+    model_config = _STRICT
+
+    theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: grey")
+    albedo: list[Numbers] = Field(description="[theta_i][wavelength]; over the azimuths of the light the largest")
+    specular: list[Numbers] = Field(description="[theta_i][wavelength], the share of the Dirac part in it")
+    integration_error: float = Field(description="of the albedo, the largest estimate")
+    hemispherical: Numbers = Field(description="[wavelength], of light that is the same from everywhere")
+    max_albedo: float
+    max_at_theta_i_deg: float
+    max_at_wavelength_nm: float | None
+    exceeds_1_from_theta_i_deg: float | None
+    furnace: Furnace | None = Field(description="null: the model has no lossless parameters")
+    bound_on_a: UniformBound | None = Field(description="null: not a He-Torrance material")
+    verdict: EnergyVerdict
+    reason: str = Field(description="how much, where; of a known excess the citation")
+
+
+class Jump(BaseModel):
+    """How far f_r jumps across a seam, relative to its value there."""
+
+    model_config = _STRICT
+
+    seam: str = Field(description="what is crossed")
+    largest: float
+    where: str
+    tolerance: float
+
+
+class Smoothness(BaseModel):
+    """Jumps of the model across its branches, and of the table across the seams of its grid."""
+
+    model_config = _STRICT
+
+    model: list[Jump]
+    table: list[Jump]
+    verdict: Verdict
+
+
+class TableError(BaseModel):
+    """The table less the model, over planes of incidence, and at fresh directions against what the table states."""
+
+    model_config = _STRICT
+
+    stated_p99: float | None = Field(description="null: the table states no error")
+    fresh_p99: float
+    maps: list[Map] = Field(description="relative error over theta_i and theta_r, negative back towards the light")
+    verdict: Verdict
+
+
+class Sampling(BaseModel):
+    """The sampler of the model at the parameters of the material, for some lights."""
+
+    model_config = _STRICT
+
+    samples: int = Field(description="of each light")
+    theta_i_deg: list[float]
+    wavelength_nm: float | None
+    chi_square_p: Numbers = Field(description="probability of a worse histogram if the density is right; null: no bins")
+    largest_weight: Numbers
+    weight_spread: Numbers = Field(description="standard deviation of the weights over their mean")
+    monte_carlo: Numbers = Field(description="albedo without the Dirac part")
+    monte_carlo_error: Numbers = Field(description="its standard error")
+    quadrature: Numbers
+    verdict: Verdict
+
+
+class Limit(BaseModel):
+    """One limit that a paper states of its model, and where a material stands."""
+
+    model_config = _STRICT
+
+    quantity: str
+    value: str
+    valid: str
+    standing: Standing
+    words: str = Field(description="of the paper")
+    where: str
+
+
+class Validity(BaseModel):
+    """All limits of a model."""
+
+    model_config = _STRICT
+
+    limits: list[Limit]
+    standing: Standing = Field(description="the worst of them")
 
 
 class MaterialAudit(BaseModel):
