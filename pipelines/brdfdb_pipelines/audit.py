@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import errno
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import as_completed
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import brdfdb
+from brdfdb.atlas import ATLAS
 from brdfdb.audit import AuditReport, MaterialAudit, audit, report
-from brdfdb_pipelines import terminal
+from brdfdb.figure import Figure
+from brdfdb.gallery import GALLERY
+from brdfdb.store import StoreError
+from brdfdb_pipelines import terminal, workers
+
+Task = Callable[[], Any]
 
 
-def run(root: Path, names: list[str], report_path: Path) -> AuditReport:
+def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: bool = True) -> AuditReport:
     """Audit the named materials of a store, or all of them.
 
     Parameters
@@ -19,22 +32,97 @@ def run(root: Path, names: list[str], report_path: Path) -> AuditReport:
     names : list of str
         Materials; empty for all.
     report_path : Path
-        The JSON report, written when everything has been audited.
+        The JSON report, which ends in .json; the page is written beside it, as .html. Both are written when everything
+        has been audited.
+    jobs : int
+        How many processes work at it; 1: this one.
+    figures : bool
+        Compute the atlas and the gallery, too.
 
     Raises
     ------
     StoreError, UnknownMaterialError
-        If the store or a material is missing or damaged: every file is checked against its manifest.
+        If the store or a material is missing. Every file is checked against its manifest: what is damaged is an error,
+        too, in the end, when the report has been written of the others.
+    OSError, ValueError
+        If the report cannot be written there.
     """
     store = brdfdb.open(root)
-    revisions = {name: store.head(name) for name in names or store}
-    audits: list[MaterialAudit] = []
+    materials = list(dict.fromkeys(names)) or list(store)
+    for name in names:
+        store.head(name)
+    _check_path(report_path)
+    tasks: dict[str, Task] = {name: partial(_audited, root, name) for name in materials}
+    drawn = [*ATLAS, *GALLERY] if figures else []
+    tasks |= {f"figure {key}": partial(_drawn, key) for key in drawn}
+    done: dict[str, Any] = {}
     with terminal.progress() as bar:
-        for name in bar.track(revisions, description="auditing"):
-            store.verify(name)
-            audits.append(audit(store[name]))
-    found = report(audits)
-    report_path.write_text(found.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        task = bar.add_task("auditing", total=len(tasks))
+        for name, outcome in _outcomes(tasks, jobs):
+            done[name] = outcome
+            bar.advance(task)
+    audits = [done[name] for name in materials if isinstance(done[name], MaterialAudit)]
+    damaged = "; ".join(str(outcome) for outcome in done.values() if isinstance(outcome, StoreError))
+    if damaged and not audits:
+        raise StoreError(damaged)
+    found = report(
+        audits,
+        atlas=[done[f"figure {key}"] for key in ATLAS if figures],
+        gallery=[done[f"figure {key}"] for key in GALLERY if figures],
+    )
+    report_path.write_text(found.model_dump_json() + "\n", encoding="utf-8")
+    _print(root, found, report_path)
+    if damaged:
+        raise StoreError(damaged)
+    return found
+
+
+def _check_path(report_path: Path) -> None:
+    """Fail before the work, not after it."""
+    for path in (report_path, report_path.with_suffix(".html")):
+        if path.is_dir():
+            raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not report_path.parent.is_dir():
+        code = errno.ENOTDIR if report_path.parent.exists() else errno.ENOENT
+        raise OSError(code, os.strerror(code), str(report_path))
+    if report_path.suffix != ".json":
+        raise ValueError(f"--report: {report_path} does not end in .json")
+
+
+def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
+    """What each task returns, as it is done."""
+    if jobs == 1:
+        for name, task in tasks.items():
+            yield name, task()
+        return
+    with workers.processes(jobs) as pool:
+        futures = {pool.executor.submit(task): name for name, task in tasks.items()}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BrokenProcessPool as error:
+            raise ChildProcessError("the workers are gone, killed or out of memory") from error
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+def _audited(root: Path, name: str) -> MaterialAudit | StoreError:
+    """One material; or what is wrong with its files, which is no reason to leave the others."""
+    store = brdfdb.open(root)
+    try:
+        store.verify(name)
+        return audit(store[name])
+    except StoreError as error:
+        return error
+
+
+def _drawn(key: str) -> Figure:
+    return (ATLAS.get(key) or GALLERY[key])()
+
+
+def _print(root: Path, found: AuditReport, report_path: Path) -> None:
+    audits = found.materials
     numbers = ("albedo up to", "model", "table", "smallest f_r")
     terminal.print_table(
         f"Audit of {root}, the tables as interpolated (model, table: largest asymmetry under exchange of directions)",
@@ -55,7 +143,6 @@ def run(root: Path, names: list[str], report_path: Path) -> AuditReport:
         f"{len(audits)} audited: {len(audits) - known - len(found.violations)} pass, {known} exceed 1 as their "
         f"published parameters are known to, {len(found.violations)} violate; report in {report_path}"
     )
-    return found
 
 
 def _row(a: MaterialAudit) -> tuple[str, ...]:

@@ -106,8 +106,16 @@ def _parser() -> argparse.ArgumentParser:
         "--report",
         type=Path,
         metavar="FILE",
-        help="JSON report (default: DIR/audit.json, or DIR/audit-part.json with names)",
+        help="JSON report, which ends in .json (default: DIR/audit.json, or DIR/audit-part.json with names)",
     )
+    audit.add_argument(
+        "--jobs",
+        type=_positive,
+        default=len(os.sched_getaffinity(0)),
+        metavar="N",
+        help="processes (default: %(default)s)",
+    )
+    audit.add_argument("--no-figures", action="store_true", help="neither stability atlas nor gallery, as with names")
 
     text = "Write slices of tables as image files."
     # a command a format: argparse takes no NAME after an option that follows another positional argument
@@ -242,7 +250,13 @@ def _audit(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import audit
 
     default = options.store / ("audit-part.json" if options.names else "audit.json")
-    report = audit.run(options.store, options.names, options.report or default)
+    report = audit.run(
+        options.store,
+        options.names,
+        options.report or default,
+        jobs=options.jobs,
+        figures=not (options.names or options.no_figures),
+    )
     return VIOLATED if report.violations else 0
 
 
