@@ -67,6 +67,14 @@ def surface_of(name: str, wavelength_nm: float | None = None) -> Surface:
     return {key: float(np.squeeze(value)) for key, value in presets()[name].arguments(wavelength_nm).items()}
 
 
+def described(surface: Surface) -> str:
+    """The parameters of a surface as captions write them."""
+    return (
+        f"σ_0 = {surface['sigma_0_um']:g} µm, τ = {surface['tau_um']:g} µm, a = {surface['a']:g}, "
+        f"λ = {surface['wavelength_nm'] / 1000.0:g} µm"
+    )
+
+
 def viewers(theta_i_deg: float) -> Floats:
     """Angles [degree] of viewers in a plane, close to each other where a cone of light is mirrored."""
     near = np.arange(-4.0, 4.05, 0.1)
@@ -81,10 +89,10 @@ def cut_of(model: Callable[..., Floats], theta_i_deg: float, turn: float = 0.0, 
     return Cut(theta_i_deg, x, model(radians(theta_i_deg), 0.0, radians(abs(x)), phi_r, **arguments))
 
 
-def measured(surface: Surface, thetas_deg: Sequence[float]) -> list[Cut]:
+def measured(surface: Surface, thetas_deg: Floats) -> list[Cut]:
     """What instruments of the paper's apertures see, all three parts, at some angles of incidence."""
     cones = {"incident_solid_angle_sr": CONE_SR, "received_solid_angle_sr": CONE_SR}
-    return [cut_of(he_torrance_aperture, theta, **cones, **surface) for theta in thetas_deg]
+    return [cut_of(he_torrance_aperture, theta, **cones, **surface) for theta in thetas_deg.tolist()]
 
 
 def specular(surface: Surface, theta_i_deg: float | Floats) -> Floats:

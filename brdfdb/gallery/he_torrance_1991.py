@@ -12,6 +12,7 @@ from brdfdb.gallery._he_torrance_cuts import (
     HALF_ANGLE_DEG,
     HIGHEST_DEG,
     cut_of,
+    described,
     listed,
     measured,
     polar,
@@ -31,18 +32,18 @@ APERTURES = "Light and receiver have cones of π/1024 sr; the value in the mirro
 def fig_07() -> Figure:
     """Aluminum at 2 µm."""
     surface = surface_of("roughened-aluminum-2000nm")
-    thetas = (10.0, 45.0, 75.0)
+    thetas = np.array([10.0, 45.0, 75.0])
     cuts = measured(surface, thetas)
-    rho_s, diffuse = specular(surface, np.array(thetas)), reflected(surface, np.array(thetas), specular=False)
+    rho_s, diffuse = specular(surface, thetas), reflected(surface, thetas, specular=False)
     of_peaks = [specular_of_peak(surface, cut) for cut in cuts]
-    short = specular(surface_of("roughened-aluminum-500nm"), np.array(thetas))
-    lobes = [cut_of(he_torrance, theta, **surface) for theta in thetas]
+    short = specular(surface_of("roughened-aluminum-500nm"), thetas)
+    lobes = [cut_of(he_torrance, theta, **surface) for theta in thetas.tolist()]
     widths = [cut._replace(f_r=cut.f_r - lobe.f_r).width_deg for cut, lobe in zip(cuts, lobes, strict=True)]
     return Figure(
         key="he-torrance-1991-fig-07",
         paper="he1991",
         title="Roughened aluminum at 2 µm",
-        caption=f"f_r in the plane of incidence; σ_0 = 0.28 µm, τ = 1.77 µm, a = 0, λ = 2 µm. {APERTURES}",
+        caption=f"f_r in the plane of incidence; {described(surface)}. {APERTURES}",
         panels=[polar(cuts)],
         statements=[
             Statement(
@@ -83,16 +84,16 @@ def fig_07() -> Figure:
 def fig_08() -> Figure:
     """Aluminum at 0.5 µm."""
     surface = surface_of("roughened-aluminum-500nm")
-    thetas = (10.0, 30.0, 45.0, 60.0, 75.0)
+    thetas = np.array([10.0, 30.0, 45.0, 60.0, 75.0])
     cuts = measured(surface, thetas)
     *off, last = cuts
-    rho_s, diffuse = specular(surface, np.array(thetas)), reflected(surface, np.array(thetas), specular=False)
+    rho_s, diffuse = specular(surface, thetas), reflected(surface, thetas, specular=False)
     of_last = specular_of_peak(surface, last)
     return Figure(
         key="he-torrance-1991-fig-08",
         paper="he1991",
         title="Roughened aluminum at 0.5 µm",
-        caption=f"f_r in the plane of incidence; σ_0 = 0.28 µm, τ = 1.77 µm, a = 0, λ = 0.5 µm. {APERTURES}",
+        caption=f"f_r in the plane of incidence; {described(surface)}. {APERTURES}",
         panels=[polar(cuts)],
         statements=[
             Statement(
@@ -123,22 +124,22 @@ def fig_08() -> Figure:
 def fig_09() -> Figure:
     """Magnesium oxide, also across the plane of incidence."""
     surface = surface_of("magnesium-oxide-ceramic")
-    thetas = (10.0, 45.0, 60.0, 75.0)
+    thetas = np.array([10.0, 45.0, 60.0, 75.0])
     cuts = measured(surface, thetas)
     uniform = surface["a"] / np.pi
-    first_surface = reflected({**surface, "a": 0.0}, np.array(thetas))
+    first_surface = reflected({**surface, "a": 0.0}, thetas)
     mirror = np.array([cut.mirror for cut in cuts]) / uniform
-    rho_s = specular(surface, np.array(thetas))
+    rho_s = specular(surface, thetas)
     wavelengths = surface["sigma_0_um"] * 1000.0 / surface["wavelength_nm"]
     spread = float(cuts[0].f_r.max() / cuts[0].f_r.min())
-    across = [cut_of(he_torrance, theta, np.pi / 2.0, **surface) for theta in thetas]
+    across = [cut_of(he_torrance, theta, np.pi / 2.0, **surface) for theta in thetas.tolist()]
     excess = [float(cut.f_r.max()) / uniform - 1.0 for cut in across]
     return Figure(
         key="he-torrance-1991-fig-09",
         paper="he1991",
         title="Roughened magnesium oxide ceramic at 0.5 µm",
-        caption=f"f_r in the plane of incidence, and across it, which the paper does not draw, over a/π; σ_0 = 1.45 "
-        f"µm, τ = 13.2 µm, a = 0.9, λ = 0.5 µm. {APERTURES}",
+        caption="f_r in the plane of incidence, and across it, which the paper does not draw, over a/π; "
+        f"{described(surface)}. {APERTURES}",
         panels=[
             polar(cuts),
             Panel(
@@ -222,15 +223,20 @@ def fig_10() -> Figure:
         key="he-torrance-1991-fig-10",
         paper="he1991",
         title="Sandpaper, 220 grit",
-        caption=f"f_r for normal incidence over f_r along the normal (eq. 11); σ_0/τ = {slope:.2g}, a = 0, λ = 0.55 µm "
-        "(so the text; the caption says 0.5). The paper prints no σ_0: it is 44 µm here, beside the limit.",
+        caption=f"f_r for normal incidence over f_r along the normal (eq. 11); {described(surface)} (so the text; the "
+        f"caption says 0.5). The paper prints σ_0/τ = {slope:g} only: σ_0 is our choice, and beside it is the limit.",
         panels=[
             Panel(
                 kind="polar",
                 x_label="θ_r [degree]",
                 y_label="f_r over f_r along the normal",
                 curves=[
-                    Curve(label="σ_0 = 44 µm", x=cut.x_deg.tolist(), y=numbers(normalised), role="ours"),
+                    Curve(
+                        label=f"σ_0 = {surface['sigma_0_um']:g} µm",
+                        x=cut.x_deg.tolist(),
+                        y=numbers(normalised),
+                        role="ours",
+                    ),
                     Curve(label="σ_0/λ → ∞", x=limit.x_deg.tolist(), y=numbers(limit.f_r / limit.mirror)),
                 ],
             )
@@ -268,22 +274,22 @@ def fig_10() -> Figure:
 def fig_11() -> Figure:
     """Blue plastic, in absolute values."""
     surface = surface_of("blue-plastic")
-    thetas = (15.0, 30.0, 45.0, 60.0)
+    thetas = np.array([15.0, 30.0, 45.0, 60.0])
     cuts = measured(surface, thetas)
     uniform = surface["a"] / np.pi
     reach = 2.0 * HALF_ANGLE_DEG
     outside = max(float(abs(cut.f_r / uniform - 1.0)[abs(cut.x_deg - cut.theta_i_deg) > reach].max()) for cut in cuts)
     directional = max(
         float(cut_of(lambda *angles: he_torrance_parts(*angles, **surface).directional_diffuse, theta).f_r.max())
-        for theta in thetas
+        for theta in thetas.tolist()
     )
     rho_dh = float(reflected(surface, 0.0))
     return Figure(
         key="he-torrance-1991-fig-11",
         paper="he1991",
         title="Smooth blue plastic at 0.46 µm",
-        caption="f_r in the plane of incidence, in absolute values; σ_0 = 0, a = 0.15, λ = 0.46 µm. The heights of the "
-        "spikes are those of cones of π/1024 sr, of Figs 7 to 9; the paper does not say which it had here.",
+        caption=f"f_r in the plane of incidence, in absolute values; {described(surface)}. The heights of the spikes "
+        "are those of cones of π/1024 sr, of Figs 7 to 9; the paper does not say which it had here.",
         panels=[
             Panel(x_label="θ_r [degree]", y_label="f_r [1/sr]", log_y=True, curves=[cut.curve(1.0) for cut in cuts])
         ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from brdfdb.figure import Curve, Figure, Panel, Statement, numbers
-from brdfdb.gallery._he_torrance_cuts import Cut, cut_of, listed, reflected, smooth, specular, surface_of
+from brdfdb.gallery._he_torrance_cuts import Surface, cut_of, described, listed, reflected, smooth, specular, surface_of
 from brdfdb.models import he_torrance, he_torrance_very_rough, lambert
 from brdfdb.parameters import Floats
 
@@ -39,9 +39,9 @@ def fig_12() -> Figure:
         key="he-torrance-1991-fig-12",
         paper="he1991",
         title="Aluminum cylinders of growing roughness",
-        caption="What the specular images and the highlights of the rendered cylinders are made of, at 0.55 µm: "
-        "ρ_s (eq. 73) over the angle of incidence, and the directional diffuse part in the plane of incidence at 30 "
-        "degrees over its value in the mirror direction; a = 0.",
+        caption="What the specular images and the highlights of the rendered cylinders are made of, at "
+        f"{GREEN_NM:g} nm: ρ_s (eq. 73) over the angle of incidence, and the directional diffuse part in the plane of "
+        "incidence at 30 degrees over its value in the mirror direction; a = 0.",
         panels=[
             Panel(
                 title="Specular reflectance",
@@ -110,10 +110,12 @@ def fig_13() -> Figure:
     limit = cut_of(he_torrance_very_rough, 30.0, sigma_0_over_tau=slope, **optics)
     uniform = cut_of(lambert, 30.0, **diffuser)
 
-    def off(lobe: Cut) -> float:
-        return float(abs(lobe.f_r - limit.f_r).max() / limit.f_r.max())
+    def off(surface: Surface, theta_i_deg: float = 30.0) -> float:
+        tends = cut_of(he_torrance_very_rough, theta_i_deg, sigma_0_over_tau=slope, **optics).f_r
+        return float(abs(cut_of(he_torrance, theta_i_deg, **surface).f_r - tends).max() / tends.max())
 
-    at_2_5 = off(cut)
+    thetas = (0.0, 30.0, 60.0, 80.0)
+    offs = [off(rough, theta) for theta in thetas]
     fresnel = smooth(mirror, THETA_DEG)
     images = specular(mirror, THETA_DEG)
     dull = specular(rough, THETA_DEG)
@@ -124,14 +126,15 @@ def fig_13() -> Figure:
         {**rough, "sigma_0_um": ratio * GREEN_NM / 1000.0, "tau_um": ratio * GREEN_NM / 1000.0 / slope}
         for ratio in ratios
     ]
-    from_rough = np.array([off(cut_of(he_torrance, 30.0, **surface)) for surface in scaled])
+    from_rough = np.array([off(surface) for surface in scaled])
     from_smooth = 1.0 - np.array([float(specular(surface, 30.0)) for surface in scaled]) / float(smooth(rough, 30.0))
     left = np.array([float(reflected(surface, 30.0, specular=False)) for surface in scaled])
     return Figure(
         key="he-torrance-1991-fig-13",
         paper="he1991",
         title="Limiting cases: directional diffuse, specular, uniform diffuse",
-        caption=f"Cylinders (a) σ_0 = 2.5 µm with σ_0/τ = {slope:.3g}, (b) σ_0 = 0 and (c) ideal diffuse, at 0.55 µm. "
+        caption=f"Cylinders (a) σ_0 = {rough['sigma_0_um']:g} µm with σ_0/τ = {slope:.3g}, (b) σ_0 = 0 and (c) ideal "
+        f"diffuse, at {GREEN_NM:g} nm. "
         "First f_r in the plane of incidence at 30 degrees, of (a) beside its limit; the specular part of (b) is a "
         "Dirac delta, and its reflectance follows. Last, how far He and Torrance's model is from its two limits at the "
         "slope of (a), at 30 degrees.",
@@ -173,8 +176,9 @@ def fig_13() -> Figure:
                 "at 0.16.",
                 where="section 5, on Fig. 13",
                 seen=f"At σ_0/λ = {rough['sigma_0_um'] * 1000.0 / GREEN_NM:.2g} f_r differs from the limit by "
-                f"{at_2_5:.1e} of its largest value; ρ_s is {dull[30]:g} at 30 degrees.",
-                holds=at_2_5 < 0.01 and bool(dull[30] < 1e-9),
+                f"{listed(offs, '.1e')} of its largest value at {listed(thetas)} degrees: towards grazing g falls. "
+                f"ρ_s is {dull[30]:g} at 30 degrees.",
+                holds=max(offs[:3]) < 0.01 and bool(dull[30] < 1e-9),
             ),
             Statement(
                 says="Cylinder (b) is described by the specular term, in which the reflectance is a function of "
@@ -224,8 +228,8 @@ def fig_14() -> Figure:
         key="he-torrance-1991-fig-14",
         paper="he1991",
         title="Images in smooth and in rough plastic",
-        caption="ρ_s (eq. 73) of the cube, σ_0 = 0, and of the table, σ_0 = 0.2 µm, τ = 2 µm, of the rendered scene, "
-        "at 0.55 µm, over the angle of incidence.",
+        caption=f"ρ_s (eq. 73) over the angle of incidence, of the cube, {described(cube)}, and of the table, "
+        f"{described(table)}.",
         panels=[
             Panel(
                 x_label="θ_i [degree]",
