@@ -1,0 +1,332 @@
+"""He, Torrance, Sillion and Greenberg 1991: its measured samples, Figs 7 to 11; cylinders and scene are next door."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from brdfdb.figure import Curve, Figure, Panel, Statement, numbers
+from brdfdb.gallery import he_torrance_1991_objects as objects
+from brdfdb.gallery._he_torrance_cuts import (
+    HALF_ANGLE_DEG,
+    HIGHEST_DEG,
+    cut_of,
+    described,
+    listed,
+    measured,
+    polar,
+    reflected,
+    specular,
+    specular_of_peak,
+    surface_of,
+)
+from brdfdb.models import he_torrance, he_torrance_parts, he_torrance_very_rough
+
+# Over how many degrees two equal small cones share half of their solid angle or more. Of axes 2 u half angles apart it
+# is half where 2 arccos(u) - 2 u sqrt(1 - u^2) = pi / 2.
+HALF_SEEN_DEG = 4.0 * 0.40397 * HALF_ANGLE_DEG
+APERTURES = "Light and receiver have cones of π/1024 sr; the value in the mirror direction is 1 (eq. 11)."
+
+
+def fig_07() -> Figure:
+    """Aluminum at 2 µm."""
+    surface = surface_of("roughened-aluminum-2000nm")
+    thetas = np.array([10.0, 45.0, 75.0])
+    cuts = measured(surface, thetas)
+    rho_s, diffuse = specular(surface, thetas), reflected(surface, thetas, specular=False)
+    of_peaks = [specular_of_peak(surface, cut) for cut in cuts]
+    short = specular(surface_of("roughened-aluminum-500nm"), thetas)
+    lobes = [cut_of(he_torrance, theta, **surface) for theta in thetas.tolist()]
+    widths = [cut._replace(f_r=cut.f_r - lobe.f_r).width_deg for cut, lobe in zip(cuts, lobes, strict=True)]
+    return Figure(
+        key="he-torrance-1991-fig-07",
+        paper="he1991",
+        title="Roughened aluminum at 2 µm",
+        caption=f"f_r in the plane of incidence; {described(surface)}. {APERTURES}",
+        panels=[polar(cuts)],
+        statements=[
+            Statement(
+                says="The surface shows strong specular reflection at this wavelength.",
+                where="caption of Fig. 7",
+                seen=f"All are largest in the mirror direction; the specular part is {listed(of_peaks, '.1%')} of what "
+                f"is seen there at {listed(thetas)} degrees.",
+                holds=all(cut.peak_deg == cut.theta_i_deg for cut in cuts) and min(of_peaks) > 0.5,
+            ),
+            Statement(
+                says="For incidence at 10 degrees, the reflected pattern displays both specular and directional "
+                "diffuse components.",
+                where="section 4, on Fig. 7",
+                seen=f"Specular is {of_peaks[0]:.0%} of the height of the peak and {rho_s[0]:.3f} of the light; "
+                f"directional diffuse is {diffuse[0]:.3f} of the light.",
+                holds=bool(of_peaks[0] > 0.5 and diffuse[0] > 0.5),
+            ),
+            Statement(
+                says="The angular width of the measured specular peak is determined by the solid angles of incident "
+                "and received light.",
+                where="section 4, on Fig. 7",
+                seen=f"At half of their height above the lobe they stand on, peaks are {listed(widths)} degrees wide; "
+                f"two cones of π/1024 sr share half of their solid angle or more over {HALF_SEEN_DEG:.3g}.",
+                holds=bool(np.allclose(widths, HALF_SEEN_DEG, rtol=0.01)),
+            ),
+            Statement(
+                says="An emerging specular peak as the angle of incidence is increased and, for the metal, as the "
+                "wavelength is increased.",
+                where="section 4, on Figs 7 to 9; conclusion 3",
+                seen=f"The specular part is {listed(rho_s)} of the light at {listed(thetas)} degrees, at 0.5 µm "
+                f"{listed(short)}.",
+                holds=bool(np.all(np.diff(rho_s) > 0.0) and np.all(np.diff(short) > 0.0) and np.all(rho_s > short)),
+            ),
+        ],
+    )
+
+
+def fig_08() -> Figure:
+    """Aluminum at 0.5 µm."""
+    surface = surface_of("roughened-aluminum-500nm")
+    thetas = np.array([10.0, 30.0, 45.0, 60.0, 75.0])
+    cuts = measured(surface, thetas)
+    *off, last = cuts
+    rho_s, diffuse = specular(surface, thetas), reflected(surface, thetas, specular=False)
+    of_last = specular_of_peak(surface, last)
+    return Figure(
+        key="he-torrance-1991-fig-08",
+        paper="he1991",
+        title="Roughened aluminum at 0.5 µm",
+        caption=f"f_r in the plane of incidence; {described(surface)}. {APERTURES}",
+        panels=[polar(cuts)],
+        statements=[
+            Statement(
+                says="A strong directional diffuse pattern appears.",
+                where="section 4, on Fig. 8",
+                seen=f"The directional diffuse part is {listed(diffuse, '.3f')} of the light at {listed(thetas)} "
+                f"degrees, the specular part {listed(rho_s, '.2g')}.",
+                holds=bool(np.all(diffuse > 0.5) and np.all(diffuse > rho_s)),
+            ),
+            Statement(
+                says="For 10, 30, 45 and 60 degrees the reflected intensity is maximal at larger-than-specular angles.",
+                where="section 4, on Fig. 8",
+                seen=f"The largest values are at {listed([cut.peak_deg for cut in off])} degrees, "
+                f"{listed([cut.peak for cut in off], '.3f')} times those in the mirror direction.",
+                holds=all(cut.peak_deg > cut.theta_i_deg and cut.peak > 1.0 for cut in off),
+            ),
+            Statement(
+                says="For 75 degrees, a specular peak emerges.",
+                where="section 4, on Fig. 8",
+                seen=f"The largest value is at {last.peak_deg:g} degrees, and {of_last:.0%} of it is specular; at 60 "
+                f"degrees {specular_of_peak(surface, off[-1]):.1%} of what is seen in the mirror direction is.",
+                holds=last.peak_deg == last.theta_i_deg and of_last > 0.5 > specular_of_peak(surface, off[-1]),
+            ),
+        ],
+    )
+
+
+def fig_09() -> Figure:
+    """Magnesium oxide, also across the plane of incidence."""
+    surface = surface_of("magnesium-oxide-ceramic")
+    thetas = np.array([10.0, 45.0, 60.0, 75.0])
+    cuts = measured(surface, thetas)
+    uniform = surface["a"] / np.pi
+    first_surface = reflected({**surface, "a": 0.0}, thetas)
+    mirror = np.array([cut.mirror for cut in cuts]) / uniform
+    rho_s = specular(surface, thetas)
+    wavelengths = surface["sigma_0_um"] * 1000.0 / surface["wavelength_nm"]
+    spread = float(cuts[0].f_r.max() / cuts[0].f_r.min())
+    across = [cut_of(he_torrance, theta, np.pi / 2.0, **surface) for theta in thetas.tolist()]
+    excess = [float(cut.f_r.max()) / uniform - 1.0 for cut in across]
+    return Figure(
+        key="he-torrance-1991-fig-09",
+        paper="he1991",
+        title="Roughened magnesium oxide ceramic at 0.5 µm",
+        caption="f_r in the plane of incidence, and across it, which the paper does not draw, over a/π; "
+        f"{described(surface)}. {APERTURES}",
+        panels=[
+            polar(cuts),
+            Panel(
+                kind="polar",
+                title="Across the plane of incidence",
+                x_label="θ_r [degree]",
+                y_label="f_r over a/π",
+                curves=[cut.curve(uniform) for cut in across],
+            ),
+        ],
+        statements=[
+            Statement(
+                says="This surface shows nearly uniform diffuse behavior at 10 degrees.",
+                where="section 4, on Fig. 9",
+                seen=f"f_r is the same within a factor of {spread:.2f} in the plane of incidence, and "
+                f"{1.0 - first_surface[0] / (first_surface[0] + surface['a']):.0%} of the light is uniform diffuse.",
+                holds=spread < 2.0 and bool(first_surface[0] < 0.1 * surface["a"]),
+            ),
+            Statement(
+                says="Subsurface scattering has a relatively stronger role as compared to the aluminum surface: a "
+                "strong uniform diffuse pattern.",
+                where="section 4, on Fig. 9",
+                seen=f"The first surface reflects {listed(first_surface, '.3f')} at {listed(thetas)} degrees, the "
+                f"uniform part {surface['a']:g}.",
+                holds=bool(np.all(first_surface < surface["a"])),
+            ),
+            Statement(
+                says="The surface displays an emerging peak as the angle of incidence is increased.",
+                where="section 4, on Fig. 9, of both materials",
+                seen=f"In the mirror direction f_r is {listed(mirror)} times the uniform part at {listed(thetas)} "
+                "degrees.",
+                holds=bool(np.all(np.diff(mirror) > 0.0)),
+            ),
+            Statement(
+                says="The peak that emerges for larger angles of incidence is specular.",
+                where='section 4, "an emerging specular peak for larger values of θ_i"; caption of Fig. 9',
+                seen="It is the directional diffuse lobe, largest at "
+                f"{listed([cut.peak_deg for cut in cuts])} degrees. The specular part falls as e^-g, and is "
+                f"{rho_s[-1]:.0e} of the light at 75 degrees: σ_0 is {wavelengths:.1f} wavelengths.",
+                holds=all(cut.peak_deg == cut.theta_i_deg for cut in cuts[1:]) and bool(rho_s[-1] > 1e-3),
+            ),
+            Statement(
+                says="Energy conservation gives an upper bound for a(λ), a constrained, but otherwise free, parameter.",
+                where="section 3.2.3",
+                seen=f"With a = {surface['a']:g}, ρ_dh is {listed(first_surface + surface['a'], '.3f')} at "
+                f"{listed(thetas)} degrees: there is no room for the first surface at larger angles.",
+                holds=bool(np.all(first_surface + surface["a"] <= 1.0)),
+            ),
+            Statement(
+                says="Subsurface scattered light is approximated as uniform-diffuse (i.e., Lambertian).",
+                where="section 3.2.3",
+                seen="Across the plane of incidence f_r is above a/π by at most "
+                f"{listed(excess[1:], '.2g')} of it at {listed(thetas[1:])} degrees. At 10 degrees the lobe reaches "
+                f"there: {excess[0]:.2g}.",
+                holds=max(excess[1:]) < 0.05,
+            ),
+        ],
+    )
+
+
+def fig_10() -> Figure:
+    """Sandpaper."""
+    surface = surface_of("sandpaper-220-grit")
+    slope = surface["sigma_0_um"] / surface["tau_um"]
+    cut = cut_of(he_torrance, 0.0, **surface)
+    limit = cut_of(
+        he_torrance_very_rough, 0.0, sigma_0_over_tau=slope, **{key: surface[key] for key in ("n", "k", "a")}
+    )
+    larger = cut_of(
+        he_torrance, 0.0, **{**surface, "sigma_0_um": 10 * surface["sigma_0_um"], "tau_um": 10 * surface["tau_um"]}
+    )
+    off = max(float(abs(other.f_r / cut.f_r - 1.0).max()) for other in (limit, larger))
+    normalised = cut.f_r / cut.mirror
+    lowest = int(np.argmin(normalised))
+    patterns = (
+        cut_of(he_torrance, 45.0, **surface_of("roughened-aluminum-2000nm")),
+        cut_of(he_torrance, 45.0, **surface_of("roughened-aluminum-500nm")),
+        cut_of(he_torrance, 45.0, **surface),
+    )
+    return Figure(
+        key="he-torrance-1991-fig-10",
+        paper="he1991",
+        title="Sandpaper, 220 grit",
+        caption=f"f_r for normal incidence over f_r along the normal (eq. 11); {described(surface)} (so the text; the "
+        f"caption says 0.5). The paper prints σ_0/τ = {slope:g} only: σ_0 is our choice, and beside it is the limit.",
+        panels=[
+            Panel(
+                kind="polar",
+                x_label="θ_r [degree]",
+                y_label="f_r over f_r along the normal",
+                curves=[
+                    Curve(
+                        label=f"σ_0 = {surface['sigma_0_um']:g} µm",
+                        x=cut.x_deg.tolist(),
+                        y=numbers(normalised),
+                        role="ours",
+                    ),
+                    Curve(label="σ_0/λ → ∞", x=limit.x_deg.tolist(), y=numbers(limit.f_r / limit.mirror)),
+                ],
+            )
+        ],
+        statements=[
+            Statement(
+                says="The surface shows a large reflectance at grazing reflection angles.",
+                where="caption of Fig. 10",
+                seen=f"f_r falls to {normalised[lowest]:.2f} at {abs(cut.x_deg[lowest]):.0f} degrees and then grows, "
+                f"to {normalised[-1]:.2f} at {HIGHEST_DEG:g} degrees. Of all light {reflected(surface, 0.0):.1e} is "
+                "reflected, which the normalised figure hides: facets so steep send light on into the surface.",
+                holds=abs(cut.peak_deg) == HIGHEST_DEG and cut.peak > 2.0,
+            ),
+            Statement(
+                says="For very rough surfaces, only the ratio σ_0/τ is required, not σ_0 and τ separately.",
+                where="section 4, on Fig. 10",
+                seen=f"With σ_0 and τ ten times as large, or infinite, f_r changes by {off:.1e} of itself at most.",
+                holds=off < 1e-3,
+            ),
+            Statement(
+                says="Maximal values in the specular direction for slightly rough surfaces, at off-specular angles for "
+                "intermediate roughnesses, or at grazing reflection angles for very rough surfaces.",
+                where="section 3.2.2; conclusion 4",
+                seen="At 45 degrees the directional diffuse part is largest at "
+                f"{listed([cut.peak_deg for cut in patterns])} degrees: of aluminum at 2 µm, at 0.5 µm, and of "
+                f"sandpaper, where {HIGHEST_DEG:g} are the last, towards the light or away from it.",
+                holds=abs(patterns[0].peak_deg - 45.0) < 1.0
+                and 46.0 < patterns[1].peak_deg < 80.0
+                and abs(patterns[2].peak_deg) == HIGHEST_DEG,
+            ),
+        ],
+    )
+
+
+def fig_11() -> Figure:
+    """Blue plastic, in absolute values."""
+    surface = surface_of("blue-plastic")
+    thetas = np.array([15.0, 30.0, 45.0, 60.0])
+    cuts = measured(surface, thetas)
+    uniform = surface["a"] / np.pi
+    reach = 2.0 * HALF_ANGLE_DEG
+    outside = max(float(abs(cut.f_r / uniform - 1.0)[abs(cut.x_deg - cut.theta_i_deg) > reach].max()) for cut in cuts)
+    directional = max(
+        float(cut_of(lambda *angles: he_torrance_parts(*angles, **surface).directional_diffuse, theta).f_r.max())
+        for theta in thetas.tolist()
+    )
+    rho_dh = float(reflected(surface, 0.0))
+    return Figure(
+        key="he-torrance-1991-fig-11",
+        paper="he1991",
+        title="Smooth blue plastic at 0.46 µm",
+        caption=f"f_r in the plane of incidence, in absolute values; {described(surface)}. The heights of the spikes "
+        "are those of cones of π/1024 sr, of Figs 7 to 9; the paper does not say which it had here.",
+        panels=[
+            Panel(x_label="θ_r [degree]", y_label="f_r [1/sr]", log_y=True, curves=[cut.curve(1.0) for cut in cuts])
+        ],
+        statements=[
+            Statement(
+                says="The distributions for four incidence angles reveal a linear combination of specular and uniform "
+                "diffuse behavior.",
+                where="section 4, on Fig. 11",
+                seen=f"Further than {reach:.2f} degrees from the mirror direction f_r is a/π to {outside:.0e}; in it, "
+                f"it is {listed([cut.mirror for cut in cuts])} /sr.",
+                holds=outside < 1e-9 and all(cut.peak_deg == cut.theta_i_deg for cut in cuts),
+            ),
+            Statement(
+                says="For a smooth surface the directional-diffuse term drops out.",
+                where="section 4, on Fig. 11",
+                seen=f"The largest value of that term is {directional:g} /sr.",
+                holds=directional == 0.0,
+            ),
+            Statement(
+                says="The directional-hemispherical reflectivity at 0 degrees, measured as 0.195, yields a = 0.15.",
+                where="section 4, on Fig. 11",
+                seen=f"ρ_dh is {rho_dh:.4f} at 0 degrees, {rho_dh - surface['a']:.4f} of it from the first surface; "
+                f"with ρ_ud = a, as eq. (8) is printed, it would be {rho_dh + (np.pi - 1.0) * surface['a']:.3f}. The "
+                "index of refraction is our choice: the paper prints none.",
+                holds=round(rho_dh, 3) == 0.195,
+            ),
+        ],
+    )
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "he-torrance-1991-fig-07": fig_07,
+    "he-torrance-1991-fig-08": fig_08,
+    "he-torrance-1991-fig-09": fig_09,
+    "he-torrance-1991-fig-10": fig_10,
+    "he-torrance-1991-fig-11": fig_11,
+    "he-torrance-1991-fig-12": objects.fig_12,
+    "he-torrance-1991-fig-13": objects.fig_13,
+    "he-torrance-1991-fig-14": objects.fig_14,
+}

@@ -1,0 +1,258 @@
+"""He, Torrance, Sillion and Greenberg 1991: the rendered cylinders, Figs 12 and 13, and the scene of Fig. 14."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from brdfdb.figure import Curve, Figure, Panel, Statement, numbers
+from brdfdb.gallery._he_torrance_cuts import Surface, cut_of, described, listed, reflected, smooth, specular, surface_of
+from brdfdb.models import he_torrance, he_torrance_very_rough, lambert
+from brdfdb.parameters import Floats
+
+GREEN_NM, BLUE_NM, RED_NM = 550.0, 450.0, 650.0
+THETA_DEG = np.arange(0.0, 90.0)  # angles of incidence that reflectances are drawn over
+
+
+def _over_incidence(label: str, values: Floats) -> Curve:
+    return Curve(label=label, x=THETA_DEG.tolist(), y=numbers(values))
+
+
+def fig_12() -> Figure:
+    """Aluminum cylinders (a) to (f)."""
+    names = {letter: f"aluminum-cylinder-12{letter}" for letter in "abcdef"}
+    surfaces = {letter: surface_of(name, GREEN_NM) for letter, name in names.items()}
+    labels = {
+        letter: f"({letter}) σ_0 = {surface['sigma_0_um']:g} µm, τ = {surface['tau_um']:g} µm"
+        for letter, surface in surfaces.items()
+    }
+    images = {letter: specular(surface, THETA_DEG) for letter, surface in surfaces.items()}
+    lobes = {letter: cut_of(he_torrance, 30.0, **surface) for letter, surface in surfaces.items()}
+    widths = [lobe.width_deg for lobe in lobes.values()]
+    slopes = [surface["sigma_0_um"] / surface["tau_um"] for surface in surfaces.values()]
+    at_80 = [float(image[80]) for image in images.values()]
+    falls = np.all(np.diff(list(images.values()), axis=0) <= 0.0, axis=0)
+    in_order = THETA_DEG[np.logical_and.accumulate(falls)][-1]
+    blue, red = (surface_of(names["a"], wavelength) for wavelength in (BLUE_NM, RED_NM))
+    image = [float(specular(surface, 60.0)) for surface in (blue, red)]
+    face = [float(reflected(surface, 60.0, specular=False)) for surface in (blue, red)]
+    return Figure(
+        key="he-torrance-1991-fig-12",
+        paper="he1991",
+        title="Aluminum cylinders of growing roughness",
+        caption="What the specular images and the highlights of the rendered cylinders are made of, at "
+        f"{GREEN_NM:g} nm: ρ_s (eq. 73) over the angle of incidence, and the directional diffuse part in the plane of "
+        "incidence at 30 degrees over its value in the mirror direction; a = 0.",
+        panels=[
+            Panel(
+                title="Specular reflectance",
+                x_label="θ_i [degree]",
+                y_label="ρ_s",
+                curves=[_over_incidence(labels[letter], image) for letter, image in images.items()],
+            ),
+            Panel(
+                kind="polar",
+                title="Directional diffuse, θ_i = 30°",
+                x_label="θ_r [degree]",
+                y_label="f_r over f_r in the mirror direction",
+                curves=[
+                    lobe.curve(lobe.mirror).model_copy(update={"label": labels[letter]})
+                    for letter, lobe in lobes.items()
+                ],
+            ),
+        ],
+        statements=[
+            Statement(
+                says="The sharp specular image diminishes with increasing surface roughness.",
+                where="section 5, on Fig. 12",
+                seen=f"From (a) to (f) ρ_s is {listed(at_80, '.2g')} at 80 degrees, and falls at all angles up to "
+                f"{in_order:g}; beyond, (f), whose slope σ_0/τ is smaller, is in less shadow than (e).",
+                holds=bool(in_order >= 80.0),
+            ),
+            Statement(
+                says="With increasing surface roughness, (a) to (f), the image of the light source spreads out.",
+                where="section 5, on Fig. 12",
+                seen=f"At half of its height the lobe is {listed(widths)} degrees wide. (f), of the largest σ_0, is "
+                f"narrower than (e): its slope σ_0/τ is {slopes[5]:.3f}, that of (e) {slopes[4]:.3f}.",
+                holds=bool(np.all(np.diff(widths) > 0.0)),
+            ),
+            Statement(
+                says="The lobe spreads out from (a) to (e), where τ is the same.",
+                where="section 5, on Fig. 12, and its caption",
+                seen=f"At half of its height the lobe is {listed(widths[:5])} degrees wide.",
+                holds=bool(np.all(np.diff(widths[:5]) > 0.0)),
+            ),
+            Statement(
+                says="The top and lateral edges can appear specular or nearly specular at grazing angles, even when "
+                "the face on the front side appears to be rough.",
+                where="section 5, on Fig. 12",
+                seen=f"ρ_s of (a) to (c) is {listed([images[letter][0] for letter in 'abc'], '.1e')} at normal "
+                f"incidence, and up to {listed([images[letter].max() for letter in 'abc'], '.2f')} near grazing.",
+                holds=all(images[letter][0] < 1e-6 and images[letter].max() > 0.1 for letter in "abc"),
+            ),
+            Statement(
+                says="A slight color shift: blue on the front faces, red of the specular images.",
+                where="section 5, on Fig. 12",
+                seen=f"At 60 degrees (a) reflects {face[0]:.3f} of the light diffusely at 0.45 µm and {face[1]:.3f} at "
+                f"0.65 µm; {image[0]:.4f} and {image[1]:.4f} specularly.",
+                holds=face[0] > face[1] and image[0] < image[1],
+            ),
+        ],
+    )
+
+
+def fig_13() -> Figure:
+    """The three terms apart, and how he_torrance tends to its limits."""
+    rough, mirror = (surface_of(f"aluminum-cylinder-13{letter}", GREEN_NM) for letter in "ab")
+    diffuser = surface_of("aluminum-cylinder-13c")
+    optics = {key: rough[key] for key in ("n", "k")}
+    slope = rough["sigma_0_um"] / rough["tau_um"]
+    cut = cut_of(he_torrance, 30.0, **rough)
+    limit = cut_of(he_torrance_very_rough, 30.0, sigma_0_over_tau=slope, **optics)
+    uniform = cut_of(lambert, 30.0, **diffuser)
+
+    def off(surface: Surface, theta_i_deg: float = 30.0) -> float:
+        tends = cut_of(he_torrance_very_rough, theta_i_deg, sigma_0_over_tau=slope, **optics).f_r
+        return float(abs(cut_of(he_torrance, theta_i_deg, **surface).f_r - tends).max() / tends.max())
+
+    thetas = (0.0, 30.0, 60.0, 80.0)
+    offs = [off(rough, theta) for theta in thetas]
+    fresnel = smooth(mirror, THETA_DEG)
+    images = specular(mirror, THETA_DEG)
+    dull = specular(rough, THETA_DEG)
+    directional = float(cut_of(he_torrance, 30.0, **mirror).f_r.max())
+    # from smooth to very rough at one slope
+    ratios = np.logspace(-3.0, 2.0, 21)
+    scaled = [
+        {**rough, "sigma_0_um": ratio * GREEN_NM / 1000.0, "tau_um": ratio * GREEN_NM / 1000.0 / slope}
+        for ratio in ratios
+    ]
+    from_rough = np.array([off(surface) for surface in scaled])
+    from_smooth = 1.0 - np.array([float(specular(surface, 30.0)) for surface in scaled]) / float(smooth(rough, 30.0))
+    left = np.array([float(reflected(surface, 30.0, specular=False)) for surface in scaled])
+    return Figure(
+        key="he-torrance-1991-fig-13",
+        paper="he1991",
+        title="Limiting cases: directional diffuse, specular, uniform diffuse",
+        caption=f"Cylinders (a) σ_0 = {rough['sigma_0_um']:g} µm with σ_0/τ = {slope:.3g}, (b) σ_0 = 0 and (c) ideal "
+        f"diffuse, at {GREEN_NM:g} nm. "
+        "First f_r in the plane of incidence at 30 degrees, of (a) beside its limit; the specular part of (b) is a "
+        "Dirac delta, and its reflectance follows. Last, how far He and Torrance's model is from its two limits at the "
+        "slope of (a), at 30 degrees.",
+        panels=[
+            Panel(
+                kind="polar",
+                x_label="θ_r [degree]",
+                y_label="f_r [1/sr]",
+                curves=[
+                    Curve(label=label, x=lobe.x_deg.tolist(), y=numbers(lobe.f_r))
+                    for label, lobe in (("(a)", cut), ("(a), σ_0/λ → ∞", limit), ("(c)", uniform))
+                ],
+            ),
+            Panel(
+                title="Specular reflectance",
+                x_label="θ_i [degree]",
+                y_label="ρ_s",
+                curves=[_over_incidence("(a)", dull), _over_incidence("(b)", images)],
+            ),
+            Panel(
+                title="Distance from the limits",
+                x_label="σ_0/λ",
+                y_label="share",
+                log_x=True,
+                log_y=True,
+                curves=[
+                    Curve(label=label, x=ratios.tolist(), y=numbers(values))
+                    for label, values in (
+                        ("very rough: largest difference of f_r over largest f_r", from_rough),
+                        ("smooth: 1 - ρ_s / |F|²", from_smooth),
+                        ("light in the directional diffuse part", left),
+                    )
+                ],
+            ),
+        ],
+        statements=[
+            Statement(
+                says="Cylinder (a) represents the directional diffuse term in the limit of σ_0/λ → ∞ with σ_0/τ fixed "
+                "at 0.16.",
+                where="section 5, on Fig. 13",
+                seen=f"At σ_0/λ = {rough['sigma_0_um'] * 1000.0 / GREEN_NM:.2g} f_r differs from the limit by "
+                f"{listed(offs, '.1e')} of its largest value at {listed(thetas)} degrees: towards grazing g falls. "
+                f"ρ_s is {dull[30]:g} at 30 degrees.",
+                holds=max(offs[:3]) < 0.01 and bool(dull[30] < 1e-9),
+            ),
+            Statement(
+                says="Cylinder (b) is described by the specular term, in which the reflectance is a function of "
+                "incidence angle according to the Fresnel reflectivity.",
+                where="section 5, on Fig. 13",
+                seen=f"ρ_s and |F|² differ by {abs(images - fresnel).max():.0e} at most, from {images[0]:.4f} at "
+                f"normal incidence to {images[-1]:.4f} at {THETA_DEG[-1]:g} degrees; the directional diffuse part is "
+                f"{directional:g}.",
+                holds=bool(np.allclose(images, fresnel, rtol=1e-12)) and directional == 0.0,
+            ),
+            Statement(
+                says="Cylinder (c) is ideal diffuse; note the striking differences between the three cylinders.",
+                where="section 5, on Fig. 13",
+                seen=f"f_r of (c) is {uniform.f_r.min():.4f} /sr everywhere; of (a) it goes from {cut.f_r.min():.1e} "
+                f"to {cut.f_r.max():.2f} /sr.",
+                holds=bool(
+                    np.ptp(uniform.f_r) == 0.0 and cut.f_r.max() > 2.0 * uniform.f_r.max() > 4.0 * cut.f_r.min()
+                ),
+            ),
+            Statement(
+                says="As the wavelength of the incident light becomes large relative to the projected surface "
+                "roughness, the specular term is not attenuated, since g → 0 and S → 1.",
+                where="section 3.2.1",
+                seen=f"At σ_0/λ = {ratios[0]:g} the specular part is less than |F|² by {from_smooth[0]:.1e} of it, at "
+                f"{ratios[4]:.2g} by {from_smooth[4]:.1e}: a hundred times less for a tenth of the roughness.",
+                holds=bool(
+                    np.all(np.diff(from_smooth) >= 0.0) and abs(from_smooth[4] / from_smooth[0] / 100.0 - 1.0) < 0.1
+                ),
+            ),
+            Statement(
+                says="For smooth surfaces, as σ_0/λ approaches zero, the directional diffuse part diminishes to zero.",
+                where="section 3.2.2",
+                seen=f"At σ_0/λ = {ratios[4]:.2g} it has {left[4]:.1e} of the light, at {ratios[0]:g} {left[0]:.1e}.",
+                holds=bool(np.all(np.diff(left[:9]) > 0.0) and left[0] < 1e-3),
+            ),
+        ],
+    )
+
+
+def fig_14() -> Figure:
+    """The plastic cube and the table under it."""
+    cube, table = (surface_of(f"scene-plastic-{name}") for name in ("cube", "table"))
+    on_cube, on_table, fresnel = specular(cube, THETA_DEG), specular(table, THETA_DEG), smooth(table, THETA_DEG)
+    low, high = 45, 80
+    rise, of_fresnel = on_table[high] / on_table[low], fresnel[high] / fresnel[low]
+    return Figure(
+        key="he-torrance-1991-fig-14",
+        paper="he1991",
+        title="Images in smooth and in rough plastic",
+        caption=f"ρ_s (eq. 73) over the angle of incidence, of the cube, {described(cube)}, and of the table, "
+        f"{described(table)}.",
+        panels=[
+            Panel(
+                x_label="θ_i [degree]",
+                y_label="ρ_s",
+                curves=[_over_incidence("cube", on_cube), _over_incidence("table", on_table)],
+            )
+        ],
+        statements=[
+            Statement(
+                says="On the faces of the cube, the specular image varies with reflection angle, an effect caused "
+                "solely by the Fresnel reflectivity.",
+                where="section 5, on Fig. 14",
+                seen=f"ρ_s grows from {on_cube[0]:.3f} to {on_cube[-1]:.3f} at {THETA_DEG[-1]:g} degrees, and differs "
+                f"from |F|² by {abs(on_cube - fresnel).max():.0e} at most.",
+                holds=bool(np.allclose(on_cube, fresnel, rtol=1e-12)),
+            ),
+            Statement(
+                says="The specular images on the table top also vary with reflection angle (and disappear), but this "
+                "is caused mainly by roughness effects.",
+                where="section 5, on Fig. 14",
+                seen=f"ρ_s is {on_table[high]:.3f} at {high} degrees and {on_table[low]:.1e} at {low}: a factor of "
+                f"{rise:.1e}, of which |F|² is {of_fresnel:.2g}.",
+                holds=bool(on_table[low] < 1e-4 and rise / of_fresnel > of_fresnel),
+            ),
+        ],
+    )
