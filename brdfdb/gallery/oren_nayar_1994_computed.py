@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Panel, Statement
 from brdfdb.gallery.oren_nayar_1994_lines import (
@@ -21,10 +20,11 @@ from brdfdb.gallery.oren_nayar_1994_lines import (
     between,
     curve,
     distance,
+    left_past,
     listed,
     variation,
 )
-from brdfdb.geometry import radians
+from brdfdb.geometry import degrees, radians
 from brdfdb.models import (
     lambert,
     oren_nayar,
@@ -120,11 +120,7 @@ def _cut_off() -> Statement:
     sigmas_deg = [10.0, 20.0, 30.0, 40.0]
     curves = [across(oren_nayar_gaussian, GRAZING_LIGHT, **_rough(sigma_deg)) for sigma_deg in sigmas_deg]
     bends = [float(THETA_R[1:-1][np.argmin(np.diff(values, 2))]) for values in curves]
-    left = [
-        (at(values, GRAZING_LIGHT + 1) - at(values, GRAZING_LIGHT))
-        / (at(values, GRAZING_LIGHT) - at(values, GRAZING_LIGHT - 1))
-        for values in curves
-    ]
+    left = [left_past(values, GRAZING_LIGHT) for values in curves]
     return Statement(
         says='radiance gets "cut-off" when θ_r exceeds θ_i; exactly at θ_r = θ_i, and independent of roughness',
         where="section 4.3, Fig. 8",
@@ -234,7 +230,8 @@ def fig_10() -> Figure:
             Statement(
                 says="the model predicts near-Lambertian behavior for very small incidence angles (θ_i ≈ 0)",
                 where="section 4.3, Fig. 10",
-                seen=f"At θ_i = 0 the standard deviation over viewers is {varies[0]:.1%} of the mean.",
+                seen=f"At θ_i = 0 the standard deviation over viewers is {varies[0]:.1%} of the mean (near: "
+                f"{SMALL:.0%}).",
                 holds=varies[0] < SMALL,
             ),
             Statement(
@@ -292,24 +289,24 @@ def fig_11() -> Figure:
             for light in lights_deg
         ],
         statements=[
-            _perpendicular([lines[light][-1] for light in lights_deg]),
+            _perpendicular(lights_deg, [lines[light][-1] for light in lights_deg]),
             _towards_the_source_in_azimuth([at(values, GRAZING_LIGHT) for values in lines[GRAZING_LIGHT]]),
         ],
     )
 
 
-def _perpendicular(lines: list[Floats]) -> Statement:
+def _perpendicular(lights_deg: list[float], lines: list[Floats]) -> Statement:
     varies = [variation(values) for values in lines]
-    steep = between(lines[-1], 0.0, 90.0)
-    far = between(THETA_R, 0.0, 90.0)[np.abs(steep / steep[0] - 1.0) <= SMALL].max()
+    outwards = between(lines[-1], 0.0, 90.0)
+    far = between(THETA_R, 0.0, 90.0)[np.abs(outwards / outwards[0] - 1.0) <= SMALL].max()
     return Statement(
         says="when the sensor-normal plane is perpendicular to the source-normal plane, the rough surface again "
         "exhibits near-Lambertian characteristics",
         where="section 4.3, Fig. 11",
-        seen=f"For θ_i of 60 and 75° the standard deviation over viewers is {listed(varies, '.0%')} of the mean. At "
-        f"75° radiance is within a tenth of that along the normal up to θ_r = {far:.0f}°, then grows to "
-        f"{steep[-1] / steep[0]:.2f} times that: near the horizon "
-        "shadowing and masking overlap (eq. 43).",
+        seen=f"For θ_i of {listed(lights_deg, '.0f')}° the standard deviation over viewers is {listed(varies, '.0%')} "
+        f"of the mean (near: {SMALL:.0%}). For the last, radiance is within {SMALL:.0%} of that along the normal up to "
+        f"θ_r = {far:.0f}°, then grows to {outwards[-1] / outwards[0]:.2f} times that at the horizon, where shadowing "
+        "and masking overlap (eq. 43).",
         holds=max(varies) < SMALL,
     )
 
@@ -368,8 +365,9 @@ def fig_12() -> Figure:
                 says="in all cases, the functional approximation proves to be very accurate",
                 where="section 4.3, Fig. 12",
                 seen=f"It is {listed(off, '.1%')} of the mean radiance off, root mean square, for θ_i of "
-                f"{listed(lights_deg, '.0f')}°; at worst {last[np.argmax(np.abs(last))]:+.0%} of the value, at θ_i = "
-                f"75° and θ_r = {THETA_R[np.argmax(np.abs(last))]:.0f}°.",
+                f"{listed(lights_deg, '.0f')}° (very accurate: {VERY_ACCURATE:.0%}); at worst "
+                f"{last[np.argmax(np.abs(last))]:+.0%} of the value, at θ_i = 75° and θ_r = "
+                f"{THETA_R[np.argmax(np.abs(last))]:.0f}°.",
                 holds=max(off) < VERY_ACCURATE,
             )
         ],
@@ -402,60 +400,54 @@ def _slight_sacrifice(lines: list[_Forms]) -> Statement:
         says="in order to obtain this simplification, a slight sacrifice in accuracy must be made",
         where="section 4.4, Fig. 13",
         seen=f"At azimuths of 0, 45 and 90° the qualitative model is {listed(qualitative, '.0%')} of the mean radiance "
-        f"off, the functional approximation {listed(functional, '.0%')}. Eq. 30 keeps radiance constant on the side "
-        f"away from the light: {forward[2]:.3f} at the horizon, where the integral falls to {forward[0]:.3f}.",
+        f"off (slight: {SMALL:.0%}), the functional approximation {listed(functional, '.0%')}. Eq. 30 keeps radiance "
+        f"constant on the side away from the light: {forward[2]:.3f} at the horizon, where the integral falls to "
+        f"{forward[0]:.3f}.",
         holds=max(qualitative) < SMALL,
     )
 
 
-class _Hemispheres(NamedTuple):
-    """Pairs of directions, and the flux [1] that each stands for under uniform light, cosines and all."""
-
-    theta_i: NDArray[np.float64]
-    theta_r: NDArray[np.float64]
-    delta_phi: NDArray[np.float64]
-    flux: NDArray[np.float64]
-
-
-def _hemispheres() -> _Hemispheres:
-    theta, delta_phi = radians(np.arange(2.5, 90.0, 5.0)), radians(np.arange(5.0, 180.0, 10.0))
-    directions = np.meshgrid(theta, theta, delta_phi, indexing="ij")
-    flux = np.sin(2.0 * directions[0]) * np.sin(2.0 * directions[1])
-    return _Hemispheres(*directions, flux * np.pi / flux.sum())
+def _hemispheres() -> tuple[Floats, Floats, Floats, Floats]:
+    """theta_i, theta_r, phi_r - phi_i [rad] of pairs of directions, and weights of f_r: its albedo in uniform light."""
+    theta, azimuth = radians(np.arange(2.5, 90.0, 5.0)), radians(np.arange(5.0, 180.0, 10.0))
+    theta_i, theta_r, delta_phi = np.meshgrid(theta, theta, azimuth, indexing="ij")
+    cosines = np.sin(2.0 * theta_i) * np.sin(2.0 * theta_r)
+    return theta_i, theta_r, delta_phi, cosines * np.pi / cosines.sum()
 
 
 def _third_coefficient() -> Statement:
-    theta_i, theta_r, delta_phi, flux = _hemispheres()
+    theta_i, theta_r, delta_phi, weight = _hemispheres()
     total = oren_nayar(theta_i, 0.0, theta_r, delta_phi, **_rough(30.0))
-    # Of |cos(delta_phi)| alone; on the side of the light it is all by which the direct part and eq. 30 differ
+    # The term has |cos(delta_phi)| alone; on the side of the light it is all by which eq. 27 and eq. 30 differ
     folded = theta_i, 0.0, theta_r, np.minimum(delta_phi, np.pi - delta_phi)
     term = oren_nayar(*folded, **_rough(30.0), interreflection=False) - oren_nayar_qualitative(*folded, **_rough(30.0))
-    share, largest = float(np.sum(term * flux) / np.sum(total * flux)), float(np.max(term / total))
+    share = float(np.sum(term * weight) / np.sum(total * weight))
+    most = np.argmax(term / total)
+    where = [float(degrees(angle.flat[most])) for angle in (theta_i, theta_r, delta_phi)]
     return Statement(
         says="the simulations showed that coefficient C_3 makes a relatively small contribution to the total radiance",
         where="section 4.4",
-        seen=f"{share:.1%} of the flux under uniform light at σ = 30°, but up to {largest:.0%} of the radiance where "
-        "light and viewer are near the horizon, a quarter turn apart.",
+        seen=f"{share:.1%} of what is reflected of uniform light at σ = 30° (small: {SMALL:.0%}), but up to "
+        f"{np.max(term / total):.0%} of the radiance, at θ_i, θ_r and φ_r - φ_i of {listed(where, '.1f')}°.",
         holds=share < SMALL,
     )
 
 
 def _note_7() -> Statement:
-    *directions, flux = _hemispheres()
-    theta_i, theta_r, delta_phi = directions
+    theta_i, theta_r, delta_phi, weight = _hemispheres()
     angles = theta_i, 0.0, theta_r, delta_phi
-    truth = float(np.sum(flux * oren_nayar_gaussian(*angles, **_rough(30.0))))
-    offsets = [0.33, 0.57]
-    albedos = [
-        float(np.sum(flux * oren_nayar_qualitative(*angles, **_rough(30.0), offset=offset))) for offset in offsets
-    ]
+    surface = float(np.sum(weight * oren_nayar_gaussian(*angles, **_rough(30.0))))
+    printed, changed = (
+        float(np.sum(weight * oren_nayar_qualitative(*angles, **_rough(30.0), offset=offset)))
+        for offset in (0.33, 0.57)
+    )
     return Statement(
         says="discrepancies caused by the lack of the interreflection component in the qualitative model can be "
         "partially compensated by replacing the constant 0.33 in coefficient A with 0.57",
         where="note 7",
-        seen=f"Under uniform light the surface reflects {truth:.3f}, the model {albedos[0]:.3f} with 0.33 and "
-        f"{albedos[1]:.3f} with 0.57.",
-        holds=abs(albedos[1] - truth) < abs(albedos[0] - truth),
+        seen=f"Of uniform light the surface reflects {surface:.3f}, the model {printed:.3f} with 0.33 and "
+        f"{changed:.3f} with 0.57.",
+        holds=abs(changed - surface) < abs(printed - surface),
     )
 
 

@@ -250,8 +250,8 @@ def spheres() -> Figure:
                 says="in the extreme roughness case the sphere appears like a flat disc with near constant brightness; "
                 "this has been widely observed and reported in the case of the full moon",
                 where="section 6, spheres.tif",
-                seen=f"The standard deviation at σ = 40° is {varies[-1]:.1%} of the mean; with the second bounce of "
-                f"eq. 28, which the paper does not name here, {with_bounce:.1%}.",
+                seen=f"The standard deviation at σ = 40° is {varies[-1]:.1%} of the mean (near: {SMALL:.0%}); with the "
+                f"second bounce of eq. 28, which the paper does not name here, {with_bounce:.1%}.",
                 holds=varies[-1] < SMALL,
             ),
         ],

@@ -15,8 +15,8 @@ PAPER = "orennayar1994"
 THETA_R = np.arange(-90.0, 91.0)  # degree; above 0 on the side of the light
 THETA_R_LABEL = "θ_r [degree], above 0 on the side of the light"
 
-SMALL = 0.1  # as a share of the mean: what "near" and "slight" of the paper are taken for
-VERY_ACCURATE = 0.05  # and "very accurate"
+SMALL = 0.1  # what the paper's "near", "nearly" and "slight" are taken for, mostly as a share of the mean
+VERY_ACCURATE = 0.05  # and its "very accurate"
 ROUNDING = 1e-15  # "exactly", in float64
 
 Result = TypeVar("Result")
@@ -52,6 +52,12 @@ def at(values: Floats, theta_r_deg: float) -> float:
 def between(values: Floats, low_deg: float, high_deg: float) -> Floats:
     """Those of values over THETA_R from low to high [degree], both included."""
     return values[(low_deg <= THETA_R) & (high_deg >= THETA_R)]
+
+
+def left_past(values: Floats, theta_deg: float) -> float:
+    """What values over THETA_R grow by with the first degree past an angle, over what the last one before it gave."""
+    before, there, past = (at(values, theta_deg + step) for step in (-1.0, 0.0, 1.0))
+    return (past - there) / (there - before)
 
 
 def variation(values: Floats) -> float:
