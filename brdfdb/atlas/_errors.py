@@ -48,11 +48,11 @@ def directions(theta_i: float, theta_r: float, delta_phi: float) -> dict[str, An
 
 
 def relative(value: Any, truth: Any, scale: float | None = None) -> float:
-    """abs(value - truth) over abs(truth), or over `scale`; of matrices by their norms; nan where not finite."""
+    """abs(value - truth) over abs(truth), or over `scale`; of matrices the largest of each; nan where not finite."""
     value = np.asarray(value, dtype=np.complex128)
     if not np.isfinite(value).all():
         return np.nan
-    return float(np.linalg.norm(value - truth) / (np.linalg.norm(truth) if scale is None else scale))
+    return float(np.max(np.abs(value - truth)) / (np.max(np.abs(truth)) if scale is None else scale))
 
 
 def errors(
@@ -126,9 +126,17 @@ def error_map(x: Array, y: Array, form: Form, found: Array, *, x_label: str, y_l
 
 
 def figure(
-    key: str, paper: str, where: str, title: str, caption: str, measured: Sequence[Measured], *, within: float
+    key: str,
+    paper: str,
+    where: str,
+    title: str,
+    caption: str,
+    measured: Sequence[Measured],
+    *,
+    within: float,
+    more: Sequence[Statement] = (),
 ) -> Figure:
-    """A figure with a statement a form: that ours stays `within`, and that the others do not.
+    """A figure with a statement a form, that ours stays `within` and that the others do not, and with `more`.
 
     `where` names the equations; the paper is added.
     """
@@ -141,7 +149,7 @@ def figure(
         for (label, role), values in found.items()
     ]
     panels: list[Panel | Map | Picture] = [each.panel for each in measured]
-    return Figure(key=key, paper=paper, title=title, caption=caption, panels=panels, statements=statements)
+    return Figure(key=key, paper=paper, title=title, caption=caption, panels=panels, statements=[*statements, *more])
 
 
 def stays(label: str, found: Array, within: float, where: str) -> Statement:
@@ -156,11 +164,11 @@ def stays(label: str, found: Array, within: float, where: str) -> Statement:
 
 def fails(label: str, found: Array, within: float, where: str) -> Statement:
     worst, gaps = worst_of(found)
-    beside = f", and nan or inf at {gaps} of {found.size} points" if gaps else f", of {found.size} points"
+    seen = [f"off by up to {worst:.2g}"] * (gaps < found.size) + [f"nan or inf at {gaps}"] * (gaps > 0)
     return Statement(
-        says=f"{label}: fails, off by more than {FAILS * within:.2g} somewhere, or no number at all",
+        says=f"{label}: off by more than {FAILS * within:.2g} somewhere, or no number at all",
         where=where,
-        seen=("no number anywhere" if gaps == found.size else f"off by up to {worst:.2g}") + beside,
+        seen=f"{', '.join(seen)}, of {found.size} points",
         holds=gaps > 0 or worst > FAILS * within,
     )
 
@@ -171,12 +179,14 @@ def worst_of(found: Array) -> tuple[float, int]:
     return float(np.max(found[~gaps], initial=0.0)), int(gaps.sum())
 
 
-def of_misprint(key: str, title: str, caption: str, measured: Sequence[Measured], *, within: float) -> Figure:
+def of_misprint(
+    key: str, title: str, caption: str, measured: Sequence[Measured], *, within: float, more: Sequence[Statement] = ()
+) -> Figure:
     """The figure of a misprint; what is printed and what is right stands before the caption."""
     entry = BY_KEY[key]
     where = f"{'eqs' if re.search(r'[,-] ?[0-9]', entry.equation) else 'eq.'} {entry.equation}"
     text = f"Printed: {entry.printed}. Right: {entry.right}. {caption}"
-    return figure(key, entry.paper, where, title, text, measured, within=within)
+    return figure(key, entry.paper, where, title, text, measured, within=within, more=more)
 
 
 def misprint(
@@ -192,10 +202,9 @@ def misprint(
     ours: Callable[..., Any] | None = None,
     log_x: bool = False,
     scale: float | None = None,
-    others: Sequence[Form] = (),
 ) -> Figure:
     """The figure of a misprint: the printed form and ours over x, the other arguments those where the two differ."""
     entry = BY_KEY[key]
-    forms = [Form("as printed", "printed", entry.as_printed), *others, Form("ours", "ours", ours or entry.corrected)]
+    forms = [Form("as printed", "printed", entry.as_printed), Form("ours", "ours", ours or entry.corrected)]
     panel = sweep(x, x_label, lambda each: {**entry.where, **arguments(each)}, truth, forms, log_x=log_x, scale=scale)
     return of_misprint(key, title, caption, [panel], within=within)

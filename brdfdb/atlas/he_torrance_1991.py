@@ -195,7 +195,7 @@ def root_search() -> Figure:
     def ours(theta_i: float, theta_r: float, slope: float) -> Any:
         return np.sqrt(variance(sum(hidden(np.sin(theta), np.cos(theta), slope) for theta in (theta_i, theta_r))))
 
-    forms = [Form("Newton's search", "printed", effective(entry.as_printed)), Form("Lambert's W", "ours", ours)]
+    forms = [Form("Newton's search", "printed", effective(entry.as_printed)), Form("Lambert's W, ours", "ours", ours)]
 
     def of(slope: float) -> Measured:
         return sweep(
@@ -238,7 +238,7 @@ def amplitudes_over_cross_product() -> Figure:
         f"{_BACK} (1e-13: 0, backscatter)",
         lambda x: {"theta_r": np.deg2rad(40.0) + _zero(x), "phi_r": _zero(x)},
         _jones,
-        caption=f"Light and viewer at 40 degrees, n of 1.5: the 2x2 matrix of amplitudes, by its norm. {_TRUTH}",
+        caption=f"Light and viewer at 40 degrees, n of 1.5: the 2x2 matrix of amplitudes, over its largest. {_TRUTH}",
         within=CLOSED,
         log_x=True,
     )
@@ -252,7 +252,7 @@ def sign_of_m_ps() -> Figure:
         "viewer's azimuth from the light's [degrees]",
         lambda x: {"phi_r": np.deg2rad(x)},
         _jones,
-        caption="Light at 50 degrees, viewer at 30, a perfect mirror: the 2x2 matrix of amplitudes, by its norm. "
+        caption="Light at 50 degrees, viewer at 30, a perfect mirror: the 2x2 matrix of amplitudes, over its largest. "
         f"{_TRUTH}",
         within=CLOSED,
     )
