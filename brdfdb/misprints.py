@@ -1,6 +1,6 @@
 """What the three papers print wrong, ambiguously or unsafely: each printed form beside the right one, and nothing else.
 
-The models hold the right forms only. The printed ones stand here, literal and short, for the report that sets the two
+The models hold the right forms only. The printed ones stand here, literal and short, for the atlas that sets the two
 side by side; no other module of the library knows them. Angles are radians, lengths of the surface micrometres; a BRDF
 is f_r in 1/sr, by the conventions of `brdfdb.geometry`. Division by zero gives inf or nan here, as it does in print.
 """

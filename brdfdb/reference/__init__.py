@@ -8,7 +8,7 @@ the light and pi the mirror half plane; values are f_r in 1/sr without a cosine.
 theta in [0, pi/2]: nothing is clipped or checked here. Where a paper is misprinted the corrected equation stands, and
 the docstring says so.
 
-Needs mpmath, which only the ``test`` extra installs; importing `brdfdb` does not import this package.
+Importing `brdfdb` imports neither this package nor mpmath: `brdfdb.atlas` and the tests do.
 """
 
 from typing import Any

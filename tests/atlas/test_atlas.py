@@ -1,0 +1,143 @@
+"""The atlas: every misprint has its figure, ours holds in all of them, and what fails is seen to fail."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brdfdb.atlas import _errors, he_torrance_1991, oren_nayar_1994, ward_1992
+from brdfdb.atlas._errors import Form
+from brdfdb.figure import Curve, Figure, Map, Panel, Role
+from brdfdb.misprints import MISPRINTS
+
+MODULES = (oren_nayar_1994, he_torrance_1991, ward_1992)
+FIGURES: dict[str, Callable[[], Figure]] = {key: made for module in MODULES for key, made in module.FIGURES.items()}
+every_figure = pytest.mark.parametrize("key", FIGURES)
+
+ROUNDED = 1e-2  # errors are drawn to three digits: 0.5 %
+OURS_ALONE = {"ward-narrow-at-grazing"}  # where it is weakest
+
+
+@functools.cache
+def figure(key: str) -> Figure:
+    return FIGURES[key]()
+
+
+def curve(key: str, role: Role) -> Curve:
+    """The only one of that role in the first panel."""
+    panel = figure(key).panels[0]
+    assert isinstance(panel, Panel)
+    (found,) = [each for each in panel.curves if each.role == role]
+    return found
+
+
+def printed(key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    found = curve(key, "printed")
+    return np.array(found.x), np.array(found.y, dtype=np.float64)
+
+
+def test_every_misprint_has_a_figure() -> None:
+    assert {misprint.key for misprint in MISPRINTS} <= set(FIGURES)
+
+
+def test_keys_are_those_of_one_figure() -> None:
+    assert len(FIGURES) == sum(len(module.FIGURES) for module in MODULES)
+
+
+@every_figure
+def test_a_figure_has_the_key_and_the_paper_that_it_is_listed_under(key: str) -> None:
+    papers = dict(zip(MODULES, ("orennayar1994", "he1991", "ward1992"), strict=True))
+    (module,) = [module for module in MODULES if key in module.FIGURES]
+    assert (figure(key).key, figure(key).paper) == (key, papers[module])
+    assert re.fullmatch(r"[a-z0-9-]+", key)
+    bibliography = (Path(__file__).parents[2] / "references.bib").read_text(encoding="utf-8")
+    assert f"{{{figure(key).paper}," in bibliography
+
+
+@every_figure
+def test_ours_stays_and_what_is_drawn_beside_it_fails(key: str) -> None:
+    said = [statement.says for statement in figure(key).statements]
+    assert any(re.match("(.*, )?ours(, .*)?: within ", each) for each in said)
+    assert any(": off by more than " in each for each in said) != (key in OURS_ALONE)
+    for statement in figure(key).statements:
+        assert statement.holds, statement
+
+
+@every_figure
+def test_every_point_of_ours_is_drawn(key: str) -> None:
+    drawn = 0
+    for panel in figure(key).panels:
+        if isinstance(panel, Panel):
+            for each in panel.curves:
+                assert len(each.x) == len(each.y)
+                if each.role == "ours":
+                    assert None not in each.y
+                    drawn += len(each.y)
+        elif isinstance(panel, Map) and panel.title == "ours":
+            values = [value for row in panel.values for value in row]
+            assert None not in values
+            drawn += len(values)
+    assert drawn >= 6
+
+
+# What the printed forms are off by, where it is a closed form
+
+
+def test_a_radiance_for_a_brdf_is_off_by_the_cosine_of_the_light() -> None:
+    theta, off = printed("surface-radiance-as-brdf")
+    np.testing.assert_allclose(off[1:], 1.0 - np.cos(np.deg2rad(theta[1:])), rtol=ROUNDED)
+
+
+def test_an_albedo_for_a_brdf_is_off_by_pi() -> None:
+    np.testing.assert_allclose(printed("uniform-diffuse-without-pi")[1], np.pi - 1.0, rtol=ROUNDED)
+
+
+def test_slopes_over_the_hemisphere_leave_a_part_in_2_pi() -> None:
+    np.testing.assert_allclose(printed("normalised-over-the-hemisphere")[1], 1.0 - 0.5 / np.pi, rtol=ROUNDED)
+
+
+def test_the_slope_for_its_arctan_is_off_by_their_ratio() -> None:
+    alpha, off = printed("delta-without-arctan")
+    slope = alpha * np.sqrt(np.log(100.0))
+    np.testing.assert_allclose(off, slope / np.arctan(slope) - 1.0, rtol=ROUNDED)
+
+
+def test_beckmanns_limit_is_off_by_a_part_in_g_at_the_peak() -> None:
+    g, off = printed("beckmanns-limit")
+    np.testing.assert_allclose(off[g > 1e3], 1.0 / g[g > 1e3], rtol=ROUNDED)
+
+
+# The means
+
+
+def test_a_form_that_is_off_does_not_stay_and_one_that_is_not_does_not_fail() -> None:
+    near, far, gap = np.array([0.0, 1e-12]), np.array([0.0, 1e-3]), np.array([0.0, np.nan])
+    assert _errors.stays("ours", near, 1e-10, "").holds
+    assert not _errors.stays("ours", far, 1e-10, "").holds
+    assert not _errors.stays("ours", gap, 1e-10, "").holds
+    assert not _errors.fails("printed", near, 1e-10, "").holds
+    assert _errors.fails("printed", far, 1e-10, "").holds
+    assert _errors.fails("printed", gap, 1e-10, "").holds
+
+
+def test_an_error_of_zero_is_drawn_and_one_of_nan_is_a_gap_that_the_label_counts() -> None:
+    forms = [Form("exact", "ours", lambda x: x), Form("inverse", "printed", lambda x: x * np.divide(1.0, x) * x)]
+    measured = _errors.sweep([0.0, 2.0], "x", lambda x: {"x": x}, lambda x: x, forms, scale=1.0)
+    assert isinstance(measured.panel, Panel)
+    exact, inverse = measured.panel.curves
+    assert exact.y == [_errors.NONE, _errors.NONE]
+    assert inverse.y == [None, _errors.NONE]
+    assert inverse.label == "inverse (nan or inf at 1 of 2)"
+
+
+def test_matrices_are_compared_by_their_largest_elements() -> None:
+    truth = np.array([[3.0, 0.0], [0.0, 5.0j]])
+    assert _errors.relative(truth + np.array([[0.0, 0.5], [0.25, 0.0]]), truth) == 0.1
+    assert _errors.relative(3.0 * 2.0**-1000, 2.0**-999) == 0.5  # tiny ones are not squared away
+    assert np.isnan(_errors.relative(truth + np.diag([np.inf, 0.0]), truth))
