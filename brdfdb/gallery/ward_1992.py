@@ -1,4 +1,4 @@
-"""Ward 1992: slices and highlights of the elliptical Gaussian model, and its other forms beside it."""
+"""Ward 1992: slices, lobes and highlights of the elliptical Gaussian model, and its other forms beside it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.figure import Curve, Figure, Map, Panel, Role, Statement, numbers
-from brdfdb.geometry import HALF_PI, degrees, radians
+from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Role, Statement, numbers
+from brdfdb.geometry import HALF_PI, degrees, radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
 
@@ -23,6 +23,8 @@ _BRDF = "f_r [1/sr]"
 _SLICES_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
 _LOBES_DEG = (30.0, 60.0)
 _FORMS_DEG = (30.0, 60.0)
+_CAMERA_DEG, _LIGHT_DEG = 35.0, 75.0  # above the equator of the sphere
+_WHITE = 0.2  # of the brightest point: the diffuse part is seen, too
 _FORMS: tuple[tuple[str, str, Role], ...] = (
     ("ward", "eq. 5a", "printed"),
     ("ward_half_vector", "eq. 5b", "other"),
@@ -33,6 +35,7 @@ _FORMS: tuple[tuple[str, str, Role], ...] = (
 _ROUNDING = 1e-13  # relative, between forms that are one by algebra
 _APPROXIMATE = 0.05  # of the peak: our reading of "approximation"
 _ON_THE_RIDGE = 0.01  # in the projected plane; the ridge is 0.06 wide on each side
+_BENT = 0.1  # of the thickness of a highlight: what makes it a crescent
 _WIDER = 1.5  # times: what one sees as anisotropy without measuring
 
 
@@ -210,6 +213,71 @@ def _asymmetry(material: Material) -> float:
     return float(np.max(np.abs(forth - back) / forth))
 
 
+def _crescent() -> Figure:
+    """Fig. 7a: the highlight of a light source alone, on a sphere whose grain follows its parallels."""
+    brass = presets()["rolled-brass"]
+    round_brass = _isotropic(brass)
+    axis = np.linspace(-1.0, 1.0, 72)
+    across, up = np.meshgrid(axis, axis[::-1])
+    white = _WHITE * np.nanmax(_sphere(brass, across, up))
+    panels = [
+        Picture(title=title, radiance=[numbers(row, 3) for row in np.minimum(_sphere(form, across, up) / white, 1.0)])
+        for title, form in (("eq. 5a", brass), ("eq. 4", round_brass))
+    ]
+    bend, thickness = _bend(brass)
+    round_bend, round_thickness = _bend(round_brass)
+    return Figure(
+        key="ward-1992-fig-07",
+        paper="ward1992",
+        title="The crescent of an anisotropic highlight",
+        caption=f"{_described(brass)}, on a sphere with x along its meridians; a distant light "
+        f"{_LIGHT_DEG:g} degrees above the equator, a distant camera {_CAMERA_DEG:g} degrees, on one meridian. White "
+        f"is {_WHITE:g} of the peak. Beside it eq. 4 with alpha = sqrt(alpha_x alpha_y).",
+        panels=list(panels),
+        statements=[
+            Statement(
+                says='"Note that the crescent shape of the highlight is due to longitudinal anisotropy and not the '
+                'light source"',
+                where="section 5, of Fig. 7a, another object",
+                seen=f"the light is a point; the ends of the highlight bend up by {100.0 * bend / thickness:.0f} % of "
+                f"its thickness with eq. 5a, by {100.0 * round_bend / round_thickness:.0f} % with eq. 4",
+                holds=bend > _BENT * thickness and abs(round_bend) < _BENT * round_thickness,
+            )
+        ],
+    )
+
+
+def _sphere(material: Material, across: Array, up: Array) -> Array:
+    """Radiance over the irradiance across the light [1/sr], at points of the image of a unit sphere; nan beside it."""
+    outside = across**2 + up**2 >= 1.0
+    u, v = np.where(outside, 0.0, across), np.where(outside, 0.0, up)
+    camera, light = (unit_vector(HALF_PI - radians(above), 0.0) for above in (_CAMERA_DEG, _LIGHT_DEG))
+    north = np.array([0.0, 0.0, 1.0])
+    right = np.array([0.0, 1.0, 0.0])
+    normal = u[..., np.newaxis] * right + v[..., np.newaxis] * np.cross(camera, right)
+    normal = normal + np.sqrt(1.0 - u**2 - v**2)[..., np.newaxis] * camera
+    parallel = np.cross(north, normal)
+    parallel /= np.linalg.norm(parallel, axis=-1, keepdims=True)
+    frame = np.stack([np.cross(normal, parallel), parallel, normal], axis=-2)
+    wi, wr = frame @ light, frame @ camera
+    f_r = material.spec.vectors(wi, wr, **material.arguments())
+    return np.where(outside, np.nan, f_r * np.maximum(wi[..., 2], 0.0))
+
+
+def _bend(material: Material) -> tuple[float, float]:
+    """How far the ends of the highlight lie above its middle, and how thick the middle is, in radii of the sphere.
+
+    The ends are where the brightest point of a column of the image has half the peak.
+    """
+    across, up = np.linspace(-0.4, 0.4, 81), np.linspace(0.1, 0.9, 4001)
+    radiance = _sphere(material, *np.meshgrid(across, up, indexing="ij"))
+    ridge, brightest = up[radiance.argmax(axis=1)], radiance.max(axis=1)
+    first, *_, last = np.flatnonzero(brightest > 0.5 * brightest.max())
+    middle = radiance[len(across) // 2]
+    bright = up[middle > 0.5 * middle.max()]
+    return float(0.5 * (ridge[first] + ridge[last]) - ridge[len(across) // 2]), float(bright[-1] - bright[0])
+
+
 def _lobes() -> Figure:
     """The elliptical lobe along and across, with the round one of the same peak."""
     brass = presets()["rolled-brass"]
@@ -334,6 +402,7 @@ def _in_the_mirror(material: Material) -> Statement:
 FIGURES: dict[str, Callable[[], Figure]] = {
     "ward-1992-fig-04": _image,
     "ward-1992-fig-06": _slices,
+    "ward-1992-fig-07": _crescent,
     "ward-1992-lobes": _lobes,
     "ward-1992-forms": _forms,
 }
