@@ -5,5 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from brdfdb.figure import Figure
+from brdfdb.gallery import he_torrance_1991, oren_nayar_1994, ward_1992
 
-GALLERY: Mapping[str, Callable[[], Figure]] = {}
+GALLERY: Mapping[str, Callable[[], Figure]] = {
+    **oren_nayar_1994.FIGURES,
+    **he_torrance_1991.FIGURES,
+    **ward_1992.FIGURES,
+}
