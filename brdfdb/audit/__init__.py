@@ -41,7 +41,7 @@ def audit(table: Table) -> MaterialAudit:
     reciprocity = reciprocity_of(table, pairs)
     # what is linear between its nodes is no less than they are
     values = values_of(table, None if linear_in_angles(table) else pairs.table[pairs.drawn.above])
-    smoothness = smoothness_of(table, material)
+    smoothness = smoothness_of(table, material, pairs)
     table_error = table_error_of(table, material, pairs)
     sampling = sampling_of(table, material)
     found = (

@@ -158,9 +158,9 @@ class ModelEnergy(BaseModel):
 
 
 class Jump(BaseModel):
-    """How far f_r jumps across a seam, relative to its value there.
+    """How far f_r jumps across a seam, relative to its value there, or to the floor of the error of a table.
 
-    Its slope is not a jump: the value on either side is that of the line through two points next to the seam.
+    A slope is no jump: the value on either side is that of the line through two points next to the seam.
     """
 
     model_config = _STRICT

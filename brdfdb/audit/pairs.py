@@ -12,7 +12,8 @@ from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
 SEED = 1994  # not that of the build: its directions have been looked at
-DIRECTIONS = 1000  # of each band of theta_i, half of them in the lobe
+# Of each band of theta_i, half of them in the lobe; of more than _FEW wavelengths, which vary alike, fewer
+DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
 
 
 class Pairs(NamedTuple):
@@ -26,7 +27,8 @@ class Pairs(NamedTuple):
 
 
 def pairs_of(table: Table, material: Material) -> Pairs:
-    drawn = accuracy.draw(material, table.wavelength_nm, DIRECTIONS, SEED)
+    count = DIRECTIONS if wavelengths_of(table) <= _FEW else _FEWER_DIRECTIONS
+    drawn = accuracy.draw(material, table.wavelength_nm, count, SEED)
     shape = (len(drawn.wi), wavelengths_of(table))
     both = ((drawn.wi, drawn.wr), (drawn.wr, drawn.wi))
     looked_up = (table.lookup_vectors(*each).reshape(shape) for each in both)

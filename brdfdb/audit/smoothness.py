@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from brdfdb import accuracy
 from brdfdb.albedo import wavelengths_of
 from brdfdb.audit.findings import Jump, Smoothness
+from brdfdb.audit.pairs import Pairs
 from brdfdb.geometry import degrees, directions_from_half_difference, radians, spherical_angles, unit_vector
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
@@ -52,21 +53,21 @@ class _Seam(NamedTuple):
     half_difference: bool = False
 
 
-def smoothness_of(table: Table, material: Material) -> Smoothness:
-    wavelengths, width = table.wavelength_nm, wavelengths_of(table)
-    offset = table.interpolation.offset
+def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
+    wavelengths = table.wavelength_nm
 
     def model(wi: Array, wr: Array) -> Floats:
         return accuracy.model_values(material, wavelengths, wi, wr)
 
-    def looked_up(wi: Array, wr: Array) -> Floats:  # of f_r far below the offset, rounding alone is left
-        return table.lookup_vectors(wi, wr).reshape(len(wi), width) + offset
+    def looked_up(wi: Array, wr: Array) -> Floats:
+        return table.lookup_vectors(wi, wr).reshape(len(wi), wavelengths_of(table))
 
-    stated = 0.0 if table.error is None else table.error.overall.p99
-    tolerance = max(TABLE_TOLERANCE, stated)
-    of_model = [_jump(seam, model, wavelengths, MODEL_TOLERANCE) for seam in _crossed(_of_model())]
-    of_model.append(_between_methods(material, wavelengths))
-    of_table = [_jump(seam, looked_up, wavelengths, tolerance) for seam in _crossed(_of_table(table))]
+    floor = accuracy.floor_of(pairs.model, pairs.drawn) + _TINY  # far below it tables may be anything, as they may err
+    tolerance = max(TABLE_TOLERANCE, 0.0 if table.error is None else table.error.overall.p99)
+    tiny = np.full_like(floor, _TINY)
+    of_model = [_jump(seam, model, wavelengths, tiny, MODEL_TOLERANCE) for seam in _crossed(_of_model())]
+    of_model.append(_between_methods(material, wavelengths, tiny))
+    of_table = [_jump(seam, looked_up, wavelengths, floor, tolerance) for seam in _crossed(_of_table(table))]
     good = all(jump.largest <= jump.tolerance for jump in (*of_model, *of_table))
     return Smoothness(model=of_model, table=of_table, verdict="passes" if good else "violates")
 
@@ -131,17 +132,18 @@ def _crossed(seams: Iterable[_Seam]) -> Iterator[_Seam]:
             yield seam._replace(at=seam.at[above])
 
 
-def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, tolerance: float) -> Jump:
+def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: Floats, tolerance: float) -> Jump:
     beside = np.repeat(seam.at[np.newaxis], _BESIDE.size, axis=0)
     beside[..., seam.moved] += _BESIDE[:, np.newaxis]
     wi, wr = (w.reshape(-1, 3) for w in _directions(beside, seam.half_difference))
     far_below, below, above, far_above = function(wi, wr).reshape(_BESIDE.size, len(seam.at), -1)
     with np.errstate(invalid="ignore"):  # of what is not finite
-        before, after = 2.0 * below - far_below, 2.0 * above - far_above
-    return _largest(seam.name, before, after, _directions(seam.at, seam.half_difference), wavelength_nm, tolerance)
+        sides = 2.0 * below - far_below, 2.0 * above - far_above
+    relative = _relative(*sides, floor)
+    return _largest(seam.name, relative, _directions(seam.at, seam.half_difference), wavelength_nm, tolerance)
 
 
-def _between_methods(material: Material, wavelength_nm: Array | None) -> Jump:
+def _between_methods(material: Material, wavelength_nm: Array | None, floor: Floats) -> Jump:
     """Between values along an azimuth, of which He-Torrance takes a sum from a table, and the same one by one."""
     theta_i, theta_r, phi_r = np.meshgrid(_THETA, _THETA, np.linspace(0.0, np.pi, _ROW), indexing="ij")
     spectrum = [material.arguments()] if wavelength_nm is None else [material.arguments(w) for w in wavelength_nm]
@@ -149,17 +151,21 @@ def _between_methods(material: Material, wavelength_nm: Array | None) -> Jump:
         np.stack([material.spec.evaluate(*angles, **arguments).ravel() for arguments in spectrum], axis=-1)
         for angles in ((theta_i[..., :1], 0.0, theta_r[..., :1], phi_r), (theta_i, 0.0, theta_r, phi_r))
     )
-    directions = unit_vector(theta_i, 0.0).reshape(-1, 3), unit_vector(theta_r, phi_r).reshape(-1, 3)
-    return _largest("values in rows and one by one", rows, single, directions, wavelength_nm, MODEL_TOLERANCE)
+    at = unit_vector(theta_i, 0.0).reshape(-1, 3), unit_vector(theta_r, phi_r).reshape(-1, 3)
+    relative = _relative(rows, single, floor)
+    return _largest("values in rows and one by one", relative, at, wavelength_nm, MODEL_TOLERANCE)
+
+
+def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
+    """Jumps between values of shape (N, L), relative to the larger or the floor."""
+    with np.errstate(invalid="ignore"):  # what is not finite counts as 1
+        relative = np.abs(after - before) / np.maximum(np.maximum(np.abs(after), np.abs(before)), floor)
+    return np.where(np.isfinite(relative), relative, 1.0)
 
 
 def _largest(
-    seam: str, before: Floats, after: Floats, at: tuple[Array, Array], wavelength_nm: Array | None, tolerance: float
+    seam: str, relative: Floats, at: tuple[Array, Array], wavelength_nm: Array | None, tolerance: float
 ) -> Jump:
-    """The largest jump between values of shape (N, L)."""
-    with np.errstate(invalid="ignore"):  # what is not finite counts as 1
-        relative = np.abs(after - before) / (np.maximum(np.abs(after), np.abs(before)) + _TINY)
-    relative = np.where(np.isfinite(relative), relative, 1.0)
     row, column = np.unravel_index(int(np.argmax(relative)), relative.shape)
     where = _where(*(w[row] for w in at))
     if wavelength_nm is not None:

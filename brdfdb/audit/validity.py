@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from brdfdb.audit.findings import Limit, Standing, Validity
 from brdfdb.geometry import degrees
 from brdfdb.grids import Axis
@@ -16,6 +18,9 @@ from brdfdb.materials import Material
 _MUCH = 10.0
 _WARD_ALPHA, _MUCH_GREATER = 0.2, 2.0  # "not much greater" is less than twice
 _BEYOND, _FAR_BEYOND = 0.01, 0.1  # shares of a Gaussian of slopes that lie beyond 90 degrees
+_OPAQUE = 1.0 / (4.0 * math.pi)  # k of what absorbs within a wavelength
+_GENTLE = "Simplifications result by making the local tangent-plane approximation and assuming gentle roughness slopes."
+_CHALLENGED = "the large ratio of σ_0/τ challenges the gentle slope assumption of the model"
 _ORDER: tuple[Standing, ...] = ("inside", "at the edge", "outside")
 
 
@@ -33,29 +38,31 @@ def _standing(value: float, inside: float, edge: float) -> Standing:
 
 
 def _he_torrance(material: Material, wavelength_nm: Axis | None) -> list[Limit]:
-    sigma, tau = (float(material.parameters[name]) for name in ("sigma_0_um", "tau_um"))
-    slope = sigma / tau
-    longest = (material.arguments()["wavelength_nm"] if wavelength_nm is None else wavelength_nm).max() / 1000.0
+    sigma, tau, a = (float(material.parameters[name]) for name in ("sigma_0_um", "tau_um", "a"))
+    arguments = material.arguments(wavelength_nm)
+    longest = float(arguments["wavelength_nm"].max()) / 1000.0
+    slope, k = sigma / tau, float(np.min(arguments["k"]))
     # Of Gaussian heights with eq. 48 the second derivative along a line has the variance 12 sigma_0^2 / tau^4
     radius = math.inf if sigma == 0.0 else tau * tau / (math.sqrt(12.0) * sigma)
     phase = (4.0 * math.pi * sigma / longest) ** 2
-    gentle, rough = _standing(slope, 1.0 / _MUCH, 1.0), _standing(1.0 / max(phase, 1e-300), 1.0 / _MUCH, 1.0)
+    gentle = _standing(slope, 1.0 / _MUCH, 1.0)
+    rough: Standing = "inside" if phase >= _MUCH else "at the edge" if phase > 1.0 else "outside"
+    first_surface: Standing = "inside" if a > 0.0 else gentle if k >= _OPAQUE else "outside"
     return [
         Limit(
             quantity="slope sigma_0 / tau",
             value=f"{slope:.3g}",
             valid="up to 0.1, at the edge below 1",
             standing=gentle,
-            words="Simplifications result by making the local tangent-plane approximation and assuming gentle "
-            "roughness slopes.",
-            where="He et al. 1991, section 3.1",
+            words=_GENTLE if gentle != "outside" else _CHALLENGED,
+            where="He et al. 1991, section " + ("3.1" if gentle != "outside" else "4, of sandpaper"),
         ),
         Limit(
             quantity="very rough, (v_z sigma_0)^2 at normal incidence, or gentle, sigma_0 / tau",
             value=f"{phase:.3g} at {1000.0 * longest:g} nm, or {slope:.3g}",
             valid="at least 10, at the edge above 1; or up to 0.1, at the edge below 1",
             standing=min(rough, gentle, key=_ORDER.index),
-            words="can be approximately evaluated under either of the following two conditions: "
+            words="can be approximately evaluated under either of the following two conditions: [...] "
             "the surface is very rough [...] the surface has gentle slopes",
             where="He et al. 1991, appendix A.4, below eq. 49",
         ),
@@ -67,6 +74,15 @@ def _he_torrance(material: Material, wavelength_nm: Axis | None) -> list[Limit]:
             words="The approximation is valid when the local radius of curvature of the surface is large compared to "
             "the wavelength.",
             where="He et al. 1991, section 2.2",
+        ),
+        Limit(
+            quantity="reflections but the first",
+            value=f"a = {a:g}, k = {k:.3g}, sigma_0 / tau = {slope:.3g}",
+            valid="a above 0, or k at least 1 / (4 pi) and gentle slopes",
+            standing=first_surface,
+            words="This contribution is small for metallic (opaque) surfaces with shallow roughness slopes. However, "
+            "the contribution can be important for surfaces with large slopes, or for nonmetals",
+            where="He et al. 1991, section 3.2.3",
         ),
     ]
 
