@@ -27,6 +27,7 @@ class Pairs(NamedTuple):
 
 
 def pairs_of(table: Table, material: Material) -> Pairs:
+    """Look up, and evaluate the model, at all wavelengths of a table."""
     count = DIRECTIONS if wavelengths_of(table) <= _FEW else _FEWER_DIRECTIONS
     drawn = accuracy.draw(material, table.wavelength_nm, count, SEED)
     shape = (len(drawn.wi), wavelengths_of(table))

@@ -22,6 +22,7 @@ _TINY = 1e-270  # 1/sr; smaller values carry too few digits
 
 
 def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
+    """Random pairs, pairs in the lobe, and all pairs of nodes."""
     above, in_lobe = pairs.drawn.above, pairs.drawn.in_lobe
     offset = table.interpolation.offset  # of f_r far below it, rounding alone is left
     looked_up = (pairs.table + offset, pairs.table_exchanged + offset, _interpolant_tolerance(table.grid))

@@ -38,37 +38,32 @@ Array = NDArray[np.float64]
 
 
 class _Light(NamedTuple):
-    """What is found for one light."""
+    """What is found for one light, as in `Sampling`, and whether that is good."""
 
-    chance: float
-    largest: float
-    spread: float
-    mean: float
-    standard_error: float
-    albedo: float
+    chi_square_p: float
+    largest_weight: float
+    weight_spread: float
+    monte_carlo: float
+    monte_carlo_error: float
+    quadrature: float
     good: bool
 
 
 def sampling_of(table: Table, material: Material) -> Sampling:
+    """Draw for each light, at the wavelength in the middle of those of the table."""
     wavelength = representative_nm(table)
     count = min(SAMPLES, _FEWER.get(material.model, SAMPLES))
     arguments = material.arguments(wavelength)
     found = [_light(material.spec, arguments, theta, count) for theta in THETA_I_DEG]
-    columns = [numbers(column) for column in zip(*found, strict=True)]
+    columns = {name: numbers([getattr(light, name) for light in found]) for name in _Light._fields if name != "good"}
     return Sampling(
         samples=count,
         theta_i_deg=list(THETA_I_DEG),
         phi_i_deg=PHI_I_DEG,
         wavelength_nm=wavelength,
-        **dict(zip(_FIELDS, columns[:-1], strict=True)),
+        **columns,
         verdict="passes" if all(light.good for light in found) else "violates",
     )
-
-
-_FIELDS = (
-    *("chi_square_p", "largest_weight", "weight_spread"),
-    *("monte_carlo", "monte_carlo_error", "quadrature"),
-)
 
 
 def _light(spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, count: int) -> _Light:
@@ -82,12 +77,12 @@ def _light(spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, co
     p = _chance(drawn.wr, wi, lobe_of(spec, wi, arguments))
     off = abs(mean - float(albedo))
     return _Light(
-        chance=p,
-        largest=float(np.max(drawn.weight)),
-        spread=deviation / mean if mean > 0.0 else 0.0,
-        mean=mean,
-        standard_error=standard_error,
-        albedo=float(albedo),
+        chi_square_p=p,
+        largest_weight=float(np.max(drawn.weight)),
+        weight_spread=deviation / mean if mean > 0.0 else 0.0,
+        monte_carlo=mean,
+        monte_carlo_error=standard_error,
+        quadrature=float(albedo),
         good=p >= LEAST_CHANCE and off <= STANDARD_ERRORS * standard_error + float(error) + _ROUNDING,
     )
 

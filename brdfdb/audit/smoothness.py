@@ -17,15 +17,14 @@ from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
-# Rounding of directions, times how steep a lobe is: measured 2e-12, of a sum that is
-# taken from a table
-MODEL_TOLERANCE = 1e-11
+# Rounding of directions, times how steep a lobe is, measured 1e-12; the table of He-Torrance's sum is to 1e-11
+MODEL_TOLERANCE = 2e-11
 # Nodes that stand for one direction, at a pole or both ends of a turn, are rounded to float32 one by one; a table may
-# jump there by the error that it states
-TABLE_TOLERANCE = 1e-6
+# jump there by the error that it states, up to this
+TABLE_TOLERANCE, _MOST_ERROR = 1e-6, 0.5
 _STEP = 1e-9  # [rad]
 _BESIDE = _STEP * np.array([-2.0, -1.0, 1.0, 2.0])
-_TINY = 1e-270  # 1/sr; smaller values carry too few digits
+_TINY = 1e-30  # 1/sr; smaller values are exponentials of numbers so large that they have lost digits
 _LOWEST = 1e-3  # cosine of the lowest directions that are looked at
 _SEED = 1992
 _NODES = 200  # crossings of nodes on each axis
@@ -54,6 +53,7 @@ class _Seam(NamedTuple):
 
 
 def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
+    """Of the model at all wavelengths of a table, and of the table, which may jump by the error that it states."""
     wavelengths = table.wavelength_nm
 
     def model(wi: Array, wr: Array) -> Floats:
@@ -63,7 +63,8 @@ def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
         return table.lookup_vectors(wi, wr).reshape(len(wi), wavelengths_of(table))
 
     floor = accuracy.floor_of(pairs.model, pairs.drawn) + _TINY  # far below it tables may be anything, as they may err
-    tolerance = max(TABLE_TOLERANCE, 0.0 if table.error is None else table.error.overall.p99)
+    stated = 0.0 if table.error is None else table.error.overall.p99
+    tolerance = max(TABLE_TOLERANCE, min(stated, _MOST_ERROR))
     tiny = np.full_like(floor, _TINY)
     of_model = [_jump(seam, model, wavelengths, tiny, MODEL_TOLERANCE) for seam in _crossed(_of_model())]
     of_model.append(_between_methods(material, wavelengths, tiny))

@@ -24,6 +24,7 @@ _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90
 
 
 def table_error_of(table: Table, material: Material, pairs: Pairs) -> TableError:
+    """Against what the table states, and as maps at the wavelength in the middle of those of the table."""
     with np.errstate(invalid="ignore"):  # of what is not finite
         fresh = accuracy.compare(pairs.table, pairs.model, pairs.drawn, SEED).overall.p99
     stated = None if table.error is None else table.error.overall.p99

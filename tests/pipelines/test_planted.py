@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import brdfdb
+from brdfdb.audit import sampling
 from brdfdb.staging import publish_dataset
 from brdfdb_pipelines import cli
 
@@ -101,6 +103,12 @@ def not_a_number(dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
+def jumping(dataset: xr.Dataset) -> xr.Dataset:
+    azimuth = dataset["delta_phi"].values / 60.0  # means nothing of light from the normal, the first row
+    numbers(dataset)[0] *= (1.0 + azimuth).reshape(-1, *(1,) * (numbers(dataset).ndim - 3)).astype(np.float32)
+    return dataset
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -108,6 +116,7 @@ def not_a_number(dataset: xr.Dataset) -> xr.Dataset:
         (not_reciprocal, "not reciprocal"),
         (negative, " negative values"),
         (not_a_number, " values are not finite"),
+        (jumping, "the table jumps by "),
     ],
     ids=lambda value: value.__name__ if callable(value) else "",
 )
@@ -136,3 +145,18 @@ def test_a_dark_table_that_is_too_bright_is_caught_by_its_error_alone(sound: Pat
     assert entry["energy"]["verdict"] == entry["reciprocity"]["verdict"] == entry["smoothness"]["verdict"] == "passes"
     assert entry["table_error"]["verdict"] == "violates"
     assert entry["table_error"]["fresh_p99"] == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_sampler_that_weighs_too_much_is_named(
+    sound: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = sampling.sample
+
+    def heavier(*arguments: Any, **parameters: Any) -> Any:
+        drawn = real(*arguments, **parameters)
+        return drawn._replace(weight=1.5 * drawn.weight)
+
+    monkeypatch.setattr(sampling, "sample", heavier)
+    assert cli.main(["audit", "dark", "--store", str(sound), "--report", str(tmp_path / "report.json")]) == 1
+    said = "dark: samples of the model do not have the density or the albedo that they should\n"
+    assert said in capsys.readouterr().out
