@@ -64,6 +64,17 @@ def sound(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     return root / "store"
 
 
+def audited(root: Path, name: str, report: Path) -> int:
+    """The exit code of an audit of one material, in this process: what is patched here is patched there."""
+    return cli.main(["audit", name, "--store", str(root), "--report", str(report)])
+
+
+def entry_of(report: Path) -> dict[str, Any]:
+    (entry,) = json.loads(report.read_text(encoding="utf-8"))["materials"]
+    assert isinstance(entry, dict)
+    return entry
+
+
 def numbers(dataset: xr.Dataset) -> np.ndarray:
     """What is stored of the table, to be changed in place: f_r, logarithms or parts of a spectrum of them."""
     values: np.ndarray = dataset["brdf" if "brdf" in dataset else "parts"].values
@@ -125,22 +136,24 @@ def test_a_planted_violation_is_named_and_is_exit_code_1(
     name: str, change: Change, said: str, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     dataset = xr.open_zarr(brdfdb.open(sound).path(name)).load()
-    publish_dataset(tmp_path, name, dataset)
-    assert cli.main(["audit", "--store", str(tmp_path)]) == 0
+    report, root = tmp_path / "report.json", tmp_path / "store"
+    publish_dataset(root, name, dataset)
+    assert audited(root, name, report) == 0
     capsys.readouterr()
-    publish_dataset(tmp_path, name, change(dataset))
-    assert cli.main(["verify", "--store", str(tmp_path)]) == 0  # the files are those of the manifest
-    assert cli.main(["audit", "--store", str(tmp_path)]) == 1
+    publish_dataset(root, name, change(dataset))
+    assert cli.main(["verify", "--store", str(root)]) == 0  # the files are those of the manifest
+    assert audited(root, name, report) == 1
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith(f"{name}: ") and said in line for line in lines)
-    (entry,) = json.loads((tmp_path / "audit.json").read_text(encoding="utf-8"))["materials"]
+    entry = entry_of(report)
     assert (entry["material"], entry["revision"], entry["verdict"]) == (name, "r000002", "violates")
 
 
 def test_a_dark_table_that_is_too_bright_is_caught_by_its_error_alone(sound: Path, tmp_path: Path) -> None:
-    publish_dataset(tmp_path, "dark", scaled(xr.open_zarr(brdfdb.open(sound).path("dark")).load()))
-    assert cli.main(["audit", "--store", str(tmp_path)]) == 1
-    (entry,) = json.loads((tmp_path / "audit.json").read_text(encoding="utf-8"))["materials"]
+    report, root = tmp_path / "report.json", tmp_path / "store"
+    publish_dataset(root, "dark", scaled(xr.open_zarr(brdfdb.open(sound).path("dark")).load()))
+    assert audited(root, "dark", report) == 1
+    entry = entry_of(report)
     assert entry["energy"]["max_albedo"] < 0.5
     assert entry["energy"]["verdict"] == entry["reciprocity"]["verdict"] == entry["smoothness"]["verdict"] == "passes"
     assert entry["table_error"]["verdict"] == "violates"
@@ -157,6 +170,6 @@ def test_a_sampler_that_weighs_too_much_is_named(
         return drawn._replace(weight=1.5 * drawn.weight)
 
     monkeypatch.setattr(sampling, "sample", heavier)
-    assert cli.main(["audit", "dark", "--store", str(sound), "--report", str(tmp_path / "report.json")]) == 1
+    assert audited(sound, "dark", tmp_path / "report.json") == 1
     said = "dark: samples of the model do not have the density or the albedo that they should\n"
     assert said in capsys.readouterr().out
