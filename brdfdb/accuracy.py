@@ -30,13 +30,15 @@ _MODEL = 1 << 16  # directions at which the model is evaluated at a time
 class Draw(NamedTuple):
     """Pairs of directions: unit vectors (N, 3), the band of theta_i of each, and what an integral weighs it with.
 
-    `weight` is cos theta_r over the density with which the viewer was drawn; 0 below the horizon.
+    `weight` is cos theta_r over the density with which the viewer was drawn; 0 below the horizon. `in_lobe` says which
+    viewers were drawn in the lobe.
     """
 
     wi: Floats
     wr: Floats
     band: NDArray[np.int64]
     weight: Floats
+    in_lobe: NDArray[np.bool_]
 
     @property
     def above(self) -> NDArray[np.bool_]:
@@ -59,7 +61,7 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
     u, angle = 1.0 - rng.random(band.size), rng.uniform(0.0, 2.0 * np.pi, band.size)
     over = unit_vector(np.arccos(u), angle)
     if material.spec.lobe is None:
-        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi))
+        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), np.zeros(band.size, dtype=bool))
     turns = np.arange(band.size) % (1 if wavelength_nm is None else wavelength_nm.size)
     spectrum = material.arguments(wavelength_nm)
     lobe = lobe_of(material.spec, wi, {name: v[turns] if np.ndim(v) else v for name, v in spectrum.items()})
@@ -70,7 +72,7 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
         chosen = (which >= number) & (which < number + 1)
         wr = np.where(chosen[:, np.newaxis], mirrored_in_lobe(u, angle, wi, drawn), wr)
     density = 0.5 / (2.0 * np.pi) + 0.5 * np.mean([mixture_density(drawn, wi, wr) for drawn in lobes], axis=0)
-    return Draw(wi, wr, band, np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density)
+    return Draw(wi, wr, band, np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density, which < len(lobes))
 
 
 def model_values(material: Material, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:

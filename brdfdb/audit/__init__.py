@@ -1,4 +1,4 @@
-"""What a table conserves: energy, reciprocity, positivity and finiteness, with a verdict on each."""
+"""The audit of a table: what it and its model conserve, where they jump or err, and where the model is valid."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from collections.abc import Sequence
 from brdfdb.albedo import linear_in_angles, material_of
 from brdfdb.audit.energy import energy_of
 from brdfdb.audit.findings import AuditReport, MaterialAudit, Verdict
-from brdfdb.audit.pairs import look_up
+from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.reciprocity import reciprocity_of
+from brdfdb.audit.sampling import sampling_of
+from brdfdb.audit.smoothness import smoothness_of
+from brdfdb.audit.table_error import table_error_of
+from brdfdb.audit.validity import validity_of
 from brdfdb.audit.values import values_of
 from brdfdb.figure import Figure
 from brdfdb.lookup import Table
@@ -17,7 +21,7 @@ __all__ = ["AuditReport", "MaterialAudit", "audit", "report"]
 
 
 def audit(table: Table) -> MaterialAudit:
-    """Audit one table: what it says of energy, positivity and finiteness holds for what is looked up in it.
+    """Audit one table: what it says of the table holds for what is looked up in it.
 
     Parameters
     ----------
@@ -31,12 +35,19 @@ def audit(table: Table) -> MaterialAudit:
         the material's attribute ``known_excess``, or its model, says, and "violates" where it exceeds 1 otherwise.
         A table that states its error may exceed either by what that error explains.
     """
-    material, plain = material_of(table), linear_in_angles(table)
-    looked_up = None if plain else look_up(table, material)
+    material = material_of(table)
+    pairs = pairs_of(table, material)
     energy = energy_of(table, material)
-    reciprocity = reciprocity_of(table, material, looked_up)
-    values = values_of(table, looked_up)
-    found = (energy.verdict, reciprocity.verdict, values.positivity, values.finiteness)
+    reciprocity = reciprocity_of(table, pairs)
+    # what is linear between its nodes is no less than they are
+    values = values_of(table, None if linear_in_angles(table) else pairs.table[pairs.drawn.above])
+    smoothness = smoothness_of(table, material, pairs)
+    table_error = table_error_of(table, material, pairs)
+    sampling = sampling_of(table, material)
+    found = (
+        *(energy.verdict, reciprocity.verdict, values.positivity, values.finiteness),
+        *(smoothness.verdict, table_error.verdict, sampling.verdict),
+    )
     worst: Verdict = "passes"
     for verdict in ("known published excess", "violates"):
         if verdict in found:
@@ -48,6 +59,10 @@ def audit(table: Table) -> MaterialAudit:
         energy=energy,
         reciprocity=reciprocity,
         values=values,
+        smoothness=smoothness,
+        table_error=table_error,
+        sampling=sampling,
+        validity=validity_of(material, table.wavelength_nm),
         verdict=worst,
     )
 

@@ -68,21 +68,26 @@ class Asymmetry(BaseModel):
     model_config = _STRICT
 
     pairs: int
+    min: float
     mean: float
     max: float
-    tolerance: float
+    tolerance: float | None = Field(description="of max; null: not judged, the two are interpolated from other nodes")
 
 
 class Reciprocity(BaseModel):
-    """Asymmetry of the model at the parameters of the table, and of the table."""
+    """Asymmetry of the model at the parameters of the table, and of the table.
+
+    Tables are looked up; to values that are interpolated in logarithms the offset of the logarithms is added.
+    """
 
     model_config = _STRICT
 
-    model: Asymmetry = Field(description="over random pairs of directions")
-    table: Asymmetry = Field(
-        description="over every pair that the grid holds both ways round; of tables that hold other numbers than f_r, "
-        "or hold them over half and difference vectors, over pairs that are looked up, too, to whose f_r the offset of "
-        "the logarithms is added"
+    model_random: Asymmetry = Field(description="viewers over the hemisphere")
+    model_lobe: Asymmetry | None = Field(description="viewers in the lobe and on its shoulder; null: it has none")
+    table_random: Asymmetry
+    table_lobe: Asymmetry | None
+    table_nodes: Asymmetry | None = Field(
+        description="over every pair that the grid holds both ways round; null: half and difference vectors hold none"
     )
     verdict: Verdict
 
@@ -102,7 +107,7 @@ class Values(BaseModel):
 
 
 EnergyVerdict = Literal["conserves", "loses", "known published excess", "violates"]
-Standing = Literal["inside", "at the edge", "outside"]
+Standing = Literal["inside", "at the edge", "outside", "unknown"]
 
 
 class Furnace(BaseModel):
@@ -153,13 +158,17 @@ class ModelEnergy(BaseModel):
 
 
 class Jump(BaseModel):
-    """How far f_r jumps across a seam, relative to its value there."""
+    """How far f_r jumps across a seam, relative to its value there, or to the floor of the error of a table.
+
+    A slope is no jump: the value on either side is that of the line through two points next to the seam.
+    """
 
     model_config = _STRICT
 
     seam: str = Field(description="what is crossed")
+    crossings: int
     largest: float
-    where: str
+    where: str = Field(description="of the largest: the directions in degrees, and the wavelength")
     tolerance: float
 
 
@@ -178,8 +187,9 @@ class TableError(BaseModel):
 
     model_config = _STRICT
 
-    stated_p99: float | None = Field(description="null: the table states no error")
-    fresh_p99: float
+    stated_p99: float | None = Field(description="null: the table states no error, and none is asked of it")
+    fresh_p99: float | None = Field(description="null: not finite")
+    directions: int
     maps: list[Map] = Field(description="relative error over theta_i and theta_r, negative back towards the light")
     verdict: Verdict
 
@@ -191,8 +201,9 @@ class Sampling(BaseModel):
 
     samples: int = Field(description="of each light")
     theta_i_deg: list[float]
+    phi_i_deg: float
     wavelength_nm: float | None
-    chi_square_p: Numbers = Field(description="probability of a worse histogram if the density is right; null: no bins")
+    chi_square_p: Numbers = Field(description="probability of a worse histogram if the density is right")
     largest_weight: Numbers
     weight_spread: Numbers = Field(description="standard deviation of the weights over their mean")
     monte_carlo: Numbers = Field(description="albedo without the Dirac part")
@@ -207,20 +218,20 @@ class Limit(BaseModel):
     model_config = _STRICT
 
     quantity: str
-    value: str
-    valid: str
-    standing: Standing
+    value: str = Field(description="of the material")
+    valid: str = Field(description="what was taken as inside and as the edge, where the paper gives no number")
+    standing: Standing = Field(description="unknown: the material does not say")
     words: str = Field(description="of the paper")
     where: str
 
 
 class Validity(BaseModel):
-    """All limits of a model."""
+    """All limits of a model that its paper states."""
 
     model_config = _STRICT
 
     limits: list[Limit]
-    standing: Standing = Field(description="the worst of them")
+    standing: Standing = Field(description="the worst of those that are known; inside: no limit is stated")
 
 
 class MaterialAudit(BaseModel):
@@ -234,6 +245,10 @@ class MaterialAudit(BaseModel):
     energy: Energy
     reciprocity: Reciprocity
     values: Values
+    smoothness: Smoothness
+    table_error: TableError
+    sampling: Sampling
+    validity: Validity = Field(description="no part of the verdict: what a paper tabulates is audited as it is")
     verdict: Verdict = Field(description="the worst of the findings")
 
 

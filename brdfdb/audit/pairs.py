@@ -1,29 +1,41 @@
-"""Pairs of directions at which a table is looked up, with light and viewer exchanged, too."""
+"""Pairs of directions at which a table and its model are looked at, with light and viewer exchanged, too."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 from brdfdb import accuracy
+from brdfdb.accuracy import Draw
 from brdfdb.albedo import wavelengths_of
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
-SEED = 1994
-_LOOKED_UP = 250  # directions of each band of theta_i, half of them in the lobe, where values are looked at
+SEED = 1994  # not that of the build: its directions have been looked at
+# Of each band of theta_i, half of them in the lobe; of more than _FEW wavelengths, which vary alike, fewer
+DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
 
 
-class LookedUp(NamedTuple):
-    """Values of f_r between the nodes: with light and viewer exchanged, too."""
+class Pairs(NamedTuple):
+    """f_r [1/sr] at pairs of directions, all of shape (N, L): of light and viewer, and of the two exchanged."""
 
-    forward: Floats
-    backward: Floats
+    drawn: Draw
+    table: Floats
+    table_exchanged: Floats
+    model: Floats
+    model_exchanged: Floats
 
 
-def look_up(table: Table, material: Material) -> LookedUp:
-    """f_r, shape (N, L), of pairs of directions above the horizon, half of them in the lobe."""
-    drawn = accuracy.draw(material, table.wavelength_nm, _LOOKED_UP, SEED)
-    wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
-    shape = (len(wi), wavelengths_of(table))
-    return LookedUp(table.lookup_vectors(wi, wr).reshape(shape), table.lookup_vectors(wr, wi).reshape(shape))
+def pairs_of(table: Table, material: Material) -> Pairs:
+    """Look up, and evaluate the model, at all wavelengths of a table."""
+    count = DIRECTIONS if wavelengths_of(table) <= _FEW else _FEWER_DIRECTIONS
+    drawn = accuracy.draw(material, table.wavelength_nm, count, SEED)
+    shape = (len(drawn.wi), wavelengths_of(table))
+    both = ((drawn.wi, drawn.wr), (drawn.wr, drawn.wi))
+    looked_up = (table.lookup_vectors(*each).reshape(shape) for each in both)
+    return Pairs(drawn, *looked_up, *(accuracy.model_values(material, table.wavelength_nm, *each) for each in both))
+
+
+def representative_nm(table: Table) -> float | None:
+    """The wavelength [nm] in the middle of those of a table, where what would fill pages is shown; None if grey."""
+    return None if table.wavelength_nm is None else float(table.wavelength_nm[table.wavelength_nm.size // 2])

@@ -7,11 +7,9 @@ from numpy.typing import NDArray
 
 from brdfdb.albedo import wavelengths_of
 from brdfdb.audit.findings import Asymmetry, Reciprocity
-from brdfdb.audit.pairs import SEED, LookedUp
-from brdfdb.geometry import radians
-from brdfdb.grids import Axis
+from brdfdb.audit.pairs import Pairs
+from brdfdb.grids import Grid
 from brdfdb.lookup import Table
-from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
 # The models are reciprocal; what is left is rounding, worst where exp(-V) has a large exponent: measured 3e-13
@@ -20,71 +18,64 @@ MODEL_RECIPROCITY_TOLERANCE = 1e-11
 TABLE_RECIPROCITY_TOLERANCE = 1e-6
 # Sums of the same numbers in another order, of f_r with the offset of its logarithm: measured 1.6e-14
 LOOKUP_RECIPROCITY_TOLERANCE = 5e-14
-MODEL_RECIPROCITY_PAIRS = 2000
-_POLAR = ("theta_i", "theta_r", "theta_h", "theta_d")
+_TINY = 1e-270  # 1/sr; smaller values carry too few digits
 
 
-def reciprocity_of(table: Table, material: Material, looked_up: LookedUp | None) -> Reciprocity:
-    rng = np.random.default_rng(SEED)
-    # uniform over the cosine up to the last node of the table
-    lowest = np.cos(radians(min(table.axes_deg[name][-1] for name in table.axes_deg if name in _POLAR)))
-    theta_i, theta_r = np.arccos(rng.uniform(lowest, 1.0, (2, MODEL_RECIPROCITY_PAIRS)))
-    phi_i, phi_r = rng.uniform(0.0, 2.0 * np.pi, (2, MODEL_RECIPROCITY_PAIRS))
-    forward, backward = (theta_i, phi_i, theta_r, phi_r), (theta_r, phi_r, theta_i, phi_i)
-    wavelengths = table.wavelength_nm
-    model = _asymmetry(
-        _model(material, wavelengths, forward),
-        _model(material, wavelengths, backward),
-        MODEL_RECIPROCITY_PAIRS,
-        MODEL_RECIPROCITY_TOLERANCE,
+def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
+    """Random pairs, pairs in the lobe, and all pairs of nodes."""
+    above, in_lobe = pairs.drawn.above, pairs.drawn.in_lobe
+    offset = table.interpolation.offset  # of f_r far below it, rounding alone is left
+    looked_up = (pairs.table + offset, pairs.table_exchanged + offset, _interpolant_tolerance(table.grid))
+    model = (pairs.model, pairs.model_exchanged, MODEL_RECIPROCITY_TOLERANCE)
+    found = Reciprocity(
+        model_random=_over(above & ~in_lobe, *model),
+        model_lobe=_over(above & in_lobe, *model) if in_lobe.any() else None,
+        table_random=_over(above & ~in_lobe, *looked_up),
+        table_lobe=_over(above & in_lobe, *looked_up) if in_lobe.any() else None,
+        table_nodes=None if table.grid.half_difference else _node_asymmetry(table),
+        verdict="passes",
     )
-    stored = _table_asymmetry(table, looked_up)
-    good = model.max <= model.tolerance and stored.max <= stored.tolerance
-    return Reciprocity(model=model, table=stored, verdict="passes" if good else "violates")
+    every = (found.model_random, found.model_lobe, found.table_random, found.table_lobe, found.table_nodes)
+    good = all(each is None or each.tolerance is None or each.max <= each.tolerance for each in every)
+    return found if good else found.model_copy(update={"verdict": "violates"})
 
 
-def _table_asymmetry(table: Table, looked_up: LookedUp | None) -> Asymmetry:
-    """The pairs that a grid holds both ways round, and those that were looked up."""
-    found = []
-    if not table.grid.half_difference:
-        found.append(_node_asymmetry(table))
-    if looked_up is not None and (table.grid.half_difference or table.grid.reciprocal):
-        # what is interpolated is the logarithm of f_r with an offset: of f_r far below it, rounding alone is left
-        forward, backward = (each + table.interpolation.offset for each in looked_up)
-        found.append(_asymmetry(forward, backward, len(forward), LOOKUP_RECIPROCITY_TOLERANCE))
-    worst = max(found, key=lambda each: each.max / each.tolerance)
-    pairs = sum(each.pairs for each in found)
-    return worst.model_copy(
-        update={"pairs": pairs, "mean": sum(each.mean * each.pairs for each in found) / max(pairs, 1)}
-    )
+def _interpolant_tolerance(grid: Grid) -> float | None:
+    """An interpolant is as symmetric as its nodes where light and viewer have the same; elsewhere nobody can say."""
+    if grid.half_difference:
+        return LOOKUP_RECIPROCITY_TOLERANCE
+    same = np.array_equal(grid.axes["theta_i"], grid.axes["theta_r"])
+    if grid.anisotropic:
+        same = same and np.array_equal(grid.axes["phi_i"], grid.axes["phi_r"])
+    return TABLE_RECIPROCITY_TOLERANCE if same else None
 
 
 def _node_asymmetry(table: Table) -> Asymmetry:
-    """Stored values against stored values: an interpolant is as symmetric as its nodes, if the axes are the same."""
+    """Stored values against stored values, all of them: one that is wrong is found."""
     axes = table.axes_deg
     _, i, r = np.intersect1d(axes["theta_i"], axes["theta_r"], return_indices=True)
     if table.anisotropic:
         _, phi_i, phi_r = np.intersect1d(axes["phi_i"], axes["phi_r"], return_indices=True)
         f = table.brdf[np.ix_(i, phi_i, r, phi_r)]
-        swapped = np.moveaxis(f, (0, 1), (2, 3))
+        exchanged = np.moveaxis(f, (0, 1), (2, 3))
     else:
         f = table.brdf[np.ix_(i, r)]  # exchanging them turns delta_phi to -delta_phi, where the table is the same
-        swapped = np.swapaxes(f, 0, 1)
-    return _asymmetry(f, swapped, f.size // wavelengths_of(table), TABLE_RECIPROCITY_TOLERANCE)
+        exchanged = np.swapaxes(f, 0, 1)
+    width = wavelengths_of(table)
+    return _asymmetry(f.reshape(-1, width), exchanged.reshape(-1, width), TABLE_RECIPROCITY_TOLERANCE)
 
 
-def _model(material: Material, wavelength_nm: Axis | None, angles: tuple[NDArray[np.float64], ...]) -> Floats:
-    """The model behind a table, at the table's wavelengths."""
-    if wavelength_nm is not None:
-        angles = tuple(angle[:, np.newaxis] for angle in angles)
-    return material.spec.evaluate(*angles, **material.arguments(wavelength_nm))
+def _over(chosen: NDArray[np.bool_], f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmetry:
+    return _asymmetry(f[chosen], exchanged[chosen], tolerance)
 
 
-def _asymmetry(f: Floats, swapped: Floats, pairs: int, tolerance: float) -> Asymmetry:
-    differs = f != swapped  # nan does; hardly any other value, which saves the time of the rest
-    f, swapped = f[differs].astype(np.float64), swapped[differs].astype(np.float64)
+def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmetry:
+    """Of values of shape (pairs, wavelengths)."""
+    differs = f != exchanged  # nan does; hardly any other node, which saves the time of the rest
+    one, other = f[differs].astype(np.float64), exchanged[differs].astype(np.float64)
     with np.errstate(invalid="ignore"):  # what is not finite counts as 1
-        relative = np.abs(f - swapped) / (np.abs(f) + np.abs(swapped))
+        relative = np.abs(one - other) / (np.abs(one) + np.abs(other) + _TINY)
     relative = np.where(np.isfinite(relative), relative, 1.0)
-    mean, largest = float(relative.sum() / differs.size), float(relative.max(initial=0.0))
-    return Asymmetry(pairs=pairs, mean=mean, max=largest, tolerance=tolerance)
+    smallest = float(relative.min(initial=1.0)) if differs.all() else 0.0
+    mean, largest = float(relative.sum() / max(differs.size, 1)), float(relative.max(initial=0.0))
+    return Asymmetry(pairs=len(f), min=smallest, mean=mean, max=largest, tolerance=tolerance)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from brdfdb.audit.findings import Values
-from brdfdb.audit.pairs import LookedUp
 from brdfdb.lookup import Table
 from brdfdb.parameters import Floats
 
 
-def values_of(table: Table, looked_up: LookedUp | None) -> Values:
-    brdf: list[Floats] = [table.brdf] if looked_up is None else [table.brdf, looked_up.forward]
+def values_of(table: Table, looked_up: Floats | None) -> Values:
+    """Of the nodes of a table and, where it is not linear between them, of f_r [1/sr] that was looked up, too."""
+    brdf: list[Floats] = [table.brdf] if looked_up is None else [table.brdf, looked_up]
     dirac: list[Floats] = [] if table.specular is None else [table.specular]
     reflected = [*brdf, *dirac]
     apart: list[Floats] = [array for array in (table.spectra, table.uniform) if array is not None]
@@ -23,7 +23,7 @@ def values_of(table: Table, looked_up: LookedUp | None) -> Values:
     return Values(
         count=sum(array.size for array in (table.values, *apart))
         + (0 if table.specular is None else table.specular.size),
-        looked_up=0 if looked_up is None else len(looked_up.forward),
+        looked_up=0 if looked_up is None else len(looked_up),
         smallest=smallest if np.isfinite(smallest) else None,
         negative=negative,
         not_finite=not_finite,

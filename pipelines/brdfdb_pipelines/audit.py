@@ -14,6 +14,7 @@ from typing import Any
 import brdfdb
 from brdfdb.atlas import ATLAS
 from brdfdb.audit import AuditReport, MaterialAudit, audit, report
+from brdfdb.audit.findings import Asymmetry
 from brdfdb.figure import Figure
 from brdfdb.gallery import GALLERY
 from brdfdb.store import StoreError
@@ -151,10 +152,14 @@ def _row(a: MaterialAudit) -> tuple[str, ...]:
         a.material,
         a.verdict,
         f"{albedo} at {a.energy.max_at_theta_i_deg:4g}°",
-        f"{a.reciprocity.model.max:.0e}",
-        f"{a.reciprocity.table.max:.0e}",
+        f"{_largest(a.reciprocity.model_random, a.reciprocity.model_lobe):.0e}",
+        f"{_largest(a.reciprocity.table_random, a.reciprocity.table_lobe, a.reciprocity.table_nodes):.0e}",
         "none" if a.values.smallest is None else f"{a.values.smallest:.3g}",
     )
+
+
+def _largest(*found: Asymmetry | None) -> float:
+    return max(each.max for each in found if each is not None)
 
 
 def _reasons(a: MaterialAudit) -> list[str]:
@@ -163,4 +168,14 @@ def _reasons(a: MaterialAudit) -> list[str]:
     reasons += ["not reciprocal"] if a.reciprocity.verdict == "violates" else []
     reasons += [f"{a.values.negative} negative values"] if a.values.negative else []
     reasons += [f"{a.values.not_finite} values are not finite"] if a.values.not_finite else []
+    for what, jumps in (("model", a.smoothness.model), ("table", a.smoothness.table)):
+        worst = max(jumps, key=lambda jump: jump.largest / jump.tolerance)
+        if worst.largest > worst.tolerance:
+            reasons.append(f"the {what} jumps by {worst.largest:.2g} at a seam, {worst.seam}: {worst.where}")
+    error = a.table_error
+    if error.verdict == "violates" and error.stated_p99 is not None:
+        fresh = "no number" if error.fresh_p99 is None else terminal.error(error.fresh_p99)
+        reasons.append(f"its error (p99) is {fresh}, not the {terminal.error(error.stated_p99)} that it states")
+    if a.sampling.verdict == "violates":
+        reasons.append("samples of the model do not have the density or the albedo that they should")
     return reasons

@@ -100,7 +100,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     build.add_argument("--json", action="store_true", help="print progress as JSON, an object a line")
 
-    audit = command("audit", _audit, "Audit energy, reciprocity, positivity and finiteness; exit 1 on a new violation.")
+    audit = command(
+        "audit", _audit, "Audit what tables and models conserve, where they jump or err; exit 1 on a new violation."
+    )
     audit.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
     audit.add_argument(
         "--report",

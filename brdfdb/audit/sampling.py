@@ -1,0 +1,133 @@
+"""The sampler of the model behind a table: its histogram against its density, its weights against the albedo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.audit.findings import Sampling
+from brdfdb.audit.pairs import SEED, representative_nm
+from brdfdb.figure import numbers
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.lookup import Table
+from brdfdb.materials import Material
+from brdfdb.parameters import Lobe, ModelSpec
+from brdfdb.quadrature import directional_albedo
+from brdfdb.sampling import lobe_of, mixture_density, sample
+
+SAMPLES = 100_000  # of each light
+_FEWER = {"oren_nayar_gaussian": 4000}  # integrals, of 30 us a value
+THETA_I_DEG, PHI_I_DEG = (10.0, 45.0, 80.0), 30.0
+LEAST_CHANCE = 1e-6  # below this p, samples are not those of the density
+STANDARD_ERRORS = 6.0  # chance makes one difference of 500 million as large
+_ROUNDING = 1e-12  # of a mean of weights that are all the same
+_ALBEDO_TOLERANCE = 1e-6
+_ENOUGH = 10.0  # samples that are expected in a bin
+# Bins of half vectors: of t, the slope in widths of the lobe, tenths of its Gaussian and beyond it half octaves up to
+# a hundred thousand; and of the azimuth on its ellipse
+_T = np.sqrt(-np.log1p(-np.arange(10) / 10.0))
+_T_EDGES = np.append(_T, _T[-1] * 2.0 ** (np.arange(1, 33) / 2.0))
+_PSI_EDGES = np.linspace(-np.pi, np.pi, 13)
+_NODES = 12  # of Gauss's rule, along each side of a bin
+
+Array = NDArray[np.float64]
+
+
+class _Light(NamedTuple):
+    """What is found for one light, as in `Sampling`, and whether that is good."""
+
+    chi_square_p: float
+    largest_weight: float
+    weight_spread: float
+    monte_carlo: float
+    monte_carlo_error: float
+    quadrature: float
+    good: bool
+
+
+def sampling_of(table: Table, material: Material) -> Sampling:
+    """Draw for each light, at the wavelength in the middle of those of the table."""
+    wavelength = representative_nm(table)
+    count = min(SAMPLES, _FEWER.get(material.model, SAMPLES))
+    arguments = material.arguments(wavelength)
+    found = [_light(material.spec, arguments, theta, count) for theta in THETA_I_DEG]
+    columns = {name: numbers([getattr(light, name) for light in found]) for name in _Light._fields if name != "good"}
+    return Sampling(
+        samples=count,
+        theta_i_deg=list(THETA_I_DEG),
+        phi_i_deg=PHI_I_DEG,
+        wavelength_nm=wavelength,
+        **columns,
+        verdict="passes" if all(light.good for light in found) else "violates",
+    )
+
+
+def _light(spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, count: int) -> _Light:
+    theta_i, phi_i = float(radians(theta_i_deg)), float(radians(PHI_I_DEG))
+    wi = unit_vector(theta_i, phi_i)
+    u1, u2 = np.random.default_rng(SEED).random((2, count))
+    drawn = sample(spec, u1, u2, wi, **arguments)
+    mean, deviation = float(np.mean(drawn.weight)), float(np.std(drawn.weight, ddof=1))
+    standard_error = deviation / np.sqrt(count)
+    albedo, error = directional_albedo(spec, theta_i, phi_i, tolerance=_ALBEDO_TOLERANCE, **arguments)
+    p = _chance(drawn.wr, wi, lobe_of(spec, wi, arguments))
+    off = abs(mean - float(albedo))
+    return _Light(
+        chi_square_p=p,
+        largest_weight=float(np.max(drawn.weight)),
+        weight_spread=deviation / mean if mean > 0.0 else 0.0,
+        monte_carlo=mean,
+        monte_carlo_error=standard_error,
+        quadrature=float(albedo),
+        good=p >= LEAST_CHANCE and off <= STANDARD_ERRORS * standard_error + float(error) + _ROUNDING,
+    )
+
+
+def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
+    """p of directions by Pearson's chi-square, in bins of their half vectors and one for all others.
+
+    In slopes in units of the lobe bins are as fine as the density needs, however narrow the lobe is.
+    """
+    alpha = np.array([lobe.alpha_x, lobe.alpha_y], dtype=np.float64)
+    h = wr + wi
+    s = h[:, :2] / h[:, 2:] / alpha
+    t, psi = np.hypot(s[:, 0], s[:, 1]), np.arctan2(s[:, 1], s[:, 0])
+    found, _, _ = np.histogram2d(t, psi, bins=(_T_EDGES, _PSI_EDGES))
+    expected = len(wr) * _shares(wi, lobe, alpha)
+    observed, wanted = _pooled(np.append(found, len(wr) - found.sum()), np.append(expected, len(wr) - expected.sum()))
+    chi_square = float(np.sum((observed - wanted) ** 2 / wanted))
+    return float(mpmath.gammainc((len(wanted) - 1) / 2.0, chi_square / 2.0, regularized=True))
+
+
+def _shares(wi: Array, lobe: Lobe, alpha: Array) -> Array:
+    """The integral of the density over each bin."""
+    t, t_weight = _gauss(_T_EDGES)
+    psi, psi_weight = _gauss(_PSI_EDGES)
+    t, psi = t[:, :, np.newaxis, np.newaxis], psi[np.newaxis, np.newaxis]
+    s_x, s_y = alpha[0] * t * np.cos(psi), alpha[1] * t * np.sin(psi)
+    cos_h = 1.0 / np.sqrt(1.0 + s_x * s_x + s_y * s_y)
+    h = np.stack([s_x * cos_h, s_y * cos_h, cos_h], axis=-1)
+    h_i = h @ wi
+    wr = 2.0 * h_i[..., np.newaxis] * h - wi
+    # d omega_r = 4 abs(h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
+    measure = 4.0 * np.abs(h_i) * cos_h**3 * alpha[0] * alpha[1] * t
+    return np.asarray(np.einsum("abcd,ab,cd->ac", mixture_density(lobe, wi, wr) * measure, t_weight, psi_weight))
+
+
+def _gauss(edges: Array) -> tuple[Array, Array]:
+    """Nodes and weights between edges, as rows."""
+    x, weight = np.polynomial.legendre.leggauss(_NODES)
+    half = np.diff(edges)[:, np.newaxis] / 2.0
+    return (edges[:-1] + edges[1:])[:, np.newaxis] / 2.0 + half * x, half * weight
+
+
+def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
+    """Bins from the fullest on, those of which too little is expected in one with the emptiest of the others."""
+    order = np.argsort(expected)[::-1]
+    last = max(int(np.count_nonzero(expected >= _ENOUGH)) - 1, 0)
+    starts = np.arange(last + 1)
+    return np.add.reduceat(observed[order], starts), np.add.reduceat(expected[order], starts)

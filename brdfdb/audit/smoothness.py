@@ -1,0 +1,181 @@
+"""Jumps of f_r: of the model where it changes its formula, of the table across the seams of its grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb import accuracy
+from brdfdb.albedo import wavelengths_of
+from brdfdb.audit.findings import Jump, Smoothness
+from brdfdb.audit.pairs import Pairs
+from brdfdb.geometry import degrees, directions_from_half_difference, radians, spherical_angles, unit_vector
+from brdfdb.lookup import Table
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+
+# Rounding of directions, times how steep a lobe is, measured 1e-12; the table of He-Torrance's sum is to 1e-11
+MODEL_TOLERANCE = 2e-11
+# Nodes that stand for one direction, at a pole or both ends of a turn, are rounded to float32 one by one; a table may
+# jump there by the error that it states, up to this
+TABLE_TOLERANCE, _MOST_ERROR = 1e-6, 0.5
+_STEP = 1e-9  # [rad]
+_BESIDE = _STEP * np.array([-2.0, -1.0, 1.0, 2.0])
+_TINY = 1e-30  # 1/sr; smaller values are exponentials of numbers so large that they have lost digits
+_LOWEST = 1e-3  # cosine of the lowest directions that are looked at
+_SEED = 1992
+_NODES = 200  # crossings of nodes on each axis
+_ROW = 64  # long enough that values along it come from a table
+
+Array = NDArray[np.float64]
+Function = Callable[[Array, Array], Floats]
+
+_THETA = np.array([0.2, 0.6, 1.0, 1.4])
+_PHI = np.array([0.0, 0.7, 1.6, 2.5, 3.1])
+_QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * np.pi
+_NONE = np.zeros(1)
+
+
+class _Seam(NamedTuple):
+    """Directions on a seam, shape (N, 4), and which of the four angles crosses it.
+
+    The angles are those of light and viewer, theta_i, phi_i, theta_r and phi_r, or of half and difference vector. Past
+    the pole a theta is negative: it looks the other way.
+    """
+
+    name: str
+    at: Array
+    moved: int
+    half_difference: bool = False
+
+
+def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
+    """Of the model at all wavelengths of a table, and of the table, which may jump by the error that it states."""
+    wavelengths = table.wavelength_nm
+
+    def model(wi: Array, wr: Array) -> Floats:
+        return accuracy.model_values(material, wavelengths, wi, wr)
+
+    def looked_up(wi: Array, wr: Array) -> Floats:
+        return table.lookup_vectors(wi, wr).reshape(len(wi), wavelengths_of(table))
+
+    floor = accuracy.floor_of(pairs.model, pairs.drawn) + _TINY  # far below it tables may be anything, as they may err
+    stated = 0.0 if table.error is None else table.error.overall.p99
+    tolerance = max(TABLE_TOLERANCE, min(stated, _MOST_ERROR))
+    tiny = np.full_like(floor, _TINY)
+    of_model = [_jump(seam, model, wavelengths, tiny, MODEL_TOLERANCE) for seam in _crossed(_of_model())]
+    of_model.append(_between_methods(material, wavelengths, tiny))
+    of_table = [_jump(seam, looked_up, wavelengths, floor, tolerance) for seam in _crossed(_of_table(table))]
+    good = all(jump.largest <= jump.tolerance for jump in (*of_model, *of_table))
+    return Smoothness(model=of_model, table=of_table, verdict="passes" if good else "violates")
+
+
+def _of_model() -> Iterator[_Seam]:
+    yield _Seam("viewer 90 degrees from the plane of incidence", _all(_THETA, _NONE, _THETA, _QUARTERS[1::2]), 3)
+    equal = _all(_THETA, _NONE, _NONE, _PHI)
+    equal[:, 2] = equal[:, 0]
+    yield _Seam("theta_i = theta_r", equal, 2)
+    yield _Seam("light at the normal", _all(_NONE, _PHI, _THETA, _NONE), 0)
+    yield _Seam("viewer at the normal", _all(_THETA, _NONE, _NONE, _PHI), 2)
+    yield _Seam("mirror direction", _all(_NONE, _QUARTERS + 0.3, _THETA, _PHI), 0, half_difference=True)
+    yield _Seam("back towards the light", _all(_THETA, _QUARTERS + 0.3, _NONE, _PHI), 2, half_difference=True)
+
+
+def _of_table(table: Table) -> Iterator[_Seam]:
+    yield from _of_model()
+    yield _Seam("azimuth of the light 0, 90, 180 and 270 degrees", _all(_THETA, _QUARTERS, _THETA, _PHI), 1)
+    yield _Seam("azimuth of the viewer 0, 90, 180 and 270 degrees", _all(_THETA, _PHI, _THETA, _QUARTERS), 3)
+    for name, delta_phi in (("0", 0.0), ("180", np.pi)):
+        at = _all(_THETA, _PHI, _THETA, _NONE)
+        at[:, 3] = at[:, 1] + delta_phi
+        yield _Seam(f"delta_phi of {name} degrees", at, 3)
+    rng = np.random.default_rng(_SEED)
+    for number, (name, nodes) in enumerate(table.axes_deg.items()):
+        on = np.stack([radians(rng.uniform(0.0, each[-1], _NODES)) for each in table.axes_deg.values()], axis=1)
+        on[:, number] = radians(rng.choice(nodes, _NODES))
+        at = np.zeros((_NODES, 4))
+        columns = _columns(table)
+        at[:, columns] = on
+        yield _Seam(f"nodes of {name}", at, columns[number], table.grid.half_difference)
+    if not table.grid.half_difference:
+        for name, moved in (("theta_i", 0), ("theta_r", 2)):
+            at = _all(_THETA, _PHI, _THETA, _PHI + 0.1)
+            at[:, moved] = radians(table.axes_deg[name][-1])
+            yield _Seam(f"last node of {name}", at, moved)
+
+
+def _columns(table: Table) -> list[int]:
+    """Which of the four angles each axis of a grid is; phi_i and phi_h of isotropic ones are 0."""
+    return list(range(4)) if table.anisotropic else [0, 2, 3]
+
+
+def _all(*angles: Floats) -> Array:
+    return np.stack(np.meshgrid(*angles, indexing="ij"), axis=-1, dtype=np.float64).reshape(-1, 4)
+
+
+def _directions(angles: Array, half_difference: bool) -> tuple[Array, Array]:
+    """Unit vectors of light and viewer."""
+    t_i, p_i, t_r, p_r = np.moveaxis(angles, -1, 0)
+    if half_difference:
+        t_i, p_i, t_r, p_r = directions_from_half_difference(t_i, p_i, t_r, p_r)
+    return unit_vector(t_i, p_i), unit_vector(t_r, p_r)
+
+
+def _crossed(seams: Iterable[_Seam]) -> Iterator[_Seam]:
+    """Seams with those of their directions that are above the horizon, if there are any."""
+    for seam in seams:
+        wi, wr = _directions(seam.at, seam.half_difference)
+        above = np.minimum(wi[:, 2], wr[:, 2]) > _LOWEST
+        if above.any():
+            yield seam._replace(at=seam.at[above])
+
+
+def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: Floats, tolerance: float) -> Jump:
+    beside = np.repeat(seam.at[np.newaxis], _BESIDE.size, axis=0)
+    beside[..., seam.moved] += _BESIDE[:, np.newaxis]
+    wi, wr = (w.reshape(-1, 3) for w in _directions(beside, seam.half_difference))
+    far_below, below, above, far_above = function(wi, wr).reshape(_BESIDE.size, len(seam.at), -1)
+    with np.errstate(invalid="ignore"):  # of what is not finite
+        sides = 2.0 * below - far_below, 2.0 * above - far_above
+    relative = _relative(*sides, floor)
+    return _largest(seam.name, relative, _directions(seam.at, seam.half_difference), wavelength_nm, tolerance)
+
+
+def _between_methods(material: Material, wavelength_nm: Array | None, floor: Floats) -> Jump:
+    """Between values along an azimuth, of which He-Torrance takes a sum from a table, and the same one by one."""
+    theta_i, theta_r, phi_r = np.meshgrid(_THETA, _THETA, np.linspace(0.0, np.pi, _ROW), indexing="ij")
+    spectrum = [material.arguments()] if wavelength_nm is None else [material.arguments(w) for w in wavelength_nm]
+    rows, single = (
+        np.stack([material.spec.evaluate(*angles, **arguments).ravel() for arguments in spectrum], axis=-1)
+        for angles in ((theta_i[..., :1], 0.0, theta_r[..., :1], phi_r), (theta_i, 0.0, theta_r, phi_r))
+    )
+    at = unit_vector(theta_i, 0.0).reshape(-1, 3), unit_vector(theta_r, phi_r).reshape(-1, 3)
+    relative = _relative(rows, single, floor)
+    return _largest("values in rows and one by one", relative, at, wavelength_nm, MODEL_TOLERANCE)
+
+
+def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
+    """Jumps between values of shape (N, L), relative to the larger or the floor."""
+    with np.errstate(invalid="ignore"):  # what is not finite counts as 1
+        relative = np.abs(after - before) / np.maximum(np.maximum(np.abs(after), np.abs(before)), floor)
+    return np.where(np.isfinite(relative), relative, 1.0)
+
+
+def _largest(
+    seam: str, relative: Floats, at: tuple[Array, Array], wavelength_nm: Array | None, tolerance: float
+) -> Jump:
+    row, column = np.unravel_index(int(np.argmax(relative)), relative.shape)
+    where = _where(*(w[row] for w in at))
+    if wavelength_nm is not None:
+        where += f", {wavelength_nm[column]:g} nm"
+    largest = float(f"{relative[row, column]:.3g}")
+    return Jump(seam=seam, crossings=len(relative), largest=largest, where=where, tolerance=tolerance)
+
+
+def _where(wi: Array, wr: Array) -> str:
+    theta, phi = (degrees(angles) for angles in spherical_angles(np.stack([wi, wr])))
+    named = zip(("theta_i", "phi_i", "theta_r", "phi_r"), (theta[0], phi[0], theta[1], phi[1]), strict=True)
+    return ", ".join(f"{name} {angle:.4g}" for name, angle in named) + " degrees"

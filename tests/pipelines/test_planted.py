@@ -1,0 +1,175 @@
+"""Violations planted in stored tables, with manifests that agree: `brdfdb audit` names each, and its exit code is 1."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import brdfdb
+from brdfdb.audit import sampling
+from brdfdb.staging import publish_dataset
+from brdfdb_pipelines import cli
+
+DEFINED = """\
+title = "A metal, and a material so dark that half as much light again conserves energy"
+materials = ["scene-copper-sphere", "dark"]
+wavelengths_nm = [{ start = 400, stop = 700, step = 25 }]
+[define.dark]
+title = "Dark"
+model = "oren_nayar"
+source = "no paper"
+[define.dark.parameters]
+rho = 0.3
+sigma_deg = 20
+"""
+GRIDS = """
+[grids.isotropic]
+theta_i_deg = [{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]
+theta_r_deg = [{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]
+delta_phi_deg = [{ start = 0, stop = 180, step = 10 }]
+[grids.spectral]
+theta_i_deg = [{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]
+theta_r_deg = [{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]
+delta_phi_deg = [{ start = 0, stop = 180, step = 10 }]
+[grids.anisotropic]
+theta_i_deg = [0, 80]
+phi_i_deg = [0, 360]
+theta_r_deg = [0, 80]
+phi_r_deg = [0, 360]
+"""
+RECIPES = {"planned": DEFINED.replace("[define.dark]", "tolerance = 0.02\n[define.dark]"), "plain": DEFINED + GRIDS}
+
+Change = Callable[[xr.Dataset], xr.Dataset]
+
+
+@pytest.fixture(autouse=True)
+def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is planted is in the tables, not in the samplers."""
+    monkeypatch.setattr("brdfdb.audit.sampling.SAMPLES", 2000)
+
+
+@pytest.fixture(scope="module", params=RECIPES)
+def sound(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of sound tables, planned or on plain grids."""
+    root = tmp_path_factory.mktemp(request.param)
+    recipe = root / "recipe.toml"
+    recipe.write_text(RECIPES[request.param], encoding="utf-8")
+    assert cli.main(["build", str(recipe), "--store", str(root / "store")]) == 0
+    return root / "store"
+
+
+def audited(root: Path, name: str, report: Path) -> int:
+    """The exit code of an audit of one material, in this process: what is patched here is patched there."""
+    return cli.main(["audit", name, "--jobs", "1", "--store", str(root), "--report", str(report)])
+
+
+def entry_of(report: Path) -> dict[str, Any]:
+    (entry,) = json.loads(report.read_text(encoding="utf-8"))["materials"]
+    assert isinstance(entry, dict)
+    return entry
+
+
+def numbers(dataset: xr.Dataset) -> np.ndarray:
+    """What is stored of the table, to be changed in place: f_r, logarithms or parts of a spectrum of them."""
+    values: np.ndarray = dataset["brdf" if "brdf" in dataset else "parts"].values
+    return values
+
+
+def of_logarithms(dataset: xr.Dataset) -> bool:
+    return bool(dataset.attrs["interpolation"]["logarithm"])
+
+
+def scaled(dataset: xr.Dataset) -> xr.Dataset:
+    factor = np.float32(1.5)
+    if "spectra" in dataset:  # rows are orthonormal: what they make of one logarithm at all wavelengths
+        numbers(dataset)[...] += np.log(factor) * dataset["spectra"].values.sum(axis=1).astype(np.float32)
+    elif of_logarithms(dataset):
+        numbers(dataset)[...] += np.log(factor)
+    else:
+        numbers(dataset)[...] *= factor
+    dataset.attrs["interpolation"]["offset"] *= 1.5
+    return dataset.assign(uniform=factor * dataset["uniform"]) if "uniform" in dataset else dataset
+
+
+def not_reciprocal(dataset: xr.Dataset) -> xr.Dataset:
+    numbers(dataset)[3, 5] *= np.float32(1.01)
+    return dataset
+
+
+def negative(dataset: xr.Dataset) -> xr.Dataset:
+    if of_logarithms(dataset):  # no logarithm is that of a negative number, but a part beside them may be one
+        return dataset.assign(uniform=-0.2)
+    numbers(dataset)[2, 3, 1] = -0.01
+    return dataset
+
+
+def not_a_number(dataset: xr.Dataset) -> xr.Dataset:
+    numbers(dataset)[2, 3, 1] = np.nan
+    return dataset
+
+
+def jumping(dataset: xr.Dataset) -> xr.Dataset:
+    azimuth = dataset["delta_phi"].values / 60.0  # means nothing of light from the normal, the first row
+    numbers(dataset)[0] *= (1.0 + azimuth).reshape(-1, *(1,) * (numbers(dataset).ndim - 3)).astype(np.float32)
+    return dataset
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (scaled, "its error (p99) is "),
+        (not_reciprocal, "not reciprocal"),
+        (negative, " negative values"),
+        (not_a_number, " values are not finite"),
+        (jumping, "the table jumps by "),
+    ],
+    ids=lambda value: value.__name__ if callable(value) else "",
+)
+@pytest.mark.parametrize("name", ["scene-copper-sphere", "dark"])
+def test_a_planted_violation_is_named_and_is_exit_code_1(
+    name: str, change: Change, said: str, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dataset = xr.open_zarr(brdfdb.open(sound).path(name)).load()
+    report, root = tmp_path / "report.json", tmp_path / "store"
+    publish_dataset(root, name, dataset)
+    assert audited(root, name, report) == 0
+    capsys.readouterr()
+    publish_dataset(root, name, change(dataset))
+    assert cli.main(["verify", "--store", str(root)]) == 0  # the files are those of the manifest
+    assert audited(root, name, report) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith(f"{name}: ") and said in line for line in lines)
+    entry = entry_of(report)
+    assert (entry["material"], entry["revision"], entry["verdict"]) == (name, "r000002", "violates")
+
+
+def test_a_dark_table_that_is_too_bright_is_caught_by_its_error_alone(sound: Path, tmp_path: Path) -> None:
+    report, root = tmp_path / "report.json", tmp_path / "store"
+    publish_dataset(root, "dark", scaled(xr.open_zarr(brdfdb.open(sound).path("dark")).load()))
+    assert audited(root, "dark", report) == 1
+    entry = entry_of(report)
+    assert entry["energy"]["max_albedo"] < 0.5
+    assert entry["energy"]["verdict"] == entry["reciprocity"]["verdict"] == entry["smoothness"]["verdict"] == "passes"
+    assert entry["table_error"]["verdict"] == "violates"
+    assert entry["table_error"]["fresh_p99"] == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_sampler_that_weighs_too_much_is_named(
+    sound: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = sampling.sample
+
+    def heavier(*arguments: Any, **parameters: Any) -> Any:
+        drawn = real(*arguments, **parameters)
+        return drawn._replace(weight=1.5 * drawn.weight)
+
+    monkeypatch.setattr(sampling, "sample", heavier)
+    assert audited(sound, "dark", tmp_path / "report.json") == 1
+    said = "dark: samples of the model do not have the density or the albedo that they should\n"
+    assert said in capsys.readouterr().out
