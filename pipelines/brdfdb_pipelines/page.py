@@ -1,0 +1,319 @@
+"""The report of an audit as one HTML file that needs nothing else: no network, no other file."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from itertools import groupby
+from typing import Literal, NamedTuple
+
+import jinja2
+
+from brdfdb.audit import AuditReport, MaterialAudit
+from brdfdb.audit.findings import Asymmetry
+from brdfdb.figure import Curve, Figure, Map, Numbers, Panel
+from brdfdb_pipelines import charts
+
+Level = Literal["good", "note", "bad"]
+
+PAPERS = {
+    "ward1992": "Ward 1992: Measuring and modeling anisotropic reflection",
+    "orennayar1994": "Oren and Nayar 1994: Generalization of Lambert's reflectance model",
+    "he1991": "He, Torrance, Sillion and Greenberg 1991: A comprehensive physical model for light reflection",
+}
+# What a word means for whoever skims: verdicts of all findings, and where a material stands in a model
+_LEVELS: dict[str, Level] = {
+    "passes": "good",
+    "conserves": "good",
+    "inside": "good",
+    "loses": "note",
+    "known published excess": "note",
+    "at the edge": "note",
+    "outside": "note",
+    "violates": "bad",
+}
+_MARKS: dict[Level, str] = {"good": "✓", "note": "!", "bad": "✕"}
+_WORST_FIRST = (
+    "violates",
+    "known published excess",
+    "loses",
+    "outside",
+    "at the edge",
+    "conserves",
+    "passes",
+    "inside",
+)
+_CURVES = 4  # wavelengths of a plot, at most
+_ALL_OF_IT = Curve(label="all that arrives", x=[0.0, 90.0], y=[1.0, 1.0])
+
+
+class Cell(NamedTuple):
+    """One finding on one material, in the table of all: what is shown, and what it is sorted by."""
+
+    word: str
+    text: str
+    sort: float
+
+    @property
+    def level(self) -> Level:
+        return _LEVELS[self.word]
+
+    @property
+    def mark(self) -> str:
+        return _MARKS[self.level]
+
+
+class Grid(NamedTuple):
+    """A small table in the section of a material."""
+
+    caption: str
+    headings: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+
+class Row(NamedTuple):
+    """A material in the table of all, and what its section needs beside its audit."""
+
+    audit: MaterialAudit
+    anchor: str
+    cells: list[Cell]
+    panels: list[Panel | Map]
+    tables: list[Grid]
+
+
+COLUMNS = ("model", "table", "reciprocity", "values", "smoothness", "table error", "sampling", "validity")
+
+
+def render(report: AuditReport, *, store: str, version: str, when: datetime) -> str:
+    """The page of a report.
+
+    Parameters
+    ----------
+    report : AuditReport
+        What was found.
+    store : str
+        The store that was audited, in words.
+    version : str
+        Of brdfdb.
+    when : datetime
+        When it was audited.
+
+    Returns
+    -------
+    str
+        An HTML document.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("brdfdb_pipelines", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "angle": angle, "probability": probability, "level": _LEVELS.__getitem__}
+    environment.filters["mark"] = lambda word: _MARKS[_LEVELS[word]]
+    environment.globals |= {"draw": _Drawer(), "anchor": anchor, "rank": _rank}
+    rows = [_row(a) for a in report.materials]
+    rows.sort(key=lambda row: (_rank(row.audit.verdict), _rank(row.audit.energy.verdict), row.audit.material))
+    words = ("conserves", "loses", "known published excess", "violates")
+    counts = [(word, sum(a.energy.verdict == word for a in report.materials)) for word in words]
+    return environment.get_template("page.html").render(
+        report=report,
+        rows=rows,
+        columns=COLUMNS,
+        counts=counts,
+        gallery=_by_paper(report.gallery),
+        colours=charts.VARIABLES,
+        store=store,
+        version=version,
+        when=when,
+    )
+
+
+def anchor(name: str) -> str:
+    """The id of a material's section: its name, where letters that an address cannot hold are numbers."""
+    return "m-" + re.sub(r"[^A-Za-z0-9-]", lambda letter: f"_{ord(letter[0]):x}_", name)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number for people: 0.0123, 1.2·10⁻⁹; what is missing is a dash."""
+    if value is None:
+        return "–"
+    if value != 0.0 and not 1e-4 <= abs(value) < 1e5:
+        mantissa, exponent = f"{value:.1e}".split("e")
+        return f"{mantissa.removesuffix('.0')}·10{charts.superscript(int(exponent))}".replace("-", "−")
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def angle(degrees: float) -> str:
+    """Degrees for people."""
+    return f"{degrees:.4g}°"
+
+
+def probability(value: float | None) -> str:
+    """A probability for people, without digits that mean nothing."""
+    if value is None:
+        return "–"
+    return "below 0.001" if value < 0.001 else f"{value:.3f}"
+
+
+class _Drawer:
+    """Draws for the template, and gives each drawing a key of its own."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def __call__(self, drawing: charts.Drawing) -> str:
+        self._count += 1
+        return charts.svg(drawing, f"plot-{self._count}")
+
+
+def _rank(word: str) -> int:
+    return _WORST_FIRST.index(word)
+
+
+def _by_paper(figures: list[Figure]) -> list[tuple[str, list[Figure]]]:
+    """Figures grouped by paper, papers in the order of their first figures."""
+    order = list(dict.fromkeys(figure.paper for figure in figures))
+    grouped = groupby(sorted(figures, key=lambda figure: order.index(figure.paper)), key=lambda figure: figure.paper)
+    return [(PAPERS.get(paper, paper), list(group)) for paper, group in grouped]
+
+
+def _row(a: MaterialAudit) -> Row:
+    return Row(a, anchor(a.material), _cells(a), [*_panels(a), *a.table_error.maps], _tables(a))
+
+
+def _cells(a: MaterialAudit) -> list[Cell]:
+    """In the order of `COLUMNS`; what sorts is the number that is shown."""
+    model, table = a.energy.model, a.energy.table
+    asymmetry = max(each.max for _, each in _reciprocity(a))
+    jump = max((jump.largest for jump in (*a.smoothness.model, *a.smoothness.table)), default=0.0)
+    error, p = a.table_error, [p for p in a.sampling.chi_square_p if p is not None]
+    wrong = a.values.negative + a.values.not_finite
+    values = "violates" if "violates" in (a.values.positivity, a.values.finiteness) else "passes"
+    most = math.inf if table.max_albedo is None else table.max_albedo
+    stated = "" if error.stated_p99 is None else f" of {number(error.stated_p99, 2)}"
+    edges = sum(limit.standing != "inside" for limit in a.validity.limits)
+    return [
+        Cell(model.verdict, f"{model.max_albedo:.4f} at {angle(model.max_at_theta_i_deg)}", model.max_albedo),
+        Cell(table.verdict, f"{_albedo(table.max_albedo)} at {angle(table.max_at_theta_i_deg)}", most),
+        Cell(a.reciprocity.verdict, number(asymmetry, 2), asymmetry),
+        Cell(values, f"{wrong} bad" if wrong else f"{a.values.count}", wrong),
+        Cell(a.smoothness.verdict, number(jump, 2), jump),
+        Cell(error.verdict, number(error.fresh_p99, 2) + stated, error.fresh_p99),
+        Cell(a.sampling.verdict, f"p {probability(min(p, default=None))}", min(p, default=1.0)),
+        Cell(
+            a.validity.standing,
+            f"{edges} of {len(a.validity.limits)} limits" if edges else "",
+            -_rank(a.validity.standing),
+        ),
+    ]
+
+
+def _albedo(value: float | None) -> str:
+    return "not finite" if value is None else f"{value:.4f}"
+
+
+def _reciprocity(a: MaterialAudit) -> list[tuple[str, Asymmetry]]:
+    found = a.reciprocity
+    named = [
+        ("model, random directions", found.model_random),
+        ("model, in the lobe", found.model_lobe),
+        ("table, random directions", found.table_random),
+        ("table, in the lobe", found.table_lobe),
+    ]
+    return named if found.table_nodes is None else [*named, ("table, its nodes", found.table_nodes)]
+
+
+def _tables(a: MaterialAudit) -> list[Grid]:
+    """Reciprocity, smoothness and sampling in numbers."""
+    reciprocity = [
+        (name, str(each.pairs), *(number(value, 2) for value in (each.min, each.mean, each.max, each.tolerance)))
+        for name, each in _reciprocity(a)
+    ]
+    jumps = [
+        (kind, jump.seam, number(jump.largest, 2), jump.where, number(jump.tolerance, 2))
+        for kind, found in (("model", a.smoothness.model), ("table", a.smoothness.table))
+        for jump in found
+    ]
+    s = a.sampling
+    columns = (s.chi_square_p, s.largest_weight, s.weight_spread, s.monte_carlo, s.monte_carlo_error, s.quadrature)
+    lights = [
+        (angle(theta), probability(p), *(number(value) for value in rest))
+        for theta, p, *rest in zip(s.theta_i_deg, *columns, strict=True)
+    ]
+    at = "" if s.wavelength_nm is None else f" at {s.wavelength_nm:g} nm"
+    tables = [
+        Grid("Asymmetry", ("of", "pairs", "smallest", "mean", "largest", "allowed"), reciprocity),
+        Grid("Jumps of f_r", ("of", "across", "largest, relative", "where", "allowed"), jumps),
+        Grid(
+            f"Sampling: {s.samples} samples of each light{at}",
+            ("light", "p", "largest weight", "spread", "albedo, sampled", "standard error", "albedo, integrated"),
+            lights,
+        ),
+    ]
+    return [table for table in tables if table.rows]
+
+
+def _panels(a: MaterialAudit) -> list[Panel | Map]:
+    """Albedo of model and table, over wavelengths; the furnace; the bound on a(lambda)."""
+    model, table = a.energy.model, a.energy.table
+    wavelengths = model.wavelength_nm
+    theta, albedo = "angle of the light, degrees", "directional albedo"
+    panels: list[Panel | Map] = []
+    where, at = 0, ""
+    if wavelengths is not None and len(wavelengths) > 1:
+        where = _strongest(model.albedo)
+        at = f" at {wavelengths[where]:g} nm"
+        curves = _spectral(model.theta_i_deg, model.albedo, wavelengths)
+        panels.append(Panel(title="Albedo of the model", x_label=theta, y_label=albedo, curves=curves))
+    same = (
+        0 if wavelengths is None or table.wavelength_nm is None else _nearest(table.wavelength_nm, wavelengths[where])
+    )
+    both = [
+        Curve(label="table", x=table.theta_i_deg, y=_column(table.albedo, same), role="ours"),
+        Curve(label="model", x=model.theta_i_deg, y=_column(model.albedo, where), role="truth"),
+        _ALL_OF_IT,
+    ]
+    panels.append(Panel(title=f"Model and table{at}", x_label=theta, y_label=albedo, curves=both))
+    if (furnace := model.furnace) is not None:
+        curves = _spectral(furnace.theta_i_deg, furnace.albedo, wavelengths)
+        curves = [*curves, _ALL_OF_IT]
+        panels.append(Panel(title="White furnace: made lossless", x_label=theta, y_label=albedo, curves=curves))
+    if (bound := model.bound_on_a) is not None:
+        x = bound.wavelength_nm
+        curves = [
+            Curve(label="this material", x=x, y=bound.preset, role="ours"),
+            Curve(label="largest that conserves", x=x, y=bound.largest, role="truth"),
+        ]
+        title, y_label = "Uniform diffuse part a(λ)", "a(λ)"
+        panels.append(Panel(title=title, x_label="wavelength, nm", y_label=y_label, curves=curves))
+    return panels
+
+
+def _nearest(values: list[float], value: float) -> int:
+    return min(range(len(values)), key=lambda k: abs(values[k] - value))
+
+
+def _spectral(x: list[float], rows: list[Numbers], wavelengths: list[float] | None) -> list[Curve]:
+    """Curves at a few wavelengths, the first and the last among them."""
+    if wavelengths is None or len(rows[0]) == 1:
+        return [Curve(label="model", x=x, y=_column(rows, 0), role="ours")]
+    count = min(_CURVES, len(wavelengths))
+    chosen = sorted({round(k * (len(wavelengths) - 1) / max(count - 1, 1)) for k in range(count)})
+    return [Curve(label=f"{wavelengths[k]:g} nm", x=x, y=_column(rows, k)) for k in chosen]
+
+
+def _strongest(rows: list[Numbers]) -> int:
+    """At which wavelength the largest albedo is."""
+
+    def largest(values: Iterable[float | None]) -> float:
+        return max((value for value in values if value is not None), default=-math.inf)
+
+    return max(range(len(rows[0])), key=lambda k: largest(row[k] for row in rows))
+
+
+def _column(rows: list[Numbers], k: int) -> Numbers:
+    return [row[k] for row in rows]
