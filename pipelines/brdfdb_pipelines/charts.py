@@ -248,7 +248,7 @@ def _canvas(
     title: str, labels: list[str], plot: float, right: float = _RIGHT, below: float = _BELOW
 ) -> tuple[Canvas, Axes]:
     """A figure with room for its title and for a legend above the axes, where it hides no curve."""
-    above = 10.0 + (_TITLE if title else 0.0) + _ROW * math.ceil(len(labels) / _columns(labels))
+    above = 13.0 + (_TITLE if title else 0.0) + _ROW * math.ceil(len(labels) / _columns(labels))
     height = above + plot + below
     canvas = Canvas(figsize=(WIDTH / 72.0, height / 72.0))
     axes = canvas.add_axes((_LEFT / WIDTH, below / height, (WIDTH - _LEFT - right) / WIDTH, plot / height))

@@ -16,25 +16,31 @@ from brdfdb.audit.findings import Asymmetry
 from brdfdb.figure import Curve, Figure, Map, Numbers, Panel
 from brdfdb_pipelines import charts
 
-Level = Literal["good", "note", "bad"]
+Level = Literal["good", "calm", "note", "bad"]
 
 PAPERS = {
     "ward1992": "Ward 1992: Measuring and modeling anisotropic reflection",
     "orennayar1994": "Oren and Nayar 1994: Generalization of Lambert's reflectance model",
     "he1991": "He, Torrance, Sillion and Greenberg 1991: A comprehensive physical model for light reflection",
 }
-# What a word means for whoever skims: verdicts of all findings, and where a material stands in a model
+# Verdicts of all findings and where a material stands in a model: how loud each is, and its mark beside the colour
 _LEVELS: dict[str, Level] = {
     "passes": "good",
     "conserves": "good",
     "inside": "good",
-    "loses": "note",
-    "known published excess": "note",
-    "at the edge": "note",
+    "loses": "calm",
+    "at the edge": "calm",
     "outside": "note",
+    "known published excess": "note",
     "violates": "bad",
 }
-_MARKS: dict[Level, str] = {"good": "✓", "note": "!", "bad": "✕"}
+_MARKS = dict.fromkeys(_LEVELS, "✓") | {
+    "loses": "↓",
+    "at the edge": "≈",
+    "outside": "!",
+    "known published excess": "!",
+    "violates": "✕",
+}
 _WORST_FIRST = (
     "violates",
     "known published excess",
@@ -47,6 +53,7 @@ _WORST_FIRST = (
 )
 _CURVES = 4  # wavelengths of a plot, at most
 _ALL_OF_IT = Curve(label="all that arrives", x=[0.0, 90.0], y=[1.0, 1.0])
+_IDEAL = Curve(label="ideal", x=[0.0, 90.0], y=[1.0, 1.0], role="truth")
 
 
 class Cell(NamedTuple):
@@ -62,7 +69,7 @@ class Cell(NamedTuple):
 
     @property
     def mark(self) -> str:
-        return _MARKS[self.level]
+        return _MARKS[self.word]
 
 
 class Grid(NamedTuple):
@@ -73,12 +80,21 @@ class Grid(NamedTuple):
     rows: Sequence[tuple[str, ...]]
 
 
+class Finding(NamedTuple):
+    """A verdict with its reason."""
+
+    title: str
+    word: str
+    reason: str
+
+
 class Row(NamedTuple):
     """A material in the table of all, and what its section needs beside its audit."""
 
     audit: MaterialAudit
     anchor: str
     cells: list[Cell]
+    findings: list[Finding]
     panels: list[Panel | Map]
     tables: list[Grid]
 
@@ -112,8 +128,7 @@ def render(report: AuditReport, *, store: str, version: str, when: datetime) -> 
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": number, "angle": angle, "probability": probability, "level": _LEVELS.__getitem__}
-    environment.filters["mark"] = lambda word: _MARKS[_LEVELS[word]]
+    environment.filters |= {"number": number, "angle": angle, "level": _LEVELS.__getitem__, "mark": _MARKS.__getitem__}
     environment.globals |= {"draw": _Drawer(), "anchor": anchor, "rank": _rank}
     rows = [_row(a) for a in report.materials]
     rows.sort(key=lambda row: (_rank(row.audit.verdict), _rank(row.audit.energy.verdict), row.audit.material))
@@ -182,7 +197,7 @@ def _by_paper(figures: list[Figure]) -> list[tuple[str, list[Figure]]]:
 
 
 def _row(a: MaterialAudit) -> Row:
-    return Row(a, anchor(a.material), _cells(a), [*_panels(a), *a.table_error.maps], _tables(a))
+    return Row(a, anchor(a.material), _cells(a), _findings(a), [*_panels(a), *a.table_error.maps], _tables(a))
 
 
 def _cells(a: MaterialAudit) -> list[Cell]:
@@ -210,6 +225,53 @@ def _cells(a: MaterialAudit) -> list[Cell]:
             -_rank(a.validity.standing),
         ),
     ]
+
+
+def _findings(a: MaterialAudit) -> list[Finding]:
+    """What is said of a material, a sentence each."""
+    model, table = a.energy.model, a.energy.table
+    same = table.reason and table.reason == model.reason
+    overall = [] if a.energy.reason in (model.reason, table.reason) else [("Energy", a.energy.verdict, a.energy.reason)]
+    worst = max((each for _, each in _reciprocity(a)), key=lambda each: (each.max > each.tolerance, each.max))
+    jumps = [*a.smoothness.model, *a.smoothness.table]
+    jumped = "no seam to cross"
+    if jumps:
+        jump = max(jumps, key=lambda each: (each.largest > each.tolerance, each.largest))
+        jumped = f"jumps by {number(jump.largest)} of f_r across {jump.seam}, of {number(jump.tolerance)} allowed"
+    v, error, s = a.values, a.table_error, a.sampling
+    stated = "states none" if error.stated_p99 is None else f"states {number(error.stated_p99)}"
+    p = min((p for p in s.chi_square_p if p is not None), default=None)
+    kept = sum(limit.standing == "inside" for limit in a.validity.limits)
+    found = [
+        *overall,
+        ("Energy of the model", model.verdict, model.reason),
+        ("Energy of the table", table.verdict, "as the model" if same else table.reason),
+        (
+            "Reciprocity",
+            a.reciprocity.verdict,
+            f"asymmetry up to {number(worst.max)}, of {number(worst.tolerance)} allowed",
+        ),
+        (
+            "Positivity",
+            v.positivity,
+            f"{v.negative} values are negative; the smallest f_r is {number(v.smallest)} 1/sr",
+        ),
+        ("Finiteness", v.finiteness, f"{v.not_finite} of {v.count} stored values are not finite"),
+        ("Smoothness", a.smoothness.verdict, jumped),
+        ("Table error", error.verdict, f"99 of 100 fresh values within {number(error.fresh_p99)}; the table {stated}"),
+        ("Sampling", s.verdict, f"the smallest p of {len(s.theta_i_deg)} lights is {probability(p)}"),
+        (
+            "Validity",
+            a.validity.standing,
+            f"inside {kept} of the {len(a.validity.limits)} limits that its paper states",
+        ),
+    ]
+    return [Finding(title, word, _sentence(reason)) for title, word, reason in found]
+
+
+def _sentence(text: str) -> str:
+    """With a capital and a full stop."""
+    return f"{text[:1].upper()}{text[1:].removesuffix('.')}." if text else ""
 
 
 def _albedo(value: float | None) -> str:
@@ -280,7 +342,7 @@ def _panels(a: MaterialAudit) -> list[Panel | Map]:
     panels.append(Panel(title=f"Model and table{at}", x_label=theta, y_label=albedo, curves=both))
     if (furnace := model.furnace) is not None:
         curves = _spectral(furnace.theta_i_deg, furnace.albedo, wavelengths)
-        curves = [*curves, _ALL_OF_IT]
+        curves = [*curves, _IDEAL]
         panels.append(Panel(title="White furnace: made lossless", x_label=theta, y_label=albedo, curves=curves))
     if (bound := model.bound_on_a) is not None:
         x = bound.wavelength_nm
