@@ -51,6 +51,7 @@ _WORST_FIRST = (
     "passes",
     "inside",
 )
+_LAST = 1e300  # what sorts after every number
 _CURVES = 4  # wavelengths of a plot, at most
 _ALL_OF_IT = Curve(label="all that arrives", x=[0.0, 90.0], y=[1.0, 1.0])
 _IDEAL = Curve(label="ideal", x=[0.0, 90.0], y=[1.0, 1.0], role="truth")
@@ -156,6 +157,8 @@ def number(value: float | None, digits: int = 3) -> str:
     """A number for people: 0.0123, 1.2·10⁻⁹; what is missing is a dash."""
     if value is None:
         return "–"
+    if not math.isfinite(value):
+        return "not finite"
     if value != 0.0 and not 1e-4 <= abs(value) < 1e5:
         mantissa, exponent = f"{value:.1e}".split("e")
         return f"{mantissa.removesuffix('.0')}·10{charts.superscript(int(exponent))}".replace("-", "−")
@@ -208,7 +211,7 @@ def _cells(a: MaterialAudit) -> list[Cell]:
     error, p = a.table_error, [p for p in a.sampling.chi_square_p if p is not None]
     wrong = a.values.negative + a.values.not_finite
     values = "violates" if "violates" in (a.values.positivity, a.values.finiteness) else "passes"
-    most = math.inf if table.max_albedo is None else table.max_albedo
+    most = _LAST if table.max_albedo is None else table.max_albedo
     stated = "" if error.stated_p99 is None else f" of {number(error.stated_p99, 2)}"
     edges = sum(limit.standing != "inside" for limit in a.validity.limits)
     return [

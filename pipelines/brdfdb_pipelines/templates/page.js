@@ -48,8 +48,9 @@ for (const figure of document.querySelectorAll("figure")) {
   const button = Object.assign(document.createElement("button"), { className: "save", type: "button", textContent: "Save SVG" });
   button.addEventListener("click", () => {
     const style = getComputedStyle(figure);
-    const plain = figure.querySelector("svg").outerHTML.replace(/var\((--[\w-]+)\)/g, (_, name) => style.getPropertyValue(name));
-    const text = plain.replace("<svg", `<svg xmlns="http://www.w3.org/2000/svg" font-family="sans-serif"`);
+    const drawn = new XMLSerializer().serializeToString(figure.querySelector("svg"));
+    const plain = drawn.replace(/var\((--[\w-]+)\)/g, (_, name) => style.getPropertyValue(name));
+    const text = plain.replace("<svg", '<svg font-family="sans-serif"');
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
     link.download = `${figure.dataset.name}.svg`;
