@@ -392,5 +392,7 @@ def _terse(tag: re.Match[str]) -> str:
     if "scale(" not in text:
         text = re.sub(r"-?\d+\.\d{2,}(?!\w)", lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), text)
     text = re.sub(r"#[0-9a-f]{6}\b", lambda colour: f"var({VARIABLES[colour[0]]})", text)
-    text = re.sub(r"(?<=\d) L ", " ", re.sub(r"\s+", " ", text))  # a line goes on as one
+    text = re.sub(r"\s+", " ", text)
+    if not re.search(r"[CQ] ", text):
+        text = re.sub(r"(?<=\d) L ", " ", text)  # a line goes on as one; a curve would as a curve
     return text.replace(": ", ":").replace("; ", ";").replace(' "', '"')

@@ -244,30 +244,24 @@ def _findings(a: MaterialAudit) -> list[Finding]:
     v, error, s = a.values, a.table_error, a.sampling
     stated = "states none" if error.stated_p99 is None else f"states {number(error.stated_p99)}"
     p = min((p for p in s.chi_square_p if p is not None), default=None)
-    kept = sum(limit.standing == "inside" for limit in a.validity.limits)
+    sampled = (
+        "no bins to compare" if p is None else f"the smallest p of {len(s.theta_i_deg)} lights is {probability(p)}"
+    )
+    limits = a.validity.limits
+    kept = f"inside {sum(limit.standing == 'inside' for limit in limits)} of {len(limits)} limits that its paper states"
+    asymmetric = f"asymmetry up to {number(worst.max)}, of {number(worst.tolerance)} allowed"
+    negative = f"{v.negative} values are negative; the smallest f_r is {number(v.smallest)} 1/sr"
     found = [
         *overall,
         ("Energy of the model", model.verdict, model.reason),
         ("Energy of the table", table.verdict, "as the model" if same else table.reason),
-        (
-            "Reciprocity",
-            a.reciprocity.verdict,
-            f"asymmetry up to {number(worst.max)}, of {number(worst.tolerance)} allowed",
-        ),
-        (
-            "Positivity",
-            v.positivity,
-            f"{v.negative} values are negative; the smallest f_r is {number(v.smallest)} 1/sr",
-        ),
+        ("Reciprocity", a.reciprocity.verdict, asymmetric),
+        ("Positivity", v.positivity, negative),
         ("Finiteness", v.finiteness, f"{v.not_finite} of {v.count} stored values are not finite"),
         ("Smoothness", a.smoothness.verdict, jumped),
         ("Table error", error.verdict, f"99 of 100 fresh values within {number(error.fresh_p99)}; the table {stated}"),
-        ("Sampling", s.verdict, f"the smallest p of {len(s.theta_i_deg)} lights is {probability(p)}"),
-        (
-            "Validity",
-            a.validity.standing,
-            f"inside {kept} of the {len(a.validity.limits)} limits that its paper states",
-        ),
+        ("Sampling", s.verdict, sampled),
+        ("Validity", a.validity.standing, kept if limits else "its paper states no limits"),
     ]
     return [Finding(title, word, _sentence(reason)) for title, word, reason in found]
 

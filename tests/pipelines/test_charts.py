@@ -146,6 +146,24 @@ def test_a_drawing_is_small_well_formed_and_in_variables(name: str) -> None:
     assert "<style" not in svg  # would be one of the page
 
 
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_every_step_of_a_path_has_the_numbers_that_it_needs(name: str) -> None:
+    wanted = {"M": 2, "L": 2, "Q": 4, "C": 6, "z": 0}
+    for path in re.findall(r' d="([^"]*)"', charts.svg(DRAWINGS[name], "key")):
+        for step, rest in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
+            count = len(rest.split())
+            assert count == 0 if step == "z" else (count > 0 and count % wanted[step] == 0)
+
+
+def test_a_polar_plot_stands_on_its_diameter() -> None:
+    svg = charts.svg(DRAWINGS["polar"], "key")
+    arcs = [path for path in re.findall(r' d="([^"]*)"', svg) if "C" in path]
+    ends = [np.array(re.findall(r"-?[\d.]+", path), dtype=float).reshape(-1, 2) for path in arcs]
+    assert len(arcs) > 1
+    assert len({tuple(each[-2]) for each in ends}) == 1  # from the end of its arc each goes by the centre
+    assert all(each[0].tolist() == each[-1].tolist() and each[-1, 1] == each[-2, 1] for each in ends)
+
+
 def test_ids_of_two_drawings_differ_and_references_find_theirs() -> None:
     ids: list[str] = []
     for key in ("plot-1", "decade"):  # the second begins like a colour
