@@ -31,7 +31,7 @@ class Bands(BaseModel):
     )
 
 
-class Energy(BaseModel):
+class TableEnergy(BaseModel):
     """Directional albedo of the table, Dirac part included: what leaves, of unit flux from theta_i.
 
     A table that states its error does so over bands of theta_i. What exceeds 1, or what is known of the material, may
@@ -112,6 +112,7 @@ class Furnace(BaseModel):
 
     lossless: str = Field(description="which parameters were set to what")
     theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: grey; of many wavelengths the ends and the middle")
     albedo: list[Numbers] = Field(description="[theta_i][wavelength], Dirac part included")
     hemispherical: Numbers = Field(description="[wavelength], the mean over uniform light")
     smallest: float
@@ -150,6 +151,17 @@ class ModelEnergy(BaseModel):
     bound_on_a: UniformBound | None = Field(description="null: not a He-Torrance material")
     verdict: EnergyVerdict
     reason: str = Field(description="how much, where; of a known excess the citation")
+
+
+class Energy(BaseModel):
+    """What the model behind a table does with light, and what the table makes of it."""
+
+    model_config = _STRICT
+
+    model: ModelEnergy
+    table: TableEnergy
+    verdict: EnergyVerdict = Field(description="the worse of the two")
+    reason: str = Field(description="of the one that is worse")
 
 
 class Jump(BaseModel):
