@@ -55,7 +55,8 @@ def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mappi
     lights = _lights(material)
     found = _reflected(material, arguments, lights)
     furnace = _furnace(material, arguments, wavelength_nm, lights)
-    theta, wavelength = np.unravel_index(np.argmax(found.largest), found.largest.shape)
+    # where it is the same at many angles, the first of them: rounding tells 1e-16 from each other
+    theta, wavelength = np.unravel_index(np.argmax(np.round(found.largest, 12)), found.largest.shape)
     largest, at = float(found.largest[theta, wavelength]), float(lights.theta_i_deg[theta])
     verdict, reason = _verdict(material, lights, found, furnace, known)
     exceeding = lights.theta_i_deg[np.any(found.largest - found.error > 1.0 + ENERGY_TOLERANCE, axis=1)]

@@ -52,7 +52,9 @@ def run(root: Path, names: list[str], report_path: Path) -> AuditReport:
         print(f"{within} exceed 1 by no more than the error that they state, or that of the integration, and pass")
     losing = sum(a.energy.verdict == "loses" for a in audits)
     if losing:
-        print(f"{losing} lose light as models even where nothing absorbs: the report says how much, and at which angle")
+        print(
+            f"{losing} are of models that lose light even where nothing absorbs it: the report says how much, and where"
+        )
     known = sum(a.verdict == "known published excess" for a in audits)
     print(
         f"{len(audits)} audited: {len(audits) - known - len(found.violations)} pass, {known} exceed 1 as their "
