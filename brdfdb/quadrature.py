@@ -196,7 +196,7 @@ def reflected_share(
     brdf : callable
         ``brdf(wi, wr)`` for a light (3,) and viewers (..., 3): f_r [1/sr] of shape (..., width).
     theta_i, phi_i : float [rad]
-        Direction of the light, theta below pi/2.
+        Direction of the light, theta up to pi/2.
     lobe : Lobe or None
         Of one light; where to look for what all values have in common, None if for nothing.
     tolerance : float

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ from brdfdb.lookup import Table
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
 from brdfdb.tabulate import tabulate
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
 SCHEMA = json.loads((Path(__file__).parent.parent / "schemas" / "audit.schema.json").read_text(encoding="utf-8"))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
@@ -16,6 +17,8 @@ from brdfdb.lookup import Table
 from brdfdb.tabulate import tabulate
 from tests.test_albedo import KINDS, planned, table_of
 from tests.test_audit import ISOTROPIC, known, material, verdicts, written
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
 
 def scaled(table: Table, factor: float) -> Table:

@@ -18,7 +18,7 @@ from brdfdb.models import MODELS
 from brdfdb.quadrature import directional_albedo
 from tests.test_audit import PARAMETERS, known, lambert, material
 
-compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
 SEVEN_DIGITS = 5e-7  # relative, half of the last digit that is written
 UNIFORM = 2.5e-4  # relative, of the mean over uniform light with a pole at the horizon; measured 2e-4 for k = 0.5
@@ -140,7 +140,6 @@ def test_wards_lobe_loses_half_of_the_light_at_60_degrees() -> None:
     assert found.furnace.smallest < found.furnace.largest < 1.0
 
 
-@compiled
 def test_he_and_torrances_gentle_slopes_reflect_all_near_the_normal_and_lose_light_near_grazing() -> None:
     found = energy(presets()["aluminum-cylinder-12b"], np.arange(380.0, 781.0, 100.0))
     assert found.furnace is not None
@@ -151,7 +150,6 @@ def test_he_and_torrances_gentle_slopes_reflect_all_near_the_normal_and_lose_lig
     assert found.verdict == "loses"
 
 
-@compiled
 @pytest.mark.xfail(
     strict=True,
     reason="He et al. 1991, eqs 71-84: while the specular part gives way to the diffuse one, the effective roughness "
@@ -226,7 +224,6 @@ def test_next_to_a_pole_an_excess_that_nobody_knows_violates_and_a_known_one_is_
 # The bound on a
 
 
-@compiled
 def test_bounds_of_many_surfaces_at_once_are_those_of_each() -> None:
     copper = presets()["scene-copper-sphere"].arguments(WAVELENGTHS)
     surfaces = {name: copper[name] for name in ("wavelength_nm", "sigma_0_um", "tau_um", "n", "k")}
