@@ -152,8 +152,8 @@ def test_he_and_torrances_gentle_slopes_reflect_all_near_the_normal_and_lose_lig
 
 @pytest.mark.xfail(
     strict=True,
-    reason="He et al. 1991, eqs 71-84: while the specular part gives way to the diffuse one, the effective roughness "
-    "of eq. 80 is not the same for both, and a lossless surface as gentle as that of Fig. 12 (a) reflects 1.035",
+    reason="He et al. 1991, eqs 71-84: near grazing, where the diffuse part gives way to the specular one, both of a "
+    "lossless surface as gentle as that of Fig. 12 (a) add up to 1.035, at 80 degrees and 780 nm",
 )
 def test_lossless_gentle_slopes_never_reflect_more_than_they_receive() -> None:
     found = energy(presets()["aluminum-cylinder-12a"], [780.0])
