@@ -169,7 +169,7 @@ def _albedo(
 
     def reflected(wr: Array) -> Array:
         with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            f_r = spec.vectors(wi, wr, **parameters)
+            f_r = spec.vectors(wi, wr.reshape(-1, 3), **parameters).reshape(wr.shape[:-1])  # in one row: faster
         return np.asarray(f_r * np.maximum(wr[..., 2], 0.0), dtype=np.float64)[..., np.newaxis]
 
     lobe = None if spec.lobe is None else spec.lobe(wi[2], **parameters)
@@ -261,9 +261,10 @@ def spectral_albedo(
     width = np.broadcast(*parameters.values()).size
     each = [{name: np.ravel(value)[w % np.size(value)] for name, value in parameters.items()} for w in range(width)]
 
-    def brdf(wi: Array, wr: Array) -> Array:
+    def brdf(wi: Array, wr: Array) -> Floats:
         with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            return np.stack([spec.vectors(wi, wr, **one) for one in each], axis=-1)
+            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in each]  # in one row: models are faster so
+        return np.stack(values, axis=-1).reshape(*wr.shape[:-1], width)
 
     lobe = narrowest(spec, float(np.cos(theta_i)), parameters)
     return reflected_share(
