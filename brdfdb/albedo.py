@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +10,8 @@ from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
-from brdfdb.parameters import Floats, Lobe
-from brdfdb.quadrature import reflected_share
+from brdfdb.parameters import Floats
+from brdfdb.quadrature import narrowest, reflected_share
 
 # Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
 QUADRATURE_TOLERANCE = 2e-5
@@ -131,21 +130,13 @@ def _integrated(table: Table, material: Material) -> TableAlbedo:
             brdf,
             theta_i,
             float(radians(phi_i_deg[p])),
-            _narrowest(material, float(np.cos(theta_i)), arguments),
+            narrowest(material.spec, float(np.cos(theta_i)), arguments),
             tolerance=QUADRATURE_TOLERANCE,
             most_panels=_MOST_PANELS,
             width=width,
             mirrored=not table.anisotropic,
         )
     return TableAlbedo(THETA_I_DEG, phi_i_deg, albedo, error.max(axis=1))
-
-
-def _narrowest(material: Material, cos_i: float, arguments: Mapping[str, Any]) -> Lobe | None:
-    """The lobe of a model at the wavelength where it is narrowest: panels that resolve it resolve the others."""
-    if material.spec.lobe is None:
-        return None
-    share, alpha_x, alpha_y = material.spec.lobe(cos_i, **arguments)
-    return Lobe(*(np.asarray(value) for value in (np.max(share), np.min(alpha_x), np.min(alpha_y))))
 
 
 def _trapezoid_weights(nodes: Axis) -> Axis:

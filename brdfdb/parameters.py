@@ -60,6 +60,11 @@ class Lobe(NamedTuple):
     alpha_y: Floats
 
 
+def white(_: Mapping[str, Any]) -> dict[str, float]:
+    """What makes a model lossless that absorbs by an albedo rho alone."""
+    return {"rho": 1.0}
+
+
 @dataclass(frozen=True)
 class ModelSpec:
     """A model as the rest of the library sees it.
@@ -75,6 +80,8 @@ class ModelSpec:
     are so in another way, says of their parameters whether they make it so.
     `uniform`, if there is one, names the parameter that over pi is a part of the value, the same in all directions.
     `lobe`, of models that have one, is called as ``lobe(cos_i, **parameters)`` and says where; None: a diffuse model.
+    `lossless` says which parameters to set to what so that nothing is absorbed: light that is then missing, the model
+    itself loses. None where no parameters do that.
     """
 
     name: str
@@ -94,6 +101,7 @@ class ModelSpec:
     lobe: Callable[..., Lobe] | None = None
     uniform: str | None = None
     known_excess: Mapping[str, float | str] | None = None
+    lossless: Callable[[Mapping[str, Any]], dict[str, float]] | None = None
 
     def parameter(self, name: str) -> Parameter:
         """The parameter called `name`; KeyError if the model has none."""

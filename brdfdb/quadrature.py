@@ -121,8 +121,7 @@ def directional_albedo(
     """
     spec = spec_of(model)
     parameters = named(spec, parameters)
-    if not 1e-13 <= tolerance <= 1.0:
-        raise ValueError(f"tolerance: {tolerance:.9g} is outside [1e-13, 1]")
+    _check_tolerance(tolerance)
     thetas, phis = check_theta("theta_i", theta_i), check_phi("phi_i", phi_i)
     arrays = np.broadcast_arrays(thetas, phis, *(np.asarray(value) for value in parameters.values()))
     albedo, error = np.empty(arrays[0].shape), np.empty(arrays[0].shape)
@@ -133,6 +132,11 @@ def directional_albedo(
     if specular and spec.specular is not None:
         albedo = albedo + spec.specular(thetas, **{name: parameters[name] for name in spec.specular_parameters})
     return Albedo(albedo[()], error[()])
+
+
+def _check_tolerance(tolerance: float) -> None:
+    if not 1e-13 <= tolerance <= 1.0:
+        raise ValueError(f"tolerance: {tolerance:.9g} is outside [1e-13, 1]")
 
 
 def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -165,7 +169,7 @@ def _albedo(
 
     def reflected(wr: Array) -> Array:
         with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            f_r = spec.vectors(wi, wr, **parameters)
+            f_r = spec.vectors(wi, wr.reshape(-1, 3), **parameters).reshape(wr.shape[:-1])  # in one row: faster
         return np.asarray(f_r * np.maximum(wr[..., 2], 0.0), dtype=np.float64)[..., np.newaxis]
 
     lobe = None if spec.lobe is None else spec.lobe(wi[2], **parameters)
@@ -192,7 +196,7 @@ def reflected_share(
     brdf : callable
         ``brdf(wi, wr)`` for a light (3,) and viewers (..., 3): f_r [1/sr] of shape (..., width).
     theta_i, phi_i : float [rad]
-        Direction of the light, theta below pi/2.
+        Direction of the light, theta up to pi/2.
     lobe : Lobe or None
         Of one light; where to look for what all values have in common, None if for nothing.
     tolerance : float
@@ -218,6 +222,69 @@ def reflected_share(
     panels = _panels_of(reflected, wi, theta_i, phi_i, lobe, mirrored)
     albedo, error = _adaptive(*panels, tolerance, most_panels, width)
     return Albedo(albedo, np.asarray(error))
+
+
+def spectral_albedo(
+    spec: ModelSpec,
+    theta_i: float,
+    phi_i: float,
+    parameters: Mapping[str, Any],
+    *,
+    tolerance: float,
+    most_panels: int = MOST_PANELS,
+    mirrored: bool = False,
+) -> Albedo:
+    """The directional albedo of a model for several sets of parameters at once, as those of wavelengths are.
+
+    Parameters
+    ----------
+    spec : ModelSpec
+        The model.
+    theta_i, phi_i : float [rad]
+        Direction of the light, theta up to pi/2.
+    parameters : mapping
+        All parameters of the model; numbers, and arrays of one shape (L,).
+    tolerance, most_panels, mirrored
+        As in `reflected_share`.
+
+    Returns
+    -------
+    Albedo
+        As of `reflected_share`, width L, or 1 where all parameters are numbers; without the Dirac part.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is outside its range, or the tolerance outside [1e-13, 1].
+    """
+    _check_tolerance(tolerance)
+    width = np.broadcast(*parameters.values()).size
+    each = [{name: np.ravel(value)[w % np.size(value)] for name, value in parameters.items()} for w in range(width)]
+
+    def brdf(wi: Array, wr: Array) -> Floats:
+        with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
+            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in each]  # in one row: models are faster so
+        return np.stack(values, axis=-1).reshape(*wr.shape[:-1], width)
+
+    lobe = narrowest(spec, float(np.cos(theta_i)), parameters)
+    return reflected_share(
+        brdf,
+        theta_i,
+        phi_i,
+        lobe,
+        tolerance=tolerance,
+        most_panels=most_panels,
+        width=width,
+        mirrored=mirrored,
+    )
+
+
+def narrowest(spec: ModelSpec, cos_i: float, parameters: Mapping[str, Any]) -> Lobe | None:
+    """The lobe of a model where parameters make it narrowest: panels that resolve it resolve the others."""
+    if spec.lobe is None:
+        return None
+    share, alpha_x, alpha_y = spec.lobe(np.asarray(cos_i), **parameters)
+    return Lobe(*(np.asarray(value) for value in (np.max(share), np.min(alpha_x), np.min(alpha_y))))
 
 
 def _panels_of(

@@ -8,7 +8,7 @@ import pytest
 
 from brdfdb import models
 from brdfdb.models import MODELS
-from brdfdb.quadrature import directional_albedo
+from brdfdb.quadrature import directional_albedo, spectral_albedo
 
 HALF_PI = np.pi / 2
 THETA_DEG = (0.0, 1e-6, 30.0, 60.0, 85.0, 89.9)
@@ -70,6 +70,46 @@ def test_wards_lobe_at_normal_incidence_has_a_closed_form() -> None:
         expected = np.sum(weight * np.exp(-u / alpha**2) * root * (1.0 + u) ** -2) / alpha**2
         albedo, _ = directional_albedo("ward", 0.0, rho_d=0.0, rho_s=1.0, alpha_x=alpha, alpha_y=alpha)
         assert albedo == pytest.approx(expected, abs=1e-6)  # of the closed form's own quadrature: the root ends at 1
+
+
+def test_a_mirror_has_the_reflectance_of_fresnels_equations() -> None:
+    theta_i = np.deg2rad([0.0, 30.0, 60.0, 80.0, 89.9])
+    n, cos_i = 1.5 + 2.6j, np.cos(theta_i)
+    q = np.sqrt(n**2 - np.sin(theta_i) ** 2)
+    s, p = (cos_i - q) / (cos_i + q), (n**2 * cos_i - q) / (n**2 * cos_i + q)
+    mirror = {"wavelength_nm": 500.0, "sigma_0_um": 0.0, "tau_um": 1.0, "n": 1.5, "k": 2.6}
+    albedo, _ = directional_albedo("he_torrance", theta_i, specular=True, **mirror)
+    np.testing.assert_allclose(albedo, (np.abs(s) ** 2 + np.abs(p) ** 2) / 2.0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize(("theta_deg", "phi_deg"), [(0.0, 0.0), (20.0, 0.0), (30.0, 40.0)])
+def test_wards_lobe_reflects_the_mean_of_the_weights_of_its_samples(theta_deg: float, phi_deg: float) -> None:
+    # Eq. (7) with r^2 = -log(u1): the weight is rho_s (h.i) cos^3(delta) sqrt(cos theta_r / cos theta_i)
+    x, weight = np.polynomial.legendre.leggauss(200)
+    r, angle = 4.5 * (x[:, np.newaxis] + 1.0), np.pi * x
+    slopes = r * 0.06 * np.cos(angle), r * 0.04 * np.sin(angle)
+    cos_h = 1.0 / np.sqrt(1.0 + slopes[0] ** 2 + slopes[1] ** 2)
+    theta_i, phi_i = np.deg2rad([theta_deg, phi_deg])
+    towards = np.sin(theta_i) * (slopes[0] * np.cos(phi_i) + slopes[1] * np.sin(phi_i)) + np.cos(theta_i)
+    cos_r = np.maximum(2.0 * towards * cos_h**2 - np.cos(theta_i), 0.0)
+    mean = towards * cos_h**4 * np.sqrt(cos_r / np.cos(theta_i)) * 2.0 * r * np.exp(-(r**2)) / 2.0
+    expected = 4.5 * weight @ mean @ weight
+    lobe = {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": 0.06, "alpha_y": 0.04}
+    assert directional_albedo("ward", theta_i, phi_i, **lobe).albedo == pytest.approx(expected, abs=TOLERANCE)
+
+
+def test_several_sets_of_parameters_share_panels_and_keep_their_albedos() -> None:
+    rough = COPPER | {"sigma_0_um": 0.2, "tau_um": 2.0, "a": 0.1, "k": np.array([2.0, 3.0, 4.0])}
+    together = spectral_albedo(MODELS["he_torrance"], 1.2, 0.0, rough, tolerance=1e-7, mirrored=True)
+    each = directional_albedo("he_torrance", 1.2, tolerance=1e-7, **rough)
+    assert together.albedo.shape == (3,)
+    assert together.error <= 1e-7
+    assert np.ptp(each.albedo) > 0.1
+    np.testing.assert_allclose(together.albedo, each.albedo, atol=2e-7)
+    grey = spectral_albedo(MODELS["lambert"], 1.2, 0.0, {"rho": 0.3}, tolerance=1e-9)
+    assert grey.albedo == pytest.approx([0.3], abs=1e-9)
+    with pytest.raises(ValueError, match=r"^tolerance: 0 is outside \[1e-13, 1\]$"):
+        spectral_albedo(MODELS["lambert"], 1.2, 0.0, {"rho": 0.3}, tolerance=0.0)
 
 
 @pytest.mark.parametrize("alpha", [(0.01, 0.01), (0.1, 0.1), (0.6, 0.6), (2.0, 2.0), (0.01, 2.0), (2.0, 0.3)])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import datetime
+from importlib.metadata import version
 
 from brdfdb.albedo import linear_in_angles, material_of
 from brdfdb.audit.energy import energy_of
@@ -33,7 +35,8 @@ def audit(table: Table) -> MaterialAudit:
     MaterialAudit
         The findings. The verdict on energy is "known published excess" where the albedo exceeds 1 no further than
         the material's attribute ``known_excess``, or its model, says, and "violates" where it exceeds 1 otherwise.
-        A table that states its error may exceed either by what that error explains.
+        A table that states its error may exceed either by what that error explains. That a model "loses" light that
+        nothing absorbs is said, and passes.
     """
     material = material_of(table)
     pairs = pairs_of(table, material)
@@ -48,10 +51,7 @@ def audit(table: Table) -> MaterialAudit:
         *(energy.verdict, reciprocity.verdict, values.positivity, values.finiteness),
         *(smoothness.verdict, table_error.verdict, sampling.verdict),
     )
-    worst: Verdict = "passes"
-    for verdict in ("known published excess", "violates"):
-        if verdict in found:
-            worst = verdict
+    excused: Verdict = "known published excess" if "known published excess" in found else "passes"
     return MaterialAudit(
         material=table.name,
         revision=table.revision,
@@ -63,15 +63,27 @@ def audit(table: Table) -> MaterialAudit:
         table_error=table_error,
         sampling=sampling,
         validity=validity_of(material, table.wavelength_nm),
-        verdict=worst,
+        verdict="violates" if "violates" in found else excused,
     )
 
 
-def report(audits: list[MaterialAudit], atlas: Sequence[Figure] = (), gallery: Sequence[Figure] = ()) -> AuditReport:
-    """Collect audits and figures into the report of a store."""
+def report(
+    audits: Sequence[MaterialAudit],
+    *,
+    store: str,
+    when: datetime,
+    atlas: Sequence[Figure] = (),
+    gallery: Sequence[Figure] = (),
+    damaged: Sequence[str] = (),
+) -> AuditReport:
+    """Collect audits, figures and what could not be audited into the report of a store."""
     return AuditReport(
-        materials=audits,
+        store=store,
+        brdfdb=version("brdfdb"),
+        when=when,
+        materials=list(audits),
         atlas=list(atlas),
         gallery=list(gallery),
+        damaged=list(damaged),
         violations=[a.material for a in audits if a.verdict == "violates"],
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -31,7 +32,7 @@ class Bands(BaseModel):
     )
 
 
-class Energy(BaseModel):
+class TableEnergy(BaseModel):
     """Directional albedo of the table, Dirac part included: what leaves, of unit flux from theta_i.
 
     A table that states its error does so over bands of theta_i. What exceeds 1, or what is known of the material, may
@@ -117,6 +118,7 @@ class Furnace(BaseModel):
 
     lossless: str = Field(description="which parameters were set to what")
     theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: grey; of many wavelengths the ends and the middle")
     albedo: list[Numbers] = Field(description="[theta_i][wavelength], Dirac part included")
     hemispherical: Numbers = Field(description="[wavelength], the mean over uniform light")
     smallest: float
@@ -155,6 +157,17 @@ class ModelEnergy(BaseModel):
     bound_on_a: UniformBound | None = Field(description="null: not a He-Torrance material")
     verdict: EnergyVerdict
     reason: str = Field(description="how much, where; of a known excess the citation")
+
+
+class Energy(BaseModel):
+    """What the model behind a table does with light, and what the table makes of it."""
+
+    model_config = _STRICT
+
+    model: ModelEnergy
+    table: TableEnergy
+    verdict: EnergyVerdict = Field(description="the worse of the two")
+    reason: str = Field(description="of the one that is worse")
 
 
 class Jump(BaseModel):
@@ -259,7 +272,11 @@ class AuditReport(BaseModel):
 
     format: Literal["brdfdb-audit"] = "brdfdb-audit"
     version: Literal[3] = 3
+    store: str = Field(description="its directory")
+    brdfdb: str = Field(description="version of the library")
+    when: datetime
     materials: list[MaterialAudit]
     atlas: list[Figure] = Field(description="where methods fail: forms of the models against high-precision values")
     gallery: list[Figure] = Field(description="the figures of the papers, computed")
+    damaged: list[str] = Field(description="a sentence on each table that is damaged, and was not audited")
     violations: list[str] = Field(description="names of the materials that violate something not known as published")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -183,6 +184,13 @@ def lobe(
     total = diffuse + specular
     share = np.divide(specular, total, where=total > 0.0, out=np.zeros(np.shape(total)))
     return Lobe(share, np.asarray(alpha_x, dtype=np.float64), np.asarray(alpha_y, dtype=np.float64))
+
+
+def lossless(parameters: Mapping[str, float]) -> dict[str, float]:
+    """Both reflectances scaled to a sum of 1; of a black surface the diffuse one is 1."""
+    rho_d, rho_s = parameters["rho_d"], parameters["rho_s"]
+    total = rho_d + rho_s
+    return {"rho_d": rho_d / total, "rho_s": rho_s / total} if total > 0.0 else {"rho_d": 1.0, "rho_s": 0.0}
 
 
 def wide_lobe(cos_i: Floats, **parameters: ArrayLike) -> Lobe:

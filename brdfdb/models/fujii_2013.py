@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of the unnormalised lobe")
 SIGMA = Parameter("sigma", "σ'", "1", 0.0, 1.0, "ratio of the non-diffuse to the diffuse term; 0 is Lambert")
@@ -97,4 +97,5 @@ SPEC = ModelSpec(
     evaluate=oren_nayar_fujii,
     vectors=oren_nayar_fujii_vectors,
     grazing_pole=True,
+    lossless=white,
 )

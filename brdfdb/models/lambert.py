@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brdfdb.geometry import checked_angles, checked_vectors, finished
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo")
 
@@ -58,4 +58,5 @@ SPEC = ModelSpec(
     parameters=(RHO,),
     evaluate=lambert,
     vectors=lambert_vectors,
+    lossless=white,
 )

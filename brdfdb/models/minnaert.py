@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 K = Parameter("k", "k", "1", 0.0, 1.0, "limb darkening exponent; 1 is Lambert")
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "scale; the albedo at k = 1", default=1.0)
@@ -79,6 +79,14 @@ def _f_r(directions: Directions, k: ArrayLike, rho: ArrayLike) -> Floats:
     return finished(_evaluate(directions.cos_i, directions.cos_r, K.check(k), RHO.check(rho)), directions)
 
 
+# Of k = 0 and rho = 1 at 89.5 degrees: 1 / cos, 114.6
+_KNOWN_EXCESS: dict[str, float | str] = {
+    "max_albedo": 114.6,
+    "from_theta_i_deg": 0.0,
+    "citation": "Oren and Nayar 1994, section 1: as printed, Minnaert's law reflects 1 at normal incidence and, for k "
+    "below 1, more the further the light is from it, cos(theta_i)^(k - 1), without bound",
+}
+
 SPEC = ModelSpec(
     name="minnaert",
     version=1,
@@ -89,4 +97,6 @@ SPEC = ModelSpec(
     evaluate=minnaert,
     vectors=minnaert_vectors,
     grazing_pole=True,
+    known_excess=_KNOWN_EXCESS,
+    lossless=white,
 )

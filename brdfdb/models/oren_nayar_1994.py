@@ -12,7 +12,7 @@ from brdfdb._elementary import arcsin, cosine
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import HALF_PI, Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a facet")
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
@@ -418,6 +418,7 @@ SPEC = ModelSpec(
     vectors=oren_nayar_vectors,
     grazing_pole=True,
     known_excess=_KNOWN_EXCESS,
+    lossless=white,
 )
 QUALITATIVE_SPEC = ModelSpec(
     name="oren_nayar_qualitative",
@@ -430,4 +431,5 @@ QUALITATIVE_SPEC = ModelSpec(
     vectors=oren_nayar_qualitative_vectors,
     grazing_pole=True,
     known_excess=_KNOWN_EXCESS,
+    lossless=white,
 )

@@ -12,7 +12,7 @@ from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._oren_nayar_facets import bounce_of_cavity, direct_of_cavity, gaussian
 from brdfdb.models.oren_nayar_1994 import RHO, SIGMA, Parts
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 THETA_A = Parameter("theta_a", "θ_a", "rad", 0.0, np.pi / 2, "slope of the facets")
 PHI_A = Parameter("phi_a", "φ_a", "rad", 0.0, np.pi, "azimuth of the facets' normals, and half a turn from it")
@@ -451,6 +451,7 @@ UNIDIRECTIONAL_SPEC = ModelSpec(
     vectors=oren_nayar_unidirectional_vectors,
     grazing_pole=True,
     anisotropic=lambda parameters: parameters["theta_a"] > 0.0,
+    lossless=white,
 )
 SINGLE_SLOPE_SPEC = ModelSpec(
     name="oren_nayar_single_slope",
@@ -463,6 +464,7 @@ SINGLE_SLOPE_SPEC = ModelSpec(
     vectors=oren_nayar_single_slope_vectors,
     grazing_pole=True,
     known_excess=_SINGLE_SLOPE_EXCESS,
+    lossless=white,
 )
 GAUSSIAN_SPEC = ModelSpec(
     name="oren_nayar_gaussian",
@@ -474,4 +476,5 @@ GAUSSIAN_SPEC = ModelSpec(
     evaluate=oren_nayar_gaussian,
     vectors=oren_nayar_gaussian_vectors,
     grazing_pole=True,
+    lossless=white,
 )

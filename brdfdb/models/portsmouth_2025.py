@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from brdfdb._elementary import arcsin
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
-from brdfdb.parameters import Floats, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a single scattering; the albedo at 1")
 ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1.0, "Fujii's mixing ratio; 0 is Lambert")
@@ -118,4 +118,5 @@ SPEC = ModelSpec(
     evaluate=oren_nayar_energy_preserving,
     vectors=oren_nayar_energy_preserving_vectors,
     grazing_pole=True,
+    lossless=white,
 )

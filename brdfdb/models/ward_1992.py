@@ -14,6 +14,7 @@ from brdfdb.models._ward_lobes import (
     by_angles,
     by_vectors,
     lobe,
+    lossless,
     wide_lobe,
 )
 from brdfdb.parameters import Floats, ModelSpec
@@ -169,6 +170,7 @@ SPEC = ModelSpec(
     uniform="rho_d",
     lobe=lobe,
     known_excess=_KNOWN_EXCESS,
+    lossless=lossless,
 )
 HALF_VECTOR_SPEC = ModelSpec(
     name="ward_half_vector",
@@ -184,4 +186,5 @@ HALF_VECTOR_SPEC = ModelSpec(
     uniform="rho_d",
     lobe=wide_lobe,
     known_excess=_HALF_VECTOR_KNOWN_EXCESS,
+    lossless=lossless,
 )

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from brdfdb.audit.findings import Asymmetry
 from brdfdb.figure import Figure
 from brdfdb.gallery import GALLERY
 from brdfdb.store import StoreError
-from brdfdb_pipelines import terminal, workers
+from brdfdb_pipelines import page, terminal, workers
 
 Task = Callable[[], Any]
 
@@ -63,18 +64,23 @@ def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: 
             done[name] = outcome
             bar.advance(task)
     audits = [done[name] for name in materials if isinstance(done[name], MaterialAudit)]
-    damaged = "; ".join(str(outcome) for outcome in done.values() if isinstance(outcome, StoreError))
+    damaged = [str(outcome) for outcome in done.values() if isinstance(outcome, StoreError)]
     if damaged and not audits:
-        raise StoreError(damaged)
+        raise StoreError("; ".join(damaged))
     found = report(
         audits,
+        store=str(root),
+        when=datetime.now(UTC).replace(microsecond=0),
         atlas=[done[f"figure {key}"] for key in ATLAS if figures],
         gallery=[done[f"figure {key}"] for key in GALLERY if figures],
+        damaged=damaged,
     )
     report_path.write_text(found.model_dump_json() + "\n", encoding="utf-8")
+    page_path = report_path.with_suffix(".html")
+    page_path.write_text(page.render(found), encoding="utf-8")
     _print(root, found, report_path)
     if damaged:
-        raise StoreError(damaged)
+        raise StoreError("; ".join(damaged))
     return found
 
 
@@ -124,21 +130,26 @@ def _drawn(key: str) -> Figure:
 
 def _print(root: Path, found: AuditReport, report_path: Path) -> None:
     audits = found.materials
-    numbers = ("albedo up to", "model", "table", "smallest f_r")
+    numbers = ("albedo of model", "of table", "model", "table", "smallest f_r")
     terminal.print_table(
         f"Audit of {root}, the tables as interpolated (model, table: largest asymmetry under exchange of directions)",
-        ("material", "verdict", *numbers),
+        ("material", "verdict", "energy", *numbers),
         [_row(a) for a in audits],
         numbers=numbers,
     )
     for a in audits:
         for reason in _reasons(a):
             print(f"{a.material}: {reason}")
-    if any(a.energy.verdict == "violates" for a in audits):
+    if any(a.energy.table.verdict == "violates" for a in audits):
         print("a table whose grid is too coarse for its lobe can exceed 1 where its model does not: try a finer grid")
-    within = sum(a.energy.verdict == "passes" and bool(a.energy.reason) for a in audits)
+    within = sum(a.energy.table.verdict == "passes" and bool(a.energy.table.reason) for a in audits)
     if within:
         print(f"{within} exceed 1 by no more than the error that they state, or that of the integration, and pass")
+    losing = sum(a.energy.verdict == "loses" for a in audits)
+    if losing:
+        print(
+            f"{losing} are of models that lose light even where nothing absorbs it: the report says how much, and where"
+        )
     known = sum(a.verdict == "known published excess" for a in audits)
     print(
         f"{len(audits)} audited: {len(audits) - known - len(found.violations)} pass, {known} exceed 1 as their "
@@ -147,11 +158,14 @@ def _print(root: Path, found: AuditReport, report_path: Path) -> None:
 
 
 def _row(a: MaterialAudit) -> tuple[str, ...]:
-    albedo = "not finite" if a.energy.max_albedo is None else f"{a.energy.max_albedo:.4f}"
+    model, table = a.energy.model, a.energy.table
+    albedo = "not finite" if table.max_albedo is None else f"{table.max_albedo:.4f}"
     return (
         a.material,
         a.verdict,
-        f"{albedo} at {a.energy.max_at_theta_i_deg:4g}°",
+        a.energy.verdict,
+        f"{model.max_albedo:.4f} at {model.max_at_theta_i_deg:4.3g}°",
+        f"{albedo} at {table.max_at_theta_i_deg:4g}°",
         f"{_largest(a.reciprocity.model_random, a.reciprocity.model_lobe):.0e}",
         f"{_largest(a.reciprocity.table_random, a.reciprocity.table_lobe, a.reciprocity.table_nodes):.0e}",
         "none" if a.values.smallest is None else f"{a.values.smallest:.3g}",
@@ -164,7 +178,8 @@ def _largest(*found: Asymmetry | None) -> float:
 
 def _reasons(a: MaterialAudit) -> list[str]:
     """A sentence for each finding that is not a pass, or is one only because of the error that the table states."""
-    reasons = [a.energy.reason] if a.energy.reason else []
+    energy = a.energy.reason if a.energy.verdict in ("known published excess", "violates") else a.energy.table.reason
+    reasons = [energy] if energy else []
     reasons += ["not reciprocal"] if a.reciprocity.verdict == "violates" else []
     reasons += [f"{a.values.negative} negative values"] if a.values.negative else []
     reasons += [f"{a.values.not_finite} values are not finite"] if a.values.not_finite else []

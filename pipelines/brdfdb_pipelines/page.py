@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from datetime import datetime
 from itertools import groupby
 from typing import Literal, NamedTuple
 
@@ -30,6 +29,7 @@ _LEVELS: dict[str, Level] = {
     "inside": "good",
     "loses": "calm",
     "at the edge": "calm",
+    "unknown": "calm",
     "outside": "note",
     "known published excess": "note",
     "violates": "bad",
@@ -37,6 +37,7 @@ _LEVELS: dict[str, Level] = {
 _MARKS = dict.fromkeys(_LEVELS, "✓") | {
     "loses": "↓",
     "at the edge": "≈",
+    "unknown": "?",
     "outside": "!",
     "known published excess": "!",
     "violates": "✕",
@@ -47,6 +48,7 @@ _WORST_FIRST = (
     "loses",
     "outside",
     "at the edge",
+    "unknown",
     "conserves",
     "passes",
     "inside",
@@ -103,19 +105,13 @@ class Row(NamedTuple):
 COLUMNS = ("model", "table", "reciprocity", "values", "smoothness", "table error", "sampling", "validity")
 
 
-def render(report: AuditReport, *, store: str, version: str, when: datetime) -> str:
+def render(report: AuditReport) -> str:
     """The page of a report.
 
     Parameters
     ----------
     report : AuditReport
-        What was found.
-    store : str
-        The store that was audited, in words.
-    version : str
-        Of brdfdb.
-    when : datetime
-        When it was audited.
+        What was found, where and when.
 
     Returns
     -------
@@ -142,9 +138,6 @@ def render(report: AuditReport, *, store: str, version: str, when: datetime) -> 
         counts=counts,
         gallery=_by_paper(report.gallery),
         colours=charts.VARIABLES,
-        store=store,
-        version=version,
-        when=when,
     )
 
 
@@ -213,14 +206,15 @@ def _cells(a: MaterialAudit) -> list[Cell]:
     values = "violates" if "violates" in (a.values.positivity, a.values.finiteness) else "passes"
     most = _LAST if table.max_albedo is None else table.max_albedo
     stated = "" if error.stated_p99 is None else f" of {number(error.stated_p99, 2)}"
-    edges = sum(limit.standing != "inside" for limit in a.validity.limits)
+    fresh = "not finite" if error.fresh_p99 is None else number(error.fresh_p99, 2)
+    edges = sum(limit.standing in ("at the edge", "outside") for limit in a.validity.limits)
     return [
         Cell(model.verdict, f"{model.max_albedo:.4f} at {angle(model.max_at_theta_i_deg)}", model.max_albedo),
         Cell(table.verdict, f"{_albedo(table.max_albedo)} at {angle(table.max_at_theta_i_deg)}", most),
         Cell(a.reciprocity.verdict, number(asymmetry, 2), asymmetry),
         Cell(values, f"{wrong} bad" if wrong else f"{a.values.count}", wrong),
         Cell(a.smoothness.verdict, number(jump, 2), jump),
-        Cell(error.verdict, number(error.fresh_p99, 2) + stated, error.fresh_p99),
+        Cell(error.verdict, fresh + stated, _LAST if error.fresh_p99 is None else error.fresh_p99),
         Cell(a.sampling.verdict, f"p {probability(min(p, default=None))}", min(p, default=1.0)),
         Cell(
             a.validity.standing,
@@ -235,13 +229,15 @@ def _findings(a: MaterialAudit) -> list[Finding]:
     model, table = a.energy.model, a.energy.table
     same = table.reason and table.reason == model.reason
     overall = [] if a.energy.reason in (model.reason, table.reason) else [("Energy", a.energy.verdict, a.energy.reason)]
-    worst = max((each for _, each in _reciprocity(a)), key=lambda each: (each.max > each.tolerance, each.max))
+    judged = [(each.max, each.tolerance) for _, each in _reciprocity(a) if each.tolerance is not None]
+    most, allowed = max(judged, key=lambda pair: (pair[0] > pair[1], pair[0]))
     jumps = [*a.smoothness.model, *a.smoothness.table]
     jumped = "no seam to cross"
     if jumps:
         jump = max(jumps, key=lambda each: (each.largest > each.tolerance, each.largest))
         jumped = f"jumps by {number(jump.largest)} of f_r across {jump.seam}, of {number(jump.tolerance)} allowed"
     v, error, s = a.values, a.table_error, a.sampling
+    fresh = "no number" if error.fresh_p99 is None else number(error.fresh_p99)
     stated = "states none" if error.stated_p99 is None else f"states {number(error.stated_p99)}"
     p = min((p for p in s.chi_square_p if p is not None), default=None)
     sampled = (
@@ -249,7 +245,7 @@ def _findings(a: MaterialAudit) -> list[Finding]:
     )
     limits = a.validity.limits
     kept = f"inside {sum(limit.standing == 'inside' for limit in limits)} of {len(limits)} limits that its paper states"
-    asymmetric = f"asymmetry up to {number(worst.max)}, of {number(worst.tolerance)} allowed"
+    asymmetric = f"asymmetry up to {number(most)}, of {number(allowed)} allowed"
     negative = f"{v.negative} values are negative; the smallest f_r is {number(v.smallest)} 1/sr"
     found = [
         *overall,
@@ -259,7 +255,7 @@ def _findings(a: MaterialAudit) -> list[Finding]:
         ("Positivity", v.positivity, negative),
         ("Finiteness", v.finiteness, f"{v.not_finite} of {v.count} stored values are not finite"),
         ("Smoothness", a.smoothness.verdict, jumped),
-        ("Table error", error.verdict, f"99 of 100 fresh values within {number(error.fresh_p99)}; the table {stated}"),
+        ("Table error", error.verdict, f"99 of 100 fresh values within {fresh}; the table {stated}"),
         ("Sampling", s.verdict, sampled),
         ("Validity", a.validity.standing, kept if limits else "its paper states no limits"),
     ]
@@ -277,13 +273,14 @@ def _albedo(value: float | None) -> str:
 
 def _reciprocity(a: MaterialAudit) -> list[tuple[str, Asymmetry]]:
     found = a.reciprocity
-    named = [
+    named: list[tuple[str, Asymmetry | None]] = [
         ("model, random directions", found.model_random),
         ("model, in the lobe", found.model_lobe),
         ("table, random directions", found.table_random),
         ("table, in the lobe", found.table_lobe),
+        ("table, its nodes", found.table_nodes),
     ]
-    return named if found.table_nodes is None else [*named, ("table, its nodes", found.table_nodes)]
+    return [(name, each) for name, each in named if each is not None]
 
 
 def _tables(a: MaterialAudit) -> list[Grid]:
@@ -338,7 +335,7 @@ def _panels(a: MaterialAudit) -> list[Panel | Map]:
     ]
     panels.append(Panel(title=f"Model and table{at}", x_label=theta, y_label=albedo, curves=both))
     if (furnace := model.furnace) is not None:
-        curves = _spectral(furnace.theta_i_deg, furnace.albedo, wavelengths)
+        curves = _spectral(furnace.theta_i_deg, furnace.albedo, furnace.wavelength_nm)
         curves = [*curves, _IDEAL]
         panels.append(Panel(title="White furnace: made lossless", x_label=theta, y_label=albedo, curves=curves))
     if (bound := model.bound_on_a) is not None:

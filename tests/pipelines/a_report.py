@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+from typing import Any
+
 import numpy as np
 
 from brdfdb.audit.findings import (
@@ -28,6 +31,15 @@ from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Statement, numbers
 
 THETA = np.linspace(0.0, 89.0, 60)
 ODD = '<b>&"it\'s" $größe$'
+
+
+def report_of(materials: list[MaterialAudit], violations: list[str], **more: Any) -> AuditReport:
+    """A report of these materials, of one store at one time."""
+    given: dict[str, Any] = {"atlas": [], "gallery": [], "damaged": [], **more}
+    when = datetime(2026, 11, 21, 12, 34, tzinfo=UTC)
+    return AuditReport(
+        store=f"the store {ODD}", brdfdb="1.2.3", when=when, materials=materials, violations=violations, **given
+    )
 
 
 def asymmetry(largest: float = 1e-14) -> Asymmetry:
@@ -85,6 +97,7 @@ def material(
     shared |= {"max_at_wavelength_nm": 700.0 if spectral else None, "reason": reason}
     furnace = Furnace(
         lossless="rho = 1",
+        wavelength_nm=wavelengths,
         theta_i_deg=THETA.tolist(),
         albedo=[numbers(row / strength) for row in rows],
         hemispherical=numbers(scale),
@@ -137,13 +150,14 @@ def material(
             finiteness="passes",
         ),
         smoothness=Smoothness(
-            model=[Jump(seam="alpha = 45°", largest=2e-7, where="theta_i 45°, theta_r 45°", tolerance=1e-5)],
-            table=[Jump(seam="delta_phi = 180°", largest=1e-4, where="theta_i 80°", tolerance=1e-2)],
+            model=[Jump(seam="alpha = 45°", crossings=9, largest=2e-7, where="45°, 45°", tolerance=1e-5)],
+            table=[Jump(seam="delta_phi = 180°", crossings=9, largest=1e-4, where="theta_i 80°", tolerance=1e-2)],
             verdict="passes",
         ),
-        table_error=TableError(stated_p99=0.0093, fresh_p99=0.0091, maps=[error_map()], verdict="passes"),
+        table_error=TableError(stated_p99=0.0093, fresh_p99=0.0091, directions=9, maps=[error_map()], verdict="passes"),
         sampling=Sampling(
             samples=100_000,
+            phi_i_deg=0.0,
             theta_i_deg=[0.0, 45.0, 80.0],
             wavelength_nm=550.0 if spectral else None,
             chi_square_p=p,
@@ -192,4 +206,4 @@ def whole() -> AuditReport:
         figure("fig-3", "ward1992", [polar(), panel()]),
         figure("fig-4", "orennayar1994", [polar()]),
     ]
-    return AuditReport(materials=materials, atlas=atlas, gallery=gallery, violations=[ODD])
+    return report_of(materials, [ODD], atlas=atlas, gallery=gallery)

@@ -448,7 +448,7 @@ def spoil(dataset: xr.Dataset, index: tuple[int, ...], value: float) -> xr.Datas
         (lambda d: spoil(d, (1, 2, 1), np.nan), "1 values are not finite"),
         (lambda d: spoil(d, (1, 2, 1), np.inf), "1 values are not finite"),
         (lambda d: spoil(d, (1, 2, 1), 0.1), "not reciprocal"),
-        (lambda d: d.assign(brdf=d["brdf"] * np.float32(2.5)), "reflects 1.25 of what arrives at 0 degrees"),
+        (lambda d: d.assign(brdf=d["brdf"] * np.float32(2.5)), "the table reflects 1.25 of what arrives at 0 degrees"),
     ],
     ids=["negative", "nan", "inf", "asymmetric", "bright"],
 )
@@ -527,7 +527,7 @@ def test_white_oren_nayar_is_a_known_excess(
     document = json.loads((tmp_path / "store" / "audit-part.json").read_text(encoding="utf-8"))
     (entry,) = document["materials"]
     assert entry["verdict"] == "known published excess"
-    assert entry["energy"]["max_albedo"] == pytest.approx(1.046, abs=0.003)
+    assert entry["energy"]["table"]["max_albedo"] == pytest.approx(1.046, abs=0.003)
     assert f"white: {said}" in out
 
 

@@ -80,8 +80,8 @@ def test_every_table_is_audited(built: Path, names: list[str], tmp_path: Path) -
     # grids this coarse smear the lobes of the others past 1: what is stored is what is audited
     assert {entries[name]["verdict"] for name in ("foam", "mirror")} == {"passes"}
     assert code == int(any(entry["verdict"] == "violates" for entry in entries.values()))
-    mirror = np.array(entries["mirror"]["energy"]["albedo"])
-    np.testing.assert_array_equal(mirror, entries["mirror"]["energy"]["specular"])
+    mirror = np.array(entries["mirror"]["energy"]["table"]["albedo"])
+    np.testing.assert_array_equal(mirror, entries["mirror"]["energy"]["table"]["specular"])
     assert 0.3 < mirror.min() < mirror.max() <= 1.0
 
 

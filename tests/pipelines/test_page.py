@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from datetime import UTC, datetime
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,7 +11,7 @@ import pytest
 
 from brdfdb.audit.findings import AuditReport
 from brdfdb_pipelines import charts, page
-from tests.pipelines.a_report import ODD, material, whole
+from tests.pipelines.a_report import ODD, material, report_of, whole
 
 
 class Document(HTMLParser):
@@ -58,9 +57,7 @@ def report() -> AuditReport:
 
 @pytest.fixture(scope="module")
 def html(report: AuditReport) -> str:
-    return page.render(
-        report, store=f"the store {ODD}", version="1.2.3", when=datetime(2026, 11, 21, 12, 34, tzinfo=UTC)
-    )
+    return page.render(report)
 
 
 @pytest.fixture(scope="module")
@@ -178,8 +175,8 @@ def test_an_albedo_that_is_not_finite_sorts_after_all_others() -> None:
     good = material("good", "violates", 3.0)
     table = good.energy.table.model_copy(update={"max_albedo": None})
     bad = good.model_copy(update={"material": "bad", "energy": good.energy.model_copy(update={"table": table})})
-    report = AuditReport(materials=[good, bad], atlas=[], gallery=[], violations=["good", "bad"])
-    html = page.render(report, store="two", version="1", when=datetime(2026, 1, 1, tzinfo=UTC))
+    found = report_of([good, bad], ["good", "bad"])
+    html = page.render(found)
     cells = [float(value) for value in Document(html).attributes("data-sort")]
     columns = np.array(cells).reshape(2, -1)  # rows: bad, good
     assert np.all(np.isfinite(columns))
@@ -188,8 +185,7 @@ def test_an_albedo_that_is_not_finite_sorts_after_all_others() -> None:
 
 
 def test_a_report_of_nothing_is_a_page(document: Document) -> None:
-    nothing = AuditReport(materials=[], atlas=[], gallery=[], violations=[])
-    empty = Document(page.render(nothing, store="empty", version="1", when=datetime(2026, 1, 1, tzinfo=UTC)))
+    empty = Document(page.render(report_of([], [])))
     assert empty.unbalanced == []
     assert "atlas" in document.attributes("id")
     assert "atlas" not in empty.attributes("id")

@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
-from datetime import UTC, datetime
 from html import unescape
 from pathlib import Path
 
@@ -62,7 +61,7 @@ FRAMES = """<!doctype html><meta charset="utf-8">
 
 @pytest.fixture(scope="module")
 def html() -> str:
-    return page.render(whole(), store="the store", version="1.2.3", when=datetime(2026, 11, 21, tzinfo=UTC))
+    return page.render(whole())
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,190 @@
+"""Energy of the model behind a table: its directional albedo, its white furnace, and the bound on a uniform part."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from brdfdb.audit.findings import EnergyVerdict, Furnace, ModelEnergy, UniformBound
+from brdfdb.audit.known import ENERGY_TOLERANCE, known_limit
+from brdfdb.energy import a_max
+from brdfdb.figure import numbers
+from brdfdb.geometry import radians
+from brdfdb.grids import Axis
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+from brdfdb.quadrature import spectral_albedo
+
+TOLERANCE = 1e-6  # absolute, of each albedo
+MOST_PANELS = 1000  # where the quadrature of one light gives up
+BOUND_TOLERANCE = 2e-5  # absolute, of the largest a
+# Lights that people ask for [degree]. Gauss's nodes in theta_i join them, so that the mean over uniform light,
+# 2 int albedo cos theta_i sin theta_i dtheta_i, is a sum over some of the same lights
+THETA_I_DEG = (0.0, 10.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0, 87.5, 89.0, 89.5, 89.9)
+NODES = 16  # the mean is within 2e-4 of that of 48 nodes for every material of the papers
+# A lossless model loses light if it reflects less than this share of it, up to this angle [degree]: beyond, shadowing
+# alone takes more from every model of single scattering
+LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
+# Excesses of models that have a pole at the horizon are known up to this angle [degree], where they were measured
+POLE_KNOWN_UP_TO_DEG = 89.5
+_ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])  # azimuths of a light over a lobe with two axes: the rest is the same
+_TURN_DEG = np.arange(0.0, 360.0, 60.0)
+
+
+class _Lights(NamedTuple):
+    """Angles of incidence [degree], and their weights in the mean over uniform light."""
+
+    theta_i_deg: Axis
+    weights: Axis
+
+
+class _Reflected(NamedTuple):
+    """Albedos (theta_i, wavelengths): over azimuths the largest and the mean, the Dirac part in them; and the error."""
+
+    largest: Floats
+    mean: Floats
+    specular: Floats
+    error: float
+
+
+def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mapping[str, Any]) -> ModelEnergy:
+    """The energy of a model at the parameters of a material, at wavelengths [nm] if it is spectral."""
+    arguments = material.arguments(wavelength_nm)
+    lights = _lights(material)
+    found = _reflected(material, arguments, lights)
+    furnace = _furnace(material, arguments, wavelength_nm, lights)
+    # where it is the same at many angles, the first of them: rounding tells 1e-16 from each other
+    theta, wavelength = np.unravel_index(np.argmax(np.round(found.largest, 12)), found.largest.shape)
+    largest, at = float(found.largest[theta, wavelength]), float(lights.theta_i_deg[theta])
+    verdict, reason = _verdict(material, lights, found, furnace, known)
+    exceeding = lights.theta_i_deg[np.any(found.largest - found.error > 1.0 + ENERGY_TOLERANCE, axis=1)]
+    return ModelEnergy(
+        theta_i_deg=lights.theta_i_deg.tolist(),
+        wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
+        albedo=[numbers(row, 7) for row in found.largest],
+        specular=[numbers(row, 7) for row in found.specular],
+        integration_error=found.error,
+        hemispherical=numbers(lights.weights @ found.mean, 4),
+        max_albedo=largest,
+        max_at_theta_i_deg=at,
+        max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
+        exceeds_1_from_theta_i_deg=float(exceeding[0]) if exceeding.size else None,
+        furnace=furnace,
+        bound_on_a=_bound(material, arguments, lights, found) if material.model == "he_torrance" else None,
+        verdict=verdict,
+        reason=reason,
+    )
+
+
+def _verdict(
+    material: Material, lights: _Lights, found: _Reflected, furnace: Furnace | None, known: Mapping[str, Any]
+) -> tuple[EnergyVerdict, str]:
+    theta_i_deg, certain = lights.theta_i_deg, found.largest - found.error
+    if np.any(certain > 1.0 + ENERGY_TOLERANCE):
+        limit = known_limit(known, theta_i_deg) + ENERGY_TOLERANCE
+        if known and material.spec.grazing_pole:
+            limit = np.where(theta_i_deg > POLE_KNOWN_UP_TO_DEG, np.inf, limit)
+        beyond = np.max(certain, axis=1) - limit
+        if known and np.all(beyond <= 0.0):
+            return "known published excess", str(known["citation"])
+        worst = np.argmax(beyond)
+        share = float(np.max(found.largest[worst]))
+        return "violates", f"the model reflects {share:.4g} of what arrives at {theta_i_deg[worst]:g} degrees"
+    if furnace is not None:
+        judged = theta_i_deg <= LOSS_UP_TO_DEG
+        albedo = np.array(furnace.albedo, dtype=np.float64).min(axis=1)[judged]
+        least = np.argmin(albedo)
+        if albedo[least] < LOSSLESS:
+            angle = theta_i_deg[judged][least]
+            of_what = f"{albedo[least]:.3g} of what arrives at {angle:.3g} degrees"
+            return "loses", f"lossless ({furnace.lossless}), the model reflects {of_what}"
+    largest = f"reflects at most {np.max(found.largest):.4g} of what arrives"
+    return "conserves", largest if furnace else f"{largest}; no parameters make the model lossless"
+
+
+def _lights(material: Material) -> _Lights:
+    """The lights of a model: 90 degrees itself is one of them where it has no pole there."""
+    x, weight = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = np.round(45.0 * (1.0 + x), 4), weight * (np.pi / 4.0)  # people read them
+    others = np.array(THETA_I_DEG if material.spec.grazing_pole else (*THETA_I_DEG, 90.0))
+    theta_i_deg = np.concatenate([nodes, others])
+    weights = np.concatenate([weights * np.sin(2.0 * radians(nodes)), np.zeros(others.size)])
+    order = np.argsort(theta_i_deg)
+    return _Lights(theta_i_deg[order], weights[order])
+
+
+def _reflected(material: Material, arguments: Mapping[str, Any], lights: _Lights) -> _Reflected:
+    """The albedos of a model for lights from all azimuths that matter."""
+    spec, theta_i = material.spec, radians(lights.theta_i_deg)
+    phi_i_deg, weights = np.zeros(1), np.ones(1)
+    if material.anisotropic and spec.lobe_axes is not None:
+        phi_i_deg, weights = _ELLIPSE_DEG, np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
+    elif material.anisotropic:
+        phi_i_deg, weights = _TURN_DEG, np.full(_TURN_DEG.size, 1.0 / _TURN_DEG.size)
+    found = [
+        [
+            spectral_albedo(
+                spec,
+                float(theta),
+                float(phi),
+                arguments,
+                tolerance=TOLERANCE,
+                most_panels=MOST_PANELS,
+                mirrored=not material.anisotropic,
+            )
+            for phi in radians(phi_i_deg)
+        ]
+        for theta in theta_i
+    ]
+    diffuse = np.array([[each.albedo for each in row] for row in found])
+    specular = np.zeros(diffuse[:, 0].shape)
+    if spec.specular is not None:
+        parameters = {name: arguments[name] for name in spec.specular_parameters}
+        specular = np.stack(
+            [np.broadcast_to(spec.specular(theta, **parameters), specular[0].shape) for theta in theta_i]
+        )
+    mean = np.einsum("tpw,p->tw", diffuse, weights) + specular
+    error = float(f"{max(float(each.error) for row in found for each in row):.2g}")
+    return _Reflected(diffuse.max(axis=1) + specular, mean, specular, error)
+
+
+def _furnace(
+    material: Material, arguments: Mapping[str, Any], wavelength_nm: Axis | None, lights: _Lights
+) -> Furnace | None:
+    """The model with nothing absorbed, of many wavelengths at the first, the middle and the last."""
+    if material.spec.lossless is None:
+        return None
+    lossless = material.spec.lossless(material.parameters)
+    some = wavelength_nm
+    if wavelength_nm is not None:
+        some = wavelength_nm[np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])]
+        arguments = material.arguments(some)
+    found = _reflected(material, {**arguments, **lossless}, lights)
+    low, high = found.largest.min(axis=1), found.largest.max(axis=1)
+    return Furnace(
+        lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.items()),
+        theta_i_deg=lights.theta_i_deg.tolist(),
+        wavelength_nm=None if some is None else some.tolist(),
+        albedo=[numbers(row, 7) for row in found.largest],
+        hemispherical=numbers(lights.weights @ found.mean, 4),
+        smallest=float(low.min()),
+        smallest_at_theta_i_deg=float(lights.theta_i_deg[np.argmin(low)]),
+        largest=float(high.max()),
+        largest_at_theta_i_deg=float(lights.theta_i_deg[np.argmax(high)]),
+    )
+
+
+def _bound(material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected) -> UniformBound:
+    """The largest a: what reflects with a uniform part of a reflects as much less without it, at every light."""
+    a = float(material.parameters["a"])
+    surfaces = {name: value for name, value in arguments.items() if name != "a"}
+    largest = a_max(radians(lights.theta_i_deg), found.largest - a, surfaces, BOUND_TOLERANCE)
+    wavelength_nm = np.ravel(arguments["wavelength_nm"])
+    return UniformBound(
+        wavelength_nm=wavelength_nm.tolist(),
+        largest=numbers(largest),
+        preset=[a] * wavelength_nm.size,
+        keeps=bool(np.all(a <= largest + BOUND_TOLERANCE)),
+    )

@@ -1,0 +1,145 @@
+"""Energy of a table: whether it reflects more than it receives, and whether the error that it states explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.albedo import QUADRATURE_TOLERANCE, directional_albedo
+from brdfdb.audit.findings import Bands, TableEnergy, Verdict
+from brdfdb.audit.known import known_limit
+from brdfdb.error import Error
+from brdfdb.geometry import radians
+from brdfdb.grids import Axis
+from brdfdb.lookup import Table
+from brdfdb.parameters import Floats
+
+# More cannot be asked of a planner: a table that states more is judged as if it stated this
+MOST_ERROR = 0.5
+_BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
+_NOT_FINITE, _FINITE = 1e30, 1e20  # what stands for an albedo that is not finite, and what is below any mean of it
+
+
+class _Judge(NamedTuple):
+    """What is averaged before an albedo is held against a table, and by how much it then may exceed.
+
+    `means` (rows, theta_i) are weights of averages, `covers`, of that shape, which theta_i a row is about, `l1` (rows,
+    wavelengths) the error that a table states, and `reflected`, of that shape, a mean of the albedo without the Dirac
+    part that a model may have if that error is true.
+    """
+
+    means: Floats
+    covers: NDArray[np.bool_]
+    l1: Floats
+    reflected: Floats
+
+    def explained(self, limit: Floats) -> Floats:
+        """The integral of abs(table - model), in means: l1 of what the model reflects, which keeps to the limit."""
+        return self.l1 * np.minimum(self.reflected, (self.means @ limit)[:, np.newaxis])
+
+    def excess(self, albedo: Floats, limit: Floats) -> Floats:
+        """What is above a limit, over rows and wavelengths; the limit is over theta_i."""
+        return np.asarray(self.means @ np.maximum(albedo - limit[:, np.newaxis], 0.0))
+
+    def unexplained(self, albedo: Floats, limit: Floats) -> NDArray[np.bool_]:
+        """At which theta_i a limit is exceeded, and nothing explains it."""
+        rows = self.excess(albedo, limit) > self.explained(limit)
+        both = (albedo > limit[:, np.newaxis]) & (self.covers.T.astype(int) @ rows.astype(int) > 0)
+        return np.asarray(np.any(both, axis=1))
+
+
+def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
+    theta_i, _, each_azimuth, integration = directional_albedo(table)
+    diffuse = each_azimuth.max(axis=1)
+    specular = _specular(table, theta_i, diffuse.shape)
+    albedo = diffuse + specular
+    finite = np.where(np.isfinite(albedo), albedo, np.inf)
+    worst_theta, worst_wavelength = np.unravel_index(np.argmax(finite), finite.shape)
+    largest = float(finite[worst_theta, worst_wavelength])
+    judge = _judge(table, theta_i, _known(diffuse))
+    certain = _known(albedo - np.minimum(integration, QUADRATURE_TOLERANCE)[:, np.newaxis])
+    one = known_limit({}, theta_i)
+    exceeding = theta_i[np.any(finite > one[:, np.newaxis], axis=1)]
+    unexplained = theta_i[judge.unexplained(certain, one)]
+    bands = None if table.error is None else _bands(table.error, judge.explained(one), judge.excess(certain, one))
+    verdict: Verdict
+    reason = f"reflects {_share(largest)} of what arrives at {theta_i[worst_theta]:g} degrees"
+    if unexplained.size == 0:
+        verdict = "passes"
+        why = "its integration has" if bands is None else "the table states"
+        reason = f"{reason}, within the error that {why}" if exceeding.size else ""
+    elif known and np.isfinite(largest) and not np.any(judge.unexplained(certain, known_limit(known, theta_i))):
+        verdict, reason = "known published excess", str(known["citation"])
+    else:
+        verdict = "violates"
+        if bands is not None:
+            reason += ", more than the error that the table states explains"
+    return TableEnergy(
+        theta_i_deg=theta_i.tolist(),
+        wavelength_nm=None if table.wavelength_nm is None else table.wavelength_nm.tolist(),
+        albedo=_json(albedo),
+        specular=_json(specular),
+        integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else None,
+        bands=bands,
+        max_albedo=largest if np.isfinite(largest) else None,
+        max_at_theta_i_deg=float(theta_i[worst_theta]),
+        max_at_wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength]),
+        exceeds_1_from_theta_i_deg=float(exceeding[0]) if exceeding.size else None,
+        exceeds_1_beyond_error_from_theta_i_deg=float(unexplained[0]) if unexplained.size else None,
+        verdict=verdict,
+        reason=reason,
+    )
+
+
+def _share(albedo: float) -> str:
+    return f"{albedo:.4g}" if np.isfinite(albedo) else "no finite share"
+
+
+def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
+    """Each theta_i of a table without a stated error; of others the mean over bands, over which they state it.
+
+    What is above a limit that the model keeps to is wrong, and no more of a band can be wrong than l1 of what the model
+    reflects there: 1 / (1 - l1) of what the table does, at most.
+    """
+    if table.error is None:
+        each = np.eye(theta_i_deg.size)
+        nothing = np.zeros((theta_i_deg.size, 1))
+        return _Judge(each, each.astype(bool), nothing, nothing)
+    edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
+    means = _band_means(theta_i_deg, edges)
+    covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
+    return _Judge(means, covers, l1, (means @ diffuse) / (1.0 - l1))
+
+
+def _bands(error: Error, explained: Floats, excess: Floats) -> Bands:
+    known, above = (_json(np.where(each < _FINITE, each, np.nan)) for each in (explained, excess))
+    return Bands(theta_i_deg=error.theta_i_deg, stated_error=error.l1, explained=known, excess=above)
+
+
+def _known(values: Floats) -> Floats:
+    """Values of which those that are not finite are replaced by one that exceeds everything."""
+    return np.where(np.isfinite(values), values, _NOT_FINITE)
+
+
+def _band_means(theta_i_deg: Axis, edges: Axis) -> Floats:
+    """Weights, (bands, theta_i), of the mean over each band of what is linear between theta_i and the same beyond."""
+    share = (np.arange(_BAND_POINTS) + 0.5) / _BAND_POINTS
+    inside = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * share
+    return np.stack([np.interp(inside, theta_i_deg, one).mean(axis=1) for one in np.eye(theta_i_deg.size)], axis=1)
+
+
+def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats:
+    """The reflectance of the Dirac part, over theta_i and wavelength."""
+    if table.specular is None:
+        return np.zeros(shape)
+    if table.specular_theta_deg is None and np.array_equal(theta_i_deg, table.axes_deg["theta_i"]):
+        return table.specular.reshape(shape)
+    return table.specular_reflectance(radians(theta_i_deg)).reshape(shape)
+
+
+def _json(values: Floats) -> list[list[float | None]]:
+    """Nested lists to seven digits, what a float32 holds; JSON has no number for what is not finite."""
+    return [[float(f"{v:.7g}") if np.isfinite(v) else None for v in row] for row in values.tolist()]
