@@ -90,6 +90,24 @@ def directional_albedo(table: Table) -> TableAlbedo:
     return TableAlbedo(nodes, phi_i, np.asarray(albedo), np.zeros(nodes.size))
 
 
+def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
+    """The share that is reflected of light that is the same from everywhere.
+
+    Parameters
+    ----------
+    theta_i_deg : array (theta_i,) [degree]
+        From 0 on.
+    albedo : array (theta_i, wavelengths) [1]
+        Directional albedo at these angles, taken as linear between them and the same beyond the last.
+
+    Returns
+    -------
+    array (wavelengths,) [1]
+        Twice the integral of albedo cos(theta_i) sin(theta_i).
+    """
+    return np.asarray(2.0 * _theta_weights(radians(theta_i_deg)) @ albedo)
+
+
 def material_of(table: Table) -> Material:
     """The material behind a table, from what the table says of itself."""
     fields = ("title", "model", "parameters", "source")

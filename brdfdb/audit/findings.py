@@ -51,6 +51,9 @@ class TableEnergy(BaseModel):
     integration_error: float | None = Field(
         description="of the albedo, the largest estimate; 0: the exact integral of the interpolant; null: not finite"
     )
+    hemispherical: Numbers = Field(
+        description="[wavelength], of light that is the same from everywhere, albedo taken as linear between theta_i"
+    )
     bands: Bands | None = Field(description="null: the table states no error, and is allowed none")
     max_albedo: float | None = Field(description="null: not finite")
     max_at_theta_i_deg: float

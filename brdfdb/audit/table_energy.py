@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.albedo import QUADRATURE_TOLERANCE, directional_albedo
+from brdfdb.albedo import QUADRATURE_TOLERANCE, directional_albedo, hemispherical_albedo
 from brdfdb.audit.findings import Bands, TableEnergy, Verdict
 from brdfdb.audit.known import known_limit
 from brdfdb.error import Error
+from brdfdb.figure import numbers
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
@@ -52,8 +53,8 @@ class _Judge(NamedTuple):
 
 
 def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
-    theta_i, _, each_azimuth, integration = directional_albedo(table)
-    diffuse = each_azimuth.max(axis=1)
+    found = directional_albedo(table)
+    theta_i, integration, diffuse = found.theta_i_deg, found.error, found.albedo.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
     finite = np.where(np.isfinite(albedo), albedo, np.inf)
@@ -83,6 +84,7 @@ def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
         albedo=_json(albedo),
         specular=_json(specular),
         integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else None,
+        hemispherical=numbers(hemispherical_albedo(theta_i, found.mean + specular), 4),
         bands=bands,
         max_albedo=largest if np.isfinite(largest) else None,
         max_at_theta_i_deg=float(theta_i[worst_theta]),

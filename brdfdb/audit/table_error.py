@@ -19,6 +19,7 @@ WORST_OF_STATED = 1.5
 EXACT = 1e-6
 _STEP_DEG = 3.0  # of the maps
 _LAST_DEG = 89.0
+_LEAST = 1e-6  # what is less is drawn as this: maps are read for what is wrong, and zeros have no colour
 # Azimuth [degree] of viewers at negative theta_r
 _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90.0}
 
@@ -53,12 +54,12 @@ def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_
     with np.errstate(invalid="ignore"):
         error = accuracy.relative(found, truth, floor).reshape(theta_i_deg.size, -1)
     return Map(
-        title=title if wavelength is None else f"{title}, {wavelength:g} nm",
+        title=f"Error {title}" if wavelength is None else f"Error {title}, {wavelength:g} nm",
         x_label="theta_r [degrees], negative back towards the light",
         y_label="theta_i [degrees]",
-        value_label="abs(table - model) / model",
+        value_label=f"abs(table - model) / model, no less than {_LEAST:g}",
         x=theta_r_deg.tolist(),
         y=theta_i_deg.tolist(),
-        values=[numbers(row, 2) for row in error],
+        values=[numbers(row, 2) for row in np.maximum(error, _LEAST)],
         log=True,
     )

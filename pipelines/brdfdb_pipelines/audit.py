@@ -10,18 +10,24 @@ from concurrent.futures.process import BrokenProcessPool
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import brdfdb
 from brdfdb.atlas import ATLAS
 from brdfdb.audit import AuditReport, MaterialAudit, audit, report
 from brdfdb.audit.findings import Asymmetry
-from brdfdb.figure import Figure
 from brdfdb.gallery import GALLERY
 from brdfdb.store import StoreError
 from brdfdb_pipelines import page, terminal, workers
 
 Task = Callable[[], Any]
+
+
+class Section(NamedTuple):
+    """What a task found, drawn for the page."""
+
+    subject: Any
+    plots: list[page.Plot]
 
 
 def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: bool = True) -> AuditReport:
@@ -63,7 +69,7 @@ def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: 
         for name, outcome in _outcomes(tasks, jobs):
             done[name] = outcome
             bar.advance(task)
-    audits = [done[name] for name in materials if isinstance(done[name], MaterialAudit)]
+    audits = [done[name].subject for name in materials if isinstance(done[name], Section)]
     damaged = [str(outcome) for outcome in done.values() if isinstance(outcome, StoreError)]
     if damaged and not audits:
         raise StoreError("; ".join(damaged))
@@ -71,13 +77,14 @@ def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: 
         audits,
         store=str(root),
         when=datetime.now(UTC).replace(microsecond=0),
-        atlas=[done[f"figure {key}"] for key in ATLAS if figures],
-        gallery=[done[f"figure {key}"] for key in GALLERY if figures],
+        atlas=[done[f"figure {key}"].subject for key in ATLAS if figures],
+        gallery=[done[f"figure {key}"].subject for key in GALLERY if figures],
         damaged=damaged,
     )
     report_path.write_text(found.model_dump_json() + "\n", encoding="utf-8")
+    plots = {page.key_of(each.subject): each.plots for each in done.values() if isinstance(each, Section)}
     page_path = report_path.with_suffix(".html")
-    page_path.write_text(page.render(found), encoding="utf-8")
+    page_path.write_text(page.render(found, plots), encoding="utf-8")
     _print(root, found, report_path)
     if damaged:
         raise StoreError("; ".join(damaged))
@@ -114,18 +121,20 @@ def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
                 future.cancel()
 
 
-def _audited(root: Path, name: str) -> MaterialAudit | StoreError:
+def _audited(root: Path, name: str) -> Section | StoreError:
     """One material; or what is wrong with its files, which is no reason to leave the others."""
     store = brdfdb.open(root)
     try:
         store.verify(name)
-        return audit(store[name])
+        found = audit(store[name])
     except StoreError as error:
         return error
+    return Section(found, page.plots_of(found))
 
 
-def _drawn(key: str) -> Figure:
-    return (ATLAS.get(key) or GALLERY[key])()
+def _drawn(key: str) -> Section:
+    figure = (ATLAS.get(key) or GALLERY[key])()
+    return Section(figure, page.plots_of(figure))
 
 
 def _print(root: Path, found: AuditReport, report_path: Path) -> None:

@@ -354,7 +354,9 @@ def superscript(exponent: int) -> str:
 
 
 def _power(value: float) -> str:
-    """A power of ten."""
+    """A power of ten; of what is left of one below the smallest float, nothing."""
+    if value <= 0.0:
+        return ""
     exponent = round(math.log10(value))
     return "10" + superscript(exponent) if exponent else "1"
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Literal, NamedTuple
 
 import jinja2
 
 from brdfdb.audit import AuditReport, MaterialAudit
-from brdfdb.audit.findings import Asymmetry
+from brdfdb.audit.findings import Asymmetry, Furnace
+from brdfdb.audit.model_energy import LOSSLESS
 from brdfdb.figure import Curve, Figure, Map, Numbers, Panel
 from brdfdb_pipelines import charts
 
@@ -59,6 +60,13 @@ _ALL_OF_IT = Curve(label="all that arrives", x=[0.0, 90.0], y=[1.0, 1.0])
 _IDEAL = Curve(label="ideal", x=[0.0, 90.0], y=[1.0, 1.0], role="truth")
 
 
+class Plot(NamedTuple):
+    """A drawing as a section shows it."""
+
+    kind: str
+    svg: str
+
+
 class Cell(NamedTuple):
     """One finding on one material, in the table of all: what is shown, and what it is sorted by."""
 
@@ -98,20 +106,42 @@ class Row(NamedTuple):
     anchor: str
     cells: list[Cell]
     findings: list[Finding]
-    panels: list[Panel | Map]
     tables: list[Grid]
 
 
-COLUMNS = ("model", "table", "reciprocity", "values", "smoothness", "table error", "sampling", "validity")
+COLUMNS = (
+    "model",
+    "table",
+    "white furnace",
+    "reciprocity",
+    "values",
+    "smoothness",
+    "table error",
+    "sampling",
+    "validity",
+)
 
 
-def render(report: AuditReport) -> str:
+def key_of(subject: MaterialAudit | Figure) -> str:
+    """The key of a material or a figure, unique in a report."""
+    return f"figure-{subject.key}" if isinstance(subject, Figure) else anchor(subject.material)
+
+
+def plots_of(subject: MaterialAudit | Figure) -> list[Plot]:
+    """Draw what the section of a material or a figure shows; most of the time of a page goes into this."""
+    drawings = subject.panels if isinstance(subject, Figure) else [*_panels(subject), *subject.table_error.maps]
+    return [Plot(drawing.kind, charts.svg(drawing, f"{key_of(subject)}-{n}")) for n, drawing in enumerate(drawings, 1)]
+
+
+def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -> str:
     """The page of a report.
 
     Parameters
     ----------
     report : AuditReport
         What was found, where and when.
+    plots : mapping, optional
+        Of each material and figure what `plots_of` gives, under its `key_of`; drawn here if it is not given.
 
     Returns
     -------
@@ -126,13 +156,17 @@ def render(report: AuditReport) -> str:
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "angle": angle, "level": _LEVELS.__getitem__, "mark": _MARKS.__getitem__}
-    environment.globals |= {"draw": _Drawer(), "anchor": anchor, "rank": _rank}
+    environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": _rank}
     rows = [_row(a) for a in report.materials]
     rows.sort(key=lambda row: (_rank(row.audit.verdict), _rank(row.audit.energy.verdict), row.audit.material))
     words = ("conserves", "loses", "known published excess", "violates")
     counts = [(word, sum(a.energy.verdict == word for a in report.materials)) for word in words]
+    if plots is None:
+        subjects: list[MaterialAudit | Figure] = [*report.materials, *report.atlas, *report.gallery]
+        plots = {key_of(subject): plots_of(subject) for subject in subjects}
     return environment.get_template("page.html").render(
         report=report,
+        plots=plots,
         rows=rows,
         columns=COLUMNS,
         counts=counts,
@@ -170,17 +204,6 @@ def probability(value: float | None) -> str:
     return "below 0.001" if value < 0.001 else f"{value:.3f}"
 
 
-class _Drawer:
-    """Draws for the template, and gives each drawing a key of its own."""
-
-    def __init__(self) -> None:
-        self._count = 0
-
-    def __call__(self, drawing: charts.Drawing) -> str:
-        self._count += 1
-        return charts.svg(drawing, f"plot-{self._count}")
-
-
 def _rank(word: str) -> int:
     return _WORST_FIRST.index(word)
 
@@ -193,7 +216,7 @@ def _by_paper(figures: list[Figure]) -> list[tuple[str, list[Figure]]]:
 
 
 def _row(a: MaterialAudit) -> Row:
-    return Row(a, anchor(a.material), _cells(a), _findings(a), [*_panels(a), *a.table_error.maps], _tables(a))
+    return Row(a, anchor(a.material), _cells(a), _findings(a), _tables(a))
 
 
 def _cells(a: MaterialAudit) -> list[Cell]:
@@ -211,8 +234,9 @@ def _cells(a: MaterialAudit) -> list[Cell]:
     return [
         Cell(model.verdict, f"{model.max_albedo:.4f} at {angle(model.max_at_theta_i_deg)}", model.max_albedo),
         Cell(table.verdict, f"{_albedo(table.max_albedo)} at {angle(table.max_at_theta_i_deg)}", most),
+        _furnace(model.furnace),
         Cell(a.reciprocity.verdict, number(asymmetry, 2), asymmetry),
-        Cell(values, f"{wrong} bad" if wrong else f"{a.values.count}", wrong),
+        Cell(values, f"{wrong} bad" if wrong else "all good", wrong),
         Cell(a.smoothness.verdict, number(jump, 2), jump),
         Cell(error.verdict, fresh + stated, _LAST if error.fresh_p99 is None else error.fresh_p99),
         Cell(a.sampling.verdict, f"p {probability(min(p, default=None))}", min(p, default=1.0)),
@@ -224,10 +248,20 @@ def _cells(a: MaterialAudit) -> list[Cell]:
     ]
 
 
+def _furnace(furnace: Furnace | None) -> Cell:
+    """What a lossless surface shows in uniform light, at the wavelength that is worst."""
+    shown = [] if furnace is None else [value for value in furnace.hemispherical if value is not None]
+    if not shown:
+        return Cell("unknown", "–", _LAST)
+    worst = max(shown, key=lambda value: abs(value - 1.0))
+    return Cell("loses" if worst < LOSSLESS else "conserves", f"{worst:.3f}", worst)
+
+
 def _findings(a: MaterialAudit) -> list[Finding]:
     """What is said of a material, a sentence each."""
     model, table = a.energy.model, a.energy.table
-    same = table.reason and table.reason == model.reason
+    of_table = table.reason or f"reflects at most {_albedo(table.max_albedo)} at {angle(table.max_at_theta_i_deg)}"
+    of_table = "as the model" if table.reason and table.reason == model.reason else of_table
     overall = [] if a.energy.reason in (model.reason, table.reason) else [("Energy", a.energy.verdict, a.energy.reason)]
     judged = [(each.max, each.tolerance) for _, each in _reciprocity(a) if each.tolerance is not None]
     most, allowed = max(judged, key=lambda pair: (pair[0] > pair[1], pair[0]))
@@ -250,7 +284,7 @@ def _findings(a: MaterialAudit) -> list[Finding]:
     found = [
         *overall,
         ("Energy of the model", model.verdict, model.reason),
-        ("Energy of the table", table.verdict, "as the model" if same else table.reason),
+        ("Energy of the table", table.verdict, of_table),
         ("Reciprocity", a.reciprocity.verdict, asymmetric),
         ("Positivity", v.positivity, negative),
         ("Finiteness", v.finiteness, f"{v.not_finite} of {v.count} stored values are not finite"),
@@ -325,6 +359,11 @@ def _panels(a: MaterialAudit) -> list[Panel | Map]:
         at = f" at {wavelengths[where]:g} nm"
         curves = _spectral(model.theta_i_deg, model.albedo, wavelengths)
         panels.append(Panel(title="Albedo of the model", x_label=theta, y_label=albedo, curves=curves))
+        curves = [
+            Curve(label="table", x=table.wavelength_nm or [], y=table.hemispherical, role="ours"),
+            Curve(label="model", x=wavelengths, y=model.hemispherical, role="truth"),
+        ]
+        panels.append(Panel(title="In uniform light", x_label="wavelength, nm", y_label="albedo", curves=curves))
     same = (
         0 if wavelengths is None or table.wavelength_nm is None else _nearest(table.wavelength_nm, wavelengths[where])
     )

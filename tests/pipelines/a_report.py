@@ -125,6 +125,7 @@ def material(
             table=TableEnergy(
                 **shared,
                 integration_error=1e-4,
+                hemispherical=numbers(0.69 * scale),
                 bands=None,
                 exceeds_1_beyond_error_from_theta_i_deg=None,
                 verdict=overall,

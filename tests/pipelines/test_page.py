@@ -107,7 +107,7 @@ def test_every_material_figure_and_statement_is_there(document: Document, report
             assert statement.seen in words
     drawings = sum(len(each.panels) for each in (*report.atlas, *report.gallery))
     drawings += sum(len(each.table_error.maps) for each in report.materials)
-    drawings += 3 * 2 + 4  # grey: model and table, furnace; spectral: the model alone and the bound, too
+    drawings += 3 * 2 + 5  # grey: model and table, furnace; spectral: the model alone, uniform light, the bound, too
     assert sum(tag == "svg" for tag, _ in document.elements) == drawings
 
 
