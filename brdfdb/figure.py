@@ -53,6 +53,8 @@ class Map(BaseModel):
     y: list[float]
     values: list[Numbers] = Field(description="[y][x]; null: none")
     log: bool = Field(default=False, description="whether colours are those of the logarithms")
+    low: float | None = Field(default=None, description="what the darkest colour stands for; null: the smallest value")
+    high: float | None = Field(default=None, description="what the brightest stands for; null: the largest value")
 
 
 class Picture(BaseModel):

@@ -17,6 +17,7 @@ from brdfdb.misprints import MISPRINTS
 Array = NDArray[np.float64]
 Arguments = Mapping[str, Any]
 
+LARGEST = 10.0  # what the brightest colour of a map stands for
 NONE = 1e-17  # drawn for an error of 0, and for smaller ones: a truth is rounded to float64
 ERROR = "relative error (1e-17: none)"
 FAILS = 100.0  # a form that is off by so many times what ours is held to is said to fail
@@ -121,6 +122,8 @@ def error_map(x: Array, y: Array, form: Form, found: Array, *, x_label: str, y_l
         y=axis(y),
         values=[drawn(row) for row in found.reshape(y.size, x.size)],
         log=True,
+        low=NONE,
+        high=LARGEST,
     )
     return Measured(panel, [(form.label, form.role, found)])
 

@@ -19,7 +19,7 @@ WORST_OF_STATED = 1.5
 EXACT = 1e-6
 _STEP_DEG = 3.0  # of the maps
 _LAST_DEG = 89.0
-_LEAST = 1e-6  # what is less is drawn as this: maps are read for what is wrong, and zeros have no colour
+_LEAST, _MOST = 1e-6, 1.0  # what is less is drawn as the least: zeros have no colour; all maps have the same colours
 # Azimuth [degree] of viewers at negative theta_r
 _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90.0}
 
@@ -62,4 +62,6 @@ def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_
         y=theta_i_deg.tolist(),
         values=[numbers(row, 2) for row in np.maximum(error, _LEAST)],
         log=True,
+        low=_LEAST,
+        high=_MOST,
     )

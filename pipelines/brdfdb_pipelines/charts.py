@@ -181,7 +181,9 @@ def _map(drawn: Map) -> Canvas:
         low = -high
     if low == high:
         low, high = (low / 2.0, 2.0 * high) if drawn.log else (low - 0.5, high + 0.5)
-    norm = (mpl.colors.LogNorm if drawn.log else mpl.colors.Normalize)(low, high)
+    low = low if drawn.low is None else drawn.low
+    high = high if drawn.high is None else drawn.high
+    norm = (mpl.colors.LogNorm if drawn.log else mpl.colors.Normalize)(low, high, clip=True)
     shown = np.ma.masked_invalid(np.where(values > 0.0, values, np.nan) if drawn.log else values)
     axes.pcolormesh(drawn.x, drawn.y, shown, cmap=name, norm=norm, shading="nearest", rasterized=True)
     if len(drawn.x) > 1 and len(drawn.y) > 1:  # half of the outermost values would lie beyond the axes
@@ -259,10 +261,9 @@ def _canvas(
 
 
 def _columns(labels: list[str]) -> int:
-    """How many columns of a legend fit; matplotlib fills one column after the other."""
+    """How many columns of a legend fit; matplotlib fills one after the other, the first ones with one more."""
     for columns in range(len(labels), 1, -1):
-        rows = math.ceil(len(labels) / columns)
-        widest = [max(map(len, labels[start : start + rows])) for start in range(0, len(labels), rows)]
+        widest = [max(map(len, column)) for column in np.array_split(np.array(labels), columns)]
         if sum(_SAMPLE + _LETTER * letters for letters in widest) < WIDTH - 12.0:
             return columns
     return 1

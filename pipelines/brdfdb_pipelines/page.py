@@ -377,7 +377,7 @@ def _panels(a: MaterialAudit) -> list[Panel | Map]:
         curves = _spectral(furnace.theta_i_deg, furnace.albedo, furnace.wavelength_nm)
         curves = [*curves, _IDEAL]
         panels.append(Panel(title="White furnace: made lossless", x_label=theta, y_label=albedo, curves=curves))
-    if (bound := model.bound_on_a) is not None:
+    if (bound := model.bound_on_a) is not None and len(bound.wavelength_nm) > 1:
         x = bound.wavelength_nm
         curves = [
             Curve(label="this material", x=x, y=bound.preset, role="ours"),

@@ -155,7 +155,12 @@ def test_a_dark_table_that_is_too_bright_is_caught_by_its_error_alone(sound: Pat
     assert audited(root, "dark", report) == 1
     entry = entry_of(report)
     assert entry["energy"]["table"]["max_albedo"] < 0.5
-    assert entry["energy"]["table"]["verdict"] == entry["reciprocity"]["verdict"] == entry["smoothness"]["verdict"] == "passes"
+    assert (
+        entry["energy"]["table"]["verdict"]
+        == entry["reciprocity"]["verdict"]
+        == entry["smoothness"]["verdict"]
+        == "passes"
+    )
     assert entry["table_error"]["verdict"] == "violates"
     assert entry["table_error"]["fresh_p99"] == pytest.approx(0.5, abs=0.05)
 
