@@ -40,8 +40,8 @@ def open(root: str | os.PathLike[str]) -> Store:
 
 
 _LOADED_WHEN_USED = (
-    *("audit", "energy", "exr", "family", "fresnel", "geometry", "grids", "lookup", "materials", "misprints", "models"),
-    *("quadrature", "roughness", "sampling", "spectra", "store", "tabulate"),
+    *("atlas", "audit", "energy", "exr", "family", "fresnel", "gallery", "geometry", "grids", "lookup", "materials"),
+    *("misprints", "models", "quadrature", "roughness", "sampling", "spectra", "store", "tabulate"),
 )
 
 
