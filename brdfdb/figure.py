@@ -52,6 +52,8 @@ class Map(BaseModel):
     x: list[float]
     y: list[float]
     values: list[Numbers] = Field(description="[y][x]; null: none")
+    log_x: bool = False
+    log_y: bool = False
     log: bool = Field(default=False, description="whether colours are those of the logarithms")
     low: float | None = Field(default=None, description="what the darkest colour stands for; null: the smallest value")
     high: float | None = Field(default=None, description="what the brightest stands for; null: the largest value")

@@ -112,7 +112,7 @@ def named(label: str, found: Array) -> str:
 
 
 def error_map(x: Array, y: Array, form: Form, found: Array, *, x_label: str, y_label: str) -> Measured:
-    """A map of the errors of one form, x running fastest."""
+    """A map of the errors of one form over logarithmic axes, x running fastest."""
     panel = Map(
         title=named(form.label, found),
         x_label=x_label,
@@ -121,6 +121,8 @@ def error_map(x: Array, y: Array, form: Form, found: Array, *, x_label: str, y_l
         x=axis(x),
         y=axis(y),
         values=[drawn(row) for row in found.reshape(y.size, x.size)],
+        log_x=True,
+        log_y=True,
         log=True,
         low=NONE,
         high=LARGEST,

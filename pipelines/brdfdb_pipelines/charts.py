@@ -185,12 +185,15 @@ def _map(drawn: Map) -> Canvas:
     high = high if drawn.high is None else drawn.high
     norm = (mpl.colors.LogNorm if drawn.log else mpl.colors.Normalize)(low, high, clip=True)
     shown = np.ma.masked_invalid(np.where(values > 0.0, values, np.nan) if drawn.log else values)
-    axes.pcolormesh(drawn.x, drawn.y, shown, cmap=name, norm=norm, shading="nearest", rasterized=True)
+    axes.set_xscale("log" if drawn.log_x else "linear")
+    axes.set_yscale("log" if drawn.log_y else "linear")
+    x, y = _edges(drawn.x, log=drawn.log_x), _edges(drawn.y, log=drawn.log_y)
+    axes.pcolormesh(x, y, shown, cmap=name, norm=norm, rasterized=True)
     if len(drawn.x) > 1 and len(drawn.y) > 1:  # half of the outermost values would lie beyond the axes
         axes.set_xlim(drawn.x[0], drawn.x[-1])
         axes.set_ylim(drawn.y[0], drawn.y[-1])
-    _ticks(axes, "x", *axes.get_xlim(), log=False)
-    _ticks(axes, "y", *axes.get_ylim(), log=False)
+    _ticks(axes, "x", *axes.get_xlim(), log=drawn.log_x)
+    _ticks(axes, "y", *axes.get_ylim(), log=drawn.log_y)
     axes.set_xlabel(drawn.x_label)
     axes.set_ylabel(drawn.y_label)
     box = axes.get_position()
@@ -207,6 +210,14 @@ def _map(drawn: Map) -> Canvas:
     bar.tick_params(length=0)
     bar.set_ylabel(drawn.value_label)
     return canvas
+
+
+def _edges(centres: list[float], *, log: bool) -> Floats:
+    """Where values at some centres meet: half way between them, and as far out as in at the ends."""
+    middle = np.log(centres) if log else np.array(centres)
+    half = np.diff(middle) / 2.0 if middle.size > 1 else np.array([0.5])
+    edges = np.concatenate([[middle[0] - half[0]], middle[:-1] + half[: middle.size - 1], [middle[-1] + half[-1]]])
+    return np.exp(edges) if log else edges
 
 
 def _picture(picture: Picture) -> str:

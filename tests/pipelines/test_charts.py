@@ -6,6 +6,7 @@ import base64
 import io
 import re
 import xml.etree.ElementTree as ET
+from typing import Any
 
 import numpy as np
 import pytest
@@ -194,14 +195,42 @@ def test_a_picture_is_in_srgb_and_its_background_is_clear() -> None:
 
 
 def test_a_map_has_a_colour_for_each_value_and_none_where_there_is_none() -> None:
-    svg = charts.svg(error_map(np.array([[1.0, 2.0], [1.0, np.nan]])), "key")
-    image, _bar = re.findall(r'<image href="data:image/png;base64,\s*([^"]+)" transform="scale\(1 -1\)', svg)
-    shown = imread(io.BytesIO(base64.b64decode(image)))  # upside down, and turned over where it is shown
+    shown = image_of(error_map(np.array([[1.0, 2.0], [1.0, np.nan]])))
     lower, upper = shown[len(shown) // 4], shown[3 * len(shown) // 4]  # the first row of a map is the lowest
     left, right = shown.shape[1] // 4, 3 * shown.shape[1] // 4
     assert upper[right, 3] == 0.0
     assert upper[left].tolist() == lower[left].tolist()
     assert lower[left, :3].sum() < lower[right, :3].sum()  # brighter is more
+
+
+def image_of(drawn: Map) -> Any:
+    """The pixels of a map as the page shows them turned over, (rows, columns, RGBA)."""
+    image, _bar = re.findall(
+        r'<image href="data:image/png;base64,\s*([^"]+)" transform="scale\(1 -1\)', charts.svg(drawn, "key")
+    )
+    return imread(io.BytesIO(base64.b64decode(image)))
+
+
+def test_values_of_a_map_over_logarithmic_axes_meet_half_way_between_the_logarithms() -> None:
+    axis = {"x": [1.0, 10.0, 100.0], "y": [1.0, 10.0, 100.0], "log_x": True, "log_y": True}
+    shown = image_of(error_map(np.array([[1.0, 2.0, 3.0]] * 3)).model_copy(update=axis))
+    row, columns = shown[len(shown) // 2], shown.shape[1]
+    left, middle, right = row[columns // 8], row[columns // 2], row[7 * columns // 8]
+    assert left[:3].sum() < middle[:3].sum() < right[:3].sum()
+    for at, expected in ((0.22, left), (0.28, middle), (0.72, middle), (0.78, right)):
+        assert row[round(at * columns)].tolist() == expected.tolist()
+
+
+def test_maps_with_the_same_limits_have_the_same_colours() -> None:
+    limits = {"low": 0.0, "high": 4.0}
+    small, large = (
+        image_of(error_map(values).model_copy(update=limits))
+        for values in (np.array([[1.0, 2.0], [1.0, 2.0]]), np.array([[2.0, 9.0], [2.0, 9.0]]))
+    )
+    row, columns = len(small) // 2, small.shape[1]
+    assert small[row, -columns // 4].tolist() == large[row, columns // 4].tolist()
+    brightest = image_of(error_map(np.array([[0.0, 4.0], [0.0, 4.0]])))[row, -columns // 4]
+    assert large[row, -columns // 4].tolist() == brightest.tolist()  # what is beyond has the last one
 
 
 def test_polar_panels_refuse_what_they_cannot_show() -> None:
