@@ -19,7 +19,7 @@ WORST_OF_STATED = 1.5
 EXACT = 1e-6
 _STEP_DEG = 3.0  # of the maps
 _LAST_DEG = 89.0
-_LEAST, _MOST = 1e-6, 1.0  # what is less is drawn as the least: zeros have no colour; all maps have the same colours
+LEAST, _MOST = 1e-6, 1.0  # what is less is drawn as the least: zeros have no colour; all maps have the same colours
 # Azimuth [degree] of viewers at negative theta_r
 _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90.0}
 
@@ -57,11 +57,11 @@ def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_
         title=f"Error {title}" if wavelength is None else f"Error {title}, {wavelength:g} nm",
         x_label="theta_r [degrees], negative back towards the light",
         y_label="theta_i [degrees]",
-        value_label=f"abs(table - model) / model, no less than {_LEAST:g}",
+        value_label=f"abs(table - model) / model, no less than {LEAST:g}",
         x=theta_r_deg.tolist(),
         y=theta_i_deg.tolist(),
-        values=[numbers(row, 2) for row in np.maximum(error, _LEAST)],
+        values=[numbers(row, 2) for row in np.maximum(error, LEAST)],
         log=True,
-        low=_LEAST,
+        low=LEAST,
         high=_MOST,
     )
