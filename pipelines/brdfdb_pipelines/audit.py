@@ -70,7 +70,7 @@ def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: 
             done[name] = outcome
             bar.advance(task)
     audits = [done[name].subject for name in materials if isinstance(done[name], Section)]
-    damaged = [str(outcome) for outcome in done.values() if isinstance(outcome, StoreError)]
+    damaged = [str(done[name]) for name in materials if isinstance(done[name], StoreError)]
     if damaged and not audits:
         raise StoreError("; ".join(damaged))
     found = report(
