@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Role, Statement, numbers
+from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, numbers
 from brdfdb.geometry import radians
 from brdfdb.misprints import MISPRINTS
 
@@ -80,14 +80,13 @@ def sweep(
     rows = [arguments(float(each)) for each in x]
     truths = [rounded(truth(**row)) for row in rows]
     measured = [(form.label, form.role, errors(form.evaluate, rows, truths, scale)) for form in forms]
-    curves = [curve(named(label, found), role, x, drawn(found)) for label, role, found in measured]
+    curves = [
+        curve_of(named(label, found), axis(x), np.array(drawn(found), dtype=np.float64), role)
+        for label, role, found in measured
+    ]
     y_label = ERROR if scale is None else ERROR.replace("relative error", f"error over {scale:.3g}/sr")
     panel = Panel(title=title, x_label=x_label, y_label=y_label, curves=curves, log_x=log_x, log_y=True)
     return Measured(panel, measured)
-
-
-def curve(label: str, role: Role, x: Sequence[float] | Array, y: Any) -> Curve:
-    return Curve(label=label, x=axis(x), y=numbers(np.asarray(y, dtype=np.float64)), role=role)
 
 
 def axis(x: Sequence[float] | Array) -> list[float]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brdfdb.figure import Figure, Panel, Statement
+from brdfdb.figure import Figure, Panel, Statement, listed
 from brdfdb.gallery.oren_nayar_1994_lines import (
     PAPER,
     ROUNDING,
@@ -21,7 +21,6 @@ from brdfdb.gallery.oren_nayar_1994_lines import (
     curve,
     distance,
     left_past,
-    listed,
     variation,
 )
 from brdfdb.geometry import degrees, radians
