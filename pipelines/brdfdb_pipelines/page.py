@@ -372,15 +372,12 @@ def _panels(a: MaterialAudit) -> list[Panel | Map]:
         curves = _spectral(model.theta_i_deg, model.albedo, wavelengths)
         panels.append(Panel(title="Albedo of the model", x_label=theta, y_label=albedo, curves=curves))
         curves = [
-            Curve(label="table", x=table.wavelength_nm or [], y=table.hemispherical, role="ours"),
+            Curve(label="table", x=wavelengths, y=table.hemispherical, role="ours"),
             Curve(label="model", x=wavelengths, y=model.hemispherical, role="truth"),
         ]
         panels.append(Panel(title="In uniform light", x_label="wavelength, nm", y_label="albedo", curves=curves))
-    same = (
-        0 if wavelengths is None or table.wavelength_nm is None else _nearest(table.wavelength_nm, wavelengths[where])
-    )
     both = [
-        Curve(label="table", x=table.theta_i_deg, y=_column(table.albedo, same), role="ours"),
+        Curve(label="table", x=table.theta_i_deg, y=_column(table.albedo, where), role="ours"),
         Curve(label="model", x=model.theta_i_deg, y=_column(model.albedo, where), role="truth"),
         _ALL_OF_IT,
     ]
@@ -398,10 +395,6 @@ def _panels(a: MaterialAudit) -> list[Panel | Map]:
         title, y_label = "Uniform diffuse part a(λ)", "a(λ)"
         panels.append(Panel(title=title, x_label="wavelength, nm", y_label=y_label, curves=curves))
     return panels
-
-
-def _nearest(values: list[float], value: float) -> int:
-    return min(range(len(values)), key=lambda k: abs(values[k] - value))
 
 
 def _spectral(x: list[float], rows: list[Numbers], wavelengths: list[float] | None) -> list[Curve]:
