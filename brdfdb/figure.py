@@ -103,6 +103,11 @@ def numbers(values: ArrayLike, digits: int = 5) -> Numbers:
     return [float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in flat.tolist()]
 
 
+def rows(values: ArrayLike, digits: int = 5) -> list[Numbers]:
+    """`numbers` of each row of an array (rows, columns)."""
+    return [numbers(row, digits) for row in np.asarray(values)]
+
+
 def listed(values: Iterable[float], form: str = ".3g") -> str:
     """Numbers in a sentence, as "1, 2 and 3"."""
     *most, last = (format(float(value), form) for value in values)

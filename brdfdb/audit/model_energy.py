@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brdfdb.audit.findings import EnergyVerdict, Furnace, ModelEnergy, UniformBound
-from brdfdb.audit.known import ENERGY_TOLERANCE, known_limit
+from brdfdb.audit.known import DIGITS, ENERGY_TOLERANCE, known_limit
 from brdfdb.energy import a_max
-from brdfdb.figure import numbers
+from brdfdb.figure import numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.materials import Material
@@ -64,8 +64,8 @@ def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mappi
     return ModelEnergy(
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
-        albedo=[numbers(row, 7) for row in found.largest],
-        specular=[numbers(row, 7) for row in found.specular],
+        albedo=rows(found.largest, DIGITS),
+        specular=rows(found.specular, DIGITS),
         integration_error=_finite(float(f"{found.error.max():.2g}")),
         hemispherical=numbers(lights.weights @ found.mean, 4),
         max_albedo=_finite(found.largest[theta, wavelength]),
@@ -182,7 +182,7 @@ def _furnace(
         lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.items()),
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if some is None else some.tolist(),
-        albedo=[numbers(row, 7) for row in found.largest],
+        albedo=rows(found.largest, DIGITS),
         hemispherical=numbers(lights.weights @ found.mean, 4),
         smallest=_finite(low.min()),
         smallest_at_theta_i_deg=float(lights.theta_i_deg[np.argmin(low)]),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.figure import Figure, Panel, Picture, Role, Statement, curve_of, listed, numbers
+from brdfdb.figure import Figure, Panel, Picture, Role, Statement, curve_of, listed, rows
 from brdfdb.gallery.oren_nayar_1994_lines import PAPER, ROUNDING, SMALL, variation
 from brdfdb.geometry import radians
 from brdfdb.materials import presets
@@ -65,7 +65,7 @@ def sphere(model: Vectors, **parameters: float) -> Floats:
 
 
 def _picture(title: str, radiance: Floats) -> Picture:
-    return Picture(title=title, radiance=[numbers(row, DIGITS) for row in radiance])
+    return Picture(title=title, radiance=rows(radiance, DIGITS))
 
 
 def _pixels() -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, numbers
+from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, rows
 from brdfdb.geometry import HALF_PI, degrees, radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
@@ -110,7 +110,7 @@ def _image() -> Figure:
                 value_label=_BRDF,
                 x=np.round(axis, 4).tolist(),
                 y=np.round(axis, 4).tolist(),
-                values=[numbers(row, 4) for row in values],
+                values=rows(values, 4),
                 log=True,
             )
         ],
@@ -217,7 +217,7 @@ def _crescent() -> Figure:
     across, up = np.meshgrid(axis, axis[::-1])
     white = _WHITE * np.nanmax(_sphere(brass, across, up))
     panels = [
-        Picture(title=title, radiance=[numbers(row, 3) for row in np.minimum(_sphere(form, across, up) / white, 1.0)])
+        Picture(title=title, radiance=rows(np.minimum(_sphere(form, across, up) / white, 1.0), 3))
         for title, form in (("eq. 5a", brass), ("eq. 4", round_brass))
     ]
     bend, thickness = _bend(brass)
