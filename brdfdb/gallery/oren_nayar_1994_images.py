@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Panel, Picture, Role, Statement, curve_of, listed, rows
-from brdfdb.gallery.oren_nayar_1994_lines import PAPER, ROUNDING, SMALL, variation
+from brdfdb.gallery._oren_nayar_lines import PAPER, ROUNDING, SMALL, variation
 from brdfdb.geometry import radians
 from brdfdb.materials import presets
 from brdfdb.models import lambert_vectors, oren_nayar_gaussian_vectors, oren_nayar_vectors

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from brdfdb.figure import Figure, Panel, Statement, listed
-from brdfdb.gallery.oren_nayar_1994_lines import (
+from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
     SMALL,
     THETA_R,
