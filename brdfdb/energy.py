@@ -90,6 +90,11 @@ def a_max(theta_i: Array, reflectance: Floats, surfaces: Mapping[str, ArrayLike]
         wavelength_nm, sigma_0_um, tau_um, n and k; numbers, or arrays of one shape (surfaces,).
     tolerance : float
         As in `he_torrance_a_max`.
+
+    Returns
+    -------
+    array (surfaces,) [1]
+        1 less the largest reflectance, at these angles or between them; 0 where that is above 1.
     """
     below = theta_i < HALF_PI
     peak = _peak(

@@ -387,23 +387,32 @@ def test_an_excess_is_known_up_to_its_albedo_and_from_its_angle_on(
 ) -> None:
     table = lambert(0.5)
     mirror = np.array([0.1, 0.1, 0.1, 0.51, 0.55, 0.5], dtype=np.float32)
-    found = audit(replace(table, specular=mirror, attrs={**table.attrs, "known_excess": excess}))
-    assert (found.verdict, found.energy.table.verdict, found.energy.table.reason) == (verdict, verdict, reason)
-    assert (found.energy.table.exceeds_1_from_theta_i_deg, found.energy.table.max_at_theta_i_deg) == (60.0, 80.0)
-    assert written([found])["violations"] == ([] if verdict.startswith("known") else ["made-up"])
+    found = table_energy_of(replace(table, specular=mirror), excess)
+    assert (found.verdict, found.reason) == (verdict, reason)
+    assert (found.exceeds_1_from_theta_i_deg, found.max_at_theta_i_deg) == (60.0, 80.0)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_no_excess_is_known_to_be_infinite(value: float) -> None:
     table = node(lambert(0.5), value)
-    found = audit(replace(table, attrs={**table.attrs, "known_excess": known(1e300, 0.0)}))
-    assert found.energy.table.verdict == "violates"
+    assert table_energy_of(table, known(1e300, 0.0)).verdict == "violates"
 
 
 def test_a_known_excess_excuses_nothing_else() -> None:
     table = node(lambert(0.5), -1.0)
     found = audit(replace(table, attrs={**table.attrs, "known_excess": known(1.2, 0.0)}))
     assert (found.verdict, found.energy.table.verdict) == ("violates", "passes")
+
+
+@pytest.mark.parametrize("excess", [{}, known(1.2, 0.0)], ids=["of the model", "of the material"])
+def test_an_excess_is_known_of_the_model_not_of_a_table_that_exceeds_1_where_it_does_not(
+    excess: dict[str, Any],
+) -> None:
+    table = tabulated(material("oren_nayar", {"rho": 0.98, "sigma_deg": 40}), fine(2.0))
+    bright = table.brdf * np.float32(1.02 / np.max(directional_albedo(table).albedo))
+    found = audit(replace(table, values=bright, attrs={**table.attrs, "known_excess": excess}))
+    assert found.energy.model.exceeds_1_from_theta_i_deg is None
+    assert (found.energy.table.max_albedo, found.energy.table.verdict) == (pytest.approx(1.02, rel=1e-6), "violates")
 
 
 def fine(step: float) -> Grid:
@@ -449,9 +458,9 @@ def test_oren_nayar_with_rho_1_conserves_energy_on_a_rough_surface() -> None:
 
 def test_the_report_names_the_violations_and_nothing_else() -> None:
     good, bad = lambert(0.5), node(lambert(0.5), -1.0)
-    excused = replace(lambert(1.0), name="excused", attrs=lambert(1.0, known_excess=known(1.2, 0.0)).attrs)
-    excused = replace(excused, values=excused.brdf * np.float32(1.1))
-    audits = [audit(table) for table in (replace(good, name="good"), replace(bad, name="bad"), excused)]
+    excused = tabulated(material("minnaert", {"k": 0.9, "rho": 1.0}), ISOTROPIC)
+    named = {"good": good, "bad": bad, "excused": excused}
+    audits = [audit(replace(table, name=name)) for name, table in named.items()]
     document = written(audits)
     assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 3, ["bad"])
     assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]

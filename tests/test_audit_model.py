@@ -26,6 +26,7 @@ from brdfdb.lookup import Table
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
 from brdfdb.parameters import Lobe
+from brdfdb.quadrature import Albedo
 from brdfdb.sampling import lobe_of
 from tests.test_audit import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
 
@@ -78,6 +79,11 @@ def test_weights_that_are_a_hundredth_too_large_are_caught(monkeypatch: pytest.M
     found = ward_sampling(monkeypatch, heavier)
     assert found.verdict == "violates"
     assert min(p for p in found.chi_square_p if p is not None) > 1e-3
+
+
+def test_a_quadrature_that_gives_up_excuses_no_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sampling, "directional_albedo", lambda *_, **__: Albedo(np.array(0.6), np.array(1.0)))
+    assert sampling_of(lambert(0.5), material("lambert", {"rho": 0.5})).verdict == "violates"
 
 
 def test_what_is_said_of_weights_is_said_of_a_lambertian_in_closed_form() -> None:

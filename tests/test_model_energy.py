@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numba
@@ -219,6 +221,34 @@ def test_next_to_a_pole_an_excess_that_nobody_knows_violates_and_a_known_one_is_
     assert model_energy_of(made, None, {}).verdict == "violates"
     assert model_energy_of(made, None, known(1.4, 88.9)).verdict == "known published excess"
     assert model_energy_of(made, None, known(1.2, 88.9)).verdict == "violates"
+
+
+def doctored(monkeypatch: pytest.MonkeyPatch, change: Callable[[Any, Any], Any]) -> ModelEnergy:
+    """Energy of a Lambertian whose f_r, 0.95 / pi, is changed by a function of light and viewer."""
+
+    def vectors(wi: Any, wr: Any, *, rho: float) -> Any:
+        return rho / np.pi + change(wi, wr)
+
+    monkeypatch.setitem(MODELS, "lambert", replace(MODELS["lambert"], vectors=vectors))
+    return energy(material("lambert", {"rho": 0.95}))
+
+
+def test_a_model_that_is_not_finite_violates_and_is_null(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = doctored(monkeypatch, lambda wi, wr: np.where(wr[..., 2] * wi[2] < 0.1, np.nan, 0.0))
+    assert (found.verdict, found.max_albedo) == ("violates", None)
+    assert found.reason == "the model reflects no finite share of what arrives at 0 degrees"
+    assert ModelEnergy.model_validate_json(found.model_dump_json()) == found
+
+
+def test_an_integral_that_gives_up_at_one_light_excuses_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    def rough_at_60(wi: Any, wr: Any) -> Any:
+        dark = abs(wi[2] - 0.5) < 1e-9
+        return np.where(dark, -0.5 * np.sin(1e6 * wr[..., 0]) ** 2, 0.1) / np.pi
+
+    found = doctored(monkeypatch, rough_at_60)
+    assert found.integration_error is not None
+    assert found.integration_error > 0.05
+    assert (found.verdict, found.max_albedo) == ("violates", pytest.approx(1.05))
 
 
 # The bound on a

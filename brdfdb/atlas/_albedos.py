@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.figure import Curve, Panel, Role, numbers
+from brdfdb.figure import Curve, Panel, Role, curve_of
 from brdfdb.geometry import radians
 from brdfdb.quadrature import directional_albedo
 
@@ -44,7 +44,7 @@ def largest(albedo: Array, theta_i_deg: Array = THETA_DEG) -> str:
 
 
 def curve(label: str, y: ArrayLike, role: Role = "other", x: Array = THETA_DEG) -> Curve:
-    return Curve(label=label, x=x.tolist(), y=numbers(y), role=role)
+    return curve_of(label, x, y, role)
 
 
 def panel(title: str, curves: Sequence[Curve], *, log_y: bool = False) -> Panel:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Role, Statement, numbers
+from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, rows
 from brdfdb.geometry import radians
 from brdfdb.misprints import MISPRINTS
 
@@ -48,6 +48,11 @@ def directions(theta_i: float, theta_r: float, delta_phi: float) -> dict[str, An
     return {"theta_i": radians(theta_i), "phi_i": 0.0, "theta_r": radians(theta_r), "phi_r": radians(delta_phi)}
 
 
+def lobe(alpha: ArrayLike) -> dict[str, Any]:
+    """Parameters of a lobe of Ward's alone, round, that should reflect all light."""
+    return {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
+
+
 def relative(value: Any, truth: Any, scale: float | None = None) -> float:
     """abs(value - truth) over abs(truth), or over `scale`; of matrices the largest of each; nan where not finite."""
     value = np.asarray(value, dtype=np.complex128)
@@ -80,14 +85,10 @@ def sweep(
     rows = [arguments(float(each)) for each in x]
     truths = [rounded(truth(**row)) for row in rows]
     measured = [(form.label, form.role, errors(form.evaluate, rows, truths, scale)) for form in forms]
-    curves = [curve(named(label, found), role, x, drawn(found)) for label, role, found in measured]
+    curves = [curve_of(named(label, found), axis(x), np.maximum(found, NONE), role) for label, role, found in measured]
     y_label = ERROR if scale is None else ERROR.replace("relative error", f"error over {scale:.3g}/sr")
     panel = Panel(title=title, x_label=x_label, y_label=y_label, curves=curves, log_x=log_x, log_y=True)
     return Measured(panel, measured)
-
-
-def curve(label: str, role: Role, x: Sequence[float] | Array, y: Any) -> Curve:
-    return Curve(label=label, x=axis(x), y=numbers(np.asarray(y, dtype=np.float64)), role=role)
 
 
 def axis(x: Sequence[float] | Array) -> list[float]:
@@ -99,10 +100,6 @@ def rounded(truth: Any) -> Any:
     if hasattr(truth, "rows"):
         return np.array([[complex(truth[row, column]) for column in range(2)] for row in range(2)])
     return float(truth)
-
-
-def drawn(found: Array) -> list[float | None]:
-    return numbers(np.maximum(found, NONE), 3)
 
 
 def named(label: str, found: Array) -> str:
@@ -120,7 +117,7 @@ def error_map(x: Array, y: Array, form: Form, found: Array, *, x_label: str, y_l
         value_label=ERROR,
         x=axis(x),
         y=axis(y),
-        values=[drawn(row) for row in found.reshape(y.size, x.size)],
+        values=rows(np.maximum(found.reshape(y.size, x.size), NONE), 3),
         log_x=True,
         log_y=True,
         log=True,

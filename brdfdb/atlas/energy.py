@@ -33,7 +33,7 @@ from brdfdb.reference import he_torrance_1991
 _PLAIN_SIGMA_DEG = (0.0, 10.0, 20.0, 30.0, 40.0)
 _ROUGH_SIGMA_DEG = (40.0, 45.0, 50.0, 60.0, 70.0, 80.0, 90.0)
 _FEW_DEG = THETA_DEG[::4]  # of a model that is an integral itself
-_PERFECT = {"n": 1e-3, "k": 1e4, "wavelength_nm": 500.0}  # |F|^2 is 1 to 1e-10 but for the last degree
+_PERFECT = {"n": 1e-3, "k": 1e4, "wavelength_nm": 500.0}  # |F|^2 is 1 to 1e-8 up to 89.9 degrees
 
 
 def _oren_nayar() -> Figure:

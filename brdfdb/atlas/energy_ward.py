@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from brdfdb.atlas._albedos import (
     ALBEDO,
@@ -20,6 +19,7 @@ from brdfdb.atlas._albedos import (
     onset_deg,
     panel,
 )
+from brdfdb.atlas._errors import lobe
 from brdfdb.figure import Figure, Panel, Role, Statement
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.reference import mp
@@ -38,12 +38,8 @@ _SMALL = 0.01  # the same, of an alpha that is small: 4 alpha^2 of 0.05
 _SAMPLED = 1e-3  # of the mean of 128 x 128 stratified weights
 
 
-def _lobe(alpha: ArrayLike) -> dict[str, Any]:
-    return {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
-
-
 def _ward() -> Figure:
-    albedos = {alpha: {model: albedo_of(model, **_lobe(alpha)) for model, _, _ in _WARD_FORMS} for alpha in _ALPHAS}
+    albedos = {alpha: {model: albedo_of(model, **lobe(alpha)) for model, _, _ in _WARD_FORMS} for alpha in _ALPHAS}
     cosine = np.cos(radians(THETA_DEG))
     panels = [
         panel(
@@ -62,7 +58,7 @@ def _ward() -> Figure:
     duer = at(albedos[0.1]["ward_duer"], 89.5)
     bounded = max(float(albedos[alpha]["ward_bounded"].max()) for alpha in _ALPHAS)
     gentle = max(float(albedos[alpha]["ward"].max()) for alpha in (0.05, 0.1, 0.2))
-    last = float(albedo_of("ward", 89.999, **_lobe(0.1)))
+    last = float(albedo_of("ward", 89.999, **lobe(0.1)))
     return Figure(
         key="energy-ward",
         paper="ward1992",
@@ -89,8 +85,8 @@ def _ward() -> Figure:
                 says='"As long as the total reflectance, rho_d + rho_s, is less than 1 and the two alphas are not too '
                 'large, Equation 5 will yield a physically valid reflectance function"',
                 where="section 4.2",
-                seen=f"for alpha up to 0.2 at most {gentle:.3f} up to 89.9 degrees, but it grows as 1 / "
-                f"sqrt(cos(theta_i)): alpha of 0.1 reflects {last:.2f} at 89.999 degrees",
+                seen=f"for alpha up to 0.2 at most {gentle:.3f} rho_s up to 89.9 degrees, but it grows as 1 / "
+                f"sqrt(cos(theta_i)): alpha of 0.1 reflects {last:.2f} rho_s at 89.999 degrees",
                 holds=max(gentle, last) <= 1.0,
             ),
             Statement(
@@ -134,7 +130,7 @@ def _ward_normal() -> Figure:
     exact = [_at_the_normal(float(alpha)) for alpha in _NORMAL_ALPHAS]
     closed = {model: np.array([float(each[model]) for each in exact]) for model, _, _ in _WARD_FORMS}
     albedos = {
-        model: albedo_of(model, 0.0, tolerance=0.1 * EXACT, **_lobe(_NORMAL_ALPHAS)) for model, _, _ in _WARD_FORMS
+        model: albedo_of(model, 0.0, tolerance=0.1 * EXACT, **lobe(_NORMAL_ALPHAS)) for model, _, _ in _WARD_FORMS
     }
     off = {model: np.abs(albedos[model] - closed[model]) for model in albedos}
     worst = max(float(each.max()) for each in off.values())
@@ -187,7 +183,7 @@ def _ward_samples() -> Figure:
     drawn = ward_sample(u[:, np.newaxis, np.newaxis], u[:, np.newaxis], lights, rho_s=1.0, alpha_x=alpha, alpha_y=alpha)
     weighted = drawn.weight.mean(axis=(0, 1))
     uniform = (drawn.wr[..., 2] > 0.0).mean(axis=(0, 1))
-    albedo = albedo_of("ward", **_lobe(alpha))
+    albedo = albedo_of("ward", **lobe(alpha))
     off = float(np.max(np.abs(weighted - albedo)))
     return Figure(
         key="energy-ward-samples",

@@ -33,10 +33,10 @@ def audit(table: Table) -> MaterialAudit:
     Returns
     -------
     MaterialAudit
-        The findings. The verdict on energy is "known published excess" where the albedo exceeds 1 no further than
-        the material's attribute ``known_excess``, or its model, says, and "violates" where it exceeds 1 otherwise.
-        A table that states its error may exceed either by what that error explains. That a model "loses" light that
-        nothing absorbs is said, and passes.
+        The findings. The verdict on energy is "known published excess" where the albedo of the model exceeds 1, and
+        it and that of the table no further than the material's attribute ``known_excess``, or its model, says; it is
+        "violates" where either exceeds 1 otherwise. A table that states its error may exceed 1, or what is known, by
+        what that error explains. That a model "loses" light that nothing absorbs is said, and passes.
     """
     material = material_of(table)
     pairs = pairs_of(table, material)

@@ -15,7 +15,8 @@ _SEVERITY: tuple[EnergyVerdict, ...] = ("conserves", "loses", "known published e
 def energy_of(table: Table, material: Material) -> Energy:
     known = known_excess(table, material)
     model = model_energy_of(material, table.wavelength_nm, known)
-    stored = table_energy_of(table, known)
+    # what is published is an excess of the model: where the model has none, that of a table is the table's own
+    stored = table_energy_of(table, known if model.verdict == "known published excess" else {})
     of_table: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
     if _SEVERITY.index(of_table) > _SEVERITY.index(model.verdict):
         reason = stored.reason if of_table.startswith("known") else f"the table {stored.reason}"

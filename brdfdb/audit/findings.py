@@ -124,9 +124,9 @@ class Furnace(BaseModel):
     wavelength_nm: list[float] | None = Field(description="null: grey; of many wavelengths the ends and the middle")
     albedo: list[Numbers] = Field(description="[theta_i][wavelength], Dirac part included")
     hemispherical: Numbers = Field(description="[wavelength], the mean over uniform light")
-    smallest: float
+    smallest: float | None = Field(description="null: not finite")
     smallest_at_theta_i_deg: float
-    largest: float
+    largest: float | None = Field(description="null: not finite")
     largest_at_theta_i_deg: float
 
 
@@ -150,9 +150,9 @@ class ModelEnergy(BaseModel):
     wavelength_nm: list[float] | None = Field(description="null: grey")
     albedo: list[Numbers] = Field(description="[theta_i][wavelength]; over the azimuths of the light the largest")
     specular: list[Numbers] = Field(description="[theta_i][wavelength], the share of the Dirac part in it")
-    integration_error: float = Field(description="of the albedo, the largest estimate")
+    integration_error: float | None = Field(description="of the albedo, the largest estimate; null: not finite")
     hemispherical: Numbers = Field(description="[wavelength], of light that is the same from everywhere")
-    max_albedo: float
+    max_albedo: float | None = Field(description="null: not finite")
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
     exceeds_1_from_theta_i_deg: float | None

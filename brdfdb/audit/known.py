@@ -1,4 +1,4 @@
-"""What is known of an excess: how far an albedo may be above 1, from which angle on, and who says so."""
+"""What albedos are held against: 1, or what is known of an excess, from which angle on, and who says so."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from brdfdb.materials import Material
 
 # A sum of float32 values: an ideal diffuser, albedo 1, measures 1 + 1.2e-7
 ENERGY_TOLERANCE = 1e-6
+DIGITS = 7  # of albedos in a report: what a float32 holds
 
 
 def known_excess(table: Table, material: Material) -> Mapping[str, Any]:

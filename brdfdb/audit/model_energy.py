@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brdfdb.audit.findings import EnergyVerdict, Furnace, ModelEnergy, UniformBound
-from brdfdb.audit.known import ENERGY_TOLERANCE, known_limit
+from brdfdb.audit.known import DIGITS, ENERGY_TOLERANCE, known_limit
 from brdfdb.energy import a_max
-from brdfdb.figure import numbers
+from brdfdb.figure import numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.materials import Material
@@ -41,12 +41,15 @@ class _Lights(NamedTuple):
 
 
 class _Reflected(NamedTuple):
-    """Albedos (theta_i, wavelengths): over azimuths the largest and the mean, the Dirac part in them; and the error."""
+    """Albedos (theta_i, wavelengths): over azimuths the largest and the mean, the Dirac part in them.
+
+    Of the errors (theta_i, 1), over azimuths and wavelengths the largest: what one light is off by excuses no other.
+    """
 
     largest: Floats
     mean: Floats
     specular: Floats
-    error: float
+    error: Floats
 
 
 def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mapping[str, Any]) -> ModelEnergy:
@@ -55,20 +58,18 @@ def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mappi
     lights = _lights(material)
     found = _reflected(material, arguments, lights)
     furnace = _furnace(material, arguments, wavelength_nm, lights)
-    # where it is the same at many angles, the first of them: rounding tells 1e-16 from each other
-    theta, wavelength = np.unravel_index(np.argmax(np.round(found.largest, 12)), found.largest.shape)
-    largest, at = float(found.largest[theta, wavelength]), float(lights.theta_i_deg[theta])
+    theta, wavelength = _worst(found.largest)
     verdict, reason = _verdict(material, lights, found, furnace, known)
     exceeding = lights.theta_i_deg[np.any(found.largest - found.error > 1.0 + ENERGY_TOLERANCE, axis=1)]
     return ModelEnergy(
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
-        albedo=[numbers(row, 7) for row in found.largest],
-        specular=[numbers(row, 7) for row in found.specular],
-        integration_error=found.error,
+        albedo=rows(found.largest, DIGITS),
+        specular=rows(found.specular, DIGITS),
+        integration_error=_finite(float(f"{found.error.max():.2g}")),
         hemispherical=numbers(lights.weights @ found.mean, 4),
-        max_albedo=largest,
-        max_at_theta_i_deg=at,
+        max_albedo=_finite(found.largest[theta, wavelength]),
+        max_at_theta_i_deg=float(lights.theta_i_deg[theta]),
         max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
         exceeds_1_from_theta_i_deg=float(exceeding[0]) if exceeding.size else None,
         furnace=furnace,
@@ -78,10 +79,24 @@ def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mappi
     )
 
 
+def _worst(albedo: Floats) -> tuple[int, int]:
+    """Where the largest is, or what is not finite; of many angles where it is the same the first: rounding differs."""
+    ranked = np.where(np.isfinite(albedo), np.round(albedo, 12), np.inf)
+    theta, wavelength = np.unravel_index(np.argmax(ranked), ranked.shape)
+    return int(theta), int(wavelength)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
 def _verdict(
     material: Material, lights: _Lights, found: _Reflected, furnace: Furnace | None, known: Mapping[str, Any]
 ) -> tuple[EnergyVerdict, str]:
     theta_i_deg, certain = lights.theta_i_deg, found.largest - found.error
+    if not np.isfinite(certain).all():
+        broken = theta_i_deg[~np.isfinite(certain).all(axis=1)]
+        return "violates", f"the model reflects no finite share of what arrives at {broken[0]:g} degrees"
     if np.any(certain > 1.0 + ENERGY_TOLERANCE):
         limit = known_limit(known, theta_i_deg) + ENERGY_TOLERANCE
         if known and material.spec.grazing_pole:
@@ -146,7 +161,7 @@ def _reflected(material: Material, arguments: Mapping[str, Any], lights: _Lights
             [np.broadcast_to(spec.specular(theta, **parameters), specular[0].shape) for theta in theta_i]
         )
     mean = np.einsum("tpw,p->tw", diffuse, weights) + specular
-    error = float(f"{max(float(each.error) for row in found for each in row):.2g}")
+    error = np.array([[max(float(each.error) for each in row)] for row in found])
     return _Reflected(diffuse.max(axis=1) + specular, mean, specular, error)
 
 
@@ -167,11 +182,11 @@ def _furnace(
         lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.items()),
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if some is None else some.tolist(),
-        albedo=[numbers(row, 7) for row in found.largest],
+        albedo=rows(found.largest, DIGITS),
         hemispherical=numbers(lights.weights @ found.mean, 4),
-        smallest=float(low.min()),
+        smallest=_finite(low.min()),
         smallest_at_theta_i_deg=float(lights.theta_i_deg[np.argmin(low)]),
-        largest=float(high.max()),
+        largest=_finite(high.max()),
         largest_at_theta_i_deg=float(lights.theta_i_deg[np.argmax(high)]),
     )
 

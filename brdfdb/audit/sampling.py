@@ -76,6 +76,7 @@ def _light(spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, co
     albedo, error = directional_albedo(spec, theta_i, phi_i, tolerance=_ALBEDO_TOLERANCE, **arguments)
     p = _chance(drawn.wr, wi, lobe_of(spec, wi, arguments))
     off = abs(mean - float(albedo))
+    allowed = STANDARD_ERRORS * standard_error + min(float(error), _ALBEDO_TOLERANCE) + _ROUNDING
     return _Light(
         chi_square_p=p,
         largest_weight=float(np.max(drawn.weight)),
@@ -83,7 +84,7 @@ def _light(spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, co
         monte_carlo=mean,
         monte_carlo_error=standard_error,
         quadrature=float(albedo),
-        good=p >= LEAST_CHANCE and off <= STANDARD_ERRORS * standard_error + float(error) + _ROUNDING,
+        good=p >= LEAST_CHANCE and off <= allowed,
     )
 
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from brdfdb.albedo import QUADRATURE_TOLERANCE, directional_albedo, hemispherical_albedo
 from brdfdb.audit.findings import Bands, TableEnergy, Verdict
-from brdfdb.audit.known import known_limit
+from brdfdb.audit.known import DIGITS, known_limit
 from brdfdb.error import Error
-from brdfdb.figure import numbers
+from brdfdb.figure import numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
@@ -81,8 +81,8 @@ def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
     return TableEnergy(
         theta_i_deg=theta_i.tolist(),
         wavelength_nm=None if table.wavelength_nm is None else table.wavelength_nm.tolist(),
-        albedo=_json(albedo),
-        specular=_json(specular),
+        albedo=rows(albedo, DIGITS),
+        specular=rows(specular, DIGITS),
         integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else None,
         hemispherical=numbers(hemispherical_albedo(theta_i, found.mean + specular), 4),
         bands=bands,
@@ -117,7 +117,7 @@ def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
 
 
 def _bands(error: Error, explained: Floats, excess: Floats) -> Bands:
-    known, above = (_json(np.where(each < _FINITE, each, np.nan)) for each in (explained, excess))
+    known, above = (rows(np.where(each < _FINITE, each, np.nan), DIGITS) for each in (explained, excess))
     return Bands(theta_i_deg=error.theta_i_deg, stated_error=error.l1, explained=known, excess=above)
 
 
@@ -140,8 +140,3 @@ def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats
     if table.specular_theta_deg is None and np.array_equal(theta_i_deg, table.axes_deg["theta_i"]):
         return table.specular.reshape(shape)
     return table.specular_reflectance(radians(theta_i_deg)).reshape(shape)
-
-
-def _json(values: Floats) -> list[list[float | None]]:
-    """Nested lists to seven digits, what a float32 holds; JSON has no number for what is not finite."""
-    return [[float(f"{v:.7g}") if np.isfinite(v) else None for v in row] for row in values.tolist()]

@@ -7,7 +7,7 @@ import numpy as np
 from brdfdb import accuracy
 from brdfdb.audit.findings import TableError
 from brdfdb.audit.pairs import SEED, Pairs, representative_nm
-from brdfdb.figure import Map, numbers
+from brdfdb.figure import Map, rows
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
@@ -60,7 +60,7 @@ def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_
         value_label=f"abs(table - model) / model, no less than {LEAST:g}",
         x=theta_r_deg.tolist(),
         y=theta_i_deg.tolist(),
-        values=[numbers(row, 2) for row in np.maximum(error, LEAST)],
+        values=rows(np.maximum(error, LEAST), 2),
         log=True,
         low=LEAST,
         high=_MOST,

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from brdfdb.figure import Curve, Panel, numbers
+from brdfdb.figure import Curve, Panel, curve_of
 from brdfdb.geometry import degrees, radians
 from brdfdb.materials import presets
 from brdfdb.models import he_torrance_aperture, he_torrance_smooth, he_torrance_specular
@@ -59,7 +59,7 @@ class Cut(NamedTuple):
 
     def curve(self, over: float) -> Curve:
         """f_r over a number, labelled with the angle of incidence."""
-        return Curve(label=self.label, x=self.x_deg.tolist(), y=numbers(self.f_r / over))
+        return curve_of(self.label, self.x_deg, self.f_r / over)
 
 
 def surface_of(name: str, wavelength_nm: float | None = None) -> Surface:
@@ -115,11 +115,6 @@ def reflected(surface: Surface, theta_i_deg: float | Floats, *, specular: bool =
     """rho_dh, with or without its specular part."""
     theta_i = radians(theta_i_deg)
     return directional_albedo("he_torrance", theta_i, tolerance=TOLERANCE, specular=specular, **surface).albedo
-
-
-def listed(values: Sequence[float] | Floats, form: str = ".3g") -> str:
-    *most, last = (format(float(value), form) for value in values)
-    return f"{', '.join(most)} and {last}"
 
 
 def polar(cuts: Sequence[Cut]) -> Panel:

@@ -6,14 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from brdfdb.figure import Curve, Figure, Panel, Statement, numbers
+from brdfdb.figure import Figure, Panel, Statement, curve_of, listed
 from brdfdb.gallery import he_torrance_1991_objects as objects
 from brdfdb.gallery._he_torrance_cuts import (
     HALF_ANGLE_DEG,
     HIGHEST_DEG,
     cut_of,
     described,
-    listed,
     measured,
     polar,
     reflected,
@@ -231,13 +230,8 @@ def fig_10() -> Figure:
                 x_label="θ_r [degree]",
                 y_label="f_r over f_r along the normal",
                 curves=[
-                    Curve(
-                        label=f"σ_0 = {surface['sigma_0_um']:g} µm",
-                        x=cut.x_deg.tolist(),
-                        y=numbers(normalised),
-                        role="ours",
-                    ),
-                    Curve(label="σ_0/λ → ∞", x=limit.x_deg.tolist(), y=numbers(limit.f_r / limit.mirror)),
+                    curve_of(f"σ_0 = {surface['sigma_0_um']:g} µm", cut.x_deg, normalised, "ours"),
+                    curve_of("σ_0/λ → ∞", limit.x_deg, limit.f_r / limit.mirror),
                 ],
             )
         ],

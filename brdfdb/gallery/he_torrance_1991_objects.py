@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from brdfdb.figure import Curve, Figure, Panel, Statement, numbers
-from brdfdb.gallery._he_torrance_cuts import Surface, cut_of, described, listed, reflected, smooth, specular, surface_of
+from brdfdb.figure import Curve, Figure, Panel, Statement, curve_of, listed
+from brdfdb.gallery._he_torrance_cuts import Surface, cut_of, described, reflected, smooth, specular, surface_of
 from brdfdb.models import he_torrance, he_torrance_very_rough, lambert
 from brdfdb.parameters import Floats
 
@@ -14,7 +14,7 @@ THETA_DEG = np.arange(0.0, 90.0)  # angles of incidence that reflectances are dr
 
 
 def _over_incidence(label: str, values: Floats) -> Curve:
-    return Curve(label=label, x=THETA_DEG.tolist(), y=numbers(values))
+    return curve_of(label, THETA_DEG, values)
 
 
 def fig_12() -> Figure:
@@ -144,7 +144,7 @@ def fig_13() -> Figure:
                 x_label="θ_r [degree]",
                 y_label="f_r [1/sr]",
                 curves=[
-                    Curve(label=label, x=lobe.x_deg.tolist(), y=numbers(lobe.f_r))
+                    curve_of(label, lobe.x_deg, lobe.f_r)
                     for label, lobe in (("(a)", cut), ("(a), σ_0/λ → ∞", limit), ("(c)", uniform))
                 ],
             ),
@@ -161,7 +161,7 @@ def fig_13() -> Figure:
                 log_x=True,
                 log_y=True,
                 curves=[
-                    Curve(label=label, x=ratios.tolist(), y=numbers(values))
+                    curve_of(label, ratios, values)
                     for label, values in (
                         ("very rough: largest difference of f_r over largest f_r", from_rough),
                         ("smooth: 1 - ρ_s / |F|²", from_smooth),

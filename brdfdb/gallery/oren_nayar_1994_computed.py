@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brdfdb.figure import Figure, Panel, Statement
-from brdfdb.gallery.oren_nayar_1994_lines import (
+from brdfdb.figure import Figure, Panel, Statement, listed
+from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
     ROUNDING,
     SMALL,
@@ -21,7 +21,6 @@ from brdfdb.gallery.oren_nayar_1994_lines import (
     curve,
     distance,
     left_past,
-    listed,
     variation,
 )
 from brdfdb.geometry import degrees, radians

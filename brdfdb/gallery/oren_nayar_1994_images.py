@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.figure import Curve, Figure, Panel, Picture, Role, Statement, numbers
-from brdfdb.gallery.oren_nayar_1994_lines import PAPER, ROUNDING, SMALL, listed, variation
+from brdfdb.figure import Figure, Panel, Picture, Role, Statement, curve_of, listed, rows
+from brdfdb.gallery._oren_nayar_lines import PAPER, ROUNDING, SMALL, variation
 from brdfdb.geometry import radians
 from brdfdb.materials import presets
 from brdfdb.models import lambert_vectors, oren_nayar_gaussian_vectors, oren_nayar_vectors
@@ -65,7 +65,7 @@ def sphere(model: Vectors, **parameters: float) -> Floats:
 
 
 def _picture(title: str, radiance: Floats) -> Picture:
-    return Picture(title=title, radiance=[numbers(row, DIGITS) for row in radiance])
+    return Picture(title=title, radiance=rows(radiance, DIGITS))
 
 
 def _pixels() -> NDArray[np.float64]:
@@ -135,7 +135,7 @@ def fig_23() -> Figure:
                 x_label="across the vase, from its left limb to its right",
                 y_label="L_r over its largest",
                 curves=[
-                    Curve(label=label, x=ACROSS[::9].tolist(), y=numbers(_over_largest(lines[name])[::9]), role=role)
+                    curve_of(label, ACROSS[::9], _over_largest(lines[name])[::9], role)
                     for name, (label, role) in names.items()
                 ],
             )
@@ -286,7 +286,7 @@ def scenes() -> Figure:
                 x_label="across the cylinder, from its left limb to its right",
                 y_label="L_r over its largest",
                 curves=[
-                    Curve(label=label, x=ACROSS[::9].tolist(), y=numbers(_over_largest(line)[::9]))
+                    curve_of(label, ACROSS[::9], _over_largest(line)[::9])
                     for label, line in (("σ = 0°", smooth[number]), ("σ = 30°", rough[number]))
                 ],
             )

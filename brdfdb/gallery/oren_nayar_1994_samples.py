@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from brdfdb.figure import Figure, Panel, Statement
-from brdfdb.gallery.oren_nayar_1994_lines import (
+from brdfdb.figure import Figure, Panel, Statement, listed
+from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
     SMALL,
     THETA_R,
@@ -20,7 +20,6 @@ from brdfdb.gallery.oren_nayar_1994_lines import (
     curve,
     distance,
     left_past,
-    listed,
 )
 from brdfdb.materials import Material, presets
 from brdfdb.models import oren_nayar, oren_nayar_body_surface, oren_nayar_gaussian, torrance_sparrow

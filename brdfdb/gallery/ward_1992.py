@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Role, Statement, numbers
+from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, rows
 from brdfdb.geometry import HALF_PI, degrees, radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
@@ -48,10 +48,6 @@ def _slice(material: Material, theta_i_deg: float, phi_i: float, viewers_deg: Ar
     """f_r in the plane of incidence; viewers below 0 are on the side of the light."""
     phi_r = np.where(viewers_deg < 0.0, phi_i, phi_i + np.pi)
     return _f_r(material, radians(theta_i_deg), phi_i, radians(np.abs(viewers_deg)), phi_r)
-
-
-def _curve(label: str, x: Array, y: ArrayLike, role: Role = "other") -> Curve:
-    return Curve(label=label, x=x.tolist(), y=numbers(y), role=role)
 
 
 def _as(model: str, material: Material) -> Material:
@@ -114,7 +110,7 @@ def _image() -> Figure:
                 value_label=_BRDF,
                 x=np.round(axis, 4).tolist(),
                 y=np.round(axis, 4).tolist(),
-                values=[numbers(row, 4) for row in values],
+                values=rows(values, 4),
                 log=True,
             )
         ],
@@ -155,7 +151,7 @@ def _slices() -> Figure:
             x_label=_ANGLE,
             y_label=_BRDF,
             curves=[
-                _curve(f"theta_i = {theta_i_deg:g}", _VIEWERS_DEG, _slice(aluminum, theta_i_deg, phi))
+                curve_of(f"theta_i = {theta_i_deg:g}", _VIEWERS_DEG, _slice(aluminum, theta_i_deg, phi))
                 for theta_i_deg in _SLICES_DEG
             ],
             log_y=True,
@@ -221,7 +217,7 @@ def _crescent() -> Figure:
     across, up = np.meshgrid(axis, axis[::-1])
     white = _WHITE * np.nanmax(_sphere(brass, across, up))
     panels = [
-        Picture(title=title, radiance=[numbers(row, 3) for row in np.minimum(_sphere(form, across, up) / white, 1.0)])
+        Picture(title=title, radiance=rows(np.minimum(_sphere(form, across, up) / white, 1.0), 3))
         for title, form in (("eq. 5a", brass), ("eq. 4", round_brass))
     ]
     bend, thickness = _bend(brass)
@@ -290,7 +286,7 @@ def _lobes() -> Figure:
             x_label=_ANGLE,
             y_label=_BRDF,
             curves=[
-                _curve(f"{label}, theta_i = {theta_i_deg:g}", _VIEWERS_DEG, _slice(form, theta_i_deg, phi), role)
+                curve_of(f"{label}, theta_i = {theta_i_deg:g}", _VIEWERS_DEG, _slice(form, theta_i_deg, phi), role)
                 for theta_i_deg in _LOBES_DEG
                 for label, form, role in forms
             ],
@@ -333,7 +329,7 @@ def _forms() -> Figure:
     panels = []
     for theta_i_deg in _FORMS_DEG:
         slices = [(label, role, _slice(_as(model, brass), theta_i_deg, _Y)) for model, label, role in _FORMS]
-        curves = [_curve(label, _VIEWERS_DEG, f_r, role) for label, role, f_r in slices]
+        curves = [curve_of(label, _VIEWERS_DEG, f_r, role) for label, role, f_r in slices]
         title = f"theta_i = {theta_i_deg:g} degrees"
         panels.append(Panel(kind="polar", title=title, x_label=_ANGLE, y_label=_BRDF, curves=curves))
         panels.append(Panel(title=title, x_label=_ANGLE, y_label=_BRDF, curves=curves, log_y=True))

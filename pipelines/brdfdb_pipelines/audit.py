@@ -70,7 +70,7 @@ def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: 
             done[name] = outcome
             bar.advance(task)
     audits = [done[name].subject for name in materials if isinstance(done[name], Section)]
-    damaged = [str(outcome) for outcome in done.values() if isinstance(outcome, StoreError)]
+    damaged = [str(done[name]) for name in materials if isinstance(done[name], StoreError)]
     if damaged and not audits:
         raise StoreError("; ".join(damaged))
     found = report(
@@ -168,13 +168,15 @@ def _print(root: Path, found: AuditReport, report_path: Path) -> None:
 
 def _row(a: MaterialAudit) -> tuple[str, ...]:
     model, table = a.energy.model, a.energy.table
-    albedo = "not finite" if table.max_albedo is None else f"{table.max_albedo:.4f}"
+    of_model, of_table = (
+        "not finite" if each.max_albedo is None else f"{each.max_albedo:.4f}" for each in (model, table)
+    )
     return (
         a.material,
         a.verdict,
         a.energy.verdict,
-        f"{model.max_albedo:.4f} at {model.max_at_theta_i_deg:4.3g}°",
-        f"{albedo} at {table.max_at_theta_i_deg:4g}°",
+        f"{of_model} at {model.max_at_theta_i_deg:4.3g}°",
+        f"{of_table} at {table.max_at_theta_i_deg:4g}°",
         f"{_largest(a.reciprocity.model_random, a.reciprocity.model_lobe):.0e}",
         f"{_largest(a.reciprocity.table_random, a.reciprocity.table_lobe, a.reciprocity.table_nodes):.0e}",
         "none" if a.values.smallest is None else f"{a.values.smallest:.3g}",

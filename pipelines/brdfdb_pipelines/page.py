@@ -23,7 +23,8 @@ PAPERS = {
     "orennayar1994": "Oren and Nayar 1994: Generalization of Lambert's reflectance model",
     "he1991": "He, Torrance, Sillion and Greenberg 1991: A comprehensive physical model for light reflection",
 }
-# Verdicts of all findings and where a material stands in a model: how loud each is, and its mark beside the colour
+# Verdicts of all findings, what a furnace shows and where a material stands in a model: how loud each is, and its mark
+# beside the colour
 _LEVELS: dict[str, Level] = {
     "passes": "good",
     "conserves": "good",
@@ -32,6 +33,7 @@ _LEVELS: dict[str, Level] = {
     "at the edge": "calm",
     "unknown": "calm",
     "outside": "note",
+    "gains": "note",
     "known published excess": "note",
     "violates": "bad",
 }
@@ -40,6 +42,7 @@ _MARKS = dict.fromkeys(_LEVELS, "✓") | {
     "at the edge": "≈",
     "unknown": "?",
     "outside": "!",
+    "gains": "!",
     "known published excess": "!",
     "violates": "✕",
 }
@@ -227,18 +230,21 @@ def _cells(a: MaterialAudit) -> list[Cell]:
     error, p = a.table_error, [p for p in a.sampling.chi_square_p if p is not None]
     wrong = a.values.negative + a.values.not_finite
     values = "violates" if "violates" in (a.values.positivity, a.values.finiteness) else "passes"
-    most = _LAST if table.max_albedo is None else table.max_albedo
     stated = "" if error.stated_p99 is None else f" of {number(error.stated_p99, 2)}"
     fresh = "not finite" if error.fresh_p99 is None else number(error.fresh_p99, 2)
     edges = sum(limit.standing in ("at the edge", "outside") for limit in a.validity.limits)
     return [
-        Cell(model.verdict, f"{model.max_albedo:.4f} at {angle(model.max_at_theta_i_deg)}", model.max_albedo),
-        Cell(table.verdict, f"{_albedo(table.max_albedo)} at {angle(table.max_at_theta_i_deg)}", most),
+        Cell(
+            model.verdict, f"{_albedo(model.max_albedo)} at {angle(model.max_at_theta_i_deg)}", _last(model.max_albedo)
+        ),
+        Cell(
+            table.verdict, f"{_albedo(table.max_albedo)} at {angle(table.max_at_theta_i_deg)}", _last(table.max_albedo)
+        ),
         _furnace(model.furnace),
         Cell(a.reciprocity.verdict, number(asymmetry, 2), asymmetry),
         Cell(values, f"{wrong} bad" if wrong else "all good", wrong),
         Cell(a.smoothness.verdict, number(jump, 2), jump),
-        Cell(error.verdict, fresh + stated, _LAST if error.fresh_p99 is None else error.fresh_p99),
+        Cell(error.verdict, fresh + stated, _last(error.fresh_p99)),
         Cell(a.sampling.verdict, f"p {probability(min(p, default=None))}", min(p, default=1.0)),
         Cell(
             a.validity.standing,
@@ -248,13 +254,19 @@ def _cells(a: MaterialAudit) -> list[Cell]:
     ]
 
 
+def _last(value: float | None) -> float:
+    """What a number is sorted by: one that is not finite comes last."""
+    return _LAST if value is None else value
+
+
 def _furnace(furnace: Furnace | None) -> Cell:
     """What a lossless surface shows in uniform light, at the wavelength that is worst."""
     shown = [] if furnace is None else [value for value in furnace.hemispherical if value is not None]
     if not shown:
         return Cell("unknown", "–", _LAST)
     worst = max(shown, key=lambda value: abs(value - 1.0))
-    return Cell("loses" if worst < LOSSLESS else "conserves", f"{worst:.3f}", worst)
+    word = "loses" if worst < LOSSLESS else "gains" if worst > 2.0 - LOSSLESS else "conserves"
+    return Cell(word, f"{worst:.3f}", worst)
 
 
 def _findings(a: MaterialAudit) -> list[Finding]:
@@ -360,15 +372,12 @@ def _panels(a: MaterialAudit) -> list[Panel | Map]:
         curves = _spectral(model.theta_i_deg, model.albedo, wavelengths)
         panels.append(Panel(title="Albedo of the model", x_label=theta, y_label=albedo, curves=curves))
         curves = [
-            Curve(label="table", x=table.wavelength_nm or [], y=table.hemispherical, role="ours"),
+            Curve(label="table", x=wavelengths, y=table.hemispherical, role="ours"),
             Curve(label="model", x=wavelengths, y=model.hemispherical, role="truth"),
         ]
         panels.append(Panel(title="In uniform light", x_label="wavelength, nm", y_label="albedo", curves=curves))
-    same = (
-        0 if wavelengths is None or table.wavelength_nm is None else _nearest(table.wavelength_nm, wavelengths[where])
-    )
     both = [
-        Curve(label="table", x=table.theta_i_deg, y=_column(table.albedo, same), role="ours"),
+        Curve(label="table", x=table.theta_i_deg, y=_column(table.albedo, where), role="ours"),
         Curve(label="model", x=model.theta_i_deg, y=_column(model.albedo, where), role="truth"),
         _ALL_OF_IT,
     ]
@@ -386,10 +395,6 @@ def _panels(a: MaterialAudit) -> list[Panel | Map]:
         title, y_label = "Uniform diffuse part a(λ)", "a(λ)"
         panels.append(Panel(title=title, x_label="wavelength, nm", y_label=y_label, curves=curves))
     return panels
-
-
-def _nearest(values: list[float], value: float) -> int:
-    return min(range(len(values)), key=lambda k: abs(values[k] - value))
 
 
 def _spectral(x: list[float], rows: list[Numbers], wavelengths: list[float] | None) -> list[Curve]:

@@ -20,7 +20,7 @@ MODULES = (oren_nayar_1994, he_torrance_1991, ward_1992)
 FIGURES: dict[str, Callable[[], Figure]] = {key: made for module in MODULES for key, made in module.FIGURES.items()}
 every_figure = pytest.mark.parametrize("key", FIGURES)
 
-ROUNDED = 1e-2  # errors are drawn to three digits: 0.5 %
+ROUNDED = 6e-4  # relative; worst measured 5.7e-4, the second term of Beckmann's limit; five digits leave 5e-5
 OURS_ALONE = {"ward-narrow-at-grazing"}  # where it is weakest
 
 

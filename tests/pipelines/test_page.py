@@ -171,17 +171,30 @@ def test_numbers_are_those_that_people_write(value: float | None, text: str) -> 
     assert page.number(value) == text
 
 
-def test_an_albedo_that_is_not_finite_sorts_after_all_others() -> None:
+@pytest.mark.parametrize(("of", "column"), [("model", 1), ("table", 2)])
+def test_an_albedo_that_is_not_finite_sorts_after_all_others(of: str, column: int) -> None:
     good = material("good", "violates", 3.0)
-    table = good.energy.table.model_copy(update={"max_albedo": None})
-    bad = good.model_copy(update={"material": "bad", "energy": good.energy.model_copy(update={"table": table})})
+    not_finite = getattr(good.energy, of).model_copy(update={"max_albedo": None})
+    bad = good.model_copy(update={"material": "bad", "energy": good.energy.model_copy(update={of: not_finite})})
     found = report_of([good, bad], ["good", "bad"])
     html = page.render(found)
     cells = [float(value) for value in Document(html).attributes("data-sort")]
     columns = np.array(cells).reshape(2, -1)  # rows: bad, good
     assert np.all(np.isfinite(columns))
-    assert columns[0, 2] > columns[1, 2]
+    assert columns[0, column] > columns[1, column]
     assert "not finite at 89°" in html
+
+
+@pytest.mark.parametrize(
+    ("shown", "word"), [([1.0], "conserves"), ([1.005, 0.98], "loses"), ([1.25], "gains"), ([0.99, 1.02], "gains")]
+)
+def test_a_furnace_conserves_neither_where_it_loses_light_nor_where_it_makes_it_up(
+    shown: list[float], word: str
+) -> None:
+    furnace = material("paint").energy.model.furnace
+    assert furnace is not None
+    cell = page._furnace(furnace.model_copy(update={"hemispherical": shown}))
+    assert (cell.word, cell.level) == (word, {"conserves": "good", "loses": "calm", "gains": "note"}[word])
 
 
 def test_a_report_of_nothing_is_a_page(document: Document) -> None:

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from brdfdb.figure import Curve, Role, numbers
+from brdfdb.figure import Curve, Role, curve_of
 from brdfdb.geometry import radians
 from brdfdb.parameters import Floats
 
@@ -72,10 +72,4 @@ def distance(values: Floats, truth: Floats) -> float:
 
 def curve(label: str, values: Floats, role: Role = "other") -> Curve:
     """Values over THETA_R, to be drawn."""
-    return Curve(label=label, x=THETA_R.tolist(), y=numbers(values), role=role)
-
-
-def listed(values: list[float], form: str) -> str:
-    """Numbers in a sentence, as "1, 2 and 3"."""
-    *most, last = (format(value, form) for value in values)
-    return f"{', '.join(most)} and {last}" if most else last
+    return curve_of(label, THETA_R, values, role)
