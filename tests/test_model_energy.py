@@ -22,6 +22,7 @@ from tests.test_audit import PARAMETERS, known, lambert, material
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
+PEAK = 2e-4  # absolute, of the largest albedo over angles; measured 9e-5
 SEVEN_DIGITS = 5e-7  # relative, half of the last digit that is written
 UNIFORM = 2.5e-4  # relative, of the mean over uniform light with a pole at the horizon; measured 2e-4 for k = 0.5
 WAVELENGTHS = np.array([400.0, 550.0, 780.0])
@@ -172,7 +173,7 @@ def test_white_oren_nayar_exceeds_1_as_the_fit_is_known_to(sigma_deg: float, alb
     found = energy(material("oren_nayar", {"rho": 1.0, "sigma_deg": sigma_deg}))
     assert at(found, 89.0) == pytest.approx(albedo, abs=6e-4)
     assert found.verdict == "known published excess"
-    assert found.reason.startswith("Oren and Nayar 1994, eqs 27, 28 and 30")
+    assert ": Oren and Nayar 1994, eqs 27, 28 and 30" in found.reason
 
 
 def test_duers_normalisation_exceeds_1_without_bound() -> None:
@@ -297,3 +298,18 @@ def test_the_worse_of_model_and_table_counts(
     monkeypatch.setattr(joined, "table_energy_of", lambda *_: stored)
     found = joined.energy_of(table, made)
     assert (found.verdict, found.reason) == (verdict, reason)
+
+
+def test_a_peak_between_round_angles_is_found() -> None:
+    """The plastic table of He et al.: largest where shadowing begins, at angles that nobody would ask for."""
+    table = presets()["scene-plastic-table"]
+    wavelength_nm = np.array([550.0])
+    found = model_energy_of(table, wavelength_nm, {})
+    theta_i = np.radians(np.arange(78.0, 87.0, 0.25))
+    arguments = table.arguments(550.0)
+    dense, _ = directional_albedo("he_torrance", theta_i, tolerance=1e-7, specular=True, **arguments)
+    assert found.max_albedo == pytest.approx(float(np.max(dense)), abs=PEAK)
+    assert found.max_at_theta_i_deg == pytest.approx(float(np.degrees(theta_i[np.argmax(dense)])), abs=0.5)
+    assert found.bound_on_a is not None
+    (largest,) = (each for each in found.bound_on_a.largest if each is not None)
+    assert 1.0 - largest == pytest.approx(found.max_albedo - float(table.parameters["a"]), abs=2.0 * PEAK)

@@ -205,6 +205,10 @@ class TableError(BaseModel):
 
     stated_p99: float | None = Field(description="null: the table states no error, and none is asked of it")
     fresh_p99: float | None = Field(description="null: not finite")
+    specular: float | None = Field(
+        description="largest difference of the stored reflectances of the Dirac part from the model's; null: no Dirac "
+        "part, or not finite"
+    )
     directions: int
     maps: list[Map] = Field(description="relative error over theta_i and theta_r, negative back towards the light")
     verdict: Verdict

@@ -24,9 +24,12 @@ BOUND_TOLERANCE = 2e-5  # absolute, of the largest a
 # 2 int albedo cos theta_i sin theta_i dtheta_i, is a sum over some of the same lights
 THETA_I_DEG = (0.0, 10.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0, 87.5, 89.0, 89.5, 89.9)
 NODES = 16  # the mean is within 2e-4 of that of 48 nodes for every material of the papers
+# Lights are added beside the largest albedo, so many times, as long as it differs by more than this from those beside
+ROUNDS, FLAT = 4, 1e-6
 # A lossless model loses light if it reflects less than this share of it, up to this angle [degree]: beyond, shadowing
 # alone takes more from every model of single scattering
 LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
+GAIN = 1e-4  # beyond 1, of a lossless model, that is worth saying
 # Excesses of models that have a pole at the horizon are known up to this angle [degree], where they were measured
 POLE_KNOWN_UP_TO_DEG = 89.5
 _ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])  # azimuths of a light over a lobe with two axes: the rest is the same
@@ -56,8 +59,8 @@ def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mappi
     """The energy of a model at the parameters of a material, at wavelengths [nm] if it is spectral."""
     arguments = material.arguments(wavelength_nm)
     lights = _lights(material)
-    found = _reflected(material, arguments, lights)
     furnace = _furnace(material, arguments, wavelength_nm, lights)
+    lights, found = _refined(material, arguments, lights, _reflected(material, arguments, lights))
     theta, wavelength = _worst(found.largest)
     verdict, reason = _verdict(material, lights, found, furnace, known)
     exceeding = lights.theta_i_deg[np.any(found.largest - found.error > 1.0 + ENERGY_TOLERANCE, axis=1)]
@@ -77,6 +80,25 @@ def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mappi
         verdict=verdict,
         reason=reason,
     )
+
+
+def _refined(
+    material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected
+) -> tuple[_Lights, _Reflected]:
+    """More lights where the albedo is largest, each time half way to those beside: peaks lie between round angles."""
+    for _ in range(ROUNDS):
+        worst, _ = _worst(found.largest)
+        around = slice(max(worst - 1, 0), worst + 2)
+        if not np.ptp(found.largest[around].max(axis=1)) > FLAT:  # nan is not
+            break
+        beside = lights.theta_i_deg[around]
+        between = np.round((beside[1:] + beside[:-1]) / 2.0, 4)
+        more = _Lights(between, np.zeros(between.size))
+        order = np.argsort(np.concatenate([lights.theta_i_deg, between]))
+        lights = _Lights(*(np.concatenate(pair)[order] for pair in zip(lights, more, strict=True)))
+        new = _reflected(material, arguments, more)
+        found = _Reflected(*(np.concatenate(pair)[order] for pair in zip(found, new, strict=True)))
+    return lights, found
 
 
 def _worst(albedo: Floats) -> tuple[int, int]:
@@ -103,20 +125,27 @@ def _verdict(
             limit = np.where(theta_i_deg > POLE_KNOWN_UP_TO_DEG, np.inf, limit)
         beyond = np.max(certain, axis=1) - limit
         if known and np.all(beyond <= 0.0):
-            return "known published excess", str(known["citation"])
-        worst = np.argmax(beyond)
-        share = float(np.max(found.largest[worst]))
-        return "violates", f"the model reflects {share:.4g} of what arrives at {theta_i_deg[worst]:g} degrees"
-    if furnace is not None:
-        judged = theta_i_deg <= LOSS_UP_TO_DEG
-        albedo = np.array(furnace.albedo, dtype=np.float64).min(axis=1)[judged]
-        least = np.argmin(albedo)
-        if albedo[least] < LOSSLESS:
-            angle = theta_i_deg[judged][least]
-            of_what = f"{albedo[least]:.3g} of what arrives at {angle:.3g} degrees"
-            return "loses", f"lossless ({furnace.lossless}), the model reflects {of_what}"
+            worst, _ = _worst(found.largest)
+            share = f"{found.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
+            return "known published excess", f"reflects {share}: {known['citation']}"
+        worst = int(np.argmax(beyond))
+        share = f"{found.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
+        return "violates", f"the model reflects {share}"
     largest = f"reflects at most {np.max(found.largest):.4g} of what arrives"
-    return "conserves", largest if furnace else f"{largest}; no parameters make the model lossless"
+    if furnace is None:
+        return "conserves", f"{largest}; no parameters make the model lossless"
+    gains = ""
+    if furnace.largest is not None and furnace.largest > 1.0 + GAIN:
+        where = "" if furnace.largest_at_theta_i_deg is None else f" at {furnace.largest_at_theta_i_deg:.4g} degrees"
+        gains = f"; lossless ({furnace.lossless}), it would reflect {furnace.largest:.4g}{where}"
+    albedo = np.array(furnace.albedo, dtype=np.float64).min(axis=1)
+    judged = np.array(furnace.theta_i_deg) <= LOSS_UP_TO_DEG
+    least = np.argmin(albedo[judged])
+    if albedo[judged][least] < LOSSLESS:
+        angle = np.array(furnace.theta_i_deg)[judged][least]
+        of_what = f"{albedo[judged][least]:.3g} of what arrives at {angle:.3g} degrees"
+        return "loses", f"lossless ({furnace.lossless}), the model reflects {of_what}{gains}"
+    return "conserves", f"{largest}{gains}"
 
 
 def _lights(material: Material) -> _Lights:
@@ -199,7 +228,7 @@ def _bound(material: Material, arguments: Mapping[str, Any], lights: _Lights, fo
     wavelength_nm = np.ravel(arguments["wavelength_nm"])
     return UniformBound(
         wavelength_nm=wavelength_nm.tolist(),
-        largest=numbers(largest),
+        largest=numbers(np.round(largest, 9)),
         preset=[a] * wavelength_nm.size,
         keeps=bool(np.all(a <= largest + BOUND_TOLERANCE)),
     )

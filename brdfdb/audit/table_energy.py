@@ -73,7 +73,7 @@ def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
         why = "its integration has" if bands is None else "the table states"
         reason = f"{reason}, within the error that {why}" if exceeding.size else ""
     elif known and np.isfinite(largest) and not np.any(judge.unexplained(certain, known_limit(known, theta_i))):
-        verdict, reason = "known published excess", str(known["citation"])
+        verdict, reason = "known published excess", f"{reason}: {known['citation']}"
     else:
         verdict = "violates"
         if bands is not None:

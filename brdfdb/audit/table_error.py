@@ -17,6 +17,8 @@ from brdfdb.parameters import Floats
 WORST_OF_STATED = 1.5
 # A table may state that it is exact; float32 is to 6e-8, and offsets of logarithms take digits
 EXACT = 1e-6
+# Of the Dirac part, which is stored as float32: measured 6e-8
+SPECULAR_TOLERANCE = 1e-6
 _STEP_DEG = 3.0  # of the maps
 _LAST_DEG = 89.0
 LEAST, _MOST = 1e-6, 1.0  # what is less is drawn as the least: zeros have no colour; all maps have the same colours
@@ -29,16 +31,31 @@ def table_error_of(table: Table, material: Material, pairs: Pairs) -> TableError
     with np.errstate(invalid="ignore"):  # of what is not finite
         fresh = accuracy.compare(pairs.table, pairs.model, pairs.drawn, SEED).overall.p99
     stated = None if table.error is None else table.error.overall.p99
+    specular = _specular_error(table, material)
     good = stated is None or fresh <= WORST_OF_STATED * max(stated, EXACT)  # nan is not
+    good = good and (specular is None or specular <= SPECULAR_TOLERANCE)
     floor = accuracy.floor_of(pairs.model, pairs.drawn)
     middle = floor[[floor.size // 2]]
     return TableError(
         stated_p99=stated,
         fresh_p99=fresh if np.isfinite(fresh) else None,
+        specular=None if specular is None or not np.isfinite(specular) else specular,
         directions=int(np.count_nonzero(pairs.drawn.above)),
         maps=[_map(table, material, middle, *plane) for plane in _PLANES.items()],
         verdict="passes" if good else "violates",
     )
+
+
+def _specular_error(table: Table, material: Material) -> float | None:
+    """The largest difference of the stored reflectances of the Dirac part from the model's; None: there is none."""
+    if table.specular is None or material.spec.specular is None:
+        return None
+    nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
+    arguments = material.arguments(table.wavelength_nm)
+    parameters = {name: arguments[name] for name in material.spec.specular_parameters}
+    theta_i = radians(nodes) if table.wavelength_nm is None else radians(nodes)[:, np.newaxis]
+    truth = material.spec.specular(theta_i, **parameters)
+    return float(f"{np.max(np.abs(table.specular.reshape(truth.shape) - truth)):.3g}")
 
 
 def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_deg: float) -> Map:

@@ -129,6 +129,8 @@ def _audited(root: Path, name: str) -> Section | StoreError:
         found = audit(store[name])
     except StoreError as error:
         return error
+    except (ValueError, KeyError) as error:  # whole files, of something that is no table of ours
+        return StoreError(f"{name} cannot be audited: {error}")
     return Section(found, page.plots_of(found))
 
 
@@ -199,9 +201,11 @@ def _reasons(a: MaterialAudit) -> list[str]:
         if worst.largest > worst.tolerance:
             reasons.append(f"the {what} jumps by {worst.largest:.2g} at a seam, {worst.seam}: {worst.where}")
     error = a.table_error
-    if error.verdict == "violates" and error.stated_p99 is not None:
-        fresh = "no number" if error.fresh_p99 is None else terminal.error(error.fresh_p99)
-        reasons.append(f"its error (p99) is {fresh}, not the {terminal.error(error.stated_p99)} that it states")
+    if error.verdict == "violates":
+        fresh = "not finite" if error.fresh_p99 is None else terminal.error(error.fresh_p99)
+        mirror = "" if error.specular is None else f"; its mirror part is off by up to {error.specular:.2g}"
+        states = "none" if error.stated_p99 is None else terminal.error(error.stated_p99)
+        reasons.append(f"its error (p99) is {fresh}, the table states {states}{mirror}")
     if a.sampling.verdict == "violates":
         reasons.append("samples of the model do not have the density or the albedo that they should")
     return reasons

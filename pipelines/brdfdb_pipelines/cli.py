@@ -252,13 +252,17 @@ def _audit(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import audit
 
     default = options.store / ("audit-part.json" if options.names else "audit.json")
-    report = audit.run(
-        options.store,
-        options.names,
-        options.report or default,
-        jobs=options.jobs,
-        figures=not (options.names or options.no_figures),
-    )
+    try:
+        report = audit.run(
+            options.store,
+            options.names,
+            options.report or default,
+            jobs=options.jobs,
+            figures=not (options.names or options.no_figures),
+        )
+    except KeyboardInterrupt:
+        print("brdfdb: interrupted; no report was written, an earlier one is as it was", file=sys.stderr)
+        return INTERRUPTED
     return VIOLATED if report.violations else 0
 
 

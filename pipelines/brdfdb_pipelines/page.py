@@ -113,8 +113,8 @@ class Row(NamedTuple):
 
 
 COLUMNS = (
-    "model",
-    "table",
+    "of the model",
+    "of the table",
     "white furnace",
     "reciprocity",
     "values",
@@ -187,6 +187,7 @@ def number(value: float | None, digits: int = 3) -> str:
     """A number for people: 0.0123, 1.2·10⁻⁹; what is missing is a dash."""
     if value is None:
         return "–"
+    value += 0.0  # -0 is 0
     if not math.isfinite(value):
         return "not finite"
     if value != 0.0 and not 1e-4 <= abs(value) < 1e5:
@@ -232,6 +233,7 @@ def _cells(a: MaterialAudit) -> list[Cell]:
     values = "violates" if "violates" in (a.values.positivity, a.values.finiteness) else "passes"
     stated = "" if error.stated_p99 is None else f" of {number(error.stated_p99, 2)}"
     fresh = "not finite" if error.fresh_p99 is None else number(error.fresh_p99, 2)
+    error_word = "unknown" if error.stated_p99 is None and error.verdict == "passes" else error.verdict
     edges = sum(limit.standing in ("at the edge", "outside") for limit in a.validity.limits)
     return [
         Cell(
@@ -244,7 +246,11 @@ def _cells(a: MaterialAudit) -> list[Cell]:
         Cell(a.reciprocity.verdict, number(asymmetry, 2), asymmetry),
         Cell(values, f"{wrong} bad" if wrong else "all good", wrong),
         Cell(a.smoothness.verdict, number(jump, 2), jump),
-        Cell(error.verdict, fresh + stated, _last(error.fresh_p99)),
+        Cell(
+            error_word,
+            fresh + stated,
+            _last(error.fresh_p99),
+        ),
         Cell(a.sampling.verdict, f"p {probability(min(p, default=None))}", min(p, default=1.0)),
         Cell(
             a.validity.standing,
@@ -283,14 +289,21 @@ def _findings(a: MaterialAudit) -> list[Finding]:
         jump = max(jumps, key=lambda each: (each.largest > each.tolerance, each.largest))
         jumped = f"jumps by {number(jump.largest)} of f_r across {jump.seam}, of {number(jump.tolerance)} allowed"
     v, error, s = a.values, a.table_error, a.sampling
-    fresh = "no number" if error.fresh_p99 is None else number(error.fresh_p99)
     stated = "states none" if error.stated_p99 is None else f"states {number(error.stated_p99)}"
+    fresh = "no error can be measured"
+    if error.fresh_p99 is not None:
+        fresh = f"99 of 100 fresh values within {number(error.fresh_p99)}"
+    mirror = "" if error.specular is None else f"; the mirror part is within {number(error.specular)} of the model's"
+    erroneous = f"{fresh}; the table {stated}{mirror}"
     p = min((p for p in s.chi_square_p if p is not None), default=None)
     sampled = (
         "no bins to compare" if p is None else f"the smallest p of {len(s.theta_i_deg)} lights is {probability(p)}"
     )
     limits = a.validity.limits
-    kept = f"inside {sum(limit.standing == 'inside' for limit in limits)} of {len(limits)} limits that its paper states"
+    standings = [limit.standing for limit in limits]
+    kept = ", ".join(f"{standings.count(word)} {word}" for word in dict.fromkeys(standings))
+    kept = f"of {len(limits)} {'limit' if len(limits) == 1 else 'limits'} that its paper states {kept}"
+    finite = f"{v.not_finite} of {v.count} stored values and {v.looked_up} lookups are not finite"
     asymmetric = f"asymmetry up to {number(most)}, of {number(allowed)} allowed"
     negative = f"{v.negative} values are negative; the smallest f_r is {number(v.smallest)} 1/sr"
     found = [
@@ -299,9 +312,9 @@ def _findings(a: MaterialAudit) -> list[Finding]:
         ("Energy of the table", table.verdict, of_table),
         ("Reciprocity", a.reciprocity.verdict, asymmetric),
         ("Positivity", v.positivity, negative),
-        ("Finiteness", v.finiteness, f"{v.not_finite} of {v.count} stored values are not finite"),
+        ("Finiteness", v.finiteness, finite),
         ("Smoothness", a.smoothness.verdict, jumped),
-        ("Table error", error.verdict, f"99 of 100 fresh values within {fresh}; the table {stated}"),
+        ("Table error", error.verdict, erroneous),
         ("Sampling", s.verdict, sampled),
         ("Validity", a.validity.standing, kept if limits else "its paper states no limits"),
     ]
@@ -352,7 +365,7 @@ def _tables(a: MaterialAudit) -> list[Grid]:
         Grid("Jumps of f_r", ("of", "across", "largest, relative", "where", "allowed"), jumps),
         Grid(
             f"Sampling: {s.samples} samples of each light{at}",
-            ("light", "p", "largest weight", "spread", "albedo, sampled", "standard error", "albedo, integrated"),
+            ("light", "p", "largest weight", "spread", "diffuse albedo, sampled", "standard error", "integrated"),
             lights,
         ),
     ]

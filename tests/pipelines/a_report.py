@@ -155,7 +155,9 @@ def material(
             table=[Jump(seam="delta_phi = 180°", crossings=9, largest=1e-4, where="theta_i 80°", tolerance=1e-2)],
             verdict="passes",
         ),
-        table_error=TableError(stated_p99=0.0093, fresh_p99=0.0091, directions=9, maps=[error_map()], verdict="passes"),
+        table_error=TableError(
+            stated_p99=0.0093, fresh_p99=0.0091, specular=None, directions=9, maps=[error_map()], verdict="passes"
+        ),
         sampling=Sampling(
             samples=100_000,
             phi_i_deg=0.0,

@@ -165,6 +165,31 @@ def test_a_dark_table_that_is_too_bright_is_caught_by_its_error_alone(sound: Pat
     assert entry["table_error"]["fresh_p99"] == pytest.approx(0.5, abs=0.05)
 
 
+def test_a_mirror_part_that_is_too_weak_is_named(
+    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name, report, root = "scene-copper-sphere", tmp_path / "report.json", tmp_path / "store"
+    dataset = xr.open_zarr(brdfdb.open(sound).path(name)).load()
+    dataset["specular_reflectance"].values[...] *= np.float32(0.98)
+    publish_dataset(root, name, dataset)
+    assert audited(root, name, report) == 1
+    assert f"{name}: its error (p99) is " in (out := capsys.readouterr().out)
+    assert "; its mirror part is off by up to 0.0" in out
+    assert entry_of(report)["table_error"]["specular"] == pytest.approx(0.02 * 0.2, abs=0.02)
+
+
+def test_a_table_that_is_none_of_ours_is_named_and_the_others_are_audited(
+    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report, root = tmp_path / "report.json", tmp_path / "store"
+    dataset = xr.open_zarr(brdfdb.open(sound).path("dark")).load()
+    publish_dataset(root, "dark", dataset)
+    publish_dataset(root, "other", dataset.assign_attrs(model="phong"))
+    assert cli.main(["audit", "dark", "other", "--jobs", "1", "--store", str(root), "--report", str(report)]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith("brdfdb: other cannot be audited: ")
+    assert entry_of(report)["material"] == "dark"
+
+
 def test_a_sampler_that_weighs_too_much_is_named(
     sound: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
