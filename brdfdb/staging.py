@@ -44,7 +44,7 @@ from brdfdb.manifest import (
     write_file,
     write_json,
 )
-from brdfdb.store import FORMAT, FORMAT_VERSION, Store
+from brdfdb.store import FORMAT, FORMAT_VERSION, NAME, Store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -415,9 +415,13 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     ------
     StoreError
         If the store cannot be written.
+    ValueError
+        If the name is none of a material: it would never be found again.
     """
     from brdfdb.chunks import dataset_files
 
+    if not NAME.fullmatch(name):
+        raise ValueError(f"name: {name!r} is not made of lower-case letters, digits and single hyphens")
     store = Path(root)
     make_store(store)
     files = dataset_files(dataset)

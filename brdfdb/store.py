@@ -36,7 +36,7 @@ FORMAT = "brdfdb"
 FORMAT_VERSION = 1
 
 _DECODED = 8  # tables kept decoded by a Store
-_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")  # of a material: what does not match is never joined to a path
+NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")  # of a material: what does not match is never joined to a path
 
 
 class UnknownMaterialError(KeyError):
@@ -102,7 +102,7 @@ class Store(Mapping[str, "Table"]):
             names = sorted(os.listdir(directory))
         except OSError as error:
             raise StoreError(f"no store at {self.root}: {error.strerror}") from error
-        return (name for name in names if _NAME.fullmatch(name) and os.path.isfile(f"{directory}/{name}/HEAD.json"))
+        return (name for name in names if NAME.fullmatch(name) and os.path.isfile(f"{directory}/{name}/HEAD.json"))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -110,7 +110,7 @@ class Store(Mapping[str, "Table"]):
     def __contains__(self, name: object) -> bool:
         return (
             isinstance(name, str)
-            and _NAME.fullmatch(name) is not None
+            and NAME.fullmatch(name) is not None
             and os.path.isfile(f"{self.root}/materials/{name}/HEAD.json")
         )
 
@@ -188,7 +188,7 @@ class Store(Mapping[str, "Table"]):
         except OSError as error:
             raise StoreError(f"cannot read {self.root}/families: {error.strerror}") from error
         names = (name.removesuffix(".json") for name in found if name.endswith(".json"))
-        return [name for name in names if _NAME.fullmatch(name)]
+        return [name for name in names if NAME.fullmatch(name)]
 
     def family(self, name: str) -> Family:
         """A family: its model at any parameters between those of its members.

@@ -85,6 +85,13 @@ def test_a_directory_of_something_else_is_not_touched(tmp_path: Path, name: str)
     assert contents(tmp_path) == {name: b"precious"}
 
 
+@pytest.mark.parametrize("name", ["White", "white-x1.5", "a/b", "..", "", "white-", "white--2"])
+def test_a_name_that_would_not_be_found_again_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ValueError, match="is not made of lower-case letters, digits and single hyphens"):
+        publish_dataset(tmp_path / "store", name, lambert(0.5))
+    assert not (tmp_path / "store").exists()
+
+
 def test_an_empty_directory_becomes_a_store(tmp_path: Path) -> None:
     assert publish_dataset(tmp_path, "white", lambert(0.5))[0] == "r000001"
     assert json.loads((tmp_path / "brdfdb.json").read_bytes()) == {"format": "brdfdb", "version": 1}

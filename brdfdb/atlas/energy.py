@@ -217,8 +217,7 @@ def _magnesium_oxide() -> Figure:
                 holds=close(known[:2], (0.977, 1.016)) and known[2] > 1.11 and close(onset, 54.0, 1.0),
             ),
             Statement(
-                says='a(lambda) is "a constrained, but otherwise free, parameter. The constraint is based on energy '
-                'conservation and gives an upper bound for a(lambda)"',
+                says="the published a(lambda) keeps to the upper bound that energy conservation gives",
                 where="section 3.2.3, against section 4",
                 seen=f"the bound is {bound:.3f}, the paper's own a is {a:g}",
                 holds=a <= bound,

@@ -34,7 +34,7 @@ SINGLE = 2e-5  # of float32, as promised; worst measured: 3.8e-8
 
 _TRUTH = "Truth: 40 digits."
 _CORNER = 1e-13  # drawn for 0 on a logarithmic axis
-_BACK = "viewer off the light, in angle and in azimuth [radians]"
+_BACK = "viewer off the light [radians]"
 _DISTANCES = [*np.logspace(-0.5, -12.0, 24), _CORNER]
 _MIRROR = 1e-3, 1e4  # n and k
 _GLOSSY = {"wavelength_nm": 500.0, "sigma_0_um": 0.1, "tau_um": 1.5, "n": 1.5, "k": 0.0}

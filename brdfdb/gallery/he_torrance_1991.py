@@ -41,7 +41,7 @@ def fig_07() -> Figure:
     return Figure(
         key="he-torrance-1991-fig-07",
         paper="he1991",
-        title="Roughened aluminum at 2 µm",
+        title="Fig. 7: roughened aluminum at 2 µm",
         caption=f"f_r in the plane of incidence; {described(surface)}. {APERTURES}",
         panels=[polar(cuts)],
         statements=[
@@ -91,7 +91,7 @@ def fig_08() -> Figure:
     return Figure(
         key="he-torrance-1991-fig-08",
         paper="he1991",
-        title="Roughened aluminum at 0.5 µm",
+        title="Fig. 8: roughened aluminum at 0.5 µm",
         caption=f"f_r in the plane of incidence; {described(surface)}. {APERTURES}",
         panels=[polar(cuts)],
         statements=[
@@ -136,7 +136,7 @@ def fig_09() -> Figure:
     return Figure(
         key="he-torrance-1991-fig-09",
         paper="he1991",
-        title="Roughened magnesium oxide ceramic at 0.5 µm",
+        title="Fig. 9: roughened magnesium oxide ceramic at 0.5 µm",
         caption="f_r in the plane of incidence, and across it, which the paper does not draw, over a/π; "
         f"{described(surface)}. {APERTURES}",
         panels=[
@@ -181,7 +181,7 @@ def fig_09() -> Figure:
                 holds=all(cut.peak_deg == cut.theta_i_deg for cut in cuts[1:]) and bool(rho_s[-1] > 1e-3),
             ),
             Statement(
-                says="Energy conservation gives an upper bound for a(λ), a constrained, but otherwise free, parameter.",
+                says="The a(λ) of Fig. 9 keeps to the upper bound that energy conservation gives.",
                 where="section 3.2.3",
                 seen=f"With a = {surface['a']:g}, ρ_dh is {listed(first_surface + surface['a'], '.3f')} at "
                 f"{listed(thetas)} degrees: there is no room for the first surface at larger angles.",
@@ -221,7 +221,7 @@ def fig_10() -> Figure:
     return Figure(
         key="he-torrance-1991-fig-10",
         paper="he1991",
-        title="Sandpaper, 220 grit",
+        title="Fig. 10: sandpaper, 220 grit",
         caption=f"f_r for normal incidence over f_r along the normal (eq. 11); {described(surface)} (so the text; the "
         f"caption says 0.5). The paper prints σ_0/τ = {slope:g} only: σ_0 is our choice, and beside it is the limit.",
         panels=[
@@ -281,7 +281,7 @@ def fig_11() -> Figure:
     return Figure(
         key="he-torrance-1991-fig-11",
         paper="he1991",
-        title="Smooth blue plastic at 0.46 µm",
+        title="Fig. 11: smooth blue plastic at 0.46 µm",
         caption=f"f_r in the plane of incidence, in absolute values; {described(surface)}. The heights of the spikes "
         "are those of cones of π/1024 sr, of Figs 7 to 9; the paper does not say which it had here.",
         panels=[

@@ -38,7 +38,7 @@ def fig_12() -> Figure:
     return Figure(
         key="he-torrance-1991-fig-12",
         paper="he1991",
-        title="Aluminum cylinders of growing roughness",
+        title="Fig. 12: aluminum cylinders of growing roughness",
         caption="What the specular images and the highlights of the rendered cylinders are made of, at "
         f"{GREEN_NM:g} nm: ρ_s (eq. 73) over the angle of incidence, and the directional diffuse part in the plane of "
         "incidence at 30 degrees over its value in the mirror direction; a = 0.",
@@ -90,7 +90,8 @@ def fig_12() -> Figure:
                 holds=all(images[letter][0] < 1e-6 and images[letter].max() > 0.1 for letter in "abc"),
             ),
             Statement(
-                says="A slight color shift: blue on the front faces, red of the specular images.",
+                says="A slight color shift: a blue shift on the front faces, and an enhanced red shift of the specular "
+                "images, which is not so apparent.",
                 where="section 5, on Fig. 12",
                 seen=f"At 60 degrees (a) reflects {face[0]:.3f} of the light diffusely at 0.45 µm and {face[1]:.3f} at "
                 f"0.65 µm; {image[0]:.4f} and {image[1]:.4f} specularly.",
@@ -132,7 +133,7 @@ def fig_13() -> Figure:
     return Figure(
         key="he-torrance-1991-fig-13",
         paper="he1991",
-        title="Limiting cases: directional diffuse, specular, uniform diffuse",
+        title="Fig. 13: limiting cases, directional diffuse, specular, uniform diffuse",
         caption=f"Cylinders (a) σ_0 = {rough['sigma_0_um']:g} µm with σ_0/τ = {slope:.3g}, (b) σ_0 = 0 and (c) ideal "
         f"diffuse, at {GREEN_NM:g} nm. "
         "First f_r in the plane of incidence at 30 degrees, of (a) beside its limit; the specular part of (b) is a "
@@ -227,7 +228,7 @@ def fig_14() -> Figure:
     return Figure(
         key="he-torrance-1991-fig-14",
         paper="he1991",
-        title="Images in smooth and in rough plastic",
+        title="Fig. 14: images in smooth and in rough plastic",
         caption=f"ρ_s (eq. 73) over the angle of incidence, of the cube, {described(cube)}, and of the table, "
         f"{described(table)}.",
         panels=[

@@ -7,6 +7,7 @@ import html
 import io
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable
 from typing import Any, Literal, NamedTuple
 
@@ -20,7 +21,7 @@ from matplotlib.patches import Wedge
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
-from brdfdb.figure import Curve, Map, Numbers, Panel, Picture
+from brdfdb.figure import Curve, Map, Numbers, Panel, Picture, Role
 
 Floats = NDArray[np.float64]
 Drawing = Panel | Map | Picture
@@ -300,12 +301,16 @@ def _legend(canvas: Canvas, lines: list[Line2D], titled: bool) -> None:
 def _lines(curves: list[Curve]) -> list[Line2D]:
     """A line for each curve, without data yet: its look is that of its role, of others one after the other."""
     lines, others = [], 0
+    seen: Counter[Role] = Counter()
     for curve in curves:
         if curve.role == "other":
             look = _Look(OTHERS[others % len(OTHERS)], 1.5, _OTHER_DASHES[others % len(OTHERS)], 3)
             others += 1
         else:
             look = _LOOKS[curve.role]
+            if seen[curve.role]:  # more of one role: the same colour, other dashes
+                look = look._replace(dashes=_OTHER_DASHES[(seen[curve.role] + 1) % len(_OTHER_DASHES)])
+            seen[curve.role] += 1
         line = Line2D(
             [],
             [],

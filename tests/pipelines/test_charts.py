@@ -103,6 +103,13 @@ def test_each_role_has_dashes_or_a_width_of_its_own() -> None:
     assert len({re.sub(r"stroke:var\([^)]*\)", "", style) for style in styles}) == len(roles)
 
 
+def test_curves_of_one_role_are_told_apart_by_their_dashes() -> None:
+    svg = charts.svg(panel(*(curve(Y, "ours") for _ in range(3))), "key")
+    styles = re.findall(r'<g data-curve="\d"><path [^>]*style="([^"]*)"', svg)
+    assert len(set(styles)) == 3
+    assert len({re.search(r"stroke:var\([^)]*\)", style)[0] for style in styles}) == 1  # type: ignore[index]
+
+
 def error_map(values: np.ndarray, *, log: bool = False) -> Map:
     rows = [numbers(row) for row in values]
     x, y = np.linspace(-90.0, 90.0, values.shape[1]), np.linspace(0.0, 89.0, values.shape[0])
