@@ -126,7 +126,7 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
     assert "Reciprocity: passes. Asymmetry up to 3·10⁻¹³, of 1·10⁻¹¹ allowed." in words
     assert "Smoothness: passes. Jumps by 0.0001 of f_r across delta_phi = 180°, of 0.01 allowed." in words
     assert "Sampling: passes. The smallest p of 3 lights is below 0.001." in words
-    assert "Validity: at the edge. Inside 1 of 2 limits that its paper states." in words
+    assert "Validity: at the edge. Of 2 limits that its paper states 1 inside, 1 at the edge." in words
 
 
 def test_violations_come_first_then_known_excess_then_losses(html: str) -> None:
