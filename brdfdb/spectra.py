@@ -7,7 +7,6 @@ Both data sets ship with the packages they are read from: optical constants with
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
@@ -116,17 +115,17 @@ def colour_science() -> Any:
 
 def check_illuminant(name: str) -> str:
     """Return the name of an illuminant of colour-science, or raise a ValueError with the closest names."""
-    return _known("illuminant", name, colour_science().SDS_ILLUMINANTS)
+    names = colour_science().SDS_ILLUMINANTS
+    if name not in names:
+        raise ValueError(f"illuminant: {name!r} is unknown{closest(name, names)}")
+    return name
 
 
 def check_observer(name: str) -> str:
-    """Return the name of a standard observer of the CIE, or raise a ValueError with the closest names."""
-    return _known("observer", name, [each for each in colour_science().MSDS_CMFS if "Standard Observer" in each])
-
-
-def _known(what: str, name: str, names: Iterable[str]) -> str:
+    """Return the name of a standard observer of the CIE, or raise a ValueError with all names."""
+    names = [each for each in colour_science().MSDS_CMFS if "Standard Observer" in each]
     if name not in names:
-        raise ValueError(f"{what}: {name!r} is unknown{closest(name, names)}")
+        raise ValueError(f"observer: {name!r} is not one of {', '.join(names)}")
     return name
 
 
