@@ -21,7 +21,7 @@ from brdfdb.shapes import Array
 Brdf = Callable[[Array, Array, Array], Floats]
 
 # Albedos are polynomials of theta_r, through as many angles from 0 to the last, and as at the last beyond: that makes
-# 4e-3 at most of all the metals, 3e-2 where 17 angles are joined by lines
+# 4e-3 at most of the papers' metals, 3e-2 where 17 angles are joined by lines
 _DEGREE, _LAST = 20, float(radians(89.5))
 _PHI = np.pi / 6.0  # between the azimuths of anisotropic materials, whose other half turn is the same by reciprocity
 _TOLERANCE = 1e-3  # absolute, of the albedos that these go through
@@ -147,7 +147,7 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
     for start in range(0, len(total), step):
         part = slice(start, start + step)
         irradiance = points.irradiance[:, part].T
-        number, light = np.nonzero(irradiance)
+        number, light = np.nonzero(irradiance * (points.wr[part, 2:] > 0.0))
         if number.size:
             reflected = f_r(points.wi[light, start + number], points.wr[start + number], wavelength)
             first = np.flatnonzero(np.diff(number, prepend=-1))

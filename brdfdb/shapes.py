@@ -178,16 +178,16 @@ class Revolution(Shape):
 
     def _hit(self, o: Array, d: Array) -> Array:
         radius, z = self._rings()
-        t = np.full(len(o), np.inf)
+        t = np.minimum(*(_disc(o, d, radius[end], z[end]) for end in (0, -1)))
+        # only rays that meet the cylinder around all cones, and of these those that meet the one around some of them
+        whole = np.flatnonzero(np.isfinite(_cone(o, d, radius.max(), radius.max(), z[0], z[-1])))
         for start in range(0, len(z) - 1, _FACETS):
             r_part, z_part = radius[start : start + _FACETS + 1], z[start : start + _FACETS + 1]
-            # only rays that meet the cylinder around these cones
-            near = np.flatnonzero(np.isfinite(_cone(o, d, r_part.max(), r_part.max(), z_part[0], z_part[-1])))
+            around = _cone(o[whole], d[whole], r_part.max(), r_part.max(), z_part[0], z_part[-1])
+            near = whole[np.isfinite(around)]
             o_near, d_near = o[near], d[near]
             for r0, r1, z0, z1 in zip(r_part[:-1], r_part[1:], z_part[:-1], z_part[1:], strict=True):
                 t[near] = np.minimum(t[near], _cone(o_near, d_near, r0, r1, z0, z1, open_ends=True))
-        for end in (0, -1):
-            t = np.minimum(t, _disc(o, d, radius[end], z[end]))
         return t
 
     def _tangent_and_normal(self, p: Array) -> tuple[Array, Array]:
