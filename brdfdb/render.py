@@ -23,7 +23,8 @@ Brdf = Callable[[Array, Array, Array], Floats]
 # Albedos are polynomials of theta_r, through as many angles from 0 to the last, and as at the last beyond: that makes
 # 4e-3 at most of the papers' metals, 3e-2 where 17 angles are joined by lines
 _DEGREE, _LAST = 20, float(radians(89.5))
-_PHI = np.pi / 6.0  # between the azimuths of anisotropic materials, whose other half turn is the same by reciprocity
+# Between the azimuths of anisotropic materials; the other half turn is the same: lobes are ellipses, grooves straight
+_PHI = np.pi / 6.0
 _TOLERANCE = 1e-3  # absolute, of the albedos that these go through
 _BATCH = 20_000  # pairs of viewer and light at a time: calls cost little beside them, and their spectra are 7 MB
 

@@ -31,7 +31,9 @@ class Light(BaseModel):
     direction: Vector = Field(description="towards the light")
     strength: float = Field(default=1.0, gt=0.0)
     solid_angle_sr: float = Field(default=0.0, ge=0.0, le=1.0)
-    samples: int = Field(default=16, ge=1, le=1024, description="over the solid angle")
+    samples: int = Field(
+        default=16, ge=1, le=1024, description="over the solid angle; much narrower lobes show them one by one"
+    )
 
     @field_validator("direction")
     @classmethod

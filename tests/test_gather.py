@@ -181,6 +181,20 @@ def test_recorded_normals_are_seen_as_the_shape_is(tmp_path: Path, suffix: str) 
         assert np.abs(getattr(traced, name) - getattr(read, name)).max() < near
 
 
+@pytest.mark.parametrize(
+    ("tangent", "towards"), [(None, (0.0, 0.6, 0.8)), ((0.0, 0.1, 1.0), (0.6, 0.0, 0.8))], ids=["horizontal", "given"]
+)
+def test_a_recorded_tangent_is_the_x_axis(
+    tmp_path: Path, tangent: tuple[float, ...] | None, towards: tuple[float, ...]
+) -> None:
+    arrays = {"normal": np.tile([0.0, -1.0, 0.0], (2, 2, 1))}
+    if tangent is not None:  # one that is not quite square to the normal is made so
+        arrays["tangent"] = np.tile(np.array(tangent) / np.linalg.norm(tangent), (2, 2, 1))
+    np.savez(tmp_path / "flat.npz", **arrays)
+    points = only(recorded(tmp_path / "flat.npz", light=(0.0, -0.8, 0.6)), 1)
+    assert np.abs(points.wi[0] - towards).max() < ROUNDING
+
+
 def test_recorded_directions_are_used_as_they_are(tmp_path: Path) -> None:
     wr = np.tile([0.0, 0.0, 1.0], (2, 3, 1))
     wi = np.tile([0.6, 0.0, 0.8], (1, 2, 3, 1))

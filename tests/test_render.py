@@ -201,7 +201,7 @@ def test_any_function_can_stand_in_for_a_model() -> None:
 def test_the_back_of_a_plane_is_black_whatever_the_function() -> None:
     back = {"kind": "plane", "axis": [0.0, 0.0, -1.0]}
     of = scene(back, "white", camera=ABOVE, lights=[{"direction": [0.0, 0.0, -1.0]}], shadows=False)
-    assert rendered(of, 2, brdfs={"white": lambda wi, wr, wavelength_nm: np.ones((len(wi), 1))}).max() == 0.0
+    assert rendered(of, 2, brdfs={"white": lambda wi, _wr, _wavelength_nm: np.ones((len(wi), 1))}).max() == 0.0
 
 
 @pytest.mark.parametrize("batch", [1, 7, 100_000])

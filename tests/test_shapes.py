@@ -106,6 +106,11 @@ def test_tangents_run_around_counter_clockwise(name: str) -> None:
     assert np.abs(tangent - [0.0, 1.0, 0.0]).max() < ROUNDING
 
 
+def test_a_turn_is_counter_clockwise_about_the_axis() -> None:
+    turned = Plane(kind="plane", turn_deg=90.0).frame(np.zeros((1, 3)))[0]
+    assert np.abs(turned - [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]).max() < ROUNDING
+
+
 @pytest.mark.parametrize(("name", "z"), [("plane", 0.0), ("cylinder", 1.5), ("box", 2.0), ("revolution", 1.36)])
 def test_tangents_of_flat_tops_are_the_x_axis(name: str, z: float) -> None:
     frame = SHAPES[name].frame(np.array([[0.1, 0.2, z]]))[0]

@@ -133,6 +133,12 @@ def test_the_command_line_renders_a_scene(tmp_path: Path, capsys: pytest.Capture
         ("[0, -1, 0]", "[0, 1, 0]", "lights.0: falls on nothing that is seen"),
         ("radius = 1", "radius = 1, position = [0, -9, 0]", "objects: no ray of 256 x 192 pixels meets ball"),
         ('kind = "sphere", radius = 1', 'kind = "recorded", file = "no.exr"', "there is no such file"),
+        (
+            'model = "lambert"\nsource = "me"\nparameters = { rho = 0.5 }',
+            'model = "he_torrance"\nsource = "me"\nrefractive_index = "main/MgO/Stephens-vis"\n'
+            "parameters = { sigma_0_um = 0.1, tau_um = 1 }\n",
+            "scene.toml: wavelength_nm: 380 has no refractive index in main/MgO/Stephens-vis",
+        ),
     ],
 )
 def test_a_scene_that_shows_nothing_is_one_sentence(
