@@ -13,11 +13,14 @@ from brdfdb.parameters import Floats
 from brdfdb.representations import Representation
 
 BATCH = 100_000  # directions at once, of forms that are fast enough
-RUN_S = 0.03  # what a run of a slower form may take
-ROUNDS = 15
+RUN_S = 0.25  # what a turn of a slower form may take
+ROUNDS = 11
 CHEAPER = 1.25  # times as cheap is clearly cheaper, in three of four rounds
 ALIKE = 1.1  # times the error is about the same error
-_TRIED, _TRIES = 64, 3  # directions that say how many fit into a run, and how often they are asked
+# Directions at once: steps so wide that a form, however busy the machine, is timed at the same one every time
+_STEPS = (256, 2048, 16384, BATCH)
+_VALUES = 1_000_000  # at once, at most
+_TRIES = 3  # how often a form is asked what one direction more costs
 
 
 class Times(NamedTuple):
@@ -52,7 +55,8 @@ def times(
     wi, wr : arrays of shape (N, 3)
         Unit vectors to evaluate at, repeated or cut off as needed.
     most : int
-        Directions at once; fewer where they take longer than `RUN_S`. 1 for single evaluations from Python.
+        Directions at once; fewer where they take longer than `RUN_S` or are a million values. 1 for single evaluations
+        from Python.
     rounds : int
         How often each form has its turn.
     clock, tick : callables
@@ -87,8 +91,7 @@ def _run(
     def directions(count: int) -> tuple[Floats, Floats]:
         return np.resize(wi, (count, 3)).astype(form.dtype), np.resize(wr, (count, 3)).astype(form.dtype)
 
-    count = min(_TRIED, most)
-    while count < most:
+    def shortest(count: int) -> float:
         light, viewer = directions(count)
         form.evaluate(light, viewer)  # compiled, and its memory at hand
         taken = []
@@ -96,10 +99,15 @@ def _run(
             start = clock()
             form.evaluate(light, viewer)
             taken.append(clock() - start)
-        room = RUN_S / max(min(taken), 1e-9)
-        if room < 2.0:
-            break
-        count = min(most, int(count * min(room, 16.0)))  # the overhead of a call makes few directions look slow
+        return min(taken)
+
+    count = most
+    if most > _STEPS[0]:
+        few, more = _STEPS[0], 4 * _STEPS[0]
+        another = (shortest(more) - shortest(few)) / (more - few)  # of few, most may be the call
+        wavelengths = form.evaluate(wi[:1].astype(form.dtype), wr[:1].astype(form.dtype)).size
+        fits = [step for step in _STEPS if step * another <= RUN_S and step * wavelengths <= _VALUES]
+        count = min(most, max(fits, default=_STEPS[0]))
     light, viewer = directions(count)
     form.evaluate(light, viewer)
     return form.evaluate, light, viewer

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,10 +45,30 @@ def test_times_are_those_of_a_value() -> None:
 
 def test_fast_forms_are_timed_at_many_directions_and_slow_ones_at_as_many_as_fit() -> None:
     machine = Machine()
-    fast, slow, slowest = machine.times(machine.form("a", 1.0), machine.form("b", 30_000.0), machine.form("c", 1e9))
+    forms = [machine.form(key, ns) for key, ns in (("a", 1.0), ("b", 3e4), ("c", 6e4), ("d", 1e9))]
+    fast, slow, as_slow, slowest = machine.times(*forms)
     assert fast.directions == cost.BATCH
-    assert 0.5 < slow.directions * 30e-6 / cost.RUN_S < 1.001
-    assert slowest.directions == 64
+    assert 0.1 * cost.RUN_S < slow.directions * 30e-6 < cost.RUN_S
+    assert as_slow.directions == slow.directions  # the same form on a busy machine
+    assert slowest.directions < slow.directions
+
+
+def test_many_wavelengths_are_many_values() -> None:
+    machine = Machine()
+    (spectral,) = machine.times(machine.form("a", 1.0, 41), rounds=1)
+    assert 1e5 < spectral.directions * 41 <= 1e6
+
+
+def test_what_a_call_costs_apart_from_its_directions_does_not_make_them_few() -> None:
+    machine = Machine()
+    plain, called = machine.form("a", 1000.0), machine.form("b", 1000.0)
+
+    def with_overhead(wi: Any, wr: Any) -> Any:
+        machine.now += 1e-3
+        return plain.evaluate(wi, wr)
+
+    alike, other = machine.times(called, replace(plain, evaluate=with_overhead), rounds=1)
+    assert other.directions == alike.directions
 
 
 def test_one_direction_is_one_direction() -> None:
