@@ -20,7 +20,7 @@ ALIKE = 1.1  # times the error is about the same error
 # Directions at once: steps so wide that a form, however busy the machine, is timed at the same one every time
 _STEPS = (256, 2048, 16384, BATCH)
 _VALUES = 1_000_000  # at once, at most
-_TRIES = 3  # how often a form is asked what one direction more costs
+_TRIES = 5  # how often a form is asked what one direction more costs
 
 
 class Times(NamedTuple):
@@ -67,7 +67,10 @@ def times(
     list of Times
         In the order of the forms.
     """
-    runs = [_run(form, wi, wr, most, clock) for form in forms]
+    runs = []
+    for form, count in zip(forms, _counts(forms, wi, wr, most, clock), strict=True):
+        runs.append((form.evaluate, *_directions(form, wi, wr, count)))
+        form.evaluate(*runs[-1][1:])  # compiled, and its memory at hand
     taken = np.empty((rounds, len(runs)))
     for row in taken:
         for number, (evaluate, light, viewer) in enumerate(runs):
@@ -83,34 +86,31 @@ def times(
     return found
 
 
-def _run(
-    form: Representation, wi: Floats, wr: Floats, most: int, clock: Callable[[], float]
-) -> tuple[Callable[[Floats, Floats], Floats], Floats, Floats]:
-    """What a turn of a form is: its function, and as many directions as fit."""
+def _directions(form: Representation, wi: Floats, wr: Floats, count: int) -> tuple[Floats, Floats]:
+    return np.resize(wi, (count, 3)).astype(form.dtype), np.resize(wr, (count, 3)).astype(form.dtype)
 
-    def directions(count: int) -> tuple[Floats, Floats]:
-        return np.resize(wi, (count, 3)).astype(form.dtype), np.resize(wr, (count, 3)).astype(form.dtype)
 
-    def shortest(count: int) -> float:
-        light, viewer = directions(count)
-        form.evaluate(light, viewer)  # compiled, and its memory at hand
-        taken = []
-        for _ in range(_TRIES):
-            start = clock()
-            form.evaluate(light, viewer)
-            taken.append(clock() - start)
-        return min(taken)
-
-    count = most
-    if most > _STEPS[0]:
-        few, more = _STEPS[0], 4 * _STEPS[0]
-        another = (shortest(more) - shortest(few)) / (more - few)  # of few, most may be the call
-        wavelengths = form.evaluate(wi[:1].astype(form.dtype), wr[:1].astype(form.dtype)).size
-        fits = [step for step in _STEPS if step * another <= RUN_S and step * wavelengths <= _VALUES]
-        count = min(most, max(fits, default=_STEPS[0]))
-    light, viewer = directions(count)
-    form.evaluate(light, viewer)
-    return form.evaluate, light, viewer
+def _counts(
+    forms: Sequence[Representation], wi: Floats, wr: Floats, most: int, clock: Callable[[], float]
+) -> list[int]:
+    """At how many directions each form is timed: the largest step that fits."""
+    if most <= _STEPS[0]:
+        return [most] * len(forms)
+    few, more = _STEPS[0], 4 * _STEPS[0]
+    wavelengths = [0] * len(forms)
+    shortest = np.full((len(forms), 2), np.inf)
+    for _ in range(_TRIES):  # in turns, too: one busy moment makes no form slow
+        for number, form in enumerate(forms):
+            for which, count in enumerate((few, more)):
+                light, viewer = _directions(form, wi, wr, count)
+                start = clock()
+                wavelengths[number] = form.evaluate(light, viewer).size // count
+                shortest[number, which] = min(shortest[number, which], clock() - start)
+    another = (shortest[:, 1] - shortest[:, 0]) / (more - few)  # of few, most may be the call
+    return [
+        min(most, max((s for s in _STEPS if s * seconds <= RUN_S and s * values <= _VALUES), default=few))
+        for seconds, values in zip(another.tolist(), wavelengths, strict=True)
+    ]
 
 
 def front(errors: Sequence[float], costs: Floats) -> list[int]:

@@ -53,6 +53,13 @@ def test_fast_forms_are_timed_at_many_directions_and_slow_ones_at_as_many_as_fit
     assert slowest.directions < slow.directions
 
 
+def test_busy_moments_do_not_make_a_form_slow() -> None:
+    machine = Machine()
+    machine.slow = itertools.chain([100.0] * 6, itertools.repeat(1.0))  # and the first call compiles
+    first, second = machine.times(machine.form("a", 3e4), machine.form("b", 3e4), rounds=1)
+    assert first.directions == second.directions == 2048
+
+
 def test_many_wavelengths_are_many_values() -> None:
     machine = Machine()
     (spectral,) = machine.times(machine.form("a", 1.0, 41), rounds=1)

@@ -138,5 +138,6 @@ def _print(one: Chart) -> None:
 
 
 def _said(point: Point) -> str:
-    error = "the truth" if point.l1 == 0.0 else f"{scatter.percent(point.l1)} off"
+    off = f"{scatter.percent(point.l1)} off in the mean, p99 {scatter.percent(point.p99)}"
+    error = "the truth" if point.l1 == 0.0 else off
     return f"{point.title} ({scatter.count(point.batch.ns)} ns, {error})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import io
 import math
 from collections.abc import Callable, Iterable
@@ -49,7 +50,9 @@ def svg(chart: Chart) -> str:
         text = io.StringIO()
         _drawn(chart).savefig(text, format="svg", metadata=_BLANK)
     opening, rest = charts.kept_ids(charts.shortened(text.getvalue()), "c").split(">", 1)
-    return f'{opening} font-family="sans-serif"><rect width="100%" height="100%" fill="#fff"/>{rest}\n'
+    described = html.escape(f"{chart.title}: error of each representation over its cost")
+    plate = '<rect width="100%" height="100%" fill="#fff"/>'
+    return f'{opening} font-family="sans-serif" role="img" aria-label="{described}">{plate}{rest}\n'
 
 
 def png(chart: Chart) -> bytes:
@@ -94,55 +97,43 @@ def _panel(
 ) -> None:
     points = {point.key: point for point in chart.points}
     costs = {key: cost(point) for key, point in points.items()}
-    low, high = min(c[0] for c in costs.values()), max(c[2] for c in costs.values())
-    spread = max(math.log10(high / low), 1.0)
-    axes.set_xscale("log")
-    axes.set_xlim(low / 10 ** (0.06 * spread), high * 10 ** (0.09 * spread))
-    axes.set_yscale("log")
-    axes.set_ylim(SMALLEST / 2.0, max(3.0, 2.0 * max(point.p99 for point in chart.points)))
-    axes.grid(color=charts.GRID, linewidth=0.6, clip_on=False)
-    axes.tick_params(length=0)
-    axes.spines[["top", "right"]].set_visible(False)
-    top = math.floor(math.log10(axes.get_ylim()[1]))
-    ticks = [10.0**power for power in range(round(math.log10(SMALLEST)), top + 1)]
-    axes.yaxis.set_major_locator(FixedLocator(ticks))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: percent(value)))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if spread < 1.7 else (1.0,), numticks=8))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: count(value)))
-    axes.xaxis.set_minor_locator(NullLocator())
-    steps_x: list[float] = []
-    steps_y: list[float] = []
-    for key in front:  # a step: no form is as accurate and clearly cheaper
-        if steps_x:
-            steps_x.append(steps_x[-1])
-            steps_y.append(_height(points[key].l1))
-        steps_x.append(costs[key][1])
-        steps_y.append(_height(points[key].l1))
-    axes.plot(
-        steps_x, steps_y, color=charts.OURS, linewidth=5.0, alpha=0.16, zorder=1, clip_on=False, solid_joinstyle="round"
-    )
+    _axes(axes, [c[0] for c in costs.values()] + [c[2] for c in costs.values()], [p.p99 for p in chart.points])
+    steps: list[tuple[float, float]] = []
+    for key in front:  # down in error, then across: there is nothing clearly cheaper below
+        here = costs[key][1], _height(points[key].l1)
+        steps += [(steps[-1][0], here[1]), here] if steps else [here]
+    axes.plot(*zip(*steps, strict=True), color=charts.OURS, linewidth=5.0, alpha=0.16, zorder=1, clip_on=False)
     for key, point in points.items():
         look, (first, middle, last), y = _LOOKS[point.kind], costs[key], _height(point.l1)
-        fill = look.colour if point.dtype == "float64" else "white"
-        axes.plot(
-            [middle, middle],
-            [y, max(y, point.p99)],
-            color=look.colour,
-            linewidth=0.7,
-            alpha=0.55,
-            zorder=2,
-            clip_on=False,
-        )
-        axes.plot([first, last], [y, y], color=look.colour, linewidth=2.0, alpha=0.4, zorder=2, clip_on=False)
-        size = 6.5 if key in front else 4.5
-        axes.plot(
-            middle, y, look.marker, color=look.colour, markerfacecolor=fill, markersize=size, zorder=3, clip_on=False
-        )
+        line: dict[str, Any] = {"color": look.colour, "zorder": 2, "clip_on": False}
+        axes.plot([middle, middle], [y, max(y, point.p99)], linewidth=0.7, alpha=0.55, **line)
+        if first < last:
+            axes.plot([first, last], [y, y], linewidth=2.0, alpha=0.4, **line)
+        size, fill = 6.5 if key in front else 4.5, look.colour if point.dtype == "float64" else "white"
+        axes.plot(middle, y, look.marker, markerfacecolor=fill, markersize=size, **line | {"zorder": 3})
     numbers = {point.key: str(number) for number, point in enumerate(chart.points, 1)}
     texts = {key: f"{numbers[key]} {points[key].title}" if named and key in front else numbers[key] for key in points}
     ordered = [*front, *(key for key in points if key not in front)]
     _label(axes, [(texts[k], costs[k][1], _height(points[k].l1), k in front) for k in ordered])
+
+
+def _axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
+    low, high = min(costs), max(costs)
+    decades = max(math.log10(high / low), 1.0)
+    axes.set_xscale("log")
+    axes.set_xlim(low / 10 ** (0.06 * decades), high * 10 ** (0.09 * decades))
+    axes.set_yscale("log")
+    axes.set_ylim(SMALLEST / 2.0, max(3.0, 2.0 * max(errors)))
+    axes.grid(color=charts.GRID, linewidth=0.6, clip_on=False)
+    axes.tick_params(length=0)
+    axes.spines[["top", "right"]].set_visible(False)
+    top = math.floor(math.log10(axes.get_ylim()[1]))
+    axes.yaxis.set_major_locator(FixedLocator([10.0**power for power in range(round(math.log10(SMALLEST)), top + 1)]))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: percent(value)))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,), numticks=6))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: count(value)))
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _label(axes: Axes, labels: Iterable[tuple[str, float, float, bool]]) -> None:
