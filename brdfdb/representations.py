@@ -150,40 +150,29 @@ def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[R
     values = material.parameters
     own = {"rho": float(values["rho"]), "sigma": float(values["sigma"])}
     bounces = bool(values.get("interreflection", True))
-    weights = {name: float(values.get(name, default)) for name, default in (("k_b", 1.0), ("k_s", 0.0))}
 
     def form(
         key: str, title: str, kind: Kind, python: str, body: Callable[..., Floats], dtype: Any = np.float64, **more: Any
     ) -> Representation:
         def evaluate(wi: Floats, wr: Floats) -> Floats:
             f_r = body(wi, wr, **own, **more)
-            if weights["k_s"] > 0.0:  # Eq. (32)
+            if "k_s" in values:  # Eq. (32)
                 surface = models.torrance_sparrow_vectors(wi, wr, sigma=own["sigma"])
-                f_r = weights["k_b"] * f_r + weights["k_s"] * surface
+                f_r = values["k_b"] * f_r + values["k_s"] * surface
             return f_r[:, np.newaxis]
 
         return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more)), dtype)
 
-    def facets(wi: Floats, wr: Floats, *, rho: float, sigma: float, direct: str, bounce: str) -> Floats:
-        """Direct light and second bounce, each by the facets or by the closed forms."""
-        parts = {}
-        if "facets" in (direct, bounce):
-            parts["facets"] = models.oren_nayar_gaussian_parts_vectors(wi, wr, rho=rho, sigma=sigma)
-        if "closed" in (direct, bounce):
-            parts["closed"] = _over_slopes(wi, wr, rho, sigma)
-        return parts[direct].direct + (parts[bounce].interreflected if bounces else 0.0)
-
-    def mixed(direct: str, bounce: str) -> Callable[..., Floats]:
-        return lambda wi, wr, **own: facets(wi, wr, **own, direct=direct, bounce=bounce)
-
-    truth = models.oren_nayar_gaussian_vectors if bounces else mixed("facets", "facets")
+    truth = models.oren_nayar_gaussian_vectors if bounces else _by_parts("facets", None)
     yield form("facets", "facets integrated, eqs 8-20 and 47", "exact", "oren_nayar_gaussian", truth)
     yield form("facets-float32", "facets integrated, float32", "exact", "oren_nayar_gaussian", truth, dtype=np.float32)
     single = "oren_nayar_single_slope over slopes"
-    yield form("closed-forms", "closed forms of B.2, eqs 45 and 49", "closed form", single, mixed("closed", "closed"))
+    closed = _by_parts("closed", "closed" if bounces else None)
+    yield form("closed-forms", "closed forms of B.2, eqs 45 and 49", "closed form", single, closed)
     if bounces:
-        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", single, mixed("facets", "closed"))
-        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", single, mixed("closed", "facets"))
+        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", single, _by_parts("facets", "closed"))
+        exact = _by_parts("closed", "facets")
+        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", single, exact)
     fit, with_bounce = models.oren_nayar_vectors, {"interreflection": bounces}
     yield form("fit", "functional fit, eqs 27-29", "approximation", "oren_nayar", fit, **with_bounce)
     yield form("fit-float32", "functional fit, float32", "approximation", "oren_nayar", fit, np.float32, **with_bounce)
@@ -211,7 +200,18 @@ def _smooth(wi: Floats, wr: Floats, *, rho: float, **_: float) -> Floats:
     return models.lambert_vectors(wi, wr, rho=rho)
 
 
-def _over_slopes(wi: Floats, wr: Floats, rho: float, sigma: float) -> models.oren_nayar_1994.Parts:
+def _by_parts(direct: str, bounce: str | None) -> Callable[..., Floats]:
+    """Direct light and second bounce, each by the "facets" or by the "closed" forms; None: no bounce."""
+    ways = {"facets": models.oren_nayar_gaussian_parts_vectors, "closed": _over_slopes}
+
+    def evaluate(wi: Floats, wr: Floats, **own: float) -> Floats:
+        parts = {way: ways[way](wi, wr, **own) for way in {direct, bounce or direct}}
+        return parts[direct].direct + (0.0 if bounce is None else parts[bounce].interreflected)
+
+    return evaluate
+
+
+def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float) -> models.oren_nayar_1994.Parts:
     """The closed forms of appendix B.2, eqs 45 and 49, averaged over slopes with the weights of eqs 25 and 26."""
     x, w = np.polynomial.legendre.leggauss(_SLOPES)
     top = min(np.pi / 2, _WIDEST * max(sigma, 1e-9))  # a flat surface: all slopes are 0

@@ -213,6 +213,20 @@ def test_a_table_takes_its_nodes_and_a_model_its_parameters() -> None:
     assert forms["table-even"].bytes == 4 * np.prod(nodes) + 8 * sum(nodes)
 
 
+def test_a_body_with_a_surface_is_their_weighted_sum() -> None:
+    plaster = {"rho": 0.9, "sigma": float(radians(30.0)), "interreflection": True}
+    weighted = {**plaster, "k_s": 0.0, "k_b": 0.5}
+    body, half = (
+        of(Material(name="m", title="m", model=model, parameters=parameters, source="a test"))[0]
+        for model, parameters in (("oren_nayar", plaster), ("oren_nayar_body_surface", weighted))
+    )
+    wi, wr = unit_vector([0.7], [0.2]), unit_vector([0.4], [2.1])
+    assert set(body) == set(half)
+    for key in body:
+        rtol = 1e-6 if body[key].dtype is np.float32 else 1e-14
+        np.testing.assert_allclose(values(half[key], wi, wr), 0.5 * values(body[key], wi, wr), rtol=rtol, err_msg=key)
+
+
 def test_a_mirror_has_no_sum_to_shorten() -> None:
     forms, _ = of(presets()["scene-plastic-cube"])
     assert not {"ten-terms", "beckmann"} & set(forms)

@@ -92,7 +92,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_file: Path | None)
     jobs = {job.material.name: job for job in recipe.load(recipe_file).jobs()}
     store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None
     subjects = []
-    for name in names:
+    for name in dict.fromkeys(names):
         table = store[name] if store is not None and name in store else None
         if name in jobs:
             subject = _Subject(jobs[name].material, jobs[name].wavelength_nm)
