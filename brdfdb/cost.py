@@ -1,0 +1,140 @@
+"""What a form costs: its time, taken in turns with its rivals; and the front of those that are worth having."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.parameters import Floats
+from brdfdb.representations import Representation
+
+BATCH = 100_000  # directions at once, of forms that are fast enough
+RUN_S = 0.25  # what a turn of a slower form may take
+ROUNDS = 11
+CHEAPER = 1.25  # times as cheap is clearly cheaper, in three of four rounds
+ALIKE = 1.1  # times the error is about the same error
+# Directions at once: steps so wide that a form, however busy the machine, is timed at the same one every time
+_STEPS = (256, 2048, 16384, BATCH)
+_VALUES = 1_000_000  # at once, at most
+_TRIES = 5  # how often a form is asked what one direction more costs
+
+
+class Times(NamedTuple):
+    """How long an evaluation takes: seconds a value of f_r, shape (rounds,), and at how many directions at once."""
+
+    seconds: NDArray[np.float64]
+    directions: int
+
+    @property
+    def quartiles_ns(self) -> tuple[float, float, float]:
+        """Lower quartile, median and upper quartile [ns a value]."""
+        low, middle, high = np.percentile(1e9 * self.seconds, [25.0, 50.0, 75.0]).tolist()
+        return low, middle, high
+
+
+def times(
+    forms: Sequence[Representation],
+    wi: Floats,
+    wr: Floats,
+    *,
+    most: int = BATCH,
+    rounds: int = ROUNDS,
+    clock: Callable[[], float] = time.perf_counter,
+    tick: Callable[[], None] = lambda: None,
+) -> list[Times]:
+    """Time forms in turns: what slows the machine down slows all of them down, and ratios within a round keep.
+
+    Parameters
+    ----------
+    forms : sequence of Representation
+        What to time, on one thread.
+    wi, wr : arrays of shape (N, 3)
+        Unit vectors to evaluate at, repeated or cut off as needed.
+    most : int
+        Directions at once; fewer where they take longer than `RUN_S` or are a million values. 1 for single evaluations
+        from Python.
+    rounds : int
+        How often each form has its turn.
+    clock, tick : callables
+        Gives seconds; is called after every round.
+
+    Returns
+    -------
+    list of Times
+        In the order of the forms.
+    """
+    runs = []
+    for form, count in zip(forms, _counts(forms, wi, wr, most, clock), strict=True):
+        runs.append((form.evaluate, *_directions(form, wi, wr, count)))
+        form.evaluate(*runs[-1][1:])  # compiled, and its memory at hand
+    taken = np.empty((rounds, len(runs)))
+    for row in taken:
+        for number, (evaluate, light, viewer) in enumerate(runs):
+            evaluate(light[:1], viewer[:1])  # its code is in the processor's cache again: that of rivals alike is, too
+            start = clock()
+            evaluate(light, viewer)
+            row[number] = clock() - start
+        tick()
+    found = []
+    for (evaluate, light, viewer), seconds in zip(runs, taken.T, strict=True):
+        values = evaluate(light[:1], viewer[:1]).size * len(light)
+        found.append(Times(seconds / values, len(light)))
+    return found
+
+
+def _directions(form: Representation, wi: Floats, wr: Floats, count: int) -> tuple[Floats, Floats]:
+    return np.resize(wi, (count, 3)).astype(form.dtype), np.resize(wr, (count, 3)).astype(form.dtype)
+
+
+def _counts(
+    forms: Sequence[Representation], wi: Floats, wr: Floats, most: int, clock: Callable[[], float]
+) -> list[int]:
+    """At how many directions each form is timed: the largest step that fits."""
+    if most <= _STEPS[0]:
+        return [most] * len(forms)
+    few, more = _STEPS[0], 4 * _STEPS[0]
+    wavelengths = [0] * len(forms)
+    shortest = np.full((len(forms), 2), np.inf)
+    for _ in range(_TRIES):  # in turns, too: one busy moment makes no form slow
+        for number, form in enumerate(forms):
+            for which, count in enumerate((few, more)):
+                light, viewer = _directions(form, wi, wr, count)
+                start = clock()
+                wavelengths[number] = form.evaluate(light, viewer).size // count
+                shortest[number, which] = min(shortest[number, which], clock() - start)
+    another = (shortest[:, 1] - shortest[:, 0]) / (more - few)  # of few, most may be the call
+    return [
+        min(most, max((s for s in _STEPS if s * seconds <= RUN_S and s * values <= _VALUES), default=few))
+        for seconds, values in zip(another.tolist(), wavelengths, strict=True)
+    ]
+
+
+def front(errors: Sequence[float], costs: Floats) -> list[int]:
+    """The forms worth having, from the most accurate one down, each clearly cheaper than the one before.
+
+    Parameters
+    ----------
+    errors : sequence of float
+        Of each form.
+    costs : array of shape (rounds, forms)
+        Of each form in each round; one round of costs that do not scatter.
+
+    Returns
+    -------
+    list of int
+        Indices. What is less accurate has to be `CHEAPER` times as cheap in three of four rounds. Of two neighbours
+        whose errors are within `ALIKE` of each other, the cheaper one stays. So neither the noise of a clock nor a
+        hair's breadth of error decides who is on the front; of equals it is the one given first.
+    """
+    chosen: list[int] = []
+    for one in sorted(range(len(errors)), key=lambda index: errors[index]):
+        if chosen and np.percentile(costs[:, chosen[-1]] / costs[:, one], 25.0) < CHEAPER:
+            continue
+        if chosen and errors[one] <= ALIKE * errors[chosen[-1]]:
+            chosen.pop()
+        chosen.append(one)
+    return chosen
