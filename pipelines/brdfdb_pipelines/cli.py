@@ -141,6 +141,16 @@ def _parser() -> argparse.ArgumentParser:
     lookup.add_argument("--json", action="store_true", help="print JSON")
     lookup.add_argument("--with-error", action="store_true", help="print the error that the table states, too")
 
+    render = command("render", _render, "Render a scene with the models of its materials, as PNG and spectral EXR.")
+    render.add_argument("scene", metavar="SCENE", help="a .toml file, or a scene that comes with the program")
+    render.add_argument(
+        "--out", type=Path, default=Path("brdf-scenes"), metavar="DIR", help="directory (default: %(default)s)"
+    )
+    render.add_argument("--width", type=_positive, default=256, metavar="N", help="pixels (default: %(default)s)")
+    render.add_argument(
+        "--across", type=_positive, default=1, metavar="N", help="rays across a pixel, and down (default: %(default)s)"
+    )
+
     listing = command("list", _list, "List the materials and families of the store, or the built-in presets.")
     listing.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")
 
@@ -288,6 +298,13 @@ def _lookup(options: argparse.Namespace) -> int:
         as_json=options.json,
         with_error=options.with_error,
     )
+    return 0
+
+
+def _render(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import render
+
+    render.run(options.scene, options.out, width=options.width, across=options.across)
     return 0
 
 

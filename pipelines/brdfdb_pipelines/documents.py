@@ -16,6 +16,7 @@ from brdfdb.audit import AuditReport
 from brdfdb.family import FamilyRecord
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
+from brdfdb.scene import Scene
 from brdfdb_pipelines.recipe import Recipe
 
 SCHEMAS: dict[str, type[BaseModel]] = {
@@ -23,6 +24,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "family": FamilyRecord,
     "material": Material,
     "recipe": Recipe,
+    "scene": Scene,
 }
 
 TABLE_BEGIN, TABLE_END = "<!-- generated: models -->", "<!-- end -->"

@@ -1,0 +1,272 @@
+"""What a camera sees of a scene: for each object the visible points, with viewer and lights in the surface's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import radians
+from brdfdb.recorded import Recorded
+from brdfdb.scene import Camera, Object, Scene
+from brdfdb.shapes import Array, unit
+
+_LIFT = 1e-4  # of 1, or of coordinates beyond: how far off their surface shadow and mirror rays begin
+_BATCH = 10_000  # shadow rays at a time: five times as fast as 100 000, which leave the cache
+_LENGTH_OFF = 0.05  # how far from 1 a recorded vector may be, which is then made 1 long: EXR with 16 bits is at 5e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """The points of one object that a camera sees, or that another object shows in its mirror.
+
+    Attributes
+    ----------
+    name, material : str
+        The object and its material.
+    wr : array (N, 3)
+        Unit vectors towards the viewer in the frame of the surface: x along the grain, z the normal.
+    wi : array (E, N, 3)
+        The same towards each sample of each light.
+    irradiance : array (E, N)
+        Irradiance of the surface by that sample, cosine included; 0 in shadow. pi for a light of strength 1 that the
+        surface faces; for spectral irradiance, times the illuminant.
+    beyond : array (N,)
+        Radiance that arrives from the mirror direction: of a light with a solid angle, and ambient; 0 where an object
+        of the list stands there.
+    via : int or None
+        In the mirror of which points of the list these are seen; None if the camera sees them.
+    at : int array (N,)
+        The pixel of each point, counted row by row from the top; or its index among the points of `via`.
+    """
+
+    name: str
+    material: str
+    wr: Array
+    wi: Array
+    irradiance: Array
+    beyond: Array
+    via: int | None
+    at: NDArray[np.int64]
+
+
+class View(NamedTuple):
+    """What a camera sees: points, those seen in mirrors after those that they are seen in.
+
+    `samples` are the rays of each of width x height pixels; where fewer points are, the rest of the pixel sees none.
+    """
+
+    points: list[Points]
+    width: int
+    height: int
+    samples: int
+
+
+def gather(scene: Scene, width: int, *, across: int = 1) -> View:
+    """Trace rays from the camera to the nearest object, from there to the lights, and once into mirrors.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen. One that is recorded has the size of its file.
+    width : int
+        Pixels across the picture; the aspect of the camera says how many down.
+    across : int
+        Rays across each pixel and down: `across` squared are averaged.
+
+    Returns
+    -------
+    View
+        A list of points for each object, then for each mirror and each object that it shows.
+
+    Raises
+    ------
+    ValueError
+        If no ray meets an object, or a light shines on nothing that is seen; if a recorded file holds no directions.
+
+    Notes
+    -----
+    Mirrors are surfaces whose model has a Dirac part, and show one reflection, as in section 5 of He et al. 1991
+    (``he1991``). The ambient radiance is not shadowed.
+    """
+    first = scene.objects[0]
+    if isinstance(first.shape, Recorded):
+        view = _recorded(scene, first, first.shape)
+    else:
+        height = max(1, round(width / scene.camera.aspect))
+        pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
+        rays = scene.camera.rays(width * across, height * across)
+        points, surfaces = _seen(scene, *rays, pixels.ravel(), None)
+        for number, surface in enumerate(surfaces):
+            if scene.materials[points[number].material].spec.specular is not None:
+                points += _mirrored(scene, points, number, surface)
+        unseen = [item.name for item in scene.objects if item.name not in {each.name for each in points}]
+        if unseen:
+            raise ValueError(f"objects: no ray of {width} x {height} pixels meets {', '.join(unseen)}")
+        view = View(points, width, height, across**2)
+    _check_lights(scene, view.points)
+    return view
+
+
+class _Surface(NamedTuple):
+    """Points (N, 3), frames with tangent, across and normal as rows (N, 3, 3), and viewers (N, 3), all in the scene."""
+
+    position: Array
+    frame: Array
+    viewer: Array
+
+
+def _seen(
+    scene: Scene, origins: Array, directions: Array, at: NDArray[np.int64], via: int | None
+) -> tuple[list[Points], list[_Surface]]:
+    """What rays meet first: points of each object that is met, and the surfaces that they lie on."""
+    distance, nearest = _trace(scene, origins, directions)
+    points, surfaces = [], []
+    for number, item in enumerate(scene.objects):
+        rays = np.flatnonzero((nearest == number) & np.isfinite(distance))
+        if not rays.size or isinstance(item.shape, Recorded):
+            continue
+        position = origins[rays] + distance[rays, np.newaxis] * directions[rays]
+        surface = _Surface(position, _turned(item.shape.frame(position), item.grain_deg), -directions[rays])
+        wi, irradiance = _lit(scene, surface)
+        wr = _viewed(surface)
+        beyond = _from_afar(scene, _mirror(surface))
+        points.append(Points(item.name, item.material, wr, wi, irradiance, beyond, via, at[rays]))
+        surfaces.append(surface)
+    return points, surfaces
+
+
+def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface) -> list[Points]:
+    """What the mirror of some points shows; in place of what lies beyond, which is then 0."""
+    facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
+    origins, directions = _lifted(surface)[facing], _mirror(surface)[facing]
+    found, _ = _seen(scene, origins, directions, facing, number)
+    for each in found:
+        points[number].beyond[each.at] = 0.0
+    return found
+
+
+def _trace(scene: Scene, origins: Array, directions: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Distance to the nearest object on each ray, and which it is."""
+    shapes = [item.shape for item in scene.objects]
+    distances = np.stack([shape.hit(origins, directions) for shape in shapes if not isinstance(shape, Recorded)])
+    nearest = np.argmin(distances, axis=0)
+    return np.min(distances, axis=0), nearest
+
+
+def _lit(scene: Scene, surface: _Surface) -> tuple[Array, Array]:
+    """Directions of all samples of all lights in the frame of the surface, and irradiances."""
+    towards = [light.towards() for light in scene.lights]
+    count = len(surface.position)
+    if not towards:
+        return np.zeros((0, count, 3)), np.zeros((0, count))
+    directions = np.concatenate(towards)
+    strength = np.concatenate(
+        [np.full(len(t), x.strength / len(t)) for x, t in zip(scene.lights, towards, strict=True)]
+    )
+    wi = unit(np.einsum("nij,ej->eni", surface.frame, directions))
+    irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
+    if scene.shadows:
+        origins = _lifted(surface)
+        sample, point = np.nonzero(irradiance)
+        for start in range(0, point.size, _BATCH):
+            which = sample[start : start + _BATCH], point[start : start + _BATCH]
+            blocked = np.isfinite(_trace(scene, origins[which[1]], directions[which[0]])[0])
+            irradiance[which] *= ~blocked
+    return wi, irradiance
+
+
+def _from_afar(scene: Scene, directions: Array) -> Array:
+    """Radiance that comes along directions from beyond all objects: of lights, and ambient."""
+    radiance = np.full(len(directions), scene.ambient)
+    for light in scene.lights:
+        radiance += np.where(directions @ unit(np.asarray(light.direction)) >= light.cos_radius, light.radiance, 0.0)
+    return radiance
+
+
+def _lifted(surface: _Surface) -> Array:
+    scale = np.maximum(1.0, np.abs(surface.position).max(axis=1, keepdims=True))
+    return np.asarray(surface.position + _LIFT * scale * surface.frame[:, 2])
+
+
+def _mirror(surface: _Surface) -> Array:
+    """Where the mirror direction of each viewer points, in the scene."""
+    normal = surface.frame[:, 2]
+    return np.asarray(2.0 * np.sum(normal * surface.viewer, axis=1, keepdims=True) * normal - surface.viewer)
+
+
+def _turned(frame: Array, grain_deg: float) -> Array:
+    """Frames turned about their normals."""
+    turn = float(radians(grain_deg))
+    along = np.cos(turn) * frame[:, 0] + np.sin(turn) * frame[:, 1]
+    return np.stack([along, np.cross(frame[:, 2], along), frame[:, 2]], axis=1)
+
+
+def _viewed(surface: _Surface) -> Array:
+    """Viewers in the frames of their points, 1 long to the last digit."""
+    return unit(np.einsum("nij,nj->ni", surface.frame, surface.viewer))
+
+
+def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
+    """The points of a file of directions."""
+    arrays = shape.read()
+    height, width = arrays["normal" if "normal" in arrays else "wr"].shape[:2]
+    good = np.all(
+        [_is_unit(each) for array in arrays.values() for each in array.reshape(-1, height * width, 3)], axis=0
+    )
+    at = np.flatnonzero(good)
+    if not at.size:
+        raise ValueError(f"{shape.file}: no pixel has unit vectors")
+    flat = {name: unit(array.reshape(-1, height * width, 3)[:, at]) for name, array in arrays.items()}
+    if "normal" in flat:
+        surface = _frames(flat, scene.camera, width, height, at, item.grain_deg)
+        # far apart, and no shadows: a file knows no positions
+        wi, irradiance = _lit(scene.model_copy(update={"shadows": False}), surface)
+        wr, beyond = _viewed(surface), _from_afar(scene, _mirror(surface))
+    else:
+        wr, wi = flat["wr"][0], flat["wi"]
+        if len(wi) != len(scene.lights) or any(light.solid_angle_sr for light in scene.lights):
+            raise ValueError(
+                f"{shape.file}: wi has {len(wi)} lights, the scene {len(scene.lights)}; "
+                "there must be as many, and none with a solid angle"
+            )
+        strength = np.array([light.strength for light in scene.lights])
+        irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
+        beyond = np.full(at.size, scene.ambient)
+    return View([Points(item.name, item.material, wr, wi, irradiance, beyond, None, at)], width, height, 1)
+
+
+def _frames(
+    flat: dict[str, Array], camera: Camera, width: int, height: int, at: NDArray[np.int64], grain_deg: float
+) -> _Surface:
+    """Surfaces of recorded normals and tangents; without tangents these are horizontal."""
+    normal = flat["normal"][0]
+    rough = flat["tangent"][0] if "tangent" in flat else np.cross([0.0, 0.0, 1.0], normal)
+    tangent = rough - np.sum(rough * normal, axis=1, keepdims=True) * normal
+    short = np.linalg.norm(tangent, axis=1) < 1e-6
+    tangent[short] = np.cross(np.cross(normal[short], [1.0, 0.0, 0.0]), normal[short])
+    tangent = unit(tangent)
+    frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
+    directions = camera.rays(width, height)[1]
+    return _Surface(np.zeros_like(normal), _turned(frame, grain_deg), -directions[at])
+
+
+def _is_unit(vectors: Array) -> NDArray[np.bool_]:
+    length = np.linalg.norm(np.nan_to_num(vectors, nan=0.0, posinf=0.0, neginf=0.0), axis=-1)
+    return np.asarray(np.abs(length - 1.0) < _LENGTH_OFF)
+
+
+def _check_lights(scene: Scene, points: Sequence[Points]) -> None:
+    """ValueError if a light falls on nothing that is seen."""
+    start = 0
+    for number, light in enumerate(scene.lights):
+        stop = start + len(light.towards())
+        if not any(np.any(each.irradiance[start:stop]) for each in points):
+            raise ValueError(
+                f"lights.{number}: falls on nothing that is seen: it is below the horizon of every visible point, or "
+                "stands behind another object"
+            )
+        start = stop

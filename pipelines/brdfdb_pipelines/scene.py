@@ -1,0 +1,65 @@
+"""Scene files: TOML by path, or by name one of those that come with the program; one sentence for what is wrong."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from brdfdb.parameters import closest
+from brdfdb.scene import Scene
+
+_SHIPPED = resources.files("brdfdb_pipelines") / "scenes"
+
+
+class SceneError(ValueError):
+    """A scene that cannot be looked at; str() is one sentence that names the file and the field."""
+
+
+def shipped() -> list[str]:
+    """The names of the scenes that come with the program."""
+    return sorted(file.name.removesuffix(".toml") for file in _SHIPPED.iterdir() if file.name.endswith(".toml"))
+
+
+def load(name: str) -> Scene:
+    """Read a scene: a path that ends in .toml, or the name of a scene that comes with the program.
+
+    Files that the scene names lie beside it.
+
+    Raises
+    ------
+    SceneError
+        If there is none, it is not TOML, or is not a scene.
+    """
+    if not name.endswith(".toml") and name not in shipped():
+        raise SceneError(
+            f"{name}: is no scene{closest(name, shipped())}; give a path that ends in .toml or one of "
+            f"{', '.join(shipped())}"
+        )
+    path = Path(name)
+    source = path if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
+    try:
+        scene = Scene.model_validate(tomllib.loads(source.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise SceneError(f"{name}: {error.strerror}") from None
+    except ValidationError as error:
+        raise SceneError(f"{name}: {_sentence(error)}") from None
+    except ValueError as error:
+        raise SceneError(f"{name}: not TOML: {error}") from None
+    return scene.resolved(path.parent)
+
+
+def _sentence(error: ValidationError) -> str:
+    """The first thing that pydantic finds fault with, and the field."""
+    first = error.errors(include_url=False)[0]
+    # after the key of a shape comes its kind, which is no key
+    loc = [str(part) for before, part in zip((None, *first["loc"]), first["loc"], strict=False) if before != "shape"]
+    if first["type"] == "value_error":
+        said = str(first["ctx"]["error"])
+        if loc and said.startswith(loc[-1]):
+            loc.pop()
+        return ".".join([*loc, said])
+    said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+    return f"{'.'.join(loc)}: {said}"
