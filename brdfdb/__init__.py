@@ -40,8 +40,21 @@ def open(root: str | os.PathLike[str]) -> Store:
 
 
 _LOADED_WHEN_USED = (
-    *("atlas", "audit", "energy", "exr", "family", "fresnel", "gallery", "geometry", "grids", "lookup", "materials"),
-    *("misprints", "models", "quadrature", "roughness", "sampling", "spectra", "store", "tabulate"),
+    *(
+        "atlas",
+        "audit",
+        "chart",
+        "energy",
+        "exr",
+        "family",
+        "fresnel",
+        "gallery",
+        "geometry",
+        "grids",
+        "lookup",
+        "materials",
+    ),
+    *("misprints", "models", "quadrature", "representations", "roughness", "sampling", "spectra", "store", "tabulate"),
 )
 
 

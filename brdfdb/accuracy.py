@@ -98,6 +98,24 @@ def relative(found: Floats, truth: Floats, floor: Floats) -> Floats:
     return np.divide(error, scale, out=np.where(error > 0.0, np.inf, 0.0), where=scale > 0.0)
 
 
+def mean_error(found: Floats, truth: Floats, weight: Floats) -> Floats:
+    """Weighted mean of abs(found - truth) over that of truth, for each row of weights and each wavelength; or 0."""
+    wrong, whole = weight @ np.abs(found - truth), weight @ truth
+    return np.divide(wrong, whole, out=np.zeros_like(wrong), where=whole > 0.0)
+
+
+def classes(drawn: Draw) -> dict[str, NDArray[np.bool_]]:
+    """Which viewers of a draw look forward or back, within 45 degrees of azimuth, and which pairs graze, beyond 75."""
+    wi, wr = drawn.wi, drawn.wr
+    along = np.sum(wi[:, :2] * wr[:, :2], axis=1)
+    across = np.hypot(*wi[:, :2].T) * np.hypot(*wr[:, :2].T)
+    return {
+        "forward": along < -np.sqrt(0.5) * across,
+        "back": along > np.sqrt(0.5) * across,
+        "grazing": np.minimum(wi[:, 2], wr[:, 2]) < np.cos(radians(75.0)),
+    }
+
+
 def measure(
     layout: Layout, read: Callable[[slice], NDArray[np.float32]], count: int | None = None, seed: int = SEED
 ) -> Error:
@@ -135,8 +153,7 @@ def compare(found: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Erro
     weights = np.concatenate(
         [np.where(drawn.band == np.arange(count)[:, np.newaxis], drawn.weight, 0.0), [drawn.weight]]
     )
-    wrong, whole = weights @ np.abs(found - truth), weights @ truth
-    l1 = np.divide(wrong, whole, out=np.zeros_like(wrong), where=whole > 0.0)
+    l1 = mean_error(found, truth, weights)
     error = np.ascontiguousarray(relative(found, truth, floor).T)
     chosen = [drawn.above & (drawn.band == band) for band in range(count)] + [drawn.above]
     percentiles = [np.percentile(error[:, rows], [50.0, 95.0, 99.0, 100.0], axis=1) for rows in chosen]

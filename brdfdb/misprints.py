@@ -1,8 +1,9 @@
 """What the three papers print wrong, ambiguously or unsafely: each printed form beside the right one, and nothing else.
 
 The models hold the right forms only. The printed ones stand here, literal and short, for the atlas that sets the two
-side by side; no other module of the library knows them. Angles are radians, lengths of the surface micrometres; a BRDF
-is f_r in 1/sr, by the conventions of `brdfdb.geometry`. Division by zero gives inf or nan here, as it does in print.
+side by side and for the chart of their costs; no other module of the library knows them. Angles are radians, lengths of
+the surface micrometres; a BRDF is f_r in 1/sr, by the conventions of `brdfdb.geometry`. Division by zero gives inf or
+nan here, as it does in print.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb import fresnel, models
+from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import checked_angles, radians, spherical_angles, unit_vector
 from brdfdb.models._he_torrance_series import diffraction_series
 from brdfdb.models.he_torrance_1991 import checked_surface, directional_diffuse
@@ -265,12 +267,17 @@ def _jones(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, n: Any, k: Any
         return M / across2[..., np.newaxis, np.newaxis]
 
 
-def _ten_terms(g: Any, V: Any) -> Any:
-    total = np.zeros(np.broadcast_shapes(np.shape(g), np.shape(V)))
+@kernel
+def _ten_terms_of(g: float, V: float) -> float:
+    total, term = 0.0, math.exp(-g)
     for m in range(1, TERMS + 1):
-        # Eq. (78) as printed, cut off
-        total = total + np.power(g, m) * np.exp(np.negative(g)) / (math.factorial(m) * m) * np.exp(np.negative(V) / m)
+        # Eq. (78) as printed, cut off: term is g^m e^-g / m!
+        term *= g / m
+        total += term / m * math.exp(-V / m)
     return total
+
+
+_ten_terms = elementwise(_ten_terms_of)  # compiled: its cost is charted, too
 
 
 def _all_terms(g: Any, V: Any) -> Any:

@@ -80,10 +80,11 @@ def test_every_misprint_is_tested_for_its_figure() -> None:
     assert {f"test_{key.replace('-', '_')}" for key in BY_KEY} <= set(globals())
 
 
-def test_the_printed_forms_are_imported_by_the_atlas_only() -> None:
+def test_the_printed_forms_are_imported_only_where_they_are_set_against_the_right_ones() -> None:
     root = Path(brdfdb.__file__).parent
+    comparing = (root / "misprints.py", root / "representations.py")  # whose cost is charted against their error
     for path in sorted(root.rglob("*.py")):
-        if path == root / "misprints.py" or path.parent == root / "atlas":
+        if path in comparing or path.parent == root / "atlas":
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             imported = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []

@@ -63,7 +63,7 @@ _OTHER_DASHES = ((), (6, 1.5), (5, 1.5, 1, 1.5), (2, 1), (8, 1.5, 1, 1.5, 1, 1.5
 # In points, of which a figure is as wide whatever it shows: rows of figures keep in line
 WIDTH, _PLOT_HEIGHT, _LEFT, _RIGHT, _BELOW, _ROW, _TITLE = 300.0, 150.0, 44.0, 10.0, 34.0, 12.0, 15.0
 _LETTER, _SAMPLE = 4.9, 34.0  # width of a letter of the legend, on average, and of what stands before the text
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",  # text stays text: small, and set in the font of the page
     "text.parse_math": False,  # a $ in a name is one
     "path.simplify": True,
@@ -105,7 +105,7 @@ def svg(drawing: Drawing, key: str) -> str:
     """
     if isinstance(drawing, Picture):
         return _picture(drawing)
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": key}):
+    with mpl.rc_context({**STYLE, "svg.hashsalt": key}):
         if isinstance(drawing, Map):
             canvas = _map(drawing)
         else:
@@ -382,8 +382,8 @@ def _array(values: Numbers) -> Floats:
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
 
 
-def _inline(text: str, key: str, described: str) -> str:
-    """What stands in a page: variables for colours, ids of its own, no digits or bytes that nobody sees."""
+def shortened(text: str) -> str:
+    """An SVG of matplotlib from its first tag on, without digits, names and bytes that nobody sees."""
     text = text[text.index("<svg") :]
     for unseen in (
         r"<!--.*?-->",
@@ -393,24 +393,37 @@ def _inline(text: str, key: str, described: str) -> str:
     ):
         text = re.sub(unseen, "", text, flags=re.DOTALL)
     text = re.sub(r"font-family:[^;\"]*;?", "", text)  # that of the page
-    (box,) = re.findall(r'viewBox="[^"]*"', text)
-    text = text[text.index(">", text.index("<svg")) + 1 :]
-    text = re.sub(r"<[^>]+>", _terse, text)
-    text = re.sub(r' id="curve-(\d+)"', r' data-curve="\1"', text).replace("xlink:href", "href")
+    return re.sub(r"<[^>]+>", _terse, text)
+
+
+def kept_ids(text: str, prefix: str) -> str:
+    """An SVG in which only those elements have ids that others refer to, each with a prefix."""
     used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', text))
-    text = re.sub(r' id="([^"]*)"', lambda m: f' id="{key}-{m[1]}"' if m[1] in used else "", text)
-    text = re.sub(r'(url\(|href=")#', rf"\1#{key}-", text)
+    text = re.sub(r' id="([^"]*)"', lambda m: f' id="{prefix}-{m[1]}"' if m[1] in used else "", text)
+    text = re.sub(r'(url\(|href=")#', rf"\1#{prefix}-", text)
     text = re.sub(r">\s+<", "><", text).strip()
-    text = re.sub(r"<g/>|<g></g>", "", text)
-    return f'<svg {box} role="img" aria-label="{described}">{text}'
+    return re.sub(r"<g/>|<g></g>", "", text)
+
+
+def _inline(text: str, key: str, described: str) -> str:
+    """What stands in a page: variables for colours, ids of its own."""
+    text = shortened(text)
+    (box,) = re.findall(r'viewBox="[^"]*"', text)
+    text = text[text.index(">") + 1 :]
+    text = re.sub(r"<[^>]+>", _with_variables, text)
+    text = re.sub(r' id="curve-(\d+)"', r' data-curve="\1"', text).replace("xlink:href", "href")
+    return f'<svg {box} role="img" aria-label="{described}">{kept_ids(text, key)}'
+
+
+def _with_variables(tag: re.Match[str]) -> str:
+    return re.sub(r"#[0-9a-f]{6}\b", lambda colour: f"var({VARIABLES[colour[0]]})", tag[0])
 
 
 def _terse(tag: re.Match[str]) -> str:
-    """A tag with a decimal for each point, and a variable for each colour."""
+    """A tag with a decimal for each point."""
     text = re.sub(r' transform="rotate\(-0 [^"]*"', "", tag[0])
     if "scale(" not in text:
         text = re.sub(r"-?\d+\.\d{2,}(?!\w)", lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), text)
-    text = re.sub(r"#[0-9a-f]{6}\b", lambda colour: f"var({VARIABLES[colour[0]]})", text)
     text = re.sub(r"\s+", " ", text)
     if not re.search(r"[CQ] ", text):
         text = re.sub(r"(?<=\d) L ", " ", text)  # a line goes on as one; a curve would as a curve

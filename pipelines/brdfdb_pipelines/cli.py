@@ -58,7 +58,8 @@ def _sentence(error: Exception) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="brdfdb",
-        description="Spectral BRDF tables from published surface parameters: build, audit, export, look up, serve.",
+        description="Spectral BRDF tables from published surface parameters: build, audit, chart, export, look up, "
+        "serve.",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -118,6 +119,26 @@ def _parser() -> argparse.ArgumentParser:
         help="processes (default: %(default)s)",
     )
     audit.add_argument("--no-figures", action="store_true", help="neither stability atlas nor gallery, as with names")
+
+    chart = command(
+        "chart", _chart, "Chart the cost of every form of a material against its error, as pictures and JSON."
+    )
+    chart.add_argument("names", nargs="+", metavar="NAME", help="built-in materials, or those of a recipe or the store")
+    chart.add_argument(
+        "--out",
+        type=Path,
+        default=Path("brdf-chart"),
+        metavar="DIR",
+        help="directory to write to (default: %(default)s)",
+    )
+    chart.add_argument("--recipe", type=Path, metavar="FILE", help="a TOML file that defines materials and wavelengths")
+    chart.add_argument(
+        "--tolerance",
+        type=float,
+        action="append",
+        metavar="X",
+        help="of a planned table, more than once for more of them (default: 0.1, 0.01 and, of grey materials, 0.001)",
+    )
 
     text = "Write slices of tables as image files."
     # a command a format: argparse takes no NAME after an option that follows another positional argument
@@ -274,6 +295,13 @@ def _audit(options: argparse.Namespace) -> int:
         print("brdfdb: interrupted; no report was written, an earlier one is as it was", file=sys.stderr)
         return INTERRUPTED
     return VIOLATED if report.violations else 0
+
+
+def _chart(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import chart
+
+    chart.run(options.names, options.out, store=options.store, recipe_file=options.recipe, tolerances=options.tolerance)
+    return 0
 
 
 def _export(options: argparse.Namespace) -> int:

@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from brdfdb.audit import AuditReport
+from brdfdb.chart import Charts
 from brdfdb.family import FamilyRecord
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
@@ -21,6 +22,7 @@ from brdfdb_pipelines.recipe import Recipe
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "audit": AuditReport,
+    "chart": Charts,
     "family": FamilyRecord,
     "material": Material,
     "recipe": Recipe,

@@ -26,7 +26,7 @@ from brdfdb_pipelines import cli, terminal
 
 COMMANDS = [
     *("build", "audit", "export exr", "lookup", "list", "show"),
-    *("history", "rollback", "verify", "gc", "serve"),
+    *("chart", "history", "rollback", "verify", "gc", "serve"),
 ]
 HEAVY = ["numpy", "numba", "xarray", "zarr", "pydantic", "rich", "fastapi", "uvicorn", "OpenEXR", "brdfdb.store"]
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "audit.schema.json"

@@ -1,0 +1,388 @@
+"""Every form in which the project has a material: models, approximations, printed forms and tables, as one type."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb import fresnel, misprints, models, tabulate
+from brdfdb.geometry import checked_vectors, finished
+from brdfdb.grids import (
+    ANISOTROPIC_AXES,
+    ANISOTROPIC_HALF_DIFFERENCE_AXES,
+    HALF_DIFFERENCE_AXES,
+    ISOTROPIC_AXES,
+    Grid,
+)
+from brdfdb.layout import Layout
+from brdfdb.lookup import Table
+from brdfdb.materials import Material
+from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
+from brdfdb.models.he_torrance_1991 import checked_surface, cos_bisecting, v_squared
+from brdfdb.parameters import Floats
+from brdfdb.plan import plan
+from brdfdb.tabulate import POLE_END_DEG
+
+Kind = Literal["exact", "closed form", "approximation", "printed", "other model", "table"]
+Evaluate = Callable[[Floats, Floats], Floats]
+
+TOLERANCES = (0.1, 0.01, 0.001)
+SPECTRAL_TOLERANCES = (0.1, 0.01)  # a finer one takes ten seconds to plan
+_SLOPES = 24  # of eq. 25 over the closed forms: 2000 change the mean of f_r by 3e-5 and no value by more than 1e-3
+_WIDEST = 6.0  # standard deviations of the slope that are integrated over
+_UNFACTORED = 0.01  # the tolerance of the table that is shown with and without parts
+
+
+@dataclass(frozen=True, eq=False)
+class Representation:
+    """One way to get f_r of a material at some wavelengths.
+
+    Attributes
+    ----------
+    key : str
+        Unique among those of a material: lower-case words joined by hyphens.
+    title : str
+        What it is, with the equation.
+    kind : str
+        "exact", "closed form", "approximation", "printed" (by a paper, where the models of this library hold another
+        form), "other model" (of the same parameters, meant to differ) or "table".
+    python : str
+        What it is called in Python.
+    evaluate : callable
+        ``evaluate(wi, wr)``: f_r [1/sr], shape (N, L), of unit vectors of shape (N, 3) and of the dtype below. The
+        Dirac part of He-Torrance is no part of it: it is the same for all.
+    bytes : int
+        Of the numbers that an evaluation reads: parameters and spectra, or the nodes of a table.
+    dtype : float32 or float64
+        Of the vectors to give it.
+    """
+
+    key: str
+    title: str
+    kind: Kind
+    python: str
+    evaluate: Evaluate
+    bytes: int
+    dtype: type[np.floating[Any]] = np.float64
+
+
+def representations(
+    material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
+) -> list[Representation]:
+    """Every representation of a material that the project has; the first one is the truth.
+
+    Parameters
+    ----------
+    material : Material
+        Of any model.
+    wavelength_nm : array of shape (L,) [nm], or None
+        For spectral materials, and only for them.
+    tolerances : sequence of float, optional
+        Of planned tables, each in [1e-4, 0.5]; by default 0.1, 0.01 and, of a grey material, 0.001.
+        None at all: no tables.
+
+    Returns
+    -------
+    list of Representation
+        The truth is the highest rung that there is: for Oren-Nayar the facets, integrated (`oren_nayar_gaussian`), for
+        Ward eq. 5a, for He-Torrance the sum of eq. 78, and for all others the model itself. Tables hold the truth
+        where a model of this library is the truth; they are planned for the material's own model, which is as smooth.
+
+    Raises
+    ------
+    ValueError
+        If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
+    """
+    if tolerances is None:
+        tolerances = SPECTRAL_TOLERANCES if material.spectral else TOLERANCES
+    forms = _FORMS.get(material.model, _of_itself)(material, wavelength_nm)
+    tables = _tables(material, _tabulated(material), wavelength_nm, tolerances) if tolerances else ()
+    return [*forms, *tables]
+
+
+def _direct(material: Material, wavelength_nm: NDArray[np.float64] | None) -> tuple[Evaluate, int]:
+    """The model of a material as it is called, and the bytes of its parameters."""
+    vectors = material.spec.vectors
+    if wavelength_nm is None:
+        grey = material.arguments()
+        return lambda wi, wr: vectors(wi, wr, **grey)[:, np.newaxis], 8 * len(grey)
+    together = material.arguments(wavelength_nm)
+    apart = [material.arguments(w) for w in wavelength_nm]
+
+    def evaluate(wi: Floats, wr: Floats) -> Floats:
+        if len(wi) == 1:  # one call for all wavelengths
+            return vectors(wi[:, np.newaxis], wr[:, np.newaxis], **together)
+        return np.stack([vectors(wi, wr, **arguments) for arguments in apart], axis=-1)
+
+    return evaluate, 8 * sum(np.size(each) for each in together.values())
+
+
+def _of_itself(
+    material: Material,
+    wavelength_nm: NDArray[np.float64] | None,
+    key: str = "model",
+    title: str = "",
+    kind: Kind = "exact",
+) -> Iterator[Representation]:
+    """The model of a material in both precisions."""
+    evaluate, size = _direct(material, wavelength_nm)
+    python = f"models.{material.model}"
+    title = title or f"{material.spec.title}, {material.spec.equation}"
+    yield Representation(key, title, kind, python, evaluate, size)
+    yield Representation(
+        f"{key}-float32", f"{title}, float32", kind, f"{python}, float32 vectors", evaluate, size, np.float32
+    )
+
+
+def _as(material: Material, model: str, **parameters: float) -> Material:
+    """A material of another model."""
+    return Material(name=material.name, title=material.title, model=model, parameters=parameters, source="derived")
+
+
+# Oren and Nayar 1994
+
+
+def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[Representation]:
+    values = material.parameters
+    own = {"rho": float(values["rho"]), "sigma": float(values["sigma"])}
+    bounces = bool(values.get("interreflection", True))
+    weights = {name: float(values.get(name, default)) for name, default in (("k_b", 1.0), ("k_s", 0.0))}
+
+    def form(
+        key: str, title: str, kind: Kind, python: str, body: Callable[..., Floats], dtype: Any = np.float64, **more: Any
+    ) -> Representation:
+        def evaluate(wi: Floats, wr: Floats) -> Floats:
+            f_r = body(wi, wr, **own, **more)
+            if weights["k_s"] > 0.0:  # Eq. (32)
+                surface = models.torrance_sparrow_vectors(wi, wr, sigma=own["sigma"])
+                f_r = weights["k_b"] * f_r + weights["k_s"] * surface
+            return f_r[:, np.newaxis]
+
+        return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more)), dtype)
+
+    def facets(wi: Floats, wr: Floats, *, rho: float, sigma: float, direct: str, bounce: str) -> Floats:
+        """Direct light and second bounce, each by the facets or by the closed forms."""
+        parts = {}
+        if "facets" in (direct, bounce):
+            parts["facets"] = models.oren_nayar_gaussian_parts_vectors(wi, wr, rho=rho, sigma=sigma)
+        if "closed" in (direct, bounce):
+            parts["closed"] = _over_slopes(wi, wr, rho, sigma)
+        return parts[direct].direct + (parts[bounce].interreflected if bounces else 0.0)
+
+    def mixed(direct: str, bounce: str) -> Callable[..., Floats]:
+        return lambda wi, wr, **own: facets(wi, wr, **own, direct=direct, bounce=bounce)
+
+    truth = models.oren_nayar_gaussian_vectors if bounces else mixed("facets", "facets")
+    yield form("facets", "facets integrated, eqs 8-20 and 47", "exact", "oren_nayar_gaussian", truth)
+    yield form("facets-float32", "facets integrated, float32", "exact", "oren_nayar_gaussian", truth, dtype=np.float32)
+    single = "oren_nayar_single_slope over slopes"
+    yield form("closed-forms", "closed forms of B.2, eqs 45 and 49", "closed form", single, mixed("closed", "closed"))
+    if bounces:
+        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", single, mixed("facets", "closed"))
+        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", single, mixed("closed", "facets"))
+    fit, with_bounce = models.oren_nayar_vectors, {"interreflection": bounces}
+    yield form("fit", "functional fit, eqs 27-29", "approximation", "oren_nayar", fit, **with_bounce)
+    yield form("fit-float32", "functional fit, float32", "approximation", "oren_nayar", fit, np.float32, **with_bounce)
+    if bounces:
+        yield form(
+            "fit-direct", "fit without bounce, eq. 27", "approximation", "oren_nayar", fit, interreflection=False
+        )
+    rough = models.oren_nayar_qualitative_vectors
+    yield form("qualitative", "qualitative, eq. 30", "approximation", "oren_nayar_qualitative", rough, offset=0.33)
+    yield form(
+        "qualitative-057", "qualitative, 0.57 (note 7)", "approximation", "oren_nayar_qualitative", rough, offset=0.57
+    )
+    if own["sigma"] <= 1.0:
+        yield form("fujii", "Fujii's form", "approximation", "oren_nayar_fujii", models.oren_nayar_fujii_vectors)
+
+        def eon(wi: Floats, wr: Floats, *, rho: float, sigma: float) -> Floats:
+            return models.oren_nayar_energy_preserving_vectors(wi, wr, rho=rho, roughness=sigma)
+
+        yield form("eon", "energy preserving (EON)", "other model", "oren_nayar_energy_preserving", eon)
+
+    yield form("lambert", "Lambert, no roughness", "approximation", "lambert", _smooth)
+
+
+def _smooth(wi: Floats, wr: Floats, *, rho: float, **_: float) -> Floats:
+    return models.lambert_vectors(wi, wr, rho=rho)
+
+
+def _over_slopes(wi: Floats, wr: Floats, rho: float, sigma: float) -> models.oren_nayar_1994.Parts:
+    """The closed forms of appendix B.2, eqs 45 and 49, averaged over slopes with the weights of eqs 25 and 26."""
+    x, w = np.polynomial.legendre.leggauss(_SLOPES)
+    top = min(np.pi / 2, _WIDEST * max(sigma, 1e-9))  # a flat surface: all slopes are 0
+    theta_a = (x + 1.0) * top / 2.0
+    weight = w * np.exp(-(theta_a**2) / (2.0 * max(sigma, 1e-9) ** 2)) * np.sin(theta_a)
+    weight /= weight.sum()
+    parts = models.oren_nayar_single_slope_parts_vectors(wi[:, np.newaxis], wr[:, np.newaxis], rho=rho, theta_a=theta_a)
+    return models.oren_nayar_1994.Parts(parts.direct @ weight, parts.interreflected @ weight)
+
+
+# Ward 1992
+
+
+def _ward(material: Material, _: NDArray[np.float64] | None) -> Iterator[Representation]:
+    own = {name: float(value) for name, value in material.parameters.items()}
+    yield from _of_itself(_as(material, "ward", **own), None, "elliptical", "elliptical Gaussian, eq. 5a")
+    half = _as(material, "ward_half_vector", **own)
+    yield from _of_itself(half, None, "half-vector", "half vectors, eq. 5b", "approximation")
+    if own["alpha_x"] != own["alpha_y"]:
+        alpha = float(np.sqrt(own["alpha_x"] * own["alpha_y"]))
+        round_lobe = _as(material, "ward", **own | {"alpha_x": alpha, "alpha_y": alpha})
+        yield next(_of_itself(round_lobe, None, "isotropic", "round lobe as large, eq. 4", "approximation"))
+    for key, title in (("ward_duer", "normalised by Duer"), ("ward_bounded", "bounded albedo, 2010")):
+        other = _as(material, key, **own)
+        yield next(_of_itself(other, None, key.replace("_", "-"), title, "other model"))
+    albedo = own["rho_d"] + own["rho_s"]
+    flat = _as(material, "lambert", rho=min(albedo, 1.0))
+    yield next(_of_itself(flat, None, "lambert", "Lambert, rho_d + rho_s", "approximation"))
+
+
+# He, Torrance, Sillion and Greenberg 1991
+
+
+def _he_torrance(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Representation]:
+    yield from _of_itself(material, wavelength_nm, "sum", "the sum of eq. 78, whole")
+    arguments = material.arguments(wavelength_nm)
+    size = 8 * sum(np.size(each) for each in arguments.values())
+    if material.parameters["sigma_0_um"] == 0.0:  # a mirror: no sum to shorten
+        return
+    printed = {misprint.key: misprint.as_printed for misprint in misprints.MISPRINTS}
+    ten = _eq_71(arguments, printed["ten-terms"])
+    yield Representation("ten-terms", "ten terms of eq. 78", "printed", "misprints.MISPRINTS", ten, size)
+    corrected = _eq_71(arguments, _beckmann_corrected)
+    title = "Beckmann, first order in 1/g"
+    yield Representation("beckmann-corrected", title, "approximation", "representations", corrected, size)
+    slope = arguments["sigma_0_um"] / arguments["tau_um"]
+    optical = {name: arguments[name] for name in ("n", "k", "a")}
+
+    def beckmann(wi: Floats, wr: Floats) -> Floats:
+        return models.he_torrance_very_rough_vectors(
+            wi[:, np.newaxis], wr[:, np.newaxis], sigma_0_over_tau=slope, **optical
+        )
+
+    if 1e-6 <= slope <= 1e6:
+        name = "models.he_torrance_very_rough"
+        yield Representation("beckmann", "Beckmann's limit, g to infinity", "approximation", name, beckmann, size)
+
+
+def _eq_71(arguments: dict[str, Any], total: Callable[[Floats, Floats], Floats]) -> Evaluate:
+    """He-Torrance with another sum in eq. 78: ``total(g, V)``, shapes (N, L); what no wavelength changes comes once."""
+    a = arguments["a"]
+    surface = checked_surface(**{name: value for name, value in arguments.items() if name != "a"})
+    height, correlation, slope = surface.features
+
+    def evaluate(wi: Floats, wr: Floats) -> Floats:
+        directions = checked_vectors(wi[:, np.newaxis], wr[:, np.newaxis])
+        sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
+        # Eqs (23)-(25)
+        S_over_cos_cos = shadowing(sin_i, cos_i, slope) * shadowing(sin_r, cos_r, slope)
+        v_xy2, v_z2 = v_squared(directions)
+        # Eqs (79)-(83)
+        g = height * v_z2 * variance(hidden(sin_i, cos_i, slope) + hidden(sin_r, cos_r, slope))
+        # Eq. (78)
+        D = correlation / 4.0 * total(g, correlation * v_xy2)
+        # Eq. (76), whose dot products cancel
+        G = (v_xy2 + v_z2) ** 2 / v_z2
+        # Eq. (75), at the bisecting angle
+        F2 = fresnel.unpolarised(cos_bisecting(directions), surface.n, surface.k)
+        # Eqs (71) and (72)
+        return finished((F2 * G * S_over_cos_cos * D + a) / np.pi, directions)
+
+    return evaluate
+
+
+def _beckmann_corrected(g: Floats, V: Floats) -> Floats:
+    """The limit of the sum of eq. 78 for g -> infinity and the first term beyond it, b = V / g; nothing below 0."""
+    b = V / g
+    return np.asarray(np.exp(-b) / g * np.maximum(1.0 + (b * b / 2.0 - 2.0 * b + 1.0) / g, 0.0))
+
+
+_FORMS: dict[str, Callable[[Material, NDArray[np.float64] | None], Iterator[Representation]]] = {
+    "oren_nayar": _oren_nayar,
+    "oren_nayar_qualitative": _oren_nayar,
+    "oren_nayar_gaussian": _oren_nayar,
+    "oren_nayar_body_surface": _oren_nayar,
+    "ward": _ward,
+    "ward_half_vector": _ward,
+    "he_torrance": _he_torrance,
+}
+
+
+# Tables
+
+_FITTED = ("oren_nayar", "oren_nayar_body_surface")  # models of which a table does not hold the truth
+
+
+def _tabulated(material: Material) -> Material:
+    """What tables of a material are to hold: the truth, if one model of the library is."""
+    values = material.parameters
+    if material.model in ("oren_nayar", "oren_nayar_qualitative") and values.get("interreflection", True):
+        return _as(material, "oren_nayar_gaussian", rho=values["rho"], sigma=values["sigma"])
+    if material.model == "ward_half_vector":
+        return _as(material, "ward", **values)
+    return material
+
+
+def _tables(
+    planned: Material, material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float]
+) -> Iterator[Representation]:
+    """Planned tables, one of them without its parts, too, and the two grids that anybody would begin with."""
+    table = "table of the fit" if material.model in _FITTED else "table"
+    for tolerance in dict.fromkeys(tolerances):
+        percent = f"{100.0 * tolerance:g}"
+        key = f"table-{percent.replace('.', '-')}"
+        layout = replace(plan(planned, wavelength_nm, tolerance), material=material)
+        yield _table(layout, key, f"{table}, planned for {percent} %")
+        if layout.spectra is not None and tolerance == _UNFACTORED:
+            yield _table(replace(layout, spectra=None), f"{key}-unfactored", f"the {percent} % table, spectra whole")
+    for halves, key, title in (
+        (False, "table-even", "even angles"),
+        (True, "table-halves", "half vectors"),
+    ):
+        layout = Layout(material, _plain_grid(material, halves=halves), wavelength_nm)
+        yield _table(layout, key, f"{table}, {title}, linear")
+
+
+def _table(layout: Layout, key: str, title: str) -> Representation:
+    values = np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
+    return of_table(Table.of(layout, values), key, title)
+
+
+def of_table(table: Table, key: str, title: str) -> Representation:
+    """A table that is in memory, at its own wavelengths."""
+    count = 1 if table.wavelength_nm is None else table.wavelength_nm.size
+
+    def evaluate(wi: Floats, wr: Floats) -> Floats:
+        return table.lookup_vectors(wi, wr).reshape(len(wi), count)
+
+    arrays = (table.values, *table.axes_deg.values(), table.spectra, table.uniform)
+    size = sum(each.nbytes for each in arrays if each is not None)
+    return Representation(key, title, "table", "Table.lookup_vectors", evaluate, size)
+
+
+def _plain_grid(material: Material, *, halves: bool) -> Grid:
+    """A grid that nobody planned: every 5 degrees (10 of an anisotropic surface), or half vectors crowded at the peak.
+
+    The half vectors are those of the MERL database: theta_h as the square of an even axis.
+    """
+    spec, anisotropic = material.spec, material.anisotropic
+    turn = 90.0 if spec.lobe_axes is not None else 360.0
+    if halves:
+        theta_h = 90.0 * np.linspace(0.0, 1.0, 31) ** 2
+        if anisotropic:
+            nodes = theta_h, np.linspace(0.0, turn, 7), np.linspace(0.0, 90.0, 10), np.linspace(0.0, 180.0, 19)
+            return Grid(dict(zip(ANISOTROPIC_HALF_DIFFERENCE_AXES, nodes, strict=True)))
+        quarter = np.linspace(0.0, 90.0, 19)
+        return Grid(dict(zip(HALF_DIFFERENCE_AXES, (theta_h, quarter, quarter), strict=True)))
+    end = POLE_END_DEG if spec.grazing_pole else 90.0
+    if anisotropic:
+        theta = np.linspace(0.0, end, 10)
+        nodes = theta, np.linspace(0.0, turn, round(turn / 10.0) + 1), theta, np.linspace(0.0, 360.0, 37)
+        return Grid(dict(zip(ANISOTROPIC_AXES, nodes, strict=True)))
+    theta = np.linspace(0.0, end, 19)
+    return Grid(dict(zip(ISOTROPIC_AXES, (theta, theta, np.linspace(0.0, 180.0, 37)), strict=True)))
