@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Literal, NamedTuple
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.choose import Candidate, Chosen, Decision, Left
@@ -103,7 +104,7 @@ def describe(
             title=form.title,
             kind=form.kind,
             python=form.python,
-            dtype="float32" if str(form.dtype.__name__) == "float32" else "float64",
+            dtype="float32" if form.dtype is np.float32 else "float64",
             wavelengths_nm=None if at is None else at.tolist(),
             bytes=form.bytes,
             ns=_short(price.ns),
@@ -136,7 +137,7 @@ def describe(
 
 def _reason(choice: Option, cheaper: Option | None, decision: Decision) -> str:
     """Why this one, and where it costs more than a third of the truth, why."""
-    said = "the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.p99:.2g}"
+    said = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.p99:.2g}"
     if cheaper is None:
         said += "; nothing is cheaper"
     else:

@@ -26,6 +26,8 @@ DARK = 1e-3  # exposed radiance: relative errors of what is darker are relative 
 TIGHTER, ROUNDS = 0.8, 4  # what the tolerance of single materials is multiplied with, and how often it is tried
 FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # integrals over facets are known to 1e-6
 
+_ROWS = 512  # of products at a time: larger ones BLAS gives to threads, which wait for each other on a busy machine
+
 
 class InfeasibleError(ValueError):
     """No choice keeps to the tolerance; str() is one sentence."""
@@ -116,11 +118,19 @@ def candidates(
 def _between(form: Representation, few: Array, wavelength_nm: Array) -> Representation:
     """A form at a few wavelengths, interpolated to all of them."""
     weights = np.stack([np.interp(wavelength_nm, few, one) for one in np.eye(few.size)]).astype(form.dtype)
+
+    def evaluate(wi: Floats, wr: Floats) -> Floats:
+        values = form.evaluate(wi, wr)
+        whole = np.empty((len(values), wavelength_nm.size), values.dtype)
+        for start in range(0, len(values), _ROWS):
+            np.matmul(values[start : start + _ROWS], weights, out=whole[start : start + _ROWS])
+        return whole
+
     return replace(
         form,
         key=f"{form.key}-{few.size}-wavelengths",
         title=f"{form.title}, {few.size} wavelengths",
-        evaluate=lambda wi, wr: form.evaluate(wi, wr) @ weights,
+        evaluate=evaluate,
         bytes=form.bytes + weights.nbytes,
     )
 
