@@ -141,7 +141,9 @@ def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> l
     for candidate, time in zip(forms, times, strict=True):
         form = candidate.form
         ns = time.quartiles_ns[1] * form.evaluate(wi[:1].astype(form.dtype), wr[:1].astype(form.dtype)).size
-        prices.append(Price(ns, {"time": ns, "bytes": float(form.bytes), "both": ns * form.bytes}[weigh]))
+        # of the truth in the same round: what slows the machine down slows both down
+        share = float(np.median(time.seconds / times[0].seconds))
+        prices.append(Price(ns, {"time": share, "bytes": float(form.bytes), "both": share * form.bytes}[weigh]))
     return prices
 
 
