@@ -237,6 +237,16 @@ def pick(costs: Sequence[float], error: Callable[[int], float], tolerance: float
     return Pick(chosen, min(cheaper, key=lambda index: errors[index], default=None))
 
 
+def limit(scene: Scene) -> tuple[float, str]:
+    """The tolerance of a scene and its unit; InfeasibleError if it is finer than the truth is known."""
+    stated = scene.tolerance
+    tolerance, unit = (stated.relative, "relative") if stated.relative is not None else (stated.ciede2000, "CIEDE2000")
+    assert tolerance is not None
+    if tolerance < FINEST[unit]:
+        raise InfeasibleError(f"tolerance: {tolerance:g} ({unit}) is finer than the truth is known, {FINEST[unit]:g}")
+    return tolerance, unit
+
+
 def choose(
     planned: Seen,
     checked: Seen,
@@ -269,12 +279,7 @@ def choose(
     InfeasibleError
         If the tolerance is finer than the truth is known, or the whole breaks it in the end.
     """
-    stated = planned.scene.tolerance
-    tolerance, unit = (stated.relative, "relative") if stated.relative is not None else (stated.ciede2000, "CIEDE2000")
-    assert tolerance is not None
-    finest = FINEST[unit]
-    if tolerance < finest:
-        raise InfeasibleError(f"tolerance: {tolerance:g} ({unit}) is finer than the truth is known, {finest:g}")
+    tolerance, unit = limit(planned.scene)
 
     @functools.cache
     def alone(name: str, index: int) -> Left:

@@ -13,7 +13,7 @@ import numpy as np
 
 from brdfdb import cost, picture
 from brdfdb.choices import Choice, Price, Weigh, describe
-from brdfdb.choose import Candidate, Chosen, Seen, candidates, choose
+from brdfdb.choose import Candidate, Chosen, Seen, candidates, choose, limit
 from brdfdb.gather import View, gather
 from brdfdb.render import reflectors
 from brdfdb.scene import Scene
@@ -80,6 +80,7 @@ def _run(
     store: Path | None,
     tolerances: Sequence[float] | None,
 ) -> Choice:
+    limit(scene)  # infeasible before minutes of work
     # another resolution puts every ray at another place
     view, denser = gather(scene, width), gather(scene, width + width // 2 + 1)
     materials = reflectors(scene)
