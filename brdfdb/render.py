@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -196,6 +196,14 @@ def render(
         lists.append(radiance(scene, points, known[points.material], replaced.get(points.material)))
         if progress is not None:
             progress()
+    return composed(scene, view, lists, known)
+
+
+def composed(
+    scene: Scene, view: View, lists: Sequence[Floats], materials: Mapping[str, Reflector]
+) -> NDArray[np.float64]:
+    """The picture (height, width, L) of radiances of each list of points, to which mirrors add what they show."""
+    known, lists = materials, [values.copy() for values in lists]
     pixels = np.zeros((view.height * view.width, len(scene.wavelengths_nm)))
     free = np.full(len(pixels), float(view.samples))
     # what mirrors show comes after them in the list

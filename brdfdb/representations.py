@@ -59,6 +59,8 @@ class Representation:
         Of the numbers that an evaluation reads: parameters and spectra, or the nodes of a table.
     dtype : float32 or float64
         Of the vectors to give it.
+    layout : Layout or None
+        Of a table that was tabulated here: what it takes to do so again.
     """
 
     key: str
@@ -68,6 +70,7 @@ class Representation:
     evaluate: Evaluate
     bytes: int
     dtype: type[np.floating[Any]] = np.float64
+    layout: Layout | None = None
 
 
 def representations(
@@ -350,7 +353,7 @@ def _tables(
 
 def _table(layout: Layout, key: str, title: str) -> Representation:
     values = np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
-    return of_table(Table.of(layout, values), key, title)
+    return replace(of_table(Table.of(layout, values), key, title), layout=layout)
 
 
 def of_table(table: Table, key: str, title: str) -> Representation:

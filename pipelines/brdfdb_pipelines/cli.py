@@ -140,6 +140,28 @@ def _parser() -> argparse.ArgumentParser:
         help="of a planned table, more than once for more of them (default: 0.1, 0.01 and, of grey materials, 0.001)",
     )
 
+    choose = command(
+        "choose", _choose, "Choose the cheapest form of each material that a scene cannot tell from the truth."
+    )
+    choose.add_argument("scene", metavar="SCENE", help="a .toml file, or a scene that comes with the program")
+    choose.add_argument(
+        "--out", type=Path, default=Path("brdf-choice"), metavar="DIR", help="directory (default: %(default)s)"
+    )
+    choose.add_argument(
+        "--width",
+        type=_positive,
+        default=128,
+        metavar="N",
+        help="pixels where forms are compared; the whole is checked at half as many more (default: %(default)s)",
+    )
+    choose.add_argument(
+        "--weigh",
+        choices=("time", "bytes", "both"),
+        default="time",
+        help="what is to be small; both is their product (default: %(default)s)",
+    )
+    choose.add_argument("--build", type=Path, metavar="STORE", help="publish the chosen tables in this store")
+
     text = "Write slices of tables as image files."
     # a command a format: argparse takes no NAME after an option that follows another positional argument
     formats = commands.add_parser("export", help=text, description=text).add_subparsers(required=True, metavar="FORMAT")
@@ -301,6 +323,13 @@ def _chart(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import chart
 
     chart.run(options.names, options.out, store=options.store, recipe_file=options.recipe, tolerances=options.tolerance)
+    return 0
+
+
+def _choose(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import choose
+
+    choose.run(options.scene, options.out, width=options.width, weigh=options.weigh, store=options.build)
     return 0
 
 

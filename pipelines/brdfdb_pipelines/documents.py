@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from brdfdb.audit import AuditReport
 from brdfdb.chart import Charts
+from brdfdb.choices import Choice
 from brdfdb.family import FamilyRecord
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
@@ -23,6 +24,7 @@ from brdfdb_pipelines.recipe import Recipe
 SCHEMAS: dict[str, type[BaseModel]] = {
     "audit": AuditReport,
     "chart": Charts,
+    "choice": Choice,
     "family": FamilyRecord,
     "material": Material,
     "recipe": Recipe,

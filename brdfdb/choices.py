@@ -1,0 +1,156 @@
+"""What a choice for a scene says: the types of choice.json, and reasons in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from brdfdb.choose import Candidate, Chosen, Decision, Left
+from brdfdb.representations import Kind
+from brdfdb.scene import Scene, Tolerance
+
+THIRD = 1.0 / 3.0  # of the truth: what a choice is expected to cost at most
+
+Weigh = Literal["time", "bytes", "both"]
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class Price(NamedTuple):
+    """Of a candidate: nanoseconds a pair of directions, all wavelengths of the scene; and what is weighed of it."""
+
+    ns: float
+    cost: float
+
+
+class Residue(BaseModel):
+    """Error over the pixels that show a material, in the unit of the tolerance."""
+
+    model_config = _STRICT
+
+    p99: float = Field(description="99th percentile: what keeps to the tolerance")
+    most: float = Field(description="largest")
+
+
+class Option(BaseModel):
+    """A form of a material, with all others of the scene at their truth."""
+
+    model_config = _STRICT
+
+    key: str
+    title: str
+    kind: Kind
+    python: str = Field(description="what it is called in Python")
+    dtype: Literal["float64", "float32"]
+    wavelengths_nm: list[float] | None = Field(description="that it is evaluated at; null of a grey form")
+    bytes: int = Field(description="of the numbers that an evaluation reads")
+    ns: float = Field(description="of a pair of directions at all wavelengths of the scene, on one thread")
+    share: float = Field(description="of what the truth costs, as it is weighed")
+    error: Residue
+
+
+class Material(BaseModel):
+    """What is chosen for a material, and why."""
+
+    model_config = _STRICT
+
+    material: str
+    title: str
+    pixels: int = Field(description="that show it, directly or in a mirror")
+    truth: Option
+    choice: Option
+    next_cheaper: Option | None = Field(description="the most accurate of what is cheaper; null without any")
+    whole: Residue = Field(description="of the choices all at once, sampled more densely")
+    reason: str
+    revision: str | None = Field(description="of the table in the store, if one was built")
+
+
+class Choice(BaseModel):
+    """The cheapest form of each material that a scene cannot tell from the truth."""
+
+    model_config = _STRICT
+
+    brdfdb: str
+    when: datetime
+    machine: str
+    scene: str
+    tolerance: Tolerance
+    allowed: float = Field(description="share of the tolerance that a material may use by itself")
+    weigh: Weigh
+    planned: tuple[int, int] = Field(description="pixels across and down where candidates are compared")
+    checked: tuple[int, int] = Field(description="where the whole is held to the tolerance")
+    materials: list[Material]
+
+
+def describe(
+    scene: Scene,
+    chosen: Chosen,
+    offered: Mapping[str, Sequence[Candidate]],
+    prices: Mapping[str, Sequence[Price]],
+    pixels: Mapping[str, int],
+    revisions: Mapping[str, str],
+) -> list[Material]:
+    """What is chosen for each material of a scene: figures to three digits, and reasons."""
+
+    def option(name: str, index: int, left: Left) -> Option:
+        candidate, price = offered[name][index], prices[name][index]
+        form, at = candidate.form, candidate.wavelength_nm
+        return Option(
+            key=form.key,
+            title=form.title,
+            kind=form.kind,
+            python=form.python,
+            dtype="float32" if form.dtype is np.float32 else "float64",
+            wavelengths_nm=None if at is None else at.tolist(),
+            bytes=form.bytes,
+            ns=_short(price.ns),
+            share=_short(price.cost / prices[name][0].cost),
+            error=_residue(left),
+        )
+
+    found = []
+    for name, decision in chosen.decisions.items():
+        truth = option(name, 0, Left(0.0, 0.0))
+        choice = option(name, decision.pick.chosen, decision.left)
+        cheaper = None
+        if decision.pick.cheaper is not None and decision.cheaper_left is not None:
+            cheaper = option(name, decision.pick.cheaper, decision.cheaper_left)
+        found.append(
+            Material(
+                material=name,
+                title=scene.materials[name].title,
+                pixels=pixels[name],
+                truth=truth,
+                choice=choice,
+                next_cheaper=cheaper,
+                whole=_residue(decision.whole),
+                reason=_reason(choice, cheaper, decision),
+                revision=revisions.get(name),
+            )
+        )
+    return found
+
+
+def _reason(choice: Option, cheaper: Option | None, decision: Decision) -> str:
+    """Why this one, and where it costs more than a third of the truth, why."""
+    said = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.p99:.2g}"
+    if cheaper is None:
+        said += "; nothing is cheaper"
+    else:
+        said += f"; the best of what is cheaper, {cheaper.title}, would leave {cheaper.error.p99:.2g}"
+    if choice.share > THIRD:
+        why = "there is nothing cheaper" if cheaper is None else "all that is cheaper breaks the tolerance"
+        said += f"; more than a third of the truth's cost, as {why}"
+    return said
+
+
+def _residue(left: Left) -> Residue:
+    return Residue(p99=_short(left.p99), most=_short(left.most))
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.3g}")

@@ -1,0 +1,216 @@
+"""Choosing for a scene: times the forms of its materials, writes choice.json, pictures and tables, prints reasons."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from brdfdb import cost, picture
+from brdfdb.choices import Choice, Price, Weigh, describe
+from brdfdb.choose import Candidate, Chosen, Seen, candidates, choose, limit
+from brdfdb.gather import View, gather
+from brdfdb.render import reflectors
+from brdfdb.scene import Scene
+from brdfdb.shapes import Array
+from brdfdb.staging import publish_dataset
+from brdfdb.tabulate import tabulate
+from brdfdb_pipelines import terminal
+from brdfdb_pipelines.scene import SceneError, load
+
+TIMED = 20_000  # pairs of directions of a material, drawn from those that the scene uses
+SEED = 1992
+ROUNDS = 7  # of timing
+
+
+def run(
+    name: str,
+    out: Path,
+    *,
+    width: int,
+    weigh: Weigh = "time",
+    store: Path | None = None,
+    tolerances: Sequence[float] | None = None,
+) -> Choice:
+    """Choose for a scene; write ``choice.json``, ``NAME.png``, ``NAME-truth.exr`` and ``NAME-choice.exr``.
+
+    Parameters
+    ----------
+    name : str
+        A scene by its file or name.
+    out : Path
+        Directory to write to; made if it is not there.
+    width : int
+        Pixels across where candidates are compared; the whole is checked with half as many more.
+    weigh : str
+        What is to be small: "time", "bytes", or "both", which is their product.
+    store : Path, optional
+        Where chosen tables are published, under the names of their materials.
+    tolerances : sequence of float, optional
+        Of planned tables: see `brdfdb.representations`.
+
+    Returns
+    -------
+    Choice
+        What was written.
+
+    Raises
+    ------
+    SceneError
+        If the scene is none or cannot be looked at, or its tolerance is infeasible.
+    """
+    scene = load(name)
+    try:
+        return _run(scene, name, out, width, weigh, store, tolerances)
+    except ValueError as error:
+        raise SceneError(f"{name}: {error}") from None
+
+
+def _run(
+    scene: Scene,
+    name: str,
+    out: Path,
+    width: int,
+    weigh: Weigh,
+    store: Path | None,
+    tolerances: Sequence[float] | None,
+) -> Choice:
+    limit(scene)  # infeasible before minutes of work
+    # another resolution puts every ray at another place
+    view, denser = gather(scene, width), gather(scene, width + width // 2 + 1)
+    materials = reflectors(scene)
+    with terminal.progress(counted=False) as bar:
+        task = bar.add_task("tabulating, timing", total=2 * len(materials))
+        offered, prices = {}, {}
+        for key, reflector in materials.items():
+            offered[key] = candidates(reflector.material, reflector.wavelength_nm, tolerances)
+            bar.advance(task)
+            prices[key] = _prices(offered[key], *_pairs(view, key), weigh)
+            bar.advance(task)
+        task = bar.add_task("choosing", total=len(materials) + 1)
+        truths = {key: forms[0] for key, forms in offered.items()}
+        planned, checked = (Seen(scene, each, truths, materials) for each in (view, denser))
+        costs = {key: [price.cost for price in each] for key, each in prices.items()}
+        chosen = choose(planned, checked, offered, costs, tick=lambda: bar.advance(task))
+    revisions = _built(store, offered, chosen)
+    choice = Choice(
+        brdfdb=version("brdfdb"),
+        when=datetime.now(UTC),
+        machine=f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}",
+        scene=Path(name).stem,
+        tolerance=scene.tolerance,
+        allowed=chosen.allowed,
+        weigh=weigh,
+        planned=(view.width, view.height),
+        checked=(denser.width, denser.height),
+        materials=describe(
+            scene, chosen, offered, prices, {key: planned.pixels(key).size for key in offered}, revisions
+        ),
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "choice.json").write_text(choice.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    _draw(out / Path(name).stem, checked, offered, chosen)
+    _print(choice)
+    print(f"{out}: choice.json, {choice.scene}.png, {choice.scene}-truth.exr and {choice.scene}-choice.exr")
+    return choice
+
+
+def _pairs(view: View, material: str) -> tuple[Array, Array]:
+    """Pairs of directions that the scene evaluates a material at, mixed; at least one."""
+    pairs = [
+        (points.wi[light, point], points.wr[point])
+        for points in view.points
+        if points.material == material
+        for light, point in [np.nonzero(points.irradiance * (points.wr[:, 2] > 0.0))]
+    ]
+    wi, wr = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    if not len(wi):  # in shadow
+        wi = wr = np.array([[0.0, 0.0, 1.0]])
+    mixed = np.random.default_rng(SEED).permutation(len(wi))[:TIMED]
+    return wi[mixed], wr[mixed]
+
+
+def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> list[Price]:
+    """What forms cost; the wavelengths of all are those of the scene."""
+    times = cost.times([each.form for each in forms], wi, wr, most=TIMED, rounds=ROUNDS)
+    prices = []
+    for candidate, time in zip(forms, times, strict=True):
+        form = candidate.form
+        ns = time.quartiles_ns[1] * form.evaluate(wi[:1].astype(form.dtype), wr[:1].astype(form.dtype)).size
+        # of the truth in the same round: what slows the machine down slows both down
+        share = float(np.median(time.seconds / times[0].seconds))
+        prices.append(Price(ns, {"time": share, "bytes": float(form.bytes), "both": share * form.bytes}[weigh]))
+    return prices
+
+
+def _built(store: Path | None, offered: Mapping[str, Sequence[Candidate]], chosen: Chosen) -> dict[str, str]:
+    """Revisions of the chosen tables, published in a store, by material."""
+    revisions: dict[str, str] = {}
+    for key, decision in chosen.decisions.items():
+        layout = offered[key][decision.pick.chosen].form.layout
+        if store is not None and layout is not None:
+            revisions[key], _ = publish_dataset(store, key, tabulate(layout))
+    return revisions
+
+
+def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Chosen) -> None:
+    """The comparison as a picture of four panels; truth and choice as spectral EXR."""
+    from matplotlib.figure import Figure
+
+    picks = {key: decision.pick for key, decision in chosen.decisions.items()}
+    choice = seen.picture({key: offered[key][one.chosen] for key, one in picks.items()})
+    cheaper = seen.picture(
+        {key: offered[key][one.chosen if one.cheaper is None else one.cheaper] for key, one in picks.items()}
+    )
+    for image, suffix in ((seen.truth, "truth"), (choice, "choice")):
+        picture.write_exr(stem.with_name(f"{stem.name}-{suffix}.exr"), seen.scene, image)
+    height, width = seen.truth.shape[:2]
+    canvas = Figure(figsize=(10.0, 0.6 + 10.0 * height / width), layout="constrained")
+    axes = canvas.subplots(2, 2)
+    for panel, image, title in (
+        (axes[0, 0], seen.truth, "truth"),
+        (axes[0, 1], choice, "choice"),
+        (axes[1, 1], cheaper, "next cheaper"),
+    ):
+        panel.imshow(picture.srgb(seen.scene, image))
+        panel.set_title(title)
+    shown = axes[1, 0].imshow(seen.differences(choice), vmin=0.0, cmap="viridis")
+    unit = "relative" if seen.scene.tolerance.relative is not None else "CIEDE2000"
+    axes[1, 0].set_title(f"difference of the choice, {unit}")
+    canvas.colorbar(shown, ax=axes[1, 0], shrink=0.8)
+    for panel in axes.flat:
+        panel.set_axis_off()
+    canvas.savefig(stem.with_name(f"{stem.name}.png"), dpi=110, metadata={"Software": None})
+
+
+def _print(choice: Choice) -> None:
+    """The choices as a table, and reasons."""
+    numbers = ("p99", "whole", "maximum", "ns", "bytes", "share of the truth")
+    rows = [
+        (
+            one.material,
+            one.choice.title,
+            f"{one.choice.error.p99:.2g}",
+            f"{one.whole.p99:.2g}",
+            f"{one.whole.most:.2g}",
+            f"{one.choice.ns:.3g}",
+            terminal.size(one.choice.bytes),
+            f"{one.choice.share:.2g}",
+        )
+        for one in choice.materials
+    ]
+    said = choice.tolerance
+    tolerance = f"{said.relative:g} relative" if said.relative is not None else f"CIEDE2000 {said.ciede2000:g}"
+    title = f"{choice.scene}: within {tolerance} at 99 of 100 pixels of each material"
+    terminal.print_table(title, ("material", "choice", *numbers), rows, numbers=numbers)
+    for one in choice.materials:
+        print(f"  {one.material}: {one.choice.title} {one.reason}")
+        if one.revision is not None:
+            print(f"    {one.revision} in the store")
+    if choice.allowed < 1.0:
+        print(f"  The whole keeps to the tolerance with each material within {choice.allowed:.2g} of it by itself.")

@@ -1,0 +1,137 @@
+"""Choosing from the command line: what is written, the tables that are built, and one sentence for what is wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import OpenEXR
+import pytest
+from matplotlib.image import imread
+
+import brdfdb
+from brdfdb.choices import Choice
+from brdfdb.models import oren_nayar_gaussian_vectors
+from brdfdb_pipelines import choose, cli
+from brdfdb_pipelines.documents import schema
+
+TABLE_OFF = 1.5e-4  # 1.21e-4 measured, of a table planned for 1e-3
+
+SCENE = """\
+lights = [{ direction = [0, -1, 0.5] }]
+camera = { position = [0, -5, 0], height = 2.5 }
+wavelengths_nm = [420, 440, 460, 480, 500, 520, 540, 560, 580, 600, 620, 640, 660, 680]
+tolerance = { ciede2000 = 0.5 }
+[[objects]]
+name = "ball"
+material = "rendered-sphere-40deg"
+shape = { kind = "sphere", radius = 1 }
+"""
+
+
+def written(tmp_path: Path, old: str = "", new: str = "") -> str:
+    assert old in SCENE
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace(old, new, 1), encoding="utf-8")
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Choice, Path]:
+    """A sphere that the fit is 1.2 off: facets take a thousand times as long as a table."""
+    folder = tmp_path_factory.mktemp("choose")
+    choice = choose.run(written(folder), folder / "out", width=48, store=folder / "store", tolerances=[0.001])
+    return choice, folder
+
+
+def test_what_is_written_keeps_to_the_schema_and_says_what_was_returned(done: tuple[Choice, Path]) -> None:
+    choice, folder = done
+    text = (folder / "out" / "choice.json").read_text(encoding="utf-8")
+    jsonschema.validate(json.loads(text), json.loads(schema("choice")))
+    assert Choice.model_validate_json(text) == choice
+
+
+def test_the_choice_costs_less_than_a_third_of_the_truth_and_what_is_cheaper_breaks_the_tolerance(
+    done: tuple[Choice, Path],
+) -> None:
+    (one,) = done[0].materials
+    assert one.truth.key == "facets"
+    assert one.choice.kind == "table"
+    assert one.choice.share <= 1 / 3
+    assert one.choice.error.p99 <= done[0].allowed * 0.5
+    assert one.whole.p99 <= 0.5
+    assert one.next_cheaper is not None
+    assert one.next_cheaper.error.p99 > done[0].allowed * 0.5
+    assert one.next_cheaper.title in one.reason
+
+
+def test_the_chosen_table_is_built(done: tuple[Choice, Path]) -> None:
+    choice, folder = done
+    (one,) = choice.materials
+    store = brdfdb.open(folder / "store")
+    assert one.revision == "r000001"
+    assert store.head(one.material) == one.revision
+    store.verify(one.material)
+    wi, wr = np.array([[0.6, 0.0, 0.8]]), np.array([[0.0, 0.6, 0.8]])
+    truth = oren_nayar_gaussian_vectors(wi, wr, rho=0.9, sigma=np.radians(40.0))
+    np.testing.assert_allclose(store[one.material].lookup_vectors(wi, wr), truth, rtol=TABLE_OFF)
+
+
+def test_truth_and_choice_are_pictures_that_differ_by_little(done: tuple[Choice, Path]) -> None:
+    choice, folder = done
+    images = []
+    for name in ("truth", "choice"):
+        channels = OpenEXR.File(str(folder / "out" / f"scene-{name}.exr"), separate_channels=True).channels()
+        images.append(channels["S0.560,0nm"].pixels)
+    truth, chosen = images
+    assert truth.shape == (choice.checked[1], choice.checked[0])
+    assert truth.max() > 0.3
+    assert not np.array_equal(truth, chosen)
+    # 0.5 in CIEDE2000 is 1.3 % of luminance at a lightness of 60; the rest is the limb
+    assert np.percentile(np.abs(chosen - truth)[truth > 0.1] / truth[truth > 0.1], 95.0) < 0.02
+
+
+def test_the_comparison_is_a_picture_of_four_panels(done: tuple[Choice, Path]) -> None:
+    image = imread(done[1] / "out" / "scene.png")
+    assert image.shape[1] == 1100
+    top, bottom = np.array_split(image[..., :3], 2)
+    for half in (*np.array_split(top, 2, axis=1), *np.array_split(bottom, 2, axis=1)):
+        assert np.std(half) > 0.05
+
+
+def test_bytes_can_be_weighed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    choice = choose.run(written(tmp_path), tmp_path / "out", width=16, weigh="bytes", tolerances=[])
+    (one,) = choice.materials
+    # 16 bytes, as Lambert, which breaks the tolerance: the facets themselves, or eq. 49 for their bounce
+    assert one.choice.bytes == 16
+    assert one.choice.share == 1.0
+    assert "more than a third of the truth's cost" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("{ ciede2000 = 0.5 }", "{ relative = 1e-9 }", "tolerance: 1e-09 (relative) is finer than the truth is known"),
+        ('"rendered-sphere-40deg"', '"no-such"', "objects.ball.material: 'no-such' is unknown"),
+        ("[0, -1, 0.5]", "[0, 1, 0]", "lights.0: falls on nothing that is seen"),
+        ('kind = "sphere", radius = 1', 'kind = "recorded", file = "none.exr"', "none.exr"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(
+    old: str, new: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["choose", written(tmp_path, old, new), "--width", "16", "--out", str(tmp_path / "out")]) == 2
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert said in last
+    assert "Traceback" not in last
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_exr_without_directions_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"R": np.zeros((2, 2), dtype=np.float32)}).write(str(tmp_path / "flat.exr"))
+    name = written(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.exr"')
+    assert cli.main(["choose", name, "--out", str(tmp_path / "out")]) == 2
+    assert "flat.exr" in capsys.readouterr().err.strip().splitlines()[-1]

@@ -1,0 +1,192 @@
+"""The choice for a scene: costs decide among what keeps to the tolerance, and the whole is held to it elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brdfdb.choose import ROUNDS, TIGHTER, Candidate, InfeasibleError, Left, Pick, Seen, candidates, choose, pick
+from brdfdb.cost import CHEAPER
+from brdfdb.gather import gather
+from brdfdb.materials import presets
+from brdfdb.render import reflectors, render
+from brdfdb.scene import Scene
+from brdfdb_pipelines.scene import load, shipped
+
+COARSE = [float(wavelength) for wavelength in range(420, 681, 20)]
+WIDTH, DENSER = 48, 73
+
+# Made-up costs of a wavelength: more for what is nearer the truth, so that there is always something cheaper
+COSTS = {"exact": 100.0, "printed": 60.0, "closed form": 50.0, "approximation": 10.0, "table": 5.0}
+
+
+def made_up_costs(offered: dict[str, list[Candidate]]) -> dict[str, list[float]]:
+    return {
+        name: [COSTS[each.form.kind] * (1 if each.wavelength_nm is None else each.wavelength_nm.size) for each in forms]
+        for name, forms in offered.items()
+    }
+
+
+def scene_of(tolerance: dict[str, float], *materials: str) -> Scene:
+    """Spheres side by side, with a light from the left and ambient light."""
+    places = [2.2 * number for number in range(len(materials))]
+    return Scene.model_validate(
+        {
+            "ambient": 0.05,
+            "lights": [{"direction": (-1.0, -1.0, 0.5)}],
+            "camera": {
+                "position": (places[-1] / 2, -6.0, 0.0),
+                "target": (places[-1] / 2, 0.0, 0.0),
+                "height": 2.3,
+                "aspect": 1.0 * len(materials),
+            },
+            "wavelengths_nm": COARSE,
+            "tolerance": tolerance,
+            "objects": [
+                {"name": name, "material": name, "shape": {"kind": "sphere", "radius": 1, "position": (x, 0, 0)}}
+                for name, x in zip(materials, places, strict=True)
+            ],
+        }
+    )
+
+
+def offered_and_seen(scene: Scene, *widths: int) -> tuple[dict[str, list[Candidate]], list[Seen]]:
+    """Candidates without tables, and the scene at some widths."""
+    materials = reflectors(scene)
+    offered = {name: candidates(each.material, each.wavelength_nm, ()) for name, each in materials.items()}
+    truths = {name: forms[0] for name, forms in offered.items()}
+    return offered, [Seen(scene, gather(scene, width), truths, materials) for width in widths]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "expected"),
+    [
+        pytest.param(0.0, Pick(0, 1), id="only-the-truth-keeps"),
+        pytest.param(0.1, Pick(1, 2), id="the-cheapest-that-keeps"),
+        pytest.param(0.3, Pick(2, 4), id="of-two-alike-the-more-accurate"),
+        pytest.param(9.0, Pick(4, None), id="nothing-is-cheaper"),
+    ],
+)
+def test_the_cheapest_that_keeps_to_the_tolerance_is_picked(tolerance: float, expected: Pick) -> None:
+    costs = [100.0, 50.0, 10.0 * (1.0 + CHEAPER) / 2.0, 10.0, 1.0]  # the third and fourth cost about the same
+    errors = [0.0, 0.1, 0.2, 0.3, 1.0]
+    assert pick(costs, errors.__getitem__, tolerance) == expected
+
+
+def test_errors_of_what_costs_clearly_more_are_not_asked_for() -> None:
+    asked = []
+
+    def error(index: int) -> float:
+        asked.append(index)
+        return 0.0
+
+    assert pick([100.0, 1.0, 2.0], error, 0.1) == Pick(1, None)
+    assert asked == [1]
+
+
+def test_what_is_cheaper_than_the_cheapest_that_keeps_breaks_the_tolerance() -> None:
+    rng = np.random.default_rng(1994)
+    for _ in range(200):
+        costs, errors = rng.random(8), rng.random(8)
+        errors[0] = 0.0
+        found = pick(costs.tolist(), errors.tolist().__getitem__, 0.5)
+        assert errors[found.chosen] <= 0.5
+        if found.cheaper is not None:
+            assert errors[found.cheaper] > 0.5
+            assert costs[found.cheaper] < costs[found.chosen]
+        assert costs[found.chosen] <= CHEAPER * costs[errors <= 0.5].min()
+
+
+def test_a_spectrum_at_a_few_wavelengths_is_joined_by_straight_lines() -> None:
+    material = presets()["scene-copper-sphere"]
+    wavelength = np.array(COARSE)
+    few = next(each for each in candidates(material, wavelength, ()) if each.form.key == "sum-3-wavelengths")
+    assert few.wavelength_nm is not None
+    wi, wr = np.array([[0.6, 0.0, 0.8]]), np.array([[-0.6, 0.0, 0.8]])
+    whole = candidates(material, few.wavelength_nm, ())[0].brdf(wi, wr)
+    expected = np.interp(wavelength, few.wavelength_nm, whole[0])
+    np.testing.assert_allclose(few.brdf(wi, wr)[0], expected, rtol=1e-12)
+
+
+def test_a_picture_of_truths_is_that_of_the_models() -> None:
+    scene = scene_of({"relative": 0.1}, "scene-copper-sphere")
+    _, (seen,) = offered_and_seen(scene, 12)
+    np.testing.assert_array_equal(seen.truth, render(scene, seen.view))
+    assert not seen.differences(seen.truth).any()
+
+
+def test_only_the_pixels_of_a_material_count_for_it() -> None:
+    scene = scene_of({"ciede2000": 1.0}, "rendered-sphere-0deg", "rendered-sphere-40deg")
+    offered, (seen,) = offered_and_seen(scene, 24)
+    flat = next(each for each in offered["rendered-sphere-40deg"] if each.form.key == "lambert")
+    picture = seen.picture({"rendered-sphere-40deg": flat})
+    assert seen.left("rendered-sphere-0deg", picture) == Left(0.0, 0.0)
+    changed = np.flatnonzero(seen.differences(picture))
+    assert changed.size
+    assert set(changed) <= set(seen.pixels("rendered-sphere-40deg"))
+
+
+def test_relative_errors_are_those_of_the_worst_wavelength() -> None:
+    scene = scene_of({"relative": 0.1}, "rendered-sphere-0deg")
+    _, (seen,) = offered_and_seen(scene, 8)
+    off = seen.truth.copy()
+    off[..., 3] *= 1.25
+    off[..., 5] *= 0.9
+    at = seen.pixels("rendered-sphere-0deg")
+    np.testing.assert_allclose(seen.differences(off).ravel()[at], 0.25, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_the_choice_for_a_shipped_scene_keeps_its_tolerance_where_it_was_not_planned(name: str) -> None:
+    scene = load(name).model_copy(update={"wavelengths_nm": COARSE})
+    offered, (planned, checked) = offered_and_seen(scene, WIDTH, DENSER)
+    costs = made_up_costs(offered)
+    chosen = choose(planned, checked, offered, costs)
+    tolerance = scene.tolerance.ciede2000
+    assert tolerance is not None
+    picture = checked.picture({key: offered[key][one.pick.chosen] for key, one in chosen.decisions.items()})
+    for key, one in chosen.decisions.items():
+        assert one.left.p99 <= chosen.allowed * tolerance
+        assert checked.left(key, picture).p99 <= tolerance
+        cheapest = min(costs[key])
+        if one.pick.cheaper is None:
+            assert costs[key][one.pick.chosen] <= CHEAPER * cheapest
+        else:
+            assert one.cheaper_left is not None
+            assert one.cheaper_left.p99 > chosen.allowed * tolerance
+            broken = planned.picture({key: offered[key][one.pick.cheaper]})
+            assert planned.left(key, broken).p99 > chosen.allowed * tolerance
+
+
+def test_where_the_whole_breaks_the_tolerance_single_materials_are_allowed_less() -> None:
+    # three pixels across, the fit is 0.58 off, but 1.2 where it was not looked at
+    scene = scene_of({"ciede2000": 0.8}, "rendered-sphere-40deg")
+    offered, (planned, checked) = offered_and_seen(scene, 3, 60)
+    chosen = choose(planned, checked, offered, made_up_costs(offered))
+    (one,) = chosen.decisions.values()
+    assert chosen.allowed in TIGHTER ** np.arange(1, ROUNDS)
+    assert one.left.p99 <= chosen.allowed * 0.8
+    assert one.whole.p99 <= 0.8
+    assert one.cheaper_left is not None
+    assert one.cheaper_left.p99 > chosen.allowed * 0.8
+
+
+def test_a_whole_that_breaks_the_tolerance_however_little_materials_are_allowed_is_infeasible() -> None:
+    scene = scene_of({"ciede2000": 0.8}, "rendered-sphere-40deg")
+    offered, (planned, checked) = offered_and_seen(scene, 1, 60)
+    with pytest.raises(InfeasibleError, match=r"0\.8 \(CIEDE2000\) is infeasible: the whole .* rendered-sphere-40deg"):
+        choose(planned, checked, offered, made_up_costs(offered))
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "said"),
+    [
+        ({"relative": 1e-9}, r"tolerance: 1e-09 \(relative\) is finer than the truth is known, 1e-06"),
+        ({"ciede2000": 1e-6}, r"tolerance: 1e-06 \(CIEDE2000\) is finer than the truth is known, 0.0001"),
+    ],
+)
+def test_a_tolerance_finer_than_the_truth_is_known_is_infeasible(tolerance: dict[str, float], said: str) -> None:
+    scene = scene_of(tolerance, "rendered-sphere-40deg")
+    offered, (seen,) = offered_and_seen(scene, 8)
+    with pytest.raises(InfeasibleError, match=said):
+        choose(seen, seen, offered, made_up_costs(offered))
