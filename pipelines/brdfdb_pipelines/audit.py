@@ -162,9 +162,10 @@ def _print(root: Path, found: AuditReport, report_path: Path) -> None:
             f"{losing} are of models that lose light even where nothing absorbs it: the report says how much, and where"
         )
     known = sum(a.verdict == "known published excess" for a in audits)
+    page_path = report_path.with_suffix(".html")
     print(
         f"{len(audits)} audited: {len(audits) - known - len(found.violations)} pass, {known} exceed 1 as their "
-        f"published parameters are known to, {len(found.violations)} violate; report in {report_path}"
+        f"published parameters are known to, {len(found.violations)} violate; page {page_path}, data {report_path}"
     )
 
 

@@ -427,9 +427,12 @@ def test_audit_of_some_materials_reports_those(built: Path, tmp_path: Path, caps
     lines = out.splitlines()
     assert lines[0].startswith(f"Audit of {built}")
     assert [line.split()[:2] for line in lines[2:4]] == [["mirror", "passes"], ["foam", "passes"]]
+    written = report.with_suffix(".html")
     assert lines[-1] == (
-        f"2 audited: 2 pass, 0 exceed 1 as their published parameters are known to, 0 violate; report in {report}"
+        "2 audited: 2 pass, 0 exceed 1 as their published parameters are known to, 0 violate; "
+        f"page {written}, data {report}"
     )
+    assert written.read_text(encoding="utf-8").startswith("<!doctype html>")
     document = json.loads(report.read_bytes())
     jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
     assert [entry["material"] for entry in document["materials"]] == ["mirror", "foam"]
