@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Annotated, Literal
 
 import numpy as np
@@ -32,7 +33,7 @@ def check_direction(name: str, vector: Vector) -> Vector:
     return vector
 
 
-class Shape(BaseModel):
+class Shape(BaseModel, ABC):
     """Where a shape stands: its own origin is at `position`, its own z axis along `axis`, and it is turned about that.
 
     Rays and points are arrays (N, 3) in the frame of the scene, whose z axis points up.
@@ -70,11 +71,13 @@ class Shape(BaseModel):
         tangent, normal = self._tangent_and_normal((points - np.asarray(self.position)) @ own.T)
         return np.stack([tangent, np.cross(normal, tangent), normal], axis=1) @ own
 
+    @abstractmethod
     def _hit(self, o: Array, d: Array) -> Array:
-        raise NotImplementedError
+        """As `hit`, in the shape's own axes."""
 
+    @abstractmethod
     def _tangent_and_normal(self, p: Array) -> tuple[Array, Array]:
-        raise NotImplementedError
+        """At points, in the shape's own axes."""
 
 
 class Plane(Shape):
