@@ -115,6 +115,12 @@ class Table:
         return f_r.astype(np.float32).reshape(self.grid.shape if self.wavelength_nm is None else f_r.shape)
 
     @property
+    def nbytes(self) -> int:
+        """Of the arrays that lookups read."""
+        arrays = (self.values, self.specular, self.spectra, self.uniform)
+        return sum(array.nbytes for array in arrays if array is not None)
+
+    @property
     def values_are_brdf(self) -> bool:
         """Whether the stored numbers are f_r itself."""
         return self.spectra is None and self.uniform is None and self.interpolation.plain

@@ -155,10 +155,22 @@ def xyz_weights(
 
 
 @cache
-def _srgb_weights(wavelengths: tuple[float, ...]) -> NDArray[np.float64]:
-    """Weights, shape (L, 3), that take a reflectance spectrum at `wavelengths` [nm] to linear sRGB under D65."""
-    to_rgb = np.asarray(colour_science().RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB)
-    weights = xyz_weights(wavelengths) @ to_rgb.T
+def srgb_weights(
+    wavelengths: tuple[float, ...], illuminant: str = ILLUMINANT, observer: str = OBSERVER
+) -> NDArray[np.float64]:
+    """Weights, shape (L, 3), that take a reflectance spectrum at `wavelengths` [nm] to linear sRGB: white is (1, 1, 1).
+
+    Of another illuminant than D65, the white of sRGB, colours are adapted to it by Bradford's matrix.
+    """
+    colour = colour_science()
+    space = colour.RGB_COLOURSPACES["sRGB"]
+    weights = xyz_weights(wavelengths, illuminant, observer)
+    to_rgb = np.asarray(space.matrix_XYZ_to_RGB)
+    if illuminant != ILLUMINANT:
+        to_rgb = to_rgb @ colour.adaptation.matrix_chromatic_adaptation_VonKries(
+            weights.sum(axis=0), colour.xy_to_XYZ(space.whitepoint), transform="Bradford"
+        )
+    weights = weights @ to_rgb.T
     return np.asarray(weights / weights.sum(axis=0), dtype=np.float64)
 
 
@@ -208,7 +220,7 @@ def linear_srgb(wavelength_nm: ArrayLike, reflectance: ArrayLike) -> NDArray[np.
             f"the {wavelength.size} wavelengths"
         )
     dtype = np.float32 if values.dtype == np.float32 else np.float64
-    weights = _srgb_weights(tuple(wavelength.tolist())).astype(dtype)
+    weights = srgb_weights(tuple(wavelength.tolist())).astype(dtype)
     return np.asarray(np.matmul(values.astype(dtype, copy=False), weights), dtype=dtype)
 
 

@@ -30,12 +30,20 @@ if TYPE_CHECKING:
     from brdfdb.family import Family
     from brdfdb.lookup import Table
 
-__all__ = ["FORMAT", "FORMAT_VERSION", "Store", "StoreError", "UnknownFamilyError", "UnknownMaterialError"]
+__all__ = [
+    "FORMAT",
+    "FORMAT_VERSION",
+    "Store",
+    "StoreError",
+    "UnknownFamilyError",
+    "UnknownMaterialError",
+    "UnknownRevisionError",
+]
 
 FORMAT = "brdfdb"
 FORMAT_VERSION = 1
 
-_DECODED = 8  # tables kept decoded by a Store
+CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
 NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")  # of a material: what does not match is never joined to a path
 
 
@@ -68,6 +76,13 @@ class UnknownFamilyError(UnknownMaterialError):
     kind = "family"
 
 
+class UnknownRevisionError(KeyError):
+    """A revision that a material does not have; str() is one sentence."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 class Store(Mapping[str, "Table"]):
     """A store opened for reading: a mapping from material names to decoded tables of the current revisions.
 
@@ -75,6 +90,8 @@ class Store(Mapping[str, "Table"]):
     ----------
     root : path
         Directory of the store.
+    cache_bytes : int
+        How much of decoded tables is kept; those used last stay, and always the very last.
 
     Raises
     ------
@@ -82,7 +99,7 @@ class Store(Mapping[str, "Table"]):
         If there is no store at `root`, or one of another format version.
     """
 
-    def __init__(self, root: str | os.PathLike[str]) -> None:
+    def __init__(self, root: str | os.PathLike[str], cache_bytes: int = CACHE_BYTES) -> None:
         self.root = Path(root)
         marker = self.root / "brdfdb.json"
         if not marker.is_file():
@@ -93,8 +110,11 @@ class Store(Mapping[str, "Table"]):
                 f"{marker} says format {found.get('format')} version {found.get('version')}, "
                 f"this program reads {FORMAT} version {FORMAT_VERSION}"
             )
+        self._cache_bytes = cache_bytes
         self._decoded: OrderedDict[tuple[str, str], Table] = OrderedDict()
+        self._pointers: dict[str, tuple[tuple[int, int, int], dict[str, Any]]] = {}
         self._lock = threading.Lock()
+        self._decoding = threading.Lock()
 
     def __iter__(self) -> Iterator[str]:
         directory = f"{self.root}/materials"
@@ -124,24 +144,74 @@ class Store(Mapping[str, "Table"]):
                     raise
                 # a newer revision was published, and the one we were reading removed: read the newer one
 
-    def _table(self, name: str, group: Path, digest: str) -> Table:
+    def table(self, name: str, revision: str) -> Table:
+        """The decoded table of a revision, current or not.
+
+        Raises
+        ------
+        UnknownMaterialError, UnknownRevisionError
+            If the store has no such material, or it no such revision.
+        StoreError
+            If the revision is damaged.
+        """
+        group, digest = self.location(name)
+        if group.name != revision:
+            if revision not in self.revisions(name):
+                raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; the current one is {group.name}")
+            group, digest = group.with_name(revision), ""
+        return self._table(name, group, digest)
+
+    def revisions(self, name: str) -> list[str]:
+        """The revisions of a material that are whole, oldest first."""
+        material = self.path(name).parent
+        found = {file.name.removesuffix(".MANIFEST.json") for file in material.glob("r*.MANIFEST.json")}
+        return sorted((each for each in found if number_of(each) and (material / each).is_dir()), key=number_of)
+
+    def held(self, name: str) -> Table | None:
+        """The current table of a material if it is decoded already: an answer without waiting.
+
+        Raises
+        ------
+        UnknownMaterialError, StoreError
+            As `location` does.
+        """
+        group, digest = self.location(name)
+        return self._decoded.get((f"{name} {group.name}", digest))
+
+    @property
+    def cached_bytes(self) -> int:
+        """Of the tables that are decoded now."""
         with self._lock:
-            if (name, digest) in self._decoded:
-                self._decoded.move_to_end((name, digest))
-                return self._decoded[name, digest]
+            return sum(table.nbytes for table in self._decoded.values())
+
+    def _table(self, name: str, group: Path, digest: str) -> Table:
+        key = f"{name} {group.name}", digest
+        if (held := self._used(key)) is not None:
+            return held
         from brdfdb.chunks import Whole  # loads zarr
 
-        files = check_manifest(group, digest, contents=False)["files"]
-        try:
-            table = _decode(name, group, Whole(group, files))
-        except StoreError:
-            check_manifest(group, digest, contents=True)  # names the file
-            raise
+        with self._decoding:  # who asks for the same table meanwhile waits for it
+            if (held := self._used(key)) is not None:
+                return held
+            files = check_manifest(group, digest or None, contents=False)["files"]
+            try:
+                table = _decode(name, group, Whole(group, files))
+            except StoreError:
+                check_manifest(group, digest or None, contents=True)  # names the file
+                raise
+            with self._lock:
+                self._decoded[key] = table
+                size = sum(each.nbytes for each in self._decoded.values())
+                while size > self._cache_bytes and len(self._decoded) > 1:
+                    size -= self._decoded.popitem(last=False)[1].nbytes
+            return table
+
+    def _used(self, key: tuple[str, str]) -> Table | None:
+        """A decoded table, which is now the one used last."""
         with self._lock:
-            self._decoded[name, digest] = table
-            while len(self._decoded) > _DECODED:
-                self._decoded.popitem(last=False)
-        return table
+            if key in self._decoded:
+                self._decoded.move_to_end(key)
+            return self._decoded.get(key)
 
     def head(self, name: str) -> str:
         """The current revision of a material, such as ``r000003``, read anew each time.
@@ -236,14 +306,21 @@ class Store(Mapping[str, "Table"]):
         check_manifest(*self.location(name), contents=True)
 
     def _pointer(self, name: str) -> dict[str, Any]:
-        if name not in self:
+        if not NAME.fullmatch(name):
             raise UnknownMaterialError(name, list(self))
         path = f"{self.root}/materials/{name}/HEAD.json"
         try:
-            with open(path, "rb") as handle:
-                return json_object(Path(path), handle.read())
+            at = os.stat(path)
+            seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
+            known = self._pointers.get(name)
+            if known is None or known[0] != seen:
+                with open(path, "rb") as handle:
+                    known = self._pointers[name] = seen, json_object(Path(path), handle.read())
+        except (FileNotFoundError, NotADirectoryError):
+            raise UnknownMaterialError(name, list(self)) from None
         except OSError as error:
             raise StoreError(f"cannot read {path}: {error.strerror}") from error
+        return known[1]
 
     def location(self, name: str) -> tuple[Path, str]:
         """Directory of the current revision and the digest of its manifest, both from one look at the pointer."""

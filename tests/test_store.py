@@ -21,7 +21,7 @@ from brdfdb.grids import Grid
 from brdfdb.layout import Layout
 from brdfdb.materials import Material
 from brdfdb.staging import publish_dataset
-from brdfdb.store import Store, StoreError, UnknownMaterialError
+from brdfdb.store import Store, StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.tabulate import tabulate
 
 GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
@@ -165,19 +165,38 @@ def test_a_table_never_mixes_two_revisions(root: Path, monkeypatch: pytest.Monke
     assert (store["white"].revision, rho(store)) == ("r000002", 0.75)
 
 
-def test_decoded_tables_are_kept_and_the_one_not_used_for_longest_goes(
-    root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "_DECODED", 2)
+def test_decoded_tables_are_kept_and_the_one_not_used_for_longest_goes(root: Path) -> None:
     publish(root, grey=lambert(0.5), black=lambert(0.0))
-    store = brdfdb.open(root)
+    size = brdfdb.open(root)["white"].nbytes
+    store = Store(root, cache_bytes=2 * size)
     white, grey = store["white"], store["grey"]
     assert store["white"] is white
     black = store["black"]
     assert store["white"] is white
     assert store["black"] is black
+    assert store.cached_bytes == 2 * size
+    assert store.held("grey") is None
     assert store["grey"] is not grey
-    assert len(store._decoded) == 2
+
+
+def test_a_table_larger_than_the_cache_is_kept_until_the_next_one_is_used(root: Path) -> None:
+    publish(root, grey=lambert(0.5))
+    store = Store(root, cache_bytes=1)
+    white = store["white"]
+    assert store.held("white") is white
+    assert store["grey"] is store.held("grey")
+    assert store.held("white") is None
+
+
+def test_each_revision_that_is_kept_can_be_read(root: Path) -> None:
+    publish(root, white=lambert(0.75))
+    store = brdfdb.open(root)
+    assert store.revisions("white") == ["r000001", "r000002"]
+    found = [float(store.table("white", each).brdf[0, 0, 0] * np.pi) for each in ("r000001", "r000002")]
+    np.testing.assert_allclose(found, [0.25, 0.75], rtol=1e-6)
+    for revision in ("r000003", "../white/r000001", "r1"):
+        with pytest.raises(UnknownRevisionError, match=r"white has no revision '.*'; the current one is r000002"):
+            store.table("white", revision)
 
 
 # The format

@@ -7,7 +7,7 @@ One TOML file a paper, one table a material. In the files an angle is written in
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import resources
@@ -20,7 +20,7 @@ from pydantic_core import ErrorDetails
 
 from brdfdb.geometry import degrees, radians
 from brdfdb.models import MODELS
-from brdfdb.parameters import ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter
 from brdfdb.spectra import refractive_index
 
 Text = Annotated[str, Field(min_length=1)]
@@ -195,6 +195,65 @@ class Material(BaseModel):
         wavelength = np.asarray(wavelength_nm, dtype=np.float64)
         n, k = refractive_index(self.refractive_index, wavelength)
         return {**self.parameters, "wavelength_nm": wavelength, "n": n, "k": k}
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """f_r of the model itself, where `brdfdb.lookup.Table.lookup` gives that of its table.
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r : array_like [rad]
+            Directions of light and viewer; they broadcast.
+        wavelength_nm : float or array_like (M,) [nm], optional
+            As in `arguments`. Models that are not spectral take any.
+
+        Returns
+        -------
+        array [1/sr]
+            In the shape of the angles, with a last axis for a list of wavelengths.
+
+        Raises
+        ------
+        ValueError
+            As the model and `arguments` do.
+        """
+        return self._each(self.spec.evaluate, (theta_i, phi_i, theta_r, phi_r), wavelength_nm, None)
+
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Reflectance [1] of the Dirac part of the model at theta_i [rad], 0 if it has none; shaped as by `lookup`."""
+        if self.spec.specular is None:
+            wavelengths = () if wavelength_nm is None else np.shape(wavelength_nm)
+            return np.zeros((*np.shape(theta_i), *wavelengths))[()]
+        return self._each(self.spec.specular, (theta_i,), wavelength_nm, self.spec.specular_parameters)
+
+    def _each(
+        self,
+        function: Callable[..., Floats],
+        angles: tuple[ArrayLike, ...],
+        wavelength_nm: ArrayLike | None,
+        names: tuple[str, ...] | None,
+    ) -> Floats:
+        """A function of angles and parameters (`names` of them, or all), wavelength by wavelength on a last axis."""
+        if not self.spectral:
+            value = function(*angles, **self.parameters)
+            if wavelength_nm is None or np.ndim(wavelength_nm) == 0:
+                return value
+            return np.repeat(np.asarray(value)[..., np.newaxis], np.size(wavelength_nm), axis=-1)
+        given = self.arguments(wavelength_nm)
+        used = given if names is None else {name: given[name] for name in names}
+        if given["wavelength_nm"].ndim == 0:
+            return function(*angles, **used)
+        each = [
+            {name: value[w] if np.ndim(value) else value for name, value in used.items()}
+            for w in range(given["wavelength_nm"].size)
+        ]
+        return np.stack([function(*angles, **arguments) for arguments in each], axis=-1)
 
     def file_parameters(self) -> dict[str, Number]:
         """The parameters as a human reads and writes them: angles in degrees, under names that end in ``_deg``."""
