@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, overload
 
@@ -192,12 +192,17 @@ class Table:
             brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
             return Stated(brdf, self._stated(np.asarray(theta_i), brdf, wavelength_nm))
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
-        given = [np.asarray(angle) for angle in (theta_i, phi_i, theta_r, phi_r)]
-        dtype = asked_for(theta_i, phi_i, theta_r, phi_r)
-        if any(angle.dtype.kind not in "iuf" for angle in given):
-            checked_angles(*given)
-        shape = np.broadcast_shapes(*(angle.shape for angle in given))
-        flat = [np.ascontiguousarray(np.broadcast_to(angle, shape), dtype=dtype).reshape(-1) for angle in given]
+        given: Sequence[ArrayLike] = (theta_i, phi_i, theta_r, phi_r)
+        shape: tuple[int, ...] = ()
+        if all(type(angle) is float for angle in given):  # broadcasting takes longer than the lookup of one point
+            dtype, flat = np.dtype(np.float64), list(np.array(given).reshape(4, 1))
+        else:
+            arrays = [np.asarray(angle) for angle in given]
+            dtype = asked_for(theta_i, phi_i, theta_r, phi_r)
+            if any(angle.dtype.kind not in "iuf" for angle in arrays):
+                checked_angles(*arrays)
+            shape = np.broadcast_shapes(*(angle.shape for angle in arrays))
+            flat = [np.ascontiguousarray(np.broadcast_to(angle, shape), dtype=dtype).reshape(-1) for angle in arrays]
         values = np.empty(flat[0].size * weight.size, dtype)
         horizon = float(dtype.type(HALF_PI))
         if not _lookup_kernels.by_angles(
@@ -294,21 +299,32 @@ class Table:
         ValueError
             If theta_i or a wavelength is outside its range.
         """
-        angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
-        values = np.zeros((*angles.theta_i.shape, weight.size))
+        one = isinstance(theta_i, float) and 0.0 <= theta_i <= HALF_PI  # which checks take longer than
+        angles = None if one else checked_angles(theta_i, 0.0, 0.0, 0.0)
+        theta = np.asarray(theta_i) if angles is None else angles.theta_i
+        values = np.zeros((*theta.shape, weight.size))
         if self.specular is not None:
-            table = self.specular.reshape(self.specular.shape[0], -1).astype(np.float64)
+            table = self.specular.reshape(self.specular.shape[0], -1)
             upper = np.minimum(low + 1, table.shape[1] - 1)
-            table = (1.0 - weight) * table[:, low] + weight * table[:, upper]
-            at_deg = self.specular_theta_deg
-            nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
-            position = np.interp(angles.theta_i, nodes, np.arange(nodes.size))  # nan stays nan
-            at = np.minimum(np.nan_to_num(position).astype(np.int64), nodes.size - 2)
-            share = (position - at)[..., np.newaxis]
-            values = (1.0 - share) * table[at] + share * table[at + 1]
-        shape = angles.theta_i.shape
-        return finished(values, angles, trailing=1).reshape(shape + wavelength_shape)[()]
+            position = np.interp(theta, self._specular_theta, np.arange(len(table)))[..., np.newaxis]  # nan stays nan
+            at = np.minimum(np.nan_to_num(position).astype(np.int64), len(table) - 2)
+            first, second = ((1.0 - weight) * table[row, low] + weight * table[row, upper] for row in (at, at + 1))
+            values = (1.0 - (position - at)) * first + (position - at) * second
+        if angles is not None:
+            values = finished(values, angles, trailing=1)
+        return values.reshape(theta.shape + wavelength_shape)[()]
+
+    @functools.cached_property
+    def _specular_theta(self) -> NDArray[np.float64]:
+        """Nodes [rad] of the Dirac part."""
+        at_deg = self.specular_theta_deg
+        return radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
+
+    @functools.cached_property
+    def _all_wavelengths(self) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, ...]]:
+        count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
+        return np.arange(count), np.zeros(count), () if self.wavelength_nm is None else (count,)
 
     def _wavelengths(
         self, wavelength_nm: ArrayLike | None
@@ -316,8 +332,7 @@ class Table:
         """Lower node and weight of the upper one for each wavelength asked for, and the shape they add."""
         stored = self.wavelength_nm
         if wavelength_nm is None:
-            count = 1 if stored is None else stored.size
-            return np.arange(count), np.zeros(count), () if stored is None else (count,)
+            return self._all_wavelengths
         given = np.asarray(wavelength_nm)
         if given.size and given.dtype.kind not in "iuf":
             raise ValueError(f"wavelength_nm: {wavelength_nm!r} is not a number of nanometres")

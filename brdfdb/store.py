@@ -13,6 +13,7 @@ ROOT is not itself a zarr group: xarray would rewrite a shared root file, and st
 from __future__ import annotations
 
 import difflib
+import functools
 import os
 import re
 import threading
@@ -112,7 +113,7 @@ class Store(Mapping[str, "Table"]):
             )
         self._cache_bytes = cache_bytes
         self._decoded: OrderedDict[tuple[str, str], Table] = OrderedDict()
-        self._pointers: dict[str, tuple[tuple[int, int, int], dict[str, Any]]] = {}
+        self._pointers: dict[str, _Pointer] = {}
         self._lock = threading.Lock()
         self._decoding = threading.Lock()
 
@@ -175,8 +176,7 @@ class Store(Mapping[str, "Table"]):
         UnknownMaterialError, StoreError
             As `location` does.
         """
-        group, digest = self.location(name)
-        return self._decoded.get((f"{name} {group.name}", digest))
+        return self._decoded.get((name, self.location(name)[1]))
 
     @property
     def cached_bytes(self) -> int:
@@ -185,7 +185,7 @@ class Store(Mapping[str, "Table"]):
             return sum(table.nbytes for table in self._decoded.values())
 
     def _table(self, name: str, group: Path, digest: str) -> Table:
-        key = f"{name} {group.name}", digest
+        key = name, digest or group.name
         if (held := self._used(key)) is not None:
             return held
         from brdfdb.chunks import Whole  # loads zarr
@@ -237,7 +237,7 @@ class Store(Mapping[str, "Table"]):
         StoreError
             If the pointer cannot be read.
         """
-        head = self._pointer(name)
+        head = self._pointer(name).head
         if "title" not in head:  # of a table that was built before pointers told it
             attributes = self.attributes(name)
             head = {**head, "title": attributes["title"], "model": attributes["model"]}
@@ -305,7 +305,7 @@ class Store(Mapping[str, "Table"]):
         """
         check_manifest(*self.location(name), contents=True)
 
-    def _pointer(self, name: str) -> dict[str, Any]:
+    def _pointer(self, name: str) -> _Pointer:
         if not NAME.fullmatch(name):
             raise UnknownMaterialError(name, list(self))
         path = f"{self.root}/materials/{name}/HEAD.json"
@@ -313,23 +313,34 @@ class Store(Mapping[str, "Table"]):
             at = os.stat(path)
             seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
             known = self._pointers.get(name)
-            if known is None or known[0] != seen:
+            if known is None or known.seen != seen:
                 with open(path, "rb") as handle:
-                    known = self._pointers[name] = seen, json_object(Path(path), handle.read())
+                    known = self._pointers[name] = _Pointer(seen, Path(path), json_object(Path(path), handle.read()))
         except (FileNotFoundError, NotADirectoryError):
             raise UnknownMaterialError(name, list(self)) from None
         except OSError as error:
             raise StoreError(f"cannot read {path}: {error.strerror}") from error
-        return known[1]
+        return known
 
     def location(self, name: str) -> tuple[Path, str]:
         """Directory of the current revision and the digest of its manifest, both from one look at the pointer."""
-        head = self._pointer(name)
-        revision, digest = head.get("revision"), head.get("manifest_sha256")
-        pointer = self.root / "materials" / name / "HEAD.json"
+        return self._pointer(name).location
+
+
+class _Pointer:
+    """The pointer of a material as it was read, and how to tell that it is another now."""
+
+    def __init__(self, seen: tuple[int, int, int], path: Path, head: dict[str, Any]) -> None:
+        self.seen, self.path, self.head = seen, path, head
+
+    @functools.cached_property
+    def location(self) -> tuple[Path, str]:
+        """Directory of the revision, and the digest of its manifest."""
+        revision, digest = self.head.get("revision"), self.head.get("manifest_sha256")
         if not (isinstance(revision, str) and isinstance(digest, str) and number_of(revision)):
-            raise StoreError(f"{name} is damaged: {pointer} does not name a revision and its manifest")
-        return pointer.with_name(revision), digest
+            name = self.path.parent.name
+            raise StoreError(f"{name} is damaged: {self.path} does not name a revision and its manifest")
+        return self.path.with_name(revision), digest
 
 
 def _decode(name: str, path: Path, files: Whole) -> Table:

@@ -1,26 +1,29 @@
-"""The application: its factory, which exception becomes which status, the body limit, and the server."""
+"""The application: its factory, and which exception becomes which status."""
 
 from __future__ import annotations
 
 import contextlib
-import socket
-from dataclasses import replace
-from pathlib import Path
+import threading
+from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any
 
 import orjson
 from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.middleware.cors import CORSMiddleware
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-import brdfdb
-from brdfdb.store import StoreError, UnknownMaterialError
+from brdfdb.store import StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb_api.edge import Edge, log_to_stderr
+from brdfdb_api.files import files
 from brdfdb_api.responses import PROBLEM_JSON, RequestError, problem_response
-from brdfdb_api.routes import router
+from brdfdb_api.routes import answer_point, router
 from brdfdb_api.settings import Settings
+from brdfdb_api.shelf import Shelf
+from brdfdb_api.views import views
 
 if TYPE_CHECKING:
     from brdfdb.store import Store
@@ -31,6 +34,10 @@ Lookups in audited tables of spectral BRDFs, in 1/sr with the cosine not folded 
 All angles are in degrees: theta from the normal, phi counter-clockwise; index i is the light, r the viewer.
 phi_r - phi_i = 0 looks back towards the light, 180 is the side of the mirror direction. Every error is an
 application/problem+json document with one sentence."""
+
+
+# Only JSON is compressed: numbers as bytes hardly shrink, files are compressed already
+UNCOMPRESSED = (*("application/x-npy", "application/octet-stream", "application/zip"), "image/*", "text/*")
 
 
 class Application(FastAPI):
@@ -44,30 +51,6 @@ class Application(FastAPI):
                     if status >= "400" and "application/json" in response.get("content", {}):
                         response["content"][PROBLEM_JSON] = response["content"].pop("application/json")
         return document
-
-
-class BodyLimit:
-    """ASGI middleware that counts a body while it arrives: past `limit` [bytes] reading it is a RequestError (413)."""
-
-    def __init__(self, app: ASGIApp, limit: int) -> None:
-        self.app = app
-        self.limit = limit
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        count = 0
-
-        async def counted() -> Message:
-            nonlocal count
-            message = await receive()
-            count += len(message.get("body", b""))
-            if count > self.limit:
-                raise RequestError(413, f"the body is larger than the {self.limit} bytes that are allowed")
-            return message
-
-        await self.app(scope, counted, send)
 
 
 def create_app(settings: Settings | None = None, store: Store | None = None) -> FastAPI:
@@ -92,17 +75,46 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
         summary="Spectral BRDF tables from published surface parameters",
         description=DESCRIPTION,
         generate_unique_id_function=lambda route: route.name,
+        lifespan=_warmed,
     )
     app.state.settings = settings or Settings.from_environment()
-    app.state.store = store
+    app.state.shelf = Shelf(app.state.settings, store)
     app.include_router(router)
-    app.add_middleware(BodyLimit, limit=app.state.settings.max_body_bytes)
-    for kind in (RequestError, RequestValidationError, UnknownMaterialError, StoreError, HTTPException, Exception):
+    app.include_router(views)
+    app.include_router(files)
+    for kind in (
+        *(RequestError, RequestValidationError, UnknownMaterialError, UnknownRevisionError, StoreError),
+        HTTPException,
+    ):
         app.add_exception_handler(kind, problem)
+    # the last one added is the first to see a request
+    app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=5, exclude_content_types=UNCOMPRESSED)
+    app.add_middleware(Edge, limit=app.state.settings.max_body_bytes, lookup=answer_point, failed=problem_of)
+    if app.state.settings.cors_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=app.state.settings.cors_origins,
+            allow_methods=["GET", "POST"],
+            allow_headers=["*"],
+            expose_headers=["ETag", "X-Request-ID"],
+        )
     return app
 
 
+@contextlib.asynccontextmanager
+async def _warmed(app: FastAPI) -> AsyncIterator[None]:
+    """While the application runs: the log, and a thread that decodes what lists show first."""
+    log_to_stderr(app.state.settings.log_level)
+    threading.Thread(target=app.state.shelf.warm, daemon=True).start()
+    yield
+
+
 async def problem(_: Request, error: Exception) -> Response:
+    """What the router makes of an exception."""
+    return problem_of(error)
+
+
+def problem_of(error: Exception) -> Response:
     """The one table from exceptions to statuses."""
     match error:
         case RequestError():
@@ -113,6 +125,8 @@ async def problem(_: Request, error: Exception) -> Response:
             return problem_response(422, f"{parameter}: {first['msg'].lower()}", parameter)
         case UnknownMaterialError():
             return problem_response(404, str(error), closest=error.closest)
+        case UnknownRevisionError():
+            return problem_response(404, str(error), "revision")
         case StoreError():
             return problem_response(503, str(error))
         case HTTPException():
@@ -124,47 +138,6 @@ async def problem(_: Request, error: Exception) -> Response:
 def openapi_json() -> bytes:
     """The OpenAPI document as it stands in ``api/openapi.json``."""
     return orjson.dumps(create_app(Settings()).openapi(), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
-
-
-def serve(store_dir: Path, host: str, port: int) -> None:
-    """Serve a store over HTTP until interrupted.
-
-    Parameters
-    ----------
-    store_dir : Path
-        Directory that ``brdfdb build --store`` wrote.
-    host : str
-        Name or address to listen on.
-    port : int
-        0 to 65535; 0 takes any free port.
-
-    Raises
-    ------
-    brdfdb.store.StoreError
-        If there is no store at `store_dir`.
-    ValueError
-        If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.
-    OSError
-        If `host` is not an address of this machine or the port is taken.
-    """
-    import uvicorn
-
-    if not 0 <= port <= 65535:
-        raise ValueError(f"port: {port} is outside [0, 65535]")
-    app = create_app(replace(Settings.from_environment(), store=store_dir), brdfdb.open(store_dir))
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # asyncio sends small answers at once (TCP_NODELAY) only on a socket that names its protocol: else each takes 40 ms.
-    with socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP) as listener:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            listener.bind((host, port))
-            listener.listen()
-        except OSError as error:
-            raise OSError(f"cannot listen on {host}, port {port}: {error.strerror}") from error
-        port = listener.getsockname()[1]
-        print(f"serving {store_dir} at http://{f'[{host}]' if ':' in host else host}:{port}/v1/materials", flush=True)
-        with contextlib.suppress(KeyboardInterrupt):
-            uvicorn.Server(uvicorn.Config(app, host=host, port=port)).run(sockets=[listener])
 
 
 if __name__ == "__main__":

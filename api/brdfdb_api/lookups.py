@@ -1,13 +1,15 @@
-"""The points that a lookup asks for: read from a query or a JSON body in degrees, checked, counted, evaluated."""
+"""Lookups: the points asked for, read from a query, JSON or .npy in degrees and checked; and the values, evaluated."""
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, Self, cast, get_args
+from urllib.parse import parse_qsl
 
 import numpy as np
 import orjson
@@ -22,6 +24,53 @@ if TYPE_CHECKING:
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 REQUIRED = ("theta_i", "theta_r")
 FIELDS = (*ANGLES, "wavelength_nm")
+OPTIONS = ("from", "error", "output", "illuminant", "format")
+
+Source = Literal["table", "model"]
+Output = Literal["spectrum", "xyz", "linear-srgb"]
+Format = Literal["json", "npy"]
+
+_HEADER_BYTES = 4096  # of a .npy file: dtype and shape take a hundred
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a lookup is to be answered.
+
+    Attributes
+    ----------
+    source : str
+        "table", or "model": what the table was made of.
+    error : bool
+        Whether to give the error that the table states beside the values.
+    output : str
+        "spectrum", or "xyz" or "linear-srgb" under `illuminant`, in 1/sr like f_r: white is Y = 1/pi.
+    illuminant : str
+        A name of colour-science.
+    format : str or None
+        "json" or "npy"; None leaves it to the Accept header.
+    """
+
+    source: Source = "table"
+    error: bool = False
+    output: Output = "spectrum"
+    illuminant: str = "D65"
+    format: Format | None = None
+
+    @classmethod
+    def from_query(cls, query: Mapping[str, str]) -> Self:
+        """Read what a query names of `OPTIONS`; a RequestError (422) for a value that is not allowed."""
+        if not any(name in query for name in OPTIONS):
+            return cls()
+        error = _one_of(query, "error", ("false", "true"), "false") == "true"
+        source = cast(Source, _one_of(query, "from", get_args(Source), "table"))
+        output = cast(Output, _one_of(query, "output", get_args(Output), "spectrum"))
+        if error and source == "model":
+            raise RequestError(422, "error: the model has none; it is the table that states one", "error")
+        if "illuminant" in query and output == "spectrum":
+            raise RequestError(422, "illuminant: a spectrum has none; output may be xyz or linear-srgb", "illuminant")
+        chosen = cast(Format, _one_of(query, "format", get_args(Format), "json")) if "format" in query else None
+        return cls(source, error, output, query.get("illuminant", cls.illuminant), chosen)
 
 
 @dataclass(frozen=True)
@@ -30,7 +79,7 @@ class Points:
 
     Attributes
     ----------
-    angles : dict of arrays [rad]
+    angles : tuple of arrays [rad]
         theta_i, phi_i, theta_r, phi_r; they broadcast.
     shape : tuple of int
         What they broadcast to.
@@ -38,7 +87,7 @@ class Points:
         None is every wavelength of the table.
     """
 
-    angles: dict[str, NDArray[np.float64]]
+    angles: tuple[Any, Any, Any, Any]
     shape: tuple[int, ...]
     wavelength_nm: float | NDArray[np.float64] | None
 
@@ -48,8 +97,23 @@ class Points:
         return math.prod(self.shape)
 
     @classmethod
+    def from_query(cls, query: Mapping[str, str], wavelengths: list[str]) -> Self:
+        """One point, of numbers in a query; errors as by `from_fields`."""
+        angles = []
+        for name in ANGLES:
+            if name not in query and name in REQUIRED:
+                raise RequestError(422, f"{name}: missing", name)
+            degrees = _number(name, query.get(name, "0"))
+            if name.startswith("theta") and not 0.0 <= degrees <= 180.0:
+                raise RequestError(422, f"{name}: {degrees} is outside [0, 180] degrees", name)
+            angles.append(math.radians(degrees))
+        at = [_number("wavelength_nm", text) for text in wavelengths]
+        wavelength_nm = None if not at else at[0] if len(at) == 1 else np.array(at)
+        return cls((angles[0], angles[1], angles[2], angles[3]), (), wavelength_nm)
+
+    @classmethod
     def from_json(cls, body: bytes) -> Self:
-        """Read the body of a POST.
+        """Read a JSON body.
 
         Raises
         ------
@@ -82,47 +146,133 @@ class Points:
         """
         for name in fields:
             refuse_unknown(name, FIELDS)
-        angles = {}
+        angles = []
         for name in ANGLES:
             if name not in fields and name in REQUIRED:
                 raise RequestError(422, f"{name}: missing", name)
-            degrees = _numbers(name, fields.get(name, 0.0))
-            if name.startswith("theta") and np.any(bad := (degrees < 0.0) | (degrees > 180.0)):
-                raise RequestError(422, f"{name}: {degrees[bad][0]} is outside [0, 180] degrees", name)
-            angles[name] = radians(degrees)
+            angles.append(_in_radians(name, _numbers(name, fields.get(name, 0.0))))
         try:
-            shape = np.broadcast_shapes(*(angle.shape for angle in angles.values()))
+            shape = np.broadcast_shapes(*(angle.shape for angle in angles))
         except ValueError:
-            shapes = ", ".join(f"{name} {angle.shape}" for name, angle in angles.items())
+            shapes = ", ".join(f"{name} {angle.shape}" for name, angle in zip(ANGLES, angles, strict=True))
             raise RequestError(422, f"the shapes of the angles do not broadcast: {shapes}") from None
-        return cls(angles, shape, _wavelengths(fields.get("wavelength_nm")))
+        return cls((angles[0], angles[1], angles[2], angles[3]), shape, _wavelengths(fields.get("wavelength_nm")))
+
+    @classmethod
+    def from_npy(cls, body: bytes, wavelengths: list[str]) -> Self:
+        """Read a .npy body: float32 or float64 of shape (..., 4), the angles theta_i, phi_i, theta_r, phi_r [degrees].
+
+        Raises
+        ------
+        RequestError
+            422, as by `from_fields`; for any other array.
+        """
+        degrees = _npy(body)
+        if degrees.ndim == 0 or degrees.shape[-1] != 4:
+            raise RequestError(422, f"the body: its shape {degrees.shape} is not (..., 4): {', '.join(ANGLES)}")
+        if degrees.size == 0:
+            raise RequestError(422, "the body: an empty array")
+        angles = [_in_radians(name, degrees[..., column]) for column, name in enumerate(ANGLES)]
+        at = [_number("wavelength_nm", text) for text in wavelengths]
+        wavelength_nm = None if not at else at[0] if len(at) == 1 else np.array(at)
+        return cls((angles[0], angles[1], angles[2], angles[3]), degrees.shape[:-1], wavelength_nm)
 
     def wavelengths(self, table: Table) -> float | NDArray[np.float64] | None:
         """The wavelengths [nm] of the values: what was asked for, else those of the table; None if it is grey."""
         return table.wavelength_nm if self.wavelength_nm is None else self.wavelength_nm
 
     def values(self, table: Table) -> int:
-        """How many numbers the answer holds: points times wavelengths."""
+        """How many numbers are looked up: points times wavelengths."""
         wavelengths = self.wavelengths(table)
         return self.count * (1 if wavelengths is None else np.size(wavelengths))
 
-    def brdf(self, table: Table) -> NDArray[Any]:
-        """The BRDF [1/sr], of `shape`, then the wavelengths; a RequestError (422) where the table does not reach."""
-        with _refused():
-            theta_i, phi_i, theta_r, phi_r = (self.angles[name] for name in ANGLES)
-            return np.asarray(table.lookup(theta_i, phi_i, theta_r, phi_r, self.wavelength_nm))
 
-    def specular_reflectance(self, table: Table) -> NDArray[Any]:
-        """The Dirac part [1], of the shape of theta_i, then the wavelengths."""
-        with _refused():
-            return np.asarray(table.specular_reflectance(self.angles["theta_i"], self.wavelength_nm))
+@dataclass(frozen=True)
+class Values:
+    """What a lookup found: f_r, its error or None, the Dirac part; colours on the last axis if they were asked for."""
+
+    brdf: Any
+    error: Any
+    specular_reflectance: Any
+
+
+def evaluate(points: Points, options: Options, table: Table) -> Values:
+    """Look points up; a RequestError (422) where the table does not reach, or makes no colour."""
+    with _refused():
+        if options.output != "spectrum":
+            return _coloured(points, options, table)
+        if options.source == "model":
+            from brdfdb.albedo import material_of
+
+            at = points.wavelengths(table)
+            table.specular_reflectance(0.0, at)  # no further than the table reaches
+            material = material_of(table)
+            return Values(
+                material.lookup(*points.angles, at), None, material.specular_reflectance(points.angles[0], at)
+            )
+        at = points.wavelength_nm
+        brdf, error = (
+            table.lookup(*points.angles, at, with_error=True)
+            if options.error
+            else (table.lookup(*points.angles, at), None)
+        )
+        one = table.specular is None and np.ndim(brdf) == 0  # the most asked for, and slow to work out
+        return Values(brdf, error, 0.0 if one else table.specular_reflectance(points.angles[0], at))
+
+
+def _coloured(points: Points, options: Options, table: Table) -> Values:
+    from brdfdb_api.colours import coloured, weights
+
+    assert options.output != "spectrum"
+    wavelengths = points.wavelengths(table)
+    grey = table.wavelength_nm is None
+    if grey and points.wavelength_nm is not None:
+        raise RequestError(422, "wavelength_nm: a colour of a grey material has no wavelengths", "wavelength_nm")
+    of = weights(options.output, None if grey else np.atleast_1d(cast(Any, wavelengths)), options.illuminant)
+    spectra = evaluate(points, replace(options, output="spectrum"), table)
+    return Values(
+        coloured(spectra.brdf, of, grey=grey),
+        None if spectra.error is None else coloured(spectra.error, np.abs(of), grey=grey),
+        coloured(spectra.specular_reflectance, of, grey=grey),
+    )
+
+
+def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list[str]]:
+    """A query string: single values by name, and those of wavelength_nm, which may be repeated.
+
+    Raises
+    ------
+    RequestError
+        422, for a name that is not allowed, or one that is given twice.
+    """
+    text = query.decode("latin-1")
+    if "%" in text or "+" in text:
+        pairs = parse_qsl(text, keep_blank_values=True)
+    else:
+        pairs = [(name, value) for name, _, value in (part.partition("=") for part in text.split("&") if part)]
+    single: dict[str, str] = {}
+    wavelengths = []
+    for name, value in pairs:
+        refuse_unknown(name, allowed)
+        if name == "wavelength_nm":
+            wavelengths.append(value)
+        elif name in single:
+            raise RequestError(422, f"{name}: given more than once", name)
+        else:
+            single[name] = value
+    return single, wavelengths
 
 
 def refuse_unknown(name: str, allowed: tuple[str, ...]) -> None:
     """Raise the RequestError (422) of a parameter that is not one of `allowed`: a misspelt one is never ignored."""
     if name not in allowed:
-        shown = name.encode("ascii", "backslashreplace").decode()[:40]
+        shown = shortened(name)
         raise RequestError(422, f"{shown}: unknown parameter; allowed are {', '.join(allowed) or 'none'}", shown)
+
+
+def shortened(text: str) -> str:
+    """What a client wrote, to be repeated to it: 40 characters at most, none of which is special."""
+    return text.encode("ascii", "backslashreplace").decode()[:40]
 
 
 @contextmanager
@@ -132,9 +282,57 @@ def _refused() -> Iterator[None]:
         yield
     except ValueError as error:
         name = str(error).partition(":")[0]
-        if name not in FIELDS:
+        if name == "with_error":
+            raise RequestError(422, f"error{str(error)[len(name) :]}", "error") from error
+        if name not in (*FIELDS, "illuminant"):
             raise
         raise RequestError(422, str(error), name) from error
+
+
+def _one_of(query: Mapping[str, str], name: str, allowed: tuple[str, ...], default: str) -> str:
+    value = query.get(name, default)
+    if value not in allowed:
+        raise RequestError(422, f"{name}: {shortened(value)!r} is not one of {', '.join(allowed)}", name)
+    return value
+
+
+def _number(name: str, text: str) -> float:
+    """A finite number, as a query writes it."""
+    try:
+        value = float(text) if "_" not in text else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise RequestError(422, f"{name}: {shortened(text)!r} is not a finite number", name)
+    return value
+
+
+def _in_radians(name: str, degrees: NDArray[Any]) -> NDArray[Any]:
+    """Angles [rad], checked: polar angles are within [0, 180] degrees."""
+    if name.startswith("theta"):
+        bad = ~((degrees >= 0.0) & (degrees <= 180.0))
+        if np.any(bad):
+            raise RequestError(422, f"{name}: {degrees[bad].flat[0]} is outside [0, 180] degrees", name)
+    elif not np.all(finite := np.isfinite(degrees)):
+        raise RequestError(422, f"{name}: {degrees[~finite].flat[0]} is not a finite number", name)
+    return radians(degrees)
+
+
+def _npy(body: bytes) -> NDArray[Any]:
+    """The float32 or float64 array of a .npy file; its header is believed only where the body is as long as it says."""
+    stream = io.BytesIO(body)
+    try:
+        version = np.lib.format.read_magic(stream)
+        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+        shape, by_columns, dtype = read(stream, max_header_size=_HEADER_BYTES)
+    except (ValueError, KeyError, SyntaxError, RecursionError, MemoryError, TypeError):
+        raise RequestError(422, "the body is not a .npy file") from None
+    if dtype not in (np.dtype("<f4"), np.dtype("<f8")):
+        raise RequestError(422, f"the body: {shortened(str(dtype))} is not float32 or float64, little endian")
+    data = memoryview(body)[stream.tell() :]
+    if math.prod(shape) * dtype.itemsize != len(data) or any(size < 0 for size in shape):
+        raise RequestError(422, "the body is shorter or longer than its .npy header says")
+    return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
 
 
 def _numbers(name: str, value: Any) -> NDArray[np.float64]:

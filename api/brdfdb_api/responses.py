@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from http import HTTPStatus
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import orjson
@@ -58,35 +58,72 @@ class Health(BaseModel):
 
 
 class Summary(BaseModel):
-    """One line of the catalogue."""
+    """One line of the catalogue; of a damaged material only `name`, `damaged` and `href`."""
 
     name: str
-    title: str
-    model: str
-    anisotropic: bool
-    wavelength_range_nm: list[float] | None = Field(description="first and last wavelength [nm]; null: grey")
-    revision: str
+    title: str = ""
+    model: str = ""
+    model_title: str = ""
+    paper: str = Field(default="", description="key of the paper of the model, such as he1991")
+    source: str = Field(default="", description="paper and table, figure or section of the parameters")
+    anisotropic: bool | None = None
+    wavelength_range_nm: list[float] | None = Field(
+        default=None, description="first and last wavelength [nm]; null: grey"
+    )
+    error_p99: float | None = Field(
+        default=None, description="relative error that 99 of 100 values keep to; null: not measured"
+    )
+    verdict: str | None = Field(default=None, description="of the audit of this revision; null: it has none")
+    colour: str | None = Field(default=None, description="#rrggbb of its albedo under D65, at 45 degrees, to look at")
+    revision: str = ""
+    created: str | None = None
+    bytes: int | None = None
+    damaged: str | None = Field(default=None, description="what is wrong with its files")
     href: str
 
 
 class Catalogue(BaseModel):
-    """Every material of the store, sorted by name."""
+    """Materials of the store, sorted by name."""
 
     materials: list[Summary]
+    total: int = Field(description="materials that the filters let through, on all pages")
+    next: str | None = Field(description="address of the next page; null: this is the last")
+
+
+class ParameterDocument(BaseModel):
+    """A parameter of a model."""
+
+    name: str
+    value: float | bool
+    unit: str
+    meaning: str
+    source: str
+    assumed: bool = Field(description="the paper does not print it: our choice, explained in the note")
 
 
 class Material(BaseModel):
-    """One material: where its table comes from and where it is sampled."""
+    """One material: where its table comes from, where it is sampled, how far to believe it."""
 
     name: str
     revision: str
+    title: str
+    model: str
+    parameters: list[ParameterDocument]
     anisotropic: bool
     wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")
     axes_deg: dict[str, list[float]] = Field(description="the grid of the table [degrees]")
     specular: bool = Field(description="whether there is a Dirac part: specular_reflectance is not 0 everywhere")
-    attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
-        description="title, model, parameters, source and all else the table records"
+    error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
+        description="the measured error of the table against its model, by bands of theta_i; null: not measured"
     )
+    audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
+        description="verdict of each finding of the audit, and whether it is of this revision; null: none"
+    )
+    colour: str | None
+    attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
+        description="all that the table records of itself"
+    )
+    revisions: list[str] = Field(description="that are kept, oldest first")
     links: dict[str, str]
 
 
@@ -95,13 +132,66 @@ class Lookup(BaseModel):
 
     material: str
     revision: str
-    unit: str = Field(description="unit of brdf: 1/sr")
-    wavelength_nm: float | list[float] | None = Field(description="wavelengths of the last axis [nm]; null: grey")
+    source: Literal["table", "model"]
+    unit: str = Field(description="unit of brdf and error: 1/sr")
+    output: Literal["spectrum", "xyz", "linear-srgb"]
+    illuminant: str | None = Field(description="of a colour; null of a spectrum")
+    wavelength_nm: float | list[float] | None = Field(description="wavelengths that were looked up [nm]; null: grey")
     brdf: float | list[Any] = Field(
-        description="shape of the broadcast angles, then the wavelengths unless they are one number or null"
+        description="shape of the broadcast angles, then the wavelengths unless they are one number or null; of a "
+        "colour, then three numbers"
+    )
+    error: float | list[Any] | None = Field(
+        description="in the shape of brdf, 99 of 100 values are within that of the model; null: not asked for"
     )
     specular_reflectance: float | list[Any] = Field(
-        description="Dirac part, a reflectance without unit that is not in brdf: shape of theta_i, then the wavelengths"
+        description="Dirac part, a reflectance without unit that is not in brdf: shape of theta_i, then as brdf"
+    )
+
+
+class Albedo(BaseModel):
+    """Directional albedo of a table: the share of light from theta_i that it reflects, averaged over phi_i."""
+
+    material: str
+    revision: str
+    wavelength_nm: list[float] | None = Field(description="null: grey")
+    theta_i: list[float] = Field(description="degrees")
+    albedo: list[list[float]] = Field(description="[theta_i][wavelength], without the Dirac part")
+    specular_reflectance: list[list[float]] = Field(description="[theta_i][wavelength], the Dirac part")
+    hemispherical: list[float] = Field(description="[wavelength], of light that is the same from everywhere, both")
+    error: float = Field(description="of albedo, the largest estimate of the integration")
+
+
+class Lobe(BaseModel):
+    """f_r for one light over viewers, or over half and difference angles: axes in degrees, and values over them."""
+
+    material: str
+    revision: str
+    source: Literal["table", "model"]
+    view: Literal["cut", "hemisphere", "half-difference"]
+    theta_i: float | None = Field(description="degrees; null of half-difference")
+    phi_i: float
+    output: Literal["spectrum", "xyz", "linear-srgb"]
+    illuminant: str | None
+    unit: str
+    wavelength_nm: float | list[float] | None
+    axes_deg: dict[str, list[float]] = Field(
+        description="of the axes of brdf, in order; in a cut theta_r is negative back towards the light; in a "
+        "hemisphere phi is phi_r - phi_i"
+    )
+    brdf: list[Any]
+    specular_reflectance: float | list[float] | None
+
+
+class Audit(BaseModel):
+    """What the audit found of a material."""
+
+    material: str
+    revision: str = Field(description="that was audited")
+    current: bool = Field(description="whether that is the current one")
+    when: str
+    finding: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
+        description="MaterialAudit of schemas/audit.schema.json"
     )
 
 
@@ -137,3 +227,23 @@ def problem_response(
     if closest is not None:
         problem["closest"] = list(closest)
     return Response(orjson.dumps(problem), status_code=status, media_type=PROBLEM_JSON, headers=headers)
+
+
+def plain(array: Any) -> Any:
+    """What orjson can write: a number for a 0-d array, contiguous memory for any other."""
+    return np.asarray(array).item() if np.ndim(array) == 0 else np.ascontiguousarray(array)
+
+
+def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> dict[str, str]:
+    """ETag and Cache-Control; of an address that names a revision, for good. JSON may be compressed: a weak tag."""
+    etag = f'W/"{tag}"' if kind == "json" else f'"{tag}-{kind}"'
+    kept = "public, max-age=31536000, immutable" if immutable else "no-cache"
+    return {"ETag": etag, "Cache-Control": kept, "Vary": "Accept"}
+
+
+def not_modified(held: str | None, headers: dict[str, str]) -> Response | None:
+    """The 304 of a client that already holds the answer with these headers, None for any other."""
+    if held is None:
+        return None
+    tags = {tag.strip().removeprefix("W/") for tag in held.split(",")}
+    return Response(status_code=304, headers=headers) if tags & {headers["ETag"].removeprefix("W/"), "*"} else None

@@ -1,241 +1,280 @@
-"""The addresses of the HTTP layer, and what each answers."""
+"""The addresses under /v1/materials: lists, materials and lookups; and those that tell how the service is."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from urllib.parse import urlencode
 
 import numpy as np
 from fastapi import APIRouter, Depends, Query
-from numpy.typing import NDArray
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.types import Scope
 
-import brdfdb
-from brdfdb_api.lookups import FIELDS, Points, refuse_unknown
+from brdfdb_api import documented, edge
+from brdfdb_api.documented import BODY, ERROR, NPY_ANSWER, POINT, WAVELENGTHS, answers
+from brdfdb_api.lookups import FIELDS, OPTIONS, Options, Points, evaluate, parsed
 from brdfdb_api.responses import (
     NPY,
     Catalogue,
     Health,
     Lookup,
     Material,
-    Problem,
     RequestError,
+    cache_headers,
     json_response,
+    not_modified,
     npy_response,
+    plain,
 )
+from brdfdb_api.shelf import Shelf
 
 if TYPE_CHECKING:
     from brdfdb.lookup import Table
-    from brdfdb.store import Store
 
 T = TypeVar("T")
 
 INLINE_VALUES = 500  # looking up more numbers happens in a thread, so that the event loop serves others meanwhile
 INLINE_BYTES = 32 * 2**10  # the same for reading a body; 500 points are about this long
 LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points, and numbers, in one answer, as multiples of max_points
+PAGE, MOST = 100, 1000  # materials on a page
+SEARCHED = ("name", "title", "model", "model_title", "paper", "source")
 
-ANGLE_SCHEMA = {"anyOf": [{"type": "number"}, {"type": "array", "items": {}}]}
-BODY = {
-    "description": "Angles in degrees, numbers or nested lists of numbers that broadcast as numpy arrays do.",
-    "required": True,
-    "content": {
-        "application/json": {
-            "schema": {
-                "type": "object",
-                "required": ["theta_i", "theta_r"],
-                "additionalProperties": False,
-                "properties": {
-                    "theta_i": {**ANGLE_SCHEMA, "description": "polar angle of the light [degrees], 0 to 180"},
-                    "phi_i": {**ANGLE_SCHEMA, "description": "azimuth of the light [degrees]", "default": 0},
-                    "theta_r": {**ANGLE_SCHEMA, "description": "polar angle of the viewer [degrees], 0 to 180"},
-                    "phi_r": {**ANGLE_SCHEMA, "description": "azimuth of the viewer [degrees]", "default": 0},
-                    "wavelength_nm": {
-                        "anyOf": [
-                            {"type": "number"},
-                            {"type": "array", "items": {"type": "number"}, "minItems": 1},
-                            {"type": "null"},
-                        ],
-                        "description": "wavelengths [nm]; missing or null: every wavelength of the table",
-                    },
-                },
-            },
-            "example": {"theta_i": 45, "theta_r": [0, 30, 60], "phi_r": 180},
-        }
-    },
-}
-
-Theta = Annotated[float, Query(description="polar angle [degrees]", json_schema_extra={"minimum": 0, "maximum": 180})]
-Phi = Annotated[float, Query(description="azimuth [degrees], any finite number; phi_r - phi_i = 180 is the mirror")]
-Wavelengths = Annotated[list[float] | None, Query(description="wavelength [nm], repeatable; missing: all of the table")]
-Format = Annotated[
-    Literal["json", "npy"] | None, Query(description=f"missing: npy if the Accept header names {NPY}, else json")
-]
-
-
-def answers(model: type, *statuses: int, npy: bool = False) -> dict[int | str, dict[str, Any]]:
-    """What OpenAPI says of the responses of a route: `model` at 200, and `statuses`."""
-    others: dict[int, dict[str, Any]] = {
-        304: {"description": "The ETag in If-None-Match still holds"},
-        404: {"description": "No such material; the closest names are listed", "model": Problem},
-        413: {"description": "Too large a body, or too many points for one answer", "model": Problem},
-        422: {"description": "A parameter is missing, unknown or out of range; it is named", "model": Problem},
-        503: {"description": "The store cannot be read", "model": Problem},
-    }
-    success: dict[str, Any] = {"description": "Success", "model": model}
-    if npy:
-        schema = {"type": "string", "format": "binary", "description": "brdf alone, as a .npy file"}
-        success["content"] = {NPY: {"schema": schema}}
-    return {200: success, **{status: others[status] for status in statuses}}
+router = APIRouter()
 
 
 def query_names(*allowed: str) -> Any:
     """A dependency that refuses query parameters that are not `allowed`, and any but wavelength_nm given twice."""
 
     async def check(request: Request) -> None:
-        seen = set()
-        for name, _ in request.query_params.multi_items():
-            refuse_unknown(name, allowed)
-            if name in seen and name != "wavelength_nm":
-                raise RequestError(422, f"{name}: given more than once", name)
-            seen.add(name)
+        parsed(request.scope["query_string"], allowed)
 
     return Depends(check)
 
 
-router = APIRouter()
+def shelf_of(request: Request) -> Shelf:
+    """What the application serves."""
+    shelf: Shelf = request.app.state.shelf
+    return shelf
 
 
-@router.get("/healthz", tags=["service"], responses=answers(Health, 503))
-def health(request: Request) -> Response:
+@router.get("/healthz", tags=["service"], dependencies=[query_names()], responses=answers(Health, 422))
+async def healthz() -> Response:
+    """Whether the process answers at all."""
+    return json_response({"status": "ok"})
+
+
+@router.get("/readyz", tags=["service"], dependencies=[query_names()], responses=answers(Health, 422, 503))
+def readyz(request: Request) -> Response:
     """Whether the store can be read, and how many materials it holds."""
-    return json_response({"status": "ok", "materials": len(store_of(request))})
-
-
-@router.get("/v1/materials", tags=["materials"], dependencies=[query_names()], responses=answers(Catalogue, 422, 503))
-def catalogue(request: Request) -> Response:
-    """Every material of the store, sorted by name."""
-    store = store_of(request)
-    return json_response({"materials": [summary(store, name) for name in store]})
+    return json_response({"status": "ok", "materials": len(shelf_of(request).names())})
 
 
 @router.get(
-    "/v1/materials/{name}",
-    tags=["materials"],
-    dependencies=[query_names()],
-    responses=answers(Material, 304, 404, 422, 503),
+    "/metrics", tags=["service"], dependencies=[query_names()], responses=answers(None, 422, media={"text/plain": ""})
 )
-def material(request: Request, name: str) -> Response:
-    """Where the table of a material comes from, and where it is sampled (axes in degrees)."""
-    store = store_of(request)
-    if held := not_modified(request, store, name, "json"):
+def metrics() -> Response:
+    """Requests, seconds and points counted, as Prometheus reads them."""
+    return Response(edge.metrics(), media_type="text/plain; version=1.0.0; charset=utf-8")
+
+
+@router.get(
+    "/v1/materials",
+    tags=["materials"],
+    dependencies=[query_names("cursor", "limit", "model", "paper", "q")],
+    responses=answers(Catalogue, 422, 503),
+)
+def catalogue(
+    request: Request,
+    cursor: Annotated[str, Query(description="of the page before, its last name")] = "",
+    limit: Annotated[int, Query(ge=1, le=MOST, description="materials on a page")] = PAGE,
+    model: Annotated[str, Query(description="only of this model, such as ward")] = "",
+    paper: Annotated[str, Query(description="only with this in the key of the paper or in the source")] = "",
+    q: Annotated[str, Query(description="only with all of these words in name, title, model or source")] = "",
+) -> Response:
+    """Materials of the store, sorted by name, a page at a time."""
+    shelf = shelf_of(request)
+    words = q.casefold().split()
+    found = []
+    for name in shelf.names():
+        line = shelf.summary(name)
+        text = " ".join(
+            str(line.get(key, "")) for key in ("name", "title", "model_title", "paper", "source")
+        ).casefold()
+        kept = model in ("", line.get("model", "")) and all(word in text for word in words)
+        if kept and paper.casefold() in f"{line.get('paper', '')} {line.get('source', '')}".casefold():
+            found.append(line)
+    page = [line for line in found if line["name"] > cursor][:limit]
+    for line in page:
+        shelf.colour(line["name"])
+    following = None
+    if page and found[-1]["name"] > page[-1]["name"]:
+        asked = {"model": model, "paper": paper, "q": q, "limit": limit, "cursor": page[-1]["name"]}
+        following = f"/v1/materials?{urlencode({key: value for key, value in asked.items() if value})}"
+    lines = [shelf.summary(line["name"]) for line in page]
+    return json_response({"materials": lines, "total": len(found), "next": following}, {"Cache-Control": "no-cache"})
+
+
+def both(
+    path: str, *, router: APIRouter = router, method: str = "GET", **keywords: Any
+) -> Callable[[Callable[..., T]], Callable[..., T]]:
+    """Serve an address of the current revision, and the same of any revision, which never changes."""
+
+    def add(function: Callable[..., T]) -> Callable[..., T]:
+        name = getattr(function, "__name__", "")
+        for prefix, suffix in (("", ""), ("/revisions/{revision}", "_of_revision")):
+            router.add_api_route(
+                f"/v1/materials/{{name}}{prefix}{path}",
+                function,
+                methods=[method],
+                name=f"{name}{suffix}",
+                **keywords,
+            )
+        return function
+
+    return add
+
+
+@both("", tags=["materials"], dependencies=[query_names()], responses=answers(Material, 304, 404, 422, 503))
+def material(request: Request, name: str, revision: str | None = None) -> Response:
+    """Where the table of a material comes from, where it is sampled (axes in degrees), and how far to believe it."""
+    shelf = shelf_of(request)
+    table = shelf.table(name, revision)
+    verdict = shelf.verdict(name)
+    shelf.colour(name)
+    audited = "" if verdict is None else verdict.when
+    headers = cache_headers(f"{name}-{table.revision}-{audited}")
+    if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
-    table = store[name]
-    here = f"/v1/materials/{table.name}"
+    here = f"/v1/materials/{name}" + ("" if revision is None else f"/revisions/{revision}")
+    attributes = table.attrs
     document = {
         "name": table.name,
         "revision": table.revision,
+        "title": attributes["title"],
+        "model": attributes["model"],
+        "parameters": _parameters(attributes),
         "anisotropic": table.anisotropic,
         "wavelength_nm": table.wavelength_nm,
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,
-        "attributes": dict(table.attrs),
-        "links": {"self": here, "lookup": f"{here}/lookup", "materials": "/v1/materials"},
+        "error": attributes.get("error"),
+        "audit": None if verdict is None else _verdicts(verdict.finding, verdict.when, table.revision),
+        "colour": shelf.summary(name).get("colour"),
+        "attributes": {key: value for key, value in attributes.items() if key not in ("error", "request")},
+        "revisions": shelf.store.revisions(name),
+        "links": {
+            "self": here,
+            **{key: f"{here}/{key}" for key in ("lookup", "albedo", "lobe", "slice.exr", "audit", "download.zarr")},
+            "store": f"/v1/store/materials/{name}/{table.revision}",
+            "revision": f"/v1/materials/{name}/revisions/{table.revision}",
+            "materials": "/v1/materials",
+        },
     }
-    return json_response(document, head_headers(table.name, table.revision, "json"))
+    return json_response(document, headers)
 
 
-@router.get(
-    "/v1/materials/{name}/lookup",
+def _parameters(attributes: Any) -> list[dict[str, Any]]:
+    """The parameters as files write them: value, unit, meaning, source."""
+    from brdfdb.materials import written_name
+    from brdfdb.models import MODELS
+
+    spec = MODELS.get(attributes["model"])
+    meanings = {} if spec is None else {written_name(each): each for each in spec.parameters}
+    sources, assumed = attributes.get("parameter_sources", {}), attributes.get("assumed", ())
+    return [
+        {
+            "name": name,
+            "value": value,
+            "unit": ("degree" if meanings[name].unit == "rad" else meanings[name].unit) if name in meanings else "",
+            "meaning": meanings[name].meaning if name in meanings else "",
+            "source": sources.get(name, attributes["source"]),
+            "assumed": name in assumed,
+        }
+        for name, value in attributes["parameters"].items()
+    ]
+
+
+def _verdicts(finding: dict[str, Any], when: str, revision: str) -> dict[str, Any]:
+    """The verdict of an audit, and of each finding that has one."""
+    each = {key: value["verdict"] for key, value in finding.items() if isinstance(value, dict) and "verdict" in value}
+    return {
+        "verdict": finding["verdict"],
+        "findings": each,
+        "reason": finding["energy"]["reason"],
+        "validity": finding["validity"]["standing"],
+        "revision": finding["revision"],
+        "current": finding["revision"] == revision,
+        "when": when,
+    }
+
+
+@both(
+    "/lookup",
     tags=["lookup"],
-    dependencies=[query_names(*FIELDS, "format")],
-    responses=answers(Lookup, 304, 404, 413, 422, 503, npy=True),
+    responses=answers(Lookup, 304, 404, 413, 422, 503, media=NPY_ANSWER),
+    openapi_extra={"parameters": [*POINT, WAVELENGTHS, *documented.OPTIONS, ERROR]},
 )
-async def lookup_point(
-    request: Request,
-    name: str,
-    theta_i: Theta,
-    theta_r: Theta,
-    phi_i: Phi = 0.0,
-    phi_r: Phi = 0.0,
-    wavelength_nm: Wavelengths = None,
-    format: Format = None,
-) -> Response:
-    """The BRDF of one pair of directions (angles in degrees): a number, or a list where there are several wavelengths.
+async def lookup_point(request: Request, name: str, revision: str | None = None) -> Response:
+    """The BRDF of one pair of directions (angles in degrees).
 
-    Index i is the light, r the viewer. Below the horizon (theta above 90 degrees) the BRDF is 0.
+    The wavelengths are an axis, unless wavelength_nm is one number or the material is grey. Below the horizon (theta
+    above 90 degrees) the BRDF is 0.
     """
-    fields = {"theta_i": theta_i, "phi_i": phi_i, "theta_r": theta_r, "phi_r": phi_r}
-    wavelengths = wavelength_nm[0] if wavelength_nm and len(wavelength_nm) == 1 else wavelength_nm
-    points = Points.from_fields({**fields, "wavelength_nm": wavelengths})
-    store, kind = store_of(request), answer_kind(request, format)
-    if held := not_modified(request, store, name, kind):
-        return held
-    return await answer(request, points, store[name], kind)
+    return await answer_point(request.scope, name, revision)
 
 
-@router.post(
-    "/v1/materials/{name}/lookup",
+async def answer_point(scope: Scope, name: str, revision: str | None) -> Response:
+    """Answer GET of a lookup, from the query as it came."""
+    state = scope["app"].state
+    query, wavelengths = parsed(scope["query_string"], (*FIELDS, *OPTIONS))
+    options, points = Options.from_query(query), Points.from_query(query, wavelengths)
+    accept = held = b""
+    for key, value in scope["headers"]:
+        if key == b"accept":
+            accept = value
+        elif key == b"if-none-match":
+            held = value
+    shelf: Shelf = state.shelf
+    table = shelf.held(name) if revision is None else None
+    if table is None:
+        table = await run_in_threadpool(shelf.table, name, revision)
+    kind = options.format or ("npy" if NPY.encode() in accept else "json")
+    headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
+    if held and (unchanged := not_modified(held.decode("latin-1"), headers)):
+        return unchanged
+    return await answer(state, points, options, table, kind, headers)
+
+
+@both(
+    "/lookup",
+    method="POST",
     tags=["lookup"],
-    dependencies=[query_names("format")],
-    responses=answers(Lookup, 404, 413, 422, 503, npy=True),
-    openapi_extra={"requestBody": BODY},
+    responses=answers(Lookup, 404, 413, 422, 503, media=NPY_ANSWER),
+    openapi_extra={"requestBody": BODY, "parameters": [WAVELENGTHS, *documented.OPTIONS, ERROR]},
 )
-async def lookup_points(request: Request, name: str, format: Format = None) -> Response:
+async def lookup_points(request: Request, name: str, revision: str | None = None) -> Response:
     """The BRDF of many pairs of directions (angles in degrees): an array of the shape that the angles broadcast to.
 
     The wavelengths are a last axis, unless wavelength_nm is one number or the material is grey. Below the horizon
-    (theta above 90 degrees) the BRDF is 0.
+    (theta above 90 degrees) the BRDF is 0. wavelength_nm in the query is for .npy bodies; JSON holds its own.
     """
-    table = store_of(request)[name]
+    query, wavelengths = parsed(request.scope["query_string"], ("wavelength_nm", *OPTIONS))
+    options = Options.from_query(query)
+    table = await run_in_threadpool(shelf_of(request).table, name, revision)
+    binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NPY
+    if wavelengths and not binary:
+        raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     body = await request.body()
-    points = await run(Points.from_json, body, in_thread=len(body) > INLINE_BYTES)
-    return await answer(request, points, table, answer_kind(request, format))
-
-
-def store_of(request: Request) -> Store:
-    """The store of the application, opened when it is first needed; a StoreError where that is not possible."""
-    state = request.app.state
-    if state.store is None:
-        state.store = brdfdb.open(state.settings.store)
-    store: Store = state.store
-    return store
-
-
-def summary(store: Store, name: str) -> dict[str, Any]:
-    """One line of the catalogue, from the attributes alone: no table is decoded for it."""
-    attributes = store.attributes(name)
-    return {
-        "name": name,
-        "title": attributes["title"],
-        "model": attributes["model"],
-        "anisotropic": attributes["anisotropic"],
-        "wavelength_range_nm": attributes["wavelength_range_nm"] or None,
-        "revision": store.head(name),
-        "href": f"/v1/materials/{name}",
-    }
-
-
-def head_headers(name: str, revision: str, kind: str) -> dict[str, str]:
-    """Headers of an answer that changes when the material gets a new revision."""
-    tag = f"{name}-{revision}" if kind == "json" else f"{name}-{revision}-{kind}"
-    return {"ETag": f'"{tag}"', "Cache-Control": "no-cache", "Vary": "Accept"}
-
-
-def not_modified(request: Request, store: Store, name: str, kind: str) -> Response | None:
-    """The 304 of a client that already holds this answer, None for any other."""
-    held = request.headers.get("if-none-match")
-    if held is None:
-        return None
-    headers = head_headers(name, store.head(name), kind)
-    tags = [tag.strip().removeprefix("W/") for tag in held.split(",")]
-    return Response(status_code=304, headers=headers) if headers["ETag"] in tags or "*" in tags else None
-
-
-def answer_kind(request: Request, format: str | None) -> str:
-    """json or npy: `format` decides, without it the Accept header."""
-    return format or ("npy" if NPY in request.headers.get("accept", "") else "json")
+    if binary:
+        points = await run(Points.from_npy, body, wavelengths, in_thread=len(body) > INLINE_BYTES)
+    else:
+        points = await run(Points.from_json, body, in_thread=len(body) > INLINE_BYTES)
+    kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
+    headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
+    return await answer(request.app.state, points, options, table, kind, headers)
 
 
 async def run(function: Callable[..., T], *args: Any, in_thread: bool) -> T:
@@ -243,34 +282,36 @@ async def run(function: Callable[..., T], *args: Any, in_thread: bool) -> T:
     return await run_in_threadpool(function, *args) if in_thread else function(*args)
 
 
-async def answer(request: Request, points: Points, table: Table, kind: str) -> Response:
+async def answer(
+    state: Any, points: Points, options: Options, table: Table, kind: str, headers: dict[str, str]
+) -> Response:
     """Look the points up and write them as `kind`; a RequestError (413) where they are too many for one answer."""
-    max_points, max_values = (factor * request.app.state.settings.max_points for factor in LIMITS[kind])
+    max_points, max_values = (factor * state.settings.max_points for factor in LIMITS[kind])
     if points.count > max_points:
         raise RequestError(413, f"{points.count} points are more than the {max_points} that one {kind} answer may hold")
     values = points.values(table)
     if values > max_values:
         raise RequestError(413, f"{values} values are more than the {max_values} that one {kind} answer may hold")
-    return await run(write_answer, points, table, kind, in_thread=values > INLINE_VALUES)
+    edge.POINTS.labels(options.source).inc(points.count)
+    slow = values > INLINE_VALUES or options.source == "model" or options.output != "spectrum"
+    return await run(write_answer, points, options, table, kind, headers, in_thread=slow)
 
 
-def write_answer(points: Points, table: Table, kind: str) -> Response:
+def write_answer(points: Points, options: Options, table: Table, kind: str, headers: dict[str, str]) -> Response:
     """Look the points up and write them as `kind`."""
-    headers = head_headers(table.name, table.revision, kind)
-    brdf = points.brdf(table)
+    found = evaluate(points, options, table)
     if kind == "npy":
-        return npy_response(brdf, headers)
+        return npy_response(found.brdf if found.error is None else np.stack([found.brdf, found.error]), headers)
     document = {
         "material": table.name,
         "revision": table.revision,
+        "source": options.source,
         "unit": "1/sr",
+        "output": options.output,
+        "illuminant": None if options.output == "spectrum" else options.illuminant,
         "wavelength_nm": points.wavelengths(table),
-        "brdf": plain(brdf),
-        "specular_reflectance": plain(points.specular_reflectance(table)),
+        "brdf": plain(found.brdf),
+        "error": None if found.error is None else plain(found.error),
+        "specular_reflectance": plain(found.specular_reflectance),
     }
     return json_response(document, headers)
-
-
-def plain(array: NDArray[Any]) -> Any:
-    """What orjson can write: a number for a 0-d array, contiguous memory for any other."""
-    return array.item() if array.ndim == 0 else np.ascontiguousarray(array)

@@ -1,4 +1,4 @@
-"""What the operator of the HTTP layer can set: a store, and two limits, all read from `BRDFDB_*`."""
+"""What the operator of the HTTP layer can set: a store, limits, who may ask; all read from `BRDFDB_*`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self, cast, get_args
+
+LogLevel = Literal["info", "warning", "error"]
 
 
 @dataclass(frozen=True)
@@ -17,15 +19,33 @@ class Settings:
     ----------
     store : Path
         Directory that ``brdfdb build --store`` wrote.
+    audit : Path or None
+        What ``brdfdb audit`` wrote as JSON; by default ``audit.json`` in the store, where that command puts it.
     max_points : int
         Points in one JSON answer, at least 1; a .npy answer may hold 100 times as many.
     max_body_bytes : int
-        Largest request body [bytes], at least 1. The default takes four lists of a million angles with two decimals.
+        Largest request body [bytes], at least 1. The default takes a million points as .npy.
+    cache_bytes : int
+        How much of decoded tables each worker keeps [bytes], at least 1.
+    cors_origins : tuple of str
+        Web pages of these origins may ask (CORS): ``https://example.org``, or ``*`` for all. By default none but our
+        own. Separated by commas in the environment.
+    log_level : str
+        "info" logs each request as a line of JSON, "warning" those that were refused, "error" those that failed here.
     """
 
     store: Path = Path("brdf-store")
+    audit: Path | None = None
     max_points: int = 10_000
-    max_body_bytes: int = 32 * 2**20
+    max_body_bytes: int = 64 * 2**20
+    cache_bytes: int = 256 * 2**20
+    cors_origins: tuple[str, ...] = ()
+    log_level: LogLevel = "info"
+
+    @property
+    def audit_file(self) -> Path:
+        """Where the report of an audit is looked for."""
+        return self.store / "audit.json" if self.audit is None else self.audit
 
     @classmethod
     def from_environment(cls, environ: Mapping[str, str] = os.environ) -> Self:
@@ -34,12 +54,20 @@ class Settings:
         Raises
         ------
         ValueError
-            If a limit is not a positive whole number; the sentence names the variable.
+            If a limit is not a positive whole number, or the level of the log none; the sentence names the variable.
         """
+        level = environ.get("BRDFDB_LOG_LEVEL", cls.log_level)
+        if level not in get_args(LogLevel):
+            raise ValueError(f"BRDFDB_LOG_LEVEL: {level!r} is not one of {', '.join(get_args(LogLevel))}")
+        origins = (origin.strip() for origin in environ.get("BRDFDB_CORS_ORIGINS", "").split(","))
         return cls(
             store=Path(environ.get("BRDFDB_STORE", cls.store)),
+            audit=Path(environ["BRDFDB_AUDIT"]) if "BRDFDB_AUDIT" in environ else None,
             max_points=_positive(environ, "BRDFDB_MAX_POINTS", cls.max_points),
             max_body_bytes=_positive(environ, "BRDFDB_MAX_BODY_BYTES", cls.max_body_bytes),
+            cache_bytes=_positive(environ, "BRDFDB_CACHE_BYTES", cls.cache_bytes),
+            cors_origins=tuple(origin for origin in origins if origin),
+            log_level=cast(LogLevel, level),
         )
 
 

@@ -232,6 +232,7 @@ def _parser() -> argparse.ArgumentParser:
     serve = command("serve", _serve, "Answer lookups over HTTP.")
     serve.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     serve.add_argument("--port", type=int, default=8000, help="port (default: %(default)s)")
+    serve.add_argument("--workers", type=_positive, default=1, metavar="N", help="processes (default: %(default)s)")
     return parser
 
 
@@ -383,9 +384,9 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _serve(options: argparse.Namespace) -> int:
-    from brdfdb_api.app import serve
+    from brdfdb_api.server import serve
 
-    serve(options.store, options.host, options.port)
+    serve(options.store, options.host, options.port, options.workers)
     return 0
 
 

@@ -1,0 +1,184 @@
+"""What is served: a store that may change or vanish meanwhile, what lists show of it, and the verdicts of its audit."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import orjson
+
+from brdfdb.store import Store, StoreError, UnknownMaterialError
+from brdfdb_api.settings import Settings
+
+if TYPE_CHECKING:
+    from brdfdb.lookup import Table
+
+COLOURED_BYTES = 16 * 2**20  # a larger table is not decoded only to show its colour in a list
+
+WARMED = 100  # materials whose colours are found when a server starts
+
+
+class Verdict(NamedTuple):
+    """What the audit says of a material: the finding, when, and whether it is about the current revision."""
+
+    finding: dict[str, Any]
+    when: str
+    current: bool
+
+
+class Shelf:
+    """The materials that an application serves.
+
+    Parameters
+    ----------
+    settings : Settings
+        Where the store is.
+    store : Store, optional
+        An open one. By default it is opened when it is first needed, so that there may be none yet.
+    """
+
+    def __init__(self, settings: Settings, store: Store | None = None) -> None:
+        self._settings = settings
+        self._store = store
+        self._seen: set[str] = set()
+        self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
+        self._colours: dict[tuple[str, str], str | None] = {}
+        self._audit: tuple[tuple[int, int], dict[str, Any]] | None = None
+        self._lock = threading.Lock()
+
+    @property
+    def store(self) -> Store:
+        """The store; StoreError where there is none."""
+        if self._store is None:
+            self._store = Store(self._settings.store, self._settings.cache_bytes)
+        return self._store
+
+    def held(self, name: str) -> Table | None:
+        """The current table of a material if it is decoded already; errors as by `table`."""
+        try:
+            return self.store.held(name)
+        except (UnknownMaterialError, StoreError) as error:
+            raise self._named(name, error) from error
+
+    def table(self, name: str, revision: str | None = None) -> Table:
+        """The table of a material, of its current revision or another.
+
+        Raises
+        ------
+        UnknownMaterialError, UnknownRevisionError
+            If there is none.
+        StoreError
+            If it cannot be read, or was there and is gone; the sentence names the material.
+        """
+        try:
+            found = self.store[name] if revision is None else self.store.table(name, revision)
+        except (UnknownMaterialError, StoreError) as error:
+            raise self._named(name, error) from error
+        self._seen.add(name)
+        return found
+
+    def head(self, name: str) -> str:
+        """The current revision of a material; errors as by `table`."""
+        try:
+            return self.store.head(name)
+        except (UnknownMaterialError, StoreError) as error:
+            raise self._named(name, error) from error
+
+    def _named(self, name: str, error: Exception) -> Exception:
+        """An error of a material that was served before is one of the store, and names it."""
+        if isinstance(error, UnknownMaterialError) and name not in self._seen:
+            return error
+        if isinstance(error, UnknownMaterialError):
+            return StoreError(f"{name} is gone from the store")
+        return error if name in str(error) else StoreError(f"{name} cannot be read: {error}")
+
+    def names(self) -> list[str]:
+        """The names of all materials, sorted."""
+        names = list(self.store)
+        self._seen.update(names)
+        return names
+
+    def summary(self, name: str) -> dict[str, Any]:
+        """What lists show of a material; of a damaged one its name and a sentence."""
+        try:
+            group, digest = self.store.location(name)
+            known = self._summaries.get(name)
+            if known is None or known[0] != digest:
+                known = self._summaries[name] = digest, self._described(name, group.name)
+        except (UnknownMaterialError, StoreError) as error:
+            return {"name": name, "damaged": str(error), "href": f"/v1/materials/{name}"}
+        verdict = self.verdict(name)
+        return {
+            **known[1],
+            "verdict": verdict.finding["verdict"] if verdict and verdict.current else None,
+            "colour": self._colours.get((name, digest)),
+        }
+
+    def _described(self, name: str, revision: str) -> dict[str, Any]:
+        head, attributes = self.store.summary(name), self.store.attributes(name)
+        return {
+            "name": name,
+            "title": attributes["title"],
+            "model": attributes["model"],
+            "model_title": attributes.get("model_title", attributes["model"]),
+            "paper": attributes.get("model_reference", ""),
+            "source": attributes["source"],
+            "anisotropic": attributes["anisotropic"],
+            "wavelength_range_nm": attributes["wavelength_range_nm"] or None,
+            "error_p99": head.get("error_p99"),
+            "revision": revision,
+            "created": head.get("created"),
+            "bytes": head.get("bytes"),
+            "href": f"/v1/materials/{name}",
+        }
+
+    def colour(self, name: str) -> None:
+        """Find the colour of a material for lists: decodes its table, unless that is large or damaged."""
+        from brdfdb_api.colours import swatch
+
+        try:
+            digest = self.store.location(name)[1]
+            if (name, digest) in self._colours:
+                return
+            small = (self.store.summary(name).get("bytes") or 0) <= COLOURED_BYTES
+            self._colours[name, digest] = swatch(self.store[name]) if small else None
+        except (UnknownMaterialError, StoreError):
+            return
+
+    def warm(self) -> None:
+        """Find the colours that the first page of a list shows, and with them decode its tables."""
+        with contextlib.suppress(StoreError):
+            for name in self.names()[:WARMED]:
+                self.colour(name)
+
+    def verdict(self, name: str) -> Verdict | None:
+        """What the last audit says of a material; None where there is none, or its report cannot be read."""
+        report = self._report()
+        found = report["by_name"].get(name)
+        if found is None:
+            return None
+        return Verdict(found, report["when"], found["revision"] == self.head(name))
+
+    def _report(self) -> dict[str, Any]:
+        path = self._settings.audit_file
+        try:
+            at = os.stat(path)
+        except OSError:
+            return {"when": "", "by_name": {}}
+        seen = at.st_mtime_ns, at.st_size
+        with self._lock:
+            if self._audit is None or self._audit[0] != seen:
+                self._audit = seen, _read(path)
+            return self._audit[1]
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """The findings of a report by material; none of a file that is no report."""
+    try:
+        report = orjson.loads(path.read_bytes())
+        return {"when": report["when"], "by_name": {each["material"]: each for each in report["materials"]}}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {"when": "", "by_name": {}}
