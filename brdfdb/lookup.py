@@ -300,9 +300,10 @@ class Table:
             If theta_i or a wavelength is outside its range.
         """
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
-        one = isinstance(theta_i, float) and 0.0 <= theta_i <= HALF_PI  # which checks take longer than
-        angles = None if one else checked_angles(theta_i, 0.0, 0.0, 0.0)
-        theta = np.asarray(theta_i) if angles is None else angles.theta_i
+        given: Any = theta_i
+        one = type(given) is float and 0.0 <= given <= HALF_PI  # which checks take longer than
+        angles = None if one else checked_angles(given, 0.0, 0.0, 0.0)
+        theta = np.asarray(given) if angles is None else angles.theta_i
         values = np.zeros((*theta.shape, weight.size))
         if self.specular is not None:
             table = self.specular.reshape(self.specular.shape[0], -1)
