@@ -300,21 +300,32 @@ class Table:
             If theta_i or a wavelength is outside its range.
         """
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
-        given: Any = theta_i
-        one = type(given) is float and 0.0 <= given <= HALF_PI  # which checks take longer than
-        angles = None if one else checked_angles(given, 0.0, 0.0, 0.0)
-        theta = np.asarray(given) if angles is None else angles.theta_i
-        values = np.zeros((*theta.shape, weight.size))
+        angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
+        values = np.zeros((*angles.theta_i.shape, weight.size))
         if self.specular is not None:
-            table = self.specular.reshape(self.specular.shape[0], -1)
-            upper = np.minimum(low + 1, table.shape[1] - 1)
-            position = np.interp(theta, self._specular_theta, np.arange(len(table)))[..., np.newaxis]  # nan stays nan
-            at = np.minimum(np.nan_to_num(position).astype(np.int64), len(table) - 2)
-            first, second = ((1.0 - weight) * table[row, low] + weight * table[row, upper] for row in (at, at + 1))
-            values = (1.0 - (position - at)) * first + (position - at) * second
-        if angles is not None:
-            values = finished(values, angles, trailing=1)
-        return values.reshape(theta.shape + wavelength_shape)[()]
+            position = np.interp(angles.theta_i, self._specular_theta, np.arange(len(self.specular)))  # nan stays nan
+            at = np.minimum(np.nan_to_num(position).astype(np.int64), len(self.specular) - 2)
+            values = self._specular_at(position[..., np.newaxis], at[..., np.newaxis], low, weight)
+        return finished(values, angles, trailing=1).reshape(angles.theta_i.shape + wavelength_shape)[()]
+
+    def specular_reflectance_of_one(self, theta_i: float, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """`specular_reflectance` for one light that is above the horizon: theta_i [rad] in [0, pi/2], not checked."""
+        low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
+        if self.specular is None:
+            return np.zeros(wavelength_shape)[()]
+        position = float(np.interp(theta_i, self._specular_theta, np.arange(len(self.specular))))
+        at = min(int(position), len(self.specular) - 2)
+        return self._specular_at(position, at, low, weight).reshape(wavelength_shape)[()]
+
+    def _specular_at(
+        self, position: Any, at: Any, low: NDArray[np.int64], weight: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The Dirac part between two nodes of theta_i and two wavelengths each."""
+        assert self.specular is not None
+        table = self.specular.reshape(len(self.specular), -1)
+        upper = np.minimum(low + 1, table.shape[1] - 1)
+        first, second = ((1.0 - weight) * table[row, low] + weight * table[row, upper] for row in (at, at + 1))
+        return np.asarray((1.0 - (position - at)) * first + (position - at) * second)
 
     @functools.cached_property
     def _specular_theta(self) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from brdfdb.geometry import radians
+from brdfdb.geometry import HALF_PI, radians
 from brdfdb_api.responses import RequestError
 
 if TYPE_CHECKING:
@@ -216,8 +216,10 @@ def evaluate(points: Points, options: Options, table: Table) -> Values:
             if options.error
             else (table.lookup(*points.angles, at), None)
         )
-        one = table.specular is None and np.ndim(brdf) == 0  # the most asked for, and slow to work out
-        return Values(brdf, error, 0.0 if one else table.specular_reflectance(points.angles[0], at))
+        theta_i = points.angles[0]
+        if isinstance(theta_i, float) and theta_i <= HALF_PI:  # checks of arrays take longer than the lookup of a point
+            return Values(brdf, error, table.specular_reflectance_of_one(theta_i, at))
+        return Values(brdf, error, table.specular_reflectance(theta_i, at))
 
 
 def _coloured(points: Points, options: Options, table: Table) -> Values:

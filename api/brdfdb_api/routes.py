@@ -228,24 +228,35 @@ async def lookup_point(request: Request, name: str, revision: str | None = None)
 
 async def answer_point(scope: Scope, name: str, revision: str | None) -> Response:
     """Answer GET of a lookup, from the query as it came."""
-    state = scope["app"].state
     query, wavelengths = parsed(scope["query_string"], (*FIELDS, *OPTIONS))
     options, points = Options.from_query(query), Points.from_query(query, wavelengths)
+    accept, held = _headers(scope)
+    settings = scope["app"].state.settings
+    table = await _table(scope["app"].state.shelf, name, revision)
+    kind = options.format or ("npy" if NPY in accept else "json")
+    headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
+    if held and (unchanged := not_modified(held, headers)):
+        return unchanged
+    values = checked_size(settings.max_points, points, table, kind)
+    in_thread = slow(values, options)
+    return await run(write_answer, points, options, table, kind, headers, in_thread=in_thread)
+
+
+def _headers(scope: Scope) -> tuple[str, str]:
+    """Accept and If-None-Match."""
     accept = held = b""
     for key, value in scope["headers"]:
         if key == b"accept":
             accept = value
         elif key == b"if-none-match":
             held = value
-    shelf: Shelf = state.shelf
+    return accept.decode("latin-1"), held.decode("latin-1")
+
+
+async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
+    """A table at once if it is decoded, else from a thread."""
     table = shelf.held(name) if revision is None else None
-    if table is None:
-        table = await run_in_threadpool(shelf.table, name, revision)
-    kind = options.format or ("npy" if NPY.encode() in accept else "json")
-    headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
-    if held and (unchanged := not_modified(held.decode("latin-1"), headers)):
-        return unchanged
-    return await answer(state, points, options, table, kind, headers)
+    return await run_in_threadpool(shelf.table, name, revision) if table is None else table
 
 
 @both(
@@ -263,18 +274,28 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
     """
     query, wavelengths = parsed(request.scope["query_string"], ("wavelength_nm", *OPTIONS))
     options = Options.from_query(query)
-    table = await run_in_threadpool(shelf_of(request).table, name, revision)
     binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NPY
     if wavelengths and not binary:
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
+    table = await _table(shelf_of(request), name, revision)
     body = await request.body()
-    if binary:
-        points = await run(Points.from_npy, body, wavelengths, in_thread=len(body) > INLINE_BYTES)
-    else:
-        points = await run(Points.from_json, body, in_thread=len(body) > INLINE_BYTES)
     kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
     headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
-    return await answer(request.app.state, points, options, table, kind, headers)
+    max_points = request.app.state.settings.max_points
+
+    def points_of() -> Points:
+        return Points.from_npy(body, wavelengths) if binary else Points.from_json(body)
+
+    def all_at_once() -> Response:
+        points = points_of()
+        checked_size(max_points, points, table, kind)
+        return write_answer(points, options, table, kind, headers)
+
+    if len(body) > INLINE_BYTES:
+        return await run_in_threadpool(all_at_once)
+    points = points_of()
+    values = checked_size(max_points, points, table, kind)
+    return await run(write_answer, points, options, table, kind, headers, in_thread=slow(values, options))
 
 
 async def run(function: Callable[..., T], *args: Any, in_thread: bool) -> T:
@@ -282,23 +303,27 @@ async def run(function: Callable[..., T], *args: Any, in_thread: bool) -> T:
     return await run_in_threadpool(function, *args) if in_thread else function(*args)
 
 
-async def answer(
-    state: Any, points: Points, options: Options, table: Table, kind: str, headers: dict[str, str]
-) -> Response:
-    """Look the points up and write them as `kind`; a RequestError (413) where they are too many for one answer."""
-    max_points, max_values = (factor * state.settings.max_points for factor in LIMITS[kind])
-    if points.count > max_points:
-        raise RequestError(413, f"{points.count} points are more than the {max_points} that one {kind} answer may hold")
+def slow(values: int, options: Options) -> bool:
+    """Whether looking up so many values would keep others waiting."""
+    return values > INLINE_VALUES or options.source == "model" or options.output != "spectrum"
+
+
+def checked_size(max_points: int, points: Points, table: Table, kind: str) -> int:
+    """How many numbers are looked up; a RequestError (413) where they are too many for one answer."""
+    most_points, most_values = (factor * max_points for factor in LIMITS[kind])
+    if points.count > most_points:
+        raise RequestError(
+            413, f"{points.count} points are more than the {most_points} that one {kind} answer may hold"
+        )
     values = points.values(table)
-    if values > max_values:
-        raise RequestError(413, f"{values} values are more than the {max_values} that one {kind} answer may hold")
-    edge.POINTS.labels(options.source).inc(points.count)
-    slow = values > INLINE_VALUES or options.source == "model" or options.output != "spectrum"
-    return await run(write_answer, points, options, table, kind, headers, in_thread=slow)
+    if values > most_values:
+        raise RequestError(413, f"{values} values are more than the {most_values} that one {kind} answer may hold")
+    return values
 
 
 def write_answer(points: Points, options: Options, table: Table, kind: str, headers: dict[str, str]) -> Response:
     """Look the points up and write them as `kind`."""
+    edge.POINTS.labels(options.source).inc(points.count)
     found = evaluate(points, options, table)
     if kind == "npy":
         return npy_response(found.brdf if found.error is None else np.stack([found.brdf, found.error]), headers)
