@@ -45,7 +45,7 @@ class Shelf:
         self._store = store
         self._seen: set[str] = set()
         self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
-        self._colours: dict[tuple[str, str], str | None] = {}
+        self._colours: dict[str, tuple[str, str | None]] = {}
         self._audit: tuple[tuple[int, int], dict[str, Any]] | None = None
         self._lock = threading.Lock()
 
@@ -111,10 +111,11 @@ class Shelf:
         except (UnknownMaterialError, StoreError) as error:
             return {"name": name, "damaged": str(error), "href": f"/v1/materials/{name}"}
         verdict = self.verdict(name)
+        found, colour = self._colours.get(name, ("", None))
         return {
             **known[1],
             "verdict": verdict.finding["verdict"] if verdict and verdict.current else None,
-            "colour": self._colours.get((name, digest)),
+            "colour": colour if found == digest else None,
         }
 
     def _described(self, name: str, revision: str) -> dict[str, Any]:
@@ -141,10 +142,10 @@ class Shelf:
 
         try:
             digest = self.store.location(name)[1]
-            if (name, digest) in self._colours:
+            if self._colours.get(name, ("",))[0] == digest:
                 return
             small = (self.store.summary(name).get("bytes") or 0) <= COLOURED_BYTES
-            self._colours[name, digest] = swatch(self.store[name]) if small else None
+            self._colours[name] = digest, swatch(self.store[name]) if small else None
         except (UnknownMaterialError, StoreError):
             return
 

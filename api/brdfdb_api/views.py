@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from fastapi import APIRouter, Query
@@ -44,6 +44,8 @@ _HALF = np.arange(90) + 0.5  # theta_h and theta_d
 
 _LOBE = ("view", "theta_i", "phi_i", "wavelength_nm", "from", "output", "illuminant", "format")
 
+_ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()  # as long as the table is kept
+
 views = APIRouter()
 
 Incidence = Annotated[float, Query(ge=0.0, le=90.0, description="polar angle of the light [degrees]")]
@@ -63,12 +65,14 @@ def albedo(request: Request, name: str, revision: str | None = None) -> Response
     headers = cache_headers(f"{name}-{table.revision}", immutable=revision is not None)
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
-    return Response(_albedo(table), media_type="application/json", headers=headers)
+    document = _ALBEDOS.get(table)
+    if document is None:
+        document = _ALBEDOS[table] = _albedo(table)
+    return Response(document, media_type="application/json", headers=headers)
 
 
-@functools.lru_cache(maxsize=1024)
 def _albedo(table: Table) -> bytes:
-    """The document: a third of a second of integration, kept by revision."""
+    """The document: a third of a second of integration."""
     from brdfdb.albedo import directional_albedo, hemispherical_albedo
 
     found = directional_albedo(table)
