@@ -45,7 +45,9 @@ FORMAT = "brdfdb"
 FORMAT_VERSION = 1
 
 CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
-NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")  # of a material: what does not match is never joined to a path
+# Of a material: what does not match is never joined to a path. Files may have names of 255 characters
+NAME = re.compile(r"(?!.{129})[a-z0-9]+(-[a-z0-9]+)*")
+_SHOWN = 60  # characters of an unknown name
 
 
 class UnknownMaterialError(KeyError):
@@ -68,7 +70,8 @@ class UnknownMaterialError(KeyError):
 
     def __str__(self) -> str:
         hint = f"; closest: {', '.join(self.closest)}" if self.closest else ""
-        return f"no {self.kind} {self.name!r} in the store{hint}"
+        shown = self.name if len(self.name) <= _SHOWN else f"{self.name[:_SHOWN]}..."
+        return f"no {self.kind} {shown!r} in the store{hint}"
 
 
 class UnknownFamilyError(UnknownMaterialError):

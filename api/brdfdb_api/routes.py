@@ -38,6 +38,7 @@ T = TypeVar("T")
 
 INLINE_VALUES = 500  # looking up more numbers happens in a thread, so that the event loop serves others meanwhile
 INLINE_BYTES = 32 * 2**10  # the same for reading a body; 500 points are about this long
+JSON_BYTES = 8 * 2**20  # of a JSON body: numbers in lists take twenty times as much memory as text
 LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points, and numbers, in one answer, as multiples of max_points
 PAGE, MOST = 100, 1000  # materials on a page
 SEARCHED = ("name", "title", "model", "model_title", "paper", "source")
@@ -279,6 +280,8 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     table = await _table(shelf_of(request), name, revision)
     body = await request.body()
+    if not binary and len(body) > JSON_BYTES:
+        raise RequestError(413, f"a JSON body may have {JSON_BYTES} bytes; send as many points as {NPY}")
     kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
     headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
     max_points = request.app.state.settings.max_points

@@ -1,0 +1,305 @@
+"""Hostile requests to a real server: no 5xx, each refusal a sentence of problem+json, memory bounded, still serving."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import io
+import json
+import socket
+import struct
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb.grids import Grid
+from brdfdb.layout import Layout
+from brdfdb.materials import Material
+from brdfdb.staging import publish_dataset
+from brdfdb.tabulate import tabulate
+
+GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
+LOOKUP = "/v1/materials/white/lookup"
+JSON, NPY = "application/json", "application/x-npy"
+MEMORY_MB = 700.0  # of the server: 240 before, 390 after the bodies of 64 MiB that it may take
+
+
+class Server:
+    """A server in a process of its own."""
+
+    def __init__(self, process: subprocess.Popen[str], port: int) -> None:
+        self.process, self.port = process, port
+
+    def ask(self, method: str, path: str, body: Any = None, **headers: str) -> tuple[int, str, bytes]:
+        """Status, media type and body of an answer."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        try:
+            named = {key.replace("_", "-"): value for key, value in headers.items()}
+            chunked = not isinstance(body, bytes | str | None)
+            # refused before all of the body was read, the answer is there
+            with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+                connection.request(method, path, body, named, encode_chunked=chunked)
+            answer = connection.getresponse()
+            return answer.status, answer.headers["content-type"] or "", answer.read()
+        finally:
+            connection.close()
+
+    def refused(self, status: int, method: str, path: str, body: Any = None, **headers: str) -> str:
+        """Ask what must be refused; its sentence."""
+        found, media, content = self.ask(method, path, body, **headers)
+        assert (found, media) == (status, "application/problem+json"), content[:300]
+        problem = json.loads(content)
+        assert problem["status"] == status
+        sentence: str = problem["detail"]
+        assert sentence
+        assert len(sentence) < 500
+        assert "\n" not in sentence
+        assert "Traceback" not in sentence
+        return sentence
+
+    def raw(self, data: bytes) -> bytes:
+        """Send bytes as they are; what comes back until the server closes or is silent."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=10) as connection:
+            connection.sendall(data)
+            connection.settimeout(2)
+            found = b""
+            try:
+                while part := connection.recv(65536):
+                    found += part
+            except TimeoutError:
+                pass
+            return found
+
+    @property
+    def memory_mb(self) -> float:
+        """The largest that was resident."""
+        lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
+        return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1e3
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    store = tmp_path_factory.mktemp("hostile") / "store"
+    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": 1.0}}
+    publish_dataset(store, "white", tabulate(Layout(Material.from_table("white", table), GRID)))
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(store), "--port", "0"]
+    log = (store.parent / "log").open("w")
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+    assert process.stdout is not None
+    port = int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
+    running = Server(process, port)
+    for _ in range(200):
+        try:
+            urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=5).close()
+            break
+        except OSError:
+            continue
+    yield running
+    process.terminate()
+    process.wait(20)
+    log.close()
+
+
+@pytest.fixture(autouse=True)
+def still_serving(server: Server) -> Iterator[None]:
+    yield
+    status, _, content = server.ask("GET", f"{LOOKUP}?theta_i=10&theta_r=20")
+    assert status == 200
+    assert json.loads(content)["brdf"] == pytest.approx(1 / np.pi, rel=1e-6)
+
+
+def npy(shape: str, data: bytes = b"", descr: str = "'<f8'", version: bytes = b"\x01\x00") -> bytes:
+    """A .npy file with a header of our own."""
+    header = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
+    return b"\x93NUMPY" + version + struct.pack("<H", len(header)) + header + data
+
+
+BODIES = {
+    "nothing": b"",
+    "not JSON": b"{theta_i: 1}",
+    "not UTF-8": b'{"theta_i": "\xff\xfe"}',
+    "a list": b"[1, 2]",
+    "null": b"null",
+    "a nan": b'{"theta_i": NaN, "theta_r": 0}',
+    "an infinity": b'{"theta_i": -Infinity, "theta_r": 0}',
+    "a number past all floats": b'{"theta_i": 1e999, "theta_r": 0}',
+    "an integer of a thousand digits": b'{"theta_i": ' + b"9" * 1000 + b', "theta_r": 0}',
+    "an integer of a million digits": b'{"theta_i": ' + b"9" * 10**6 + b', "theta_r": 0}',
+    "deep lists": b'{"theta_r": 0, "theta_i": ' + b"[" * 900 + b"1" + b"]" * 900 + b"}",
+    "deeper lists": b'{"theta_r": 0, "theta_i": ' + b"[" * 200_000 + b"1" + b"]" * 200_000 + b"}",
+    "deep objects": b'{"a":' * 100_000 + b"1" + b"}" * 100_000,
+    "lists that do not fit": b'{"theta_i": [1, [2]], "theta_r": 0}',
+    "empty lists": b'{"theta_i": [], "theta_r": [[]]}',
+    "words": b'{"theta_i": "45", "theta_r": 0}',
+    "truth": b'{"theta_i": true, "theta_r": 0}',
+    "objects": b'{"theta_i": {"x": 1}, "theta_r": 0}',
+    "an unknown name": b'{"theta_i": 1, "theta_r": 0, "__proto__": 2}',
+    "a name of a megabyte": b'{"theta_i": 1, "theta_r": 0, "' + b"x" * 2**20 + b'": 2}',
+    "a polar angle below the surface of the earth": b'{"theta_i": 181, "theta_r": 0}',
+    "wavelengths in lists of lists": b'{"theta_i": 1, "theta_r": 0, "wavelength_nm": [[500]]}',
+    "a wavelength of nothing": b'{"theta_i": 1, "theta_r": 0, "wavelength_nm": 0}',
+}
+ARRAYS = {
+    "nothing": b"",
+    "no .npy": b"PK\x03\x04" + bytes(100),
+    "only magic": b"\x93NUMPY",
+    "a version of the future": npy("(1, 4)", bytes(32), version=b"\x09\x00"),
+    "a header that is code": b"\x93NUMPY\x01\x00"
+    + struct.pack("<H", 40)
+    + b"__import__('os').system('echo hi')".ljust(40),
+    "a header of 64 kB": b"\x93NUMPY\x01\x00\xff\xff" + b" " * 65535,
+    "deep brackets": b"\x93NUMPY\x01\x00" + struct.pack("<H", 4000) + b"(" * 4000,
+    "a petabyte": npy("(35184372088832, 4)", bytes(64)),
+    "a product past 64 bits": npy("(4611686018427387904, 4611686018427387904, 4)", bytes(64)),
+    "a negative shape": npy("(-1, 4)", bytes(32)),
+    "fewer numbers": npy("(2, 4)", bytes(32)),
+    "more numbers": npy("(1, 4)", bytes(64)),
+    "objects": npy("(1, 4)", bytes(32), "'|O'"),
+    "records": npy("(1, 4)", bytes(32), "[('a', '<f8')]"),
+    "other bytes first": npy("(1, 4)", bytes(32), "'>f8'"),
+    "integers": npy("(1, 4)", bytes(32), "'<i8'"),
+    "three columns": npy("(1, 3)", bytes(24)),
+    "no columns": npy("()", bytes(8)),
+    "no rows": npy("(0, 4)"),
+    "nan": npy("(1, 4)", struct.pack("<4d", float("nan"), 0, 0, 0)),
+    "an infinite azimuth": npy("(1, 4)", struct.pack("<4d", 1, float("inf"), 0, 0)),
+}
+
+
+@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
+def test_hostile_json_is_refused_in_a_sentence(server: Server, body: bytes) -> None:
+    server.refused(422, "POST", LOOKUP, body, Content_Type=JSON)
+
+
+@pytest.mark.parametrize("body", ARRAYS.values(), ids=ARRAYS)
+def test_hostile_arrays_are_refused_in_a_sentence(server: Server, body: bytes) -> None:
+    server.refused(422, "POST", LOOKUP, body, Content_Type=NPY)
+
+
+@pytest.mark.parametrize("media", [JSON, NPY, "text/plain"])
+def test_a_body_of_100_mb_is_refused_while_it_arrives(server: Server, media: str) -> None:
+    said = server.refused(413, "POST", LOOKUP, bytes(100 * 10**6), Content_Type=media)
+    assert "67108864 bytes" in said
+    assert server.memory_mb < MEMORY_MB
+
+
+def test_chunks_without_a_length_are_counted(server: Server) -> None:
+    said = server.refused(413, "POST", LOOKUP, (bytes(2**20) for _ in range(100)), Content_Type=JSON)
+    assert "67108864 bytes" in said
+    assert server.memory_mb < MEMORY_MB
+
+
+def test_a_body_as_large_as_may_be_is_read_and_refused(server: Server) -> None:
+    for media, body in (
+        (JSON, b'{"theta_i": [' + b"1," * 33_000_000 + b"1]}"),
+        (NPY, npy("(2097000, 4)", bytes(67104000))),
+    ):
+        status, kind, content = server.ask("POST", LOOKUP, body, Content_Type=media)
+        assert (status, kind) in ((413, "application/problem+json"), (422, "application/problem+json")), content[:300]
+
+
+def test_points_that_broadcast_to_more_than_may_be_are_refused_before_they_are_made(server: Server) -> None:
+    angles = [1.0] * 3000
+    body = {"theta_i": [[[each]] for each in angles], "theta_r": [[each] for each in angles], "phi_r": angles}
+    said = server.refused(413, "POST", LOOKUP, json.dumps(body), Content_Type=JSON)
+    assert said.startswith("27000000000 points are more than")
+    assert server.memory_mb < MEMORY_MB
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "theta_i=nan&theta_r=0",
+        "theta_i=inf&theta_r=0",
+        "theta_i=1_0&theta_r=0",
+        "theta_i=0x10&theta_r=0",
+        "theta_i=&theta_r=0",
+        "theta_i=1&theta_i=2&theta_r=0",
+        "theta_i=1",
+        "theta_i=-0.1&theta_r=0",
+        "theta_i=1&theta_r=0&wavelength_nm=-5",
+        "theta_i=1&theta_r=0&wavelength_nm=",
+        "theta_i=1&theta_r=0&from=hell",
+        "theta_i=1&theta_r=0&output=xyz&illuminant=%00",
+        "theta_i=1&theta_r=0&output=xyz&illuminant=D66",
+        "theta_i=1&theta_r=0&illuminant=D65",
+        "theta_i=1&theta_r=0&error=perhaps",
+        "theta_i=1&theta_r=0&error=true",
+        "theta_i=1&theta_r=0&format=pickle",
+        "theta_i=1&theta_r=0&%F0%9F%92%A9=1",
+        "theta_i=%ff%fe&theta_r=0",
+        "theta_i=" + "9" * 5000 + "&theta_r=0",
+        "&&&=&",
+    ],
+)
+def test_hostile_queries_are_refused_in_a_sentence(server: Server, query: str) -> None:
+    server.refused(422, "GET", f"{LOOKUP}?{query}")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/v1/materials/..%2f..%2fetc/lookup?theta_i=1&theta_r=0",
+        "/v1/materials/%2e%2e/lookup?theta_i=1&theta_r=0",
+        "/v1/materials/white%00/lookup?theta_i=1&theta_r=0",
+        "/v1/materials/white%0a/lookup?theta_i=1&theta_r=0",
+        "/v1/materials/" + "x" * 5000,
+        "/v1/materials/white/revisions/..%2fr000001/lookup?theta_i=1&theta_r=0",
+        "/v1/materials/white/revisions/r000001%00",
+        "/v1/materials/white/revisions/r%D9%A3",
+        "/v1/store/materials/white/r000001/../../../brdfdb.json",
+        "/v1/store/materials/white/r000001/%2e%2e/HEAD.json",
+        "/v1/store/materials/white/r000001/..%2fHEAD.json",
+        "/v1/store/materials/white/r000001//etc/passwd",
+        "/v1/store/materials/%2e%2e/materials/white",
+        "/v1/store/materials/white/r000001/zarr.json%00",
+        "/no/such/address",
+    ],
+)
+def test_path_tricks_lead_nowhere(server: Server, path: str) -> None:
+    server.refused(404, "GET", path)
+
+
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "PROPFIND"])
+def test_other_methods_are_refused(server: Server, method: str) -> None:
+    server.refused(405, method, LOOKUP)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"\x00\x01\x02\x03\r\n\r\n",
+        b"GET " + b"/" * 100_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: x\r\n" + b"A: " + b"b" * 200_000 + b"\r\n\r\n",
+        b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\n",
+        b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
+    ],
+    ids=["version", "bytes", "address", "header", "length", "chunk"],
+)
+def test_what_is_no_http_is_answered_with_4xx_or_not_at_all(server: Server, data: bytes) -> None:
+    found = server.raw(data)
+    assert not found or found.split(b" ", 2)[1][:1] == b"4", found[:200]
+
+
+def test_a_client_that_goes_away_leaves_nothing_behind(server: Server) -> None:
+    for _ in range(20):
+        with socket.create_connection(("127.0.0.1", server.port), timeout=10) as connection:
+            connection.sendall(
+                b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n" + b"x" * 10
+            )
+
+
+def test_a_million_points_are_answered(server: Server) -> None:
+    buffer = io.BytesIO()
+    np.save(buffer, np.full((1_000_000, 4), 30.0))
+    status, media, content = server.ask("POST", f"{LOOKUP}?format=npy", buffer.getvalue(), Content_Type=NPY)
+    assert (status, media) == (200, NPY)
+    np.testing.assert_allclose(np.load(io.BytesIO(content)), np.full(1_000_000, 1 / np.pi), rtol=1e-6)
+    assert server.memory_mb < MEMORY_MB
