@@ -51,10 +51,10 @@ class Problem(BaseModel):
 
 
 class Health(BaseModel):
-    """The store can be read."""
+    """The process answers; where `materials` is there, the store can be read."""
 
     status: str
-    materials: int = Field(description="number of materials in the store")
+    materials: int | None = Field(default=None, description="in the store")
 
 
 class Summary(BaseModel):

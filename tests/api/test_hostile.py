@@ -10,6 +10,7 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
@@ -83,27 +84,31 @@ class Server:
         return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1e3
 
 
+@contextlib.contextmanager
+def running(folder: Path) -> Iterator[Server]:
+    """A server of a store with one white material, until the end."""
+    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": 1.0}}
+    publish_dataset(folder / "store", "white", tabulate(Layout(Material.from_table("white", table), GRID)))
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(folder / "store"), "--port", "0"]
+    with (
+        (folder / "log").open("w") as log,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True) as process,
+    ):
+        assert process.stdout is not None
+        port = int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
+        for _ in range(200):
+            with contextlib.suppress(OSError):
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=5).close()
+                break
+            time.sleep(0.05)
+        yield Server(process, port)
+        process.terminate()
+
+
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    store = tmp_path_factory.mktemp("hostile") / "store"
-    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": 1.0}}
-    publish_dataset(store, "white", tabulate(Layout(Material.from_table("white", table), GRID)))
-    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(store), "--port", "0"]
-    log = (store.parent / "log").open("w")
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
-    assert process.stdout is not None
-    port = int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
-    running = Server(process, port)
-    for _ in range(200):
-        try:
-            urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=5).close()
-            break
-        except OSError:
-            continue
-    yield running
-    process.terminate()
-    process.wait(20)
-    log.close()
+    with running(tmp_path_factory.mktemp("hostile")) as found:
+        yield found
 
 
 @pytest.fixture(autouse=True)
