@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import threading
 from collections.abc import AsyncIterator
@@ -20,7 +21,7 @@ from brdfdb.store import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb_api.edge import Edge, log_to_stderr
 from brdfdb_api.files import files
 from brdfdb_api.responses import PROBLEM_JSON, RequestError, problem_response
-from brdfdb_api.routes import answer_point, router
+from brdfdb_api.routes import LARGE_AT_ONCE, answer_point, router
 from brdfdb_api.settings import Settings
 from brdfdb_api.shelf import Shelf
 from brdfdb_api.views import views
@@ -79,6 +80,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     )
     app.state.settings = settings or Settings.from_environment()
     app.state.shelf = Shelf(app.state.settings, store)
+    app.state.large = asyncio.Semaphore(LARGE_AT_ONCE)
     app.include_router(router)
     app.include_router(views)
     app.include_router(files)

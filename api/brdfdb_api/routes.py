@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from urllib.parse import urlencode
@@ -38,6 +39,7 @@ T = TypeVar("T")
 
 INLINE_VALUES = 500  # looking up more numbers happens in a thread, so that the event loop serves others meanwhile
 INLINE_BYTES = 32 * 2**10  # the same for reading a body; 500 points are about this long
+LARGE_BYTES, LARGE_AT_ONCE = 2**20, 8  # how many larger bodies, or such that do not tell, are in memory at a time
 JSON_BYTES = 8 * 2**20  # of a JSON body: numbers in lists take twenty times as much memory as text
 LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points, and numbers, in one answer, as multiples of max_points
 PAGE, MOST = 100, 1000  # materials on a page
@@ -278,27 +280,28 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
     binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NPY
     if wavelengths and not binary:
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
-    table = await _table(shelf_of(request), name, revision)
-    body = await request.body()
-    if not binary and len(body) > JSON_BYTES:
-        raise RequestError(413, f"a JSON body may have {JSON_BYTES} bytes; send as many points as {NPY}")
     kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
+    table = await _table(shelf_of(request), name, revision)
     headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
     max_points = request.app.state.settings.max_points
 
-    def points_of() -> Points:
-        return Points.from_npy(body, wavelengths) if binary else Points.from_json(body)
+    def points_of(body: bytes) -> tuple[Points, int]:
+        points = Points.from_npy(body, wavelengths) if binary else Points.from_json(body)
+        return points, checked_size(max_points, points, table, kind)
 
-    def all_at_once() -> Response:
-        points = points_of()
-        checked_size(max_points, points, table, kind)
-        return write_answer(points, options, table, kind, headers)
+    def answer(body: bytes) -> Response:
+        return write_answer(points_of(body)[0], options, table, kind, headers)
 
-    if len(body) > INLINE_BYTES:
-        return await run_in_threadpool(all_at_once)
-    points = points_of()
-    values = checked_size(max_points, points, table, kind)
-    return await run(write_answer, points, options, table, kind, headers, in_thread=slow(values, options))
+    length = request.headers.get("content-length", "")
+    small = length.isdecimal() and int(length) <= LARGE_BYTES
+    async with contextlib.nullcontext() if small else request.app.state.large:
+        body = await request.body()
+        if not binary and len(body) > JSON_BYTES:
+            raise RequestError(413, f"a JSON body may have {JSON_BYTES} bytes; send as many points as {NPY}")
+        if len(body) > INLINE_BYTES:
+            return await run_in_threadpool(answer, body)
+        points, values = points_of(body)
+        return await run(write_answer, points, options, table, kind, headers, in_thread=slow(values, options))
 
 
 async def run(function: Callable[..., T], *args: Any, in_thread: bool) -> T:
