@@ -14,7 +14,7 @@ from importlib import resources
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import ErrorDetails
 
@@ -165,6 +165,15 @@ class Material(BaseModel):
             return self.spec.anisotropic(self.parameters)
         axes = self.spec.lobe_axes
         return axes is not None and self.parameters[axes[0]] != self.parameters[axes[1]]
+
+    def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Where a picture at some wavelengths [nm] evaluates the material: there, but for models that are not spectral.
+
+        One whose parameters are stated for some wavelengths, which make no colour, is evaluated at the first of them.
+        """
+        if not self.spectral:
+            return None
+        return wavelength_nm if self.wavelengths_nm is None else np.array(self.wavelengths_nm[:1])
 
     def arguments(self, wavelength_nm: ArrayLike | None = None) -> dict[str, Any]:
         """Keyword arguments of the model call, angles apart.
