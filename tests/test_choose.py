@@ -190,3 +190,19 @@ def test_a_tolerance_finer_than_the_truth_is_known_is_infeasible(tolerance: dict
     offered, (seen,) = offered_and_seen(scene, 8)
     with pytest.raises(InfeasibleError, match=said):
         choose(seen, seen, offered, made_up_costs(offered))
+
+
+def test_with_an_environment_all_forms_meet_the_same_directions() -> None:
+    alone = scene_of({"relative": 0.03}, "rendered-sphere-40deg")
+    room = {"rows": [[1.0, 2.0, 1.0, 0.5], [0.2, 0.4, 0.2, 0.1]], "samples": 4}
+    scene = Scene.model_validate({**alone.model_dump(), "ambient": 0.0, "environment": room})
+    offered, (planned, checked) = offered_and_seen(scene, 24, 37)
+    chosen = choose(planned, checked, offered, made_up_costs(offered))
+    (one,) = chosen.decisions.values()
+    assert one.whole.p99 <= 0.03
+    assert one.cheaper_left is not None
+    assert one.cheaper_left.p99 > chosen.allowed * 0.03
+    # another 4 directions a point are further off than the tolerance, and than what was chosen
+    other = gather(Scene.model_validate({**scene.model_dump(), "environment": {**room, "seed": 1}}), 37)
+    noise = checked.differences(render(scene, other)).ravel()[checked.pixels("rendered-sphere-40deg")]
+    assert np.percentile(noise, 99.0) > 0.03
