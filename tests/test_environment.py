@@ -14,7 +14,7 @@ from scipy import ndimage
 from brdfdb.environment import Environment
 from brdfdb.gather import gather
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import presets
+from brdfdb.materials import Material, presets
 from brdfdb.picture import write_channels
 from brdfdb.quadrature import directional_albedo
 from brdfdb.reference import ward_1992
@@ -198,6 +198,24 @@ def test_ward_like_is_the_reference() -> None:
     brass = presets()["rolled-brass"].parameters
     expected = float(ward_1992.elliptical(0.6, 0.3, 0.7, 3.3, *brass.values()))
     assert abs(float(ward_like(np.array(0.6), np.array(0.3), 0.7, 3.3, brass)) / expected - 1.0) < 1e-13
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 60.0, 89.9])
+@pytest.mark.parametrize("alpha", [1e-6, 0.01, 0.5])
+def test_whatever_f_r_is_its_weights_are_bounded_and_a_lobe_has_its_share(theta_deg: float, alpha: float) -> None:
+    gloss = {"rho_d": 0.0, "rho_s": 0.3, "alpha_x": alpha, "alpha_y": alpha}
+    material = Material.from_table(
+        "gloss", {"title": "gloss", "model": "ward", "source": "a test", "parameters": gloss}
+    )
+    wr = np.tile(unit_vector(np.radians(theta_deg), 0.3), (50, 1))
+    drawn = around(samples=100).drawn(material, WAVELENGTH, wr, ())
+    # a tenth of all directions has a density of cos / pi, and cos / pdf is pi of them alone
+    weights = 100.0 * np.maximum(drawn.wi[..., 2], 0.0) * drawn.solid_angle
+    assert weights.max() < 10.0 * np.pi * (1.0 + ROUNDING)
+    assert np.all(np.isfinite(drawn.solid_angle))
+    if alpha < 0.1 and theta_deg < 80.0:
+        mirrored = drawn.wi @ unit_vector(np.radians(theta_deg), 0.3 + np.pi) > 0.98
+        assert np.abs(mirrored.mean(axis=0) - 0.9).max() < 0.05
 
 
 def test_a_white_sphere_cannot_be_seen_in_a_uniform_environment() -> None:

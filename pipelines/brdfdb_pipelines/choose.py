@@ -81,8 +81,10 @@ def _run(
     tolerances: Sequence[float] | None,
 ) -> Choice:
     limit(scene)  # infeasible before minutes of work
-    # another resolution puts every ray at another place
-    view, denser = gather(scene, width), gather(scene, width + width // 2 + 1)
+    with terminal.progress(counted=False, transient=True) as bar:
+        bar.add_task("tracing rays", total=None)
+        # another resolution puts every ray at another place
+        view, denser = gather(scene, width), gather(scene, width + width // 2 + 1)
     materials = reflectors(scene)
     with terminal.progress(counted=False) as bar:
         task = bar.add_task("tabulating, timing", total=2 * len(materials))
