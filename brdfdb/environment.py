@@ -63,7 +63,7 @@ class Environment(BaseModel):
         """The same with its file, if it has one, named relative to a folder."""
         return self if self.file is None else self.model_copy(update={"file": str(folder / self.file)})
 
-    @functools.cached_property
+    @property
     def picture(self) -> Array:
         """Radiance (rows, columns).
 
@@ -78,14 +78,12 @@ class Environment(BaseModel):
         path = Path(self.file)
         if not path.is_file():
             raise ValueError(f"environment.file: {path}: there is no such file")
-        picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
-        if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
-            raise ValueError(f"environment.file: {path}: must hold numbers of shape (rows, columns)")
-        return _checked(f"environment.file: {path}", picture.astype(np.float64))
+        return _read(path, path.stat().st_mtime_ns)
 
     def radiance(self, towards: Array) -> Array:
         """Radiance that comes from directions (..., 3), unit vectors in the frame of the scene."""
-        rows, columns = self.picture.shape
+        picture = self.picture
+        rows, columns = picture.shape
         theta = np.arccos(np.clip(towards[..., 2], -1.0, 1.0))
         row = np.clip(theta / np.pi * rows - 0.5, 0.0, rows - 1.0)
         column = (0.5 - np.arctan2(towards[..., 1], towards[..., 0]) / (2.0 * np.pi)) * columns - 0.5
@@ -94,9 +92,7 @@ class Environment(BaseModel):
         lower = np.minimum(upper + 1, rows - 1)
 
         def along(at: NDArray[np.int64]) -> Array:
-            return np.asarray(
-                (1.0 - right) * self.picture[at, left % columns] + right * self.picture[at, (left + 1) % columns]
-            )
+            return np.asarray((1.0 - right) * picture[at, left % columns] + right * picture[at, (left + 1) % columns])
 
         return np.asarray((1.0 - down) * along(upper) + down * along(lower))
 
@@ -165,6 +161,15 @@ def _checked(name: str, picture: Array) -> Array:
     if not np.any(picture):
         raise ValueError(f"{name}: radiance is 0 everywhere")
     return picture
+
+
+@functools.lru_cache(maxsize=4)
+def _read(path: Path, _written: int) -> Array:
+    """The picture of a file, kept until it is written anew: every list of points asks for it."""
+    picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
+    if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
+        raise ValueError(f"environment.file: {path}: must hold numbers of shape (rows, columns)")
+    return _checked(f"environment.file: {path}", picture.astype(np.float64))
 
 
 def _from_numpy(path: Path) -> NDArray[np.generic]:

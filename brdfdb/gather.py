@@ -169,21 +169,25 @@ def _lit(scene: Scene, item: Object, surface: _Surface, wr: Array, stream: tuple
     strength = np.concatenate([np.zeros(0), *(np.full(len(samples), each / len(samples)) for samples, each in lights)])
     wi = unit(np.einsum("nij,ej->eni", surface.frame, towards))
     irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
-    towards = np.broadcast_to(towards[:, np.newaxis], wi.shape)
-    if scene.environment is not None:
-        drawn = scene.environment.drawn(scene.materials[item.material], np.array(scene.wavelengths_nm), wr, stream)
-        around = np.einsum("eni,nij->enj", drawn.wi, surface.frame)
-        arriving = scene.environment.radiance(around) * np.maximum(drawn.wi[..., 2], 0.0) * drawn.solid_angle
-        wi, irradiance = np.concatenate([wi, drawn.wi]), np.concatenate([irradiance, arriving])
-        towards = np.concatenate([towards, around])
-    if scene.shadows:
-        origins = _lifted(surface)
-        sample, point = np.nonzero(irradiance)
-        for start in range(0, point.size, _BATCH):
-            which = sample[start : start + _BATCH], point[start : start + _BATCH]
-            blocked = np.isfinite(_trace(scene, origins[which[1]], towards[which])[0])
-            irradiance[which] *= ~blocked
-    return wi, irradiance
+    _shadow(scene, surface, np.broadcast_to(towards[:, np.newaxis], wi.shape), irradiance)
+    if scene.environment is None:
+        return wi, irradiance
+    drawn = scene.environment.drawn(scene.materials[item.material], np.array(scene.wavelengths_nm), wr, stream)
+    around = np.einsum("eni,nij->enj", drawn.wi, surface.frame)
+    arriving = scene.environment.radiance(around) * np.maximum(drawn.wi[..., 2], 0.0) * drawn.solid_angle
+    _shadow(scene, surface, around, arriving)
+    return np.concatenate([wi, drawn.wi]), np.concatenate([irradiance, arriving])
+
+
+def _shadow(scene: Scene, surface: _Surface, towards: Array, irradiance: Array) -> None:
+    """Make irradiance (E, N) 0 where an object stands in its direction (E, N, 3), in the frame of the scene."""
+    if not scene.shadows:
+        return
+    origins = _lifted(surface)
+    sample, point = np.nonzero(irradiance)
+    for start in range(0, point.size, _BATCH):
+        which = sample[start : start + _BATCH], point[start : start + _BATCH]
+        irradiance[which] *= ~np.isfinite(_trace(scene, origins[which[1]], towards[which])[0])
 
 
 def _from_afar(scene: Scene, directions: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -313,6 +314,17 @@ def test_a_file_is_read_as_rows_are_and_lies_beside_the_scene(tmp_path: Path, na
     environment = load(str(tmp_path / "scene.toml")).environment
     assert environment is not None
     assert np.abs(environment.picture - ROOM).max() <= (SINGLE * ROOM.max() if name.endswith("exr") else 0.0)
+
+
+def test_another_picture_is_another_light(tmp_path: Path) -> None:
+    up, path = np.array([0.0, 0.0, 1.0]), tmp_path / "room.npy"
+    one = around([[1.0]])
+    assert one.radiance(up) == 1.0
+    assert one.model_copy(update={"rows": [[2.0]]}).radiance(up) == 2.0
+    for value, written_ns in ((3.0, 10**18), (4.0, 10**18 + 1)):
+        np.save(path, np.array([[value]]))
+        os.utime(path, ns=(written_ns, written_ns))
+        assert Environment(file=str(path)).radiance(up) == value
 
 
 @pytest.mark.parametrize(
