@@ -256,6 +256,16 @@ def test_directions_are_those_of_the_seed() -> None:
     assert not np.any(np.all(first == other, axis=-1))
 
 
+def test_each_object_has_directions_of_its_own() -> None:
+    side = {"kind": "plane", "size": [1.0, 2.0]}
+    right = {"name": "right", "material": "foam", "shape": {**side, "position": [0.5, 0.0, 0.0]}}
+    camera = {"position": [0.0, 0.0, 5.0], "up": [0.0, 1.0, 0.0], "height": 3.0, "aspect": 1.0}
+    of = scene("foam", {"rows": [[1.0]]}, {**side, "position": [-0.5, 0.0, 0.0]}, camera=camera, more=[right])
+    one, other = gather(of, 24).points
+    assert np.array_equal(one.wr, other.wr)
+    assert not np.any(np.all(one.wi == other.wi, axis=-1))
+
+
 def test_lights_come_first_and_then_the_environment() -> None:
     lights = [{"direction": [0.0, -1.0, 0.0], "solid_angle_sr": 0.1, "samples": 5}]
     (both,) = gather(scene("foam", {"rows": [[1.0]], "samples": 7}, lights=lights), 8).points
