@@ -175,8 +175,7 @@ def chart(
     forms = [*representations(material, wavelength_nm, tolerances), *also]
     tick()
     drawn = accuracy.draw(material, wavelength_nm, DIRECTIONS, SEED)
-    truth = forms[0].evaluate(drawn.wi, drawn.wr)
-    errors = [_errors(_found(form, drawn), truth, drawn) for form in forms]
+    errors = _errors(forms, drawn)
     tick()
     batch, single = _timed(forms, drawn, tick)
 
@@ -248,8 +247,7 @@ def chart_family(
     for number, material in enumerate(materials):
         forms = representations(material, wavelength_nm, tolerances)
         drawn = accuracy.draw(material, wavelength_nm, DIRECTIONS, SEED)
-        truth = forms[0].evaluate(drawn.wi, drawn.wr)
-        errors.append({form.key: _errors(_found(form, drawn), truth, drawn) for form in forms})
+        errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
         for form in forms:
             if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
                 kept[form.key] = number, form
@@ -334,18 +332,21 @@ def _described(form: Representation, batch: cost.Times, single: cost.Times) -> d
     }
 
 
-def _found(form: Representation, drawn: accuracy.Draw) -> Floats:
-    return form.evaluate(drawn.wi.astype(form.dtype), drawn.wr.astype(form.dtype)).astype(np.float64)
-
-
-def _errors(found: Floats, truth: Floats, drawn: accuracy.Draw) -> dict[str, Any]:
-    """To three digits, at the worst wavelength."""
-    overall = accuracy.compare(found, truth, drawn, SEED).overall
-    parts = {
-        name: float(f"{accuracy.mean_error(found, truth, np.where(rows, drawn.weight, 0.0)).max():.3g}")
-        for name, rows in accuracy.classes(drawn).items()
-    }
-    return {"l1": overall.l1, "p99": overall.p99, **parts}
+def _errors(forms: Sequence[Representation], drawn: accuracy.Draw) -> list[dict[str, Any]]:
+    """Of each form against the first one: the errors of a `Point`, to three digits."""
+    truth = forms[0].evaluate(drawn.wi, drawn.wr)
+    classes = accuracy.classes(drawn)
+    rows = []
+    for form in forms:
+        given = drawn.wi.astype(form.dtype), drawn.wr.astype(form.dtype)
+        found = truth if form is forms[0] else form.evaluate(*given).astype(np.float64)
+        overall = accuracy.compare(found, truth, drawn, SEED).overall
+        parts = {
+            name: float(f"{accuracy.mean_error(found, truth, np.where(some, drawn.weight, 0.0)).max():.3g}")
+            for name, some in classes.items()
+        }
+        rows.append({"l1": overall.l1, "p99": overall.p99, **parts})
+    return rows
 
 
 def _cost(times: cost.Times) -> Cost:

@@ -26,7 +26,8 @@ _LEFT, _GAP, _RIGHT = 66.0, 14.0, 12.0
 _SHARES = (0.44, 0.26, 0.30)  # of the width, of the panels
 _DPI = 110
 SMALLEST = 1e-6  # errors below are drawn here: the truth, and what differs from it by rounding
-_LETTER, _LINE = 4.3, 9.0  # width and height of a letter of a label, on average
+_LETTER, _LINE = 4.1, 9.0  # width and height of a letter of a label, on average
+_LEADER: dict[str, Any] = {"arrowstyle": "-", "color": charts.MUTED, "linewidth": 0.5}
 _NEAR = 10.0  # what is written further from its point has a line to it
 _COLUMNS = (18.0, 250.0, 318.0, 386.0, 454.0, 522.0, 590.0, 690.0, 770.0, 848.0)  # left end of titles, right ends
 
@@ -115,8 +116,8 @@ def _titled(height: float, title: str, said: str) -> Canvas:
 def _wavelengths(chart: Chart | FamilyChart) -> str:
     if chart.wavelength_nm is None:
         return "grey"
-    several = len(chart.wavelength_nm) > 1
-    return f"{len(chart.wavelength_nm)} wavelengths" if several else f"{chart.wavelength_nm[0]:g} nm"
+    first, *others = chart.wavelength_nm
+    return f"{1 + len(others)} wavelengths" if others else f"{first:g} nm"
 
 
 def _panel(
@@ -139,9 +140,13 @@ def _panel(
         size, fill = 6.5 if key in front else 4.5, look.colour if point.dtype == "float64" else "white"
         axes.plot(middle, y, look.marker, markerfacecolor=fill, markersize=size, **line | {"zorder": 3})
     numbers = {point.key: str(number) for number, point in enumerate(chart.points, 1)}
-    texts = {key: f"{numbers[key]} {points[key].title}" if named and key in front else numbers[key] for key in points}
     ordered = [*front, *(key for key in points if key not in front)]
-    _label(axes, [(texts[k], costs[k][1], _height(points[k].l1), k in front) for k in ordered])
+    labels = []
+    for key in ordered:
+        full = f"{numbers[key]} {points[key].title}" if named else numbers[key]
+        least = full if key in front else numbers[key]
+        labels.append(_Label(least, full, costs[key][1], _height(points[key].l1), key in front))
+    _label(axes, labels)
 
 
 def _error_axis(axes: Axes, top: float) -> None:
@@ -167,29 +172,53 @@ def _axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def _label(axes: Axes, labels: Iterable[tuple[str, float, float, bool]]) -> None:
-    """Texts beside points, each where it hides neither a point nor another text; bold ones come first."""
-    labels = list(labels)
+class _Label(NamedTuple):
+    """What is written beside a point: in full where there is room, else what has to be."""
+
+    least: str
+    full: str
+    x: float
+    y: float
+    bold: bool
+
+    def width(self, text: str) -> float:
+        return _LETTER * len(text) * (1.12 if self.bold else 1.0) + 1.0
+
+
+def _label(axes: Axes, labels: Sequence[_Label]) -> None:
+    """Texts beside points, each where it hides neither a point nor another text; those given first come first."""
     scale = 72.0 / mpl.rcParams["figure.dpi"]
-    at = [axes.transData.transform((x, y)) * scale for _, x, y, _ in labels]
+    at = [axes.transData.transform((label.x, label.y)) * scale for label in labels]
     frame = axes.get_window_extent().extents * scale
     taken = [(x - 3.0, y - 3.0, x + 3.0, y + 3.0) for x, y in at]
-    for (text, x, y, bold), here in zip(labels, at, strict=True):
-        width = _LETTER * len(text) * (1.12 if bold else 1.0) + 1.0
+    chosen = []
+    for label, here in zip(labels, at, strict=True):
+        width = label.width(label.least)
         best = min(offsets(width), key=lambda offset: hidden(box(here, offset, width), taken, frame))
         taken.append(box(here, best, width))
+        chosen.append(best)
+    for index, (label, here, best) in enumerate(zip(labels, at, chosen, strict=True)):
+        text, own, width = label.least, len(at) + index, label.width(label.full)
+        others = [*taken[:own], *taken[own + 1 :]]
+        near = [offset for offset in offsets(width) if abs(offset[1]) <= _NEAR]
+        free = [offset for offset in near if hidden(box(here, offset, width), others, frame) == 0.0]
+        if free:
+            text, best, taken[own] = label.full, free[0], box(here, free[0], width)
+        width = label.width(text)
+        side = min(max(-best[0] / width, 0.0), 1.0)  # of the text, what is next to its point: left, middle or right
         axes.annotate(
             text,
-            (x, y),
-            (best[0], best[1]),
+            (label.x, label.y),
+            (best[0] + side * width, best[1]),
             textcoords="offset points",
+            ha={0.0: "left", 1.0: "right"}.get(side, "center"),
             va="center",
             fontsize=7.5,
-            fontweight="bold" if bold else "normal",
-            color=charts.TRUTH if bold else charts.MUTED,
+            fontweight="bold" if label.bold else "normal",
+            color=charts.TRUTH if label.bold else charts.MUTED,
             zorder=4,
             bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.3},
-            arrowprops={"arrowstyle": "-", "color": charts.MUTED, "linewidth": 0.5} if abs(best[1]) > _NEAR else None,
+            arrowprops={**_LEADER, "relpos": (side, 0.5)} if abs(best[1]) > _NEAR else None,
         )
 
 
@@ -266,11 +295,11 @@ def _table(
 # Families
 
 CLOSE = 0.01  # mean error of what the truth need not be evaluated for
-_MEAN, _NAMES, _TAIL = 226.0, 152.0, 160.0  # widths: panel of means, names beside it, panel of the 99th percentile
+_MEAN, _NAMES, _TAIL = 216.0, 172.0, 150.0  # widths: panel of means, names beside it, panel of the 99th percentile
 _FAMILY_ABOVE, _FAMILY_ROW = 76.0, 310.0  # below the title, room for g; from one parameter to the next
 _HIGHEST = 10.0  # of errors drawn: ten times the light that there is
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)))
-_APART = 30.0  # of ticks that are numbers of their own
+_APART = 26.0  # of ticks that are numbers of their own
 
 
 def along(whole: FamilyChart, axis: str) -> list[list[int]]:
@@ -364,13 +393,13 @@ def _headed(axes: Axes, text: str) -> None:
 
 def _heights(axes: Axes, x: list[float], g: list[float]) -> None:
     """The g of members above the panel, of as many as there is room for."""
-    shown: list[int] = []
-    for index in range(len(x)):
-        at, before = (axes.transData.transform((x[i], 1.0))[0] for i in (index, shown[-1] if shown else 0))
-        if not shown or at - before > _APART * mpl.rcParams["figure.dpi"] / 72.0:
+    shown = [len(x) - 1]
+    for index in range(len(x) - 1, -1, -1):
+        at, after = (axes.transData.transform((x[i], 1.0))[0] for i in (index, shown[-1]))
+        if after - at > _APART * mpl.rcParams["figure.dpi"] / 72.0:
             shown.append(index)
     above = axes.secondary_xaxis("top")
-    above.set_xticks([x[index] for index in shown], labels=[count(g[index]) for index in shown])
+    above.set_xticks([x[index] for index in shown], labels=[count(float(f"{g[index]:.2g}")) for index in shown])
     above.xaxis.set_minor_locator(NullLocator())
     above.set_xlabel("g along the normal, eq. 79")
     above.tick_params(length=0)
@@ -402,18 +431,22 @@ def _named(axes: Axes, whole: FamilyChart, axis: str) -> None:
             fontweight="bold" if bold else "normal",
             color=_LOOKS[kind].colour,
             annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": charts.MUTED, "linewidth": 0.4, "shrinkA": 1.0, "shrinkB": 2.0},
+            arrowprops={**_LEADER, "relpos": (0.0, 0.5), "shrinkA": 1.0, "shrinkB": 2.0},
         )
 
 
 def apart(wanted: Sequence[float], least: float, most: float) -> list[float]:
-    """Increasing heights moved as far as needed to be `least` apart, and not above `most` if there is room."""
-    found: list[float] = []
-    for height in wanted:
-        found.append(max(height, found[-1] + least) if found else max(height, 0.0))
-    for index in range(len(found) - 1, -1, -1):
-        found[index] = min(found[index], most - least * (len(found) - 1 - index))
-    return found
+    """Increasing heights, moved as little as makes them `least` apart and keeps them between 0 and `most`."""
+    blocks: list[tuple[float, int]] = []  # of names that touch: where the first would be, and how many
+    for index, height in enumerate(wanted):
+        start, number = height - least * index, 1
+        while blocks and blocks[-1][0] > start:
+            before, several = blocks.pop()
+            start, number = (before * several + start * number) / (several + number), several + number
+        blocks.append((start, number))
+    highest = most - least * (len(wanted) - 1)
+    starts = [min(max(start, 0.0), highest) for start, number in blocks for _ in range(number)]
+    return [start + least * index for index, start in enumerate(starts)]
 
 
 def _costs(axes: Axes, whole: FamilyChart) -> None:
@@ -431,8 +464,8 @@ def _costs(axes: Axes, whole: FamilyChart) -> None:
         fill = look.colour if form.dtype == "float64" else "white"
         size = 6.5 if bold else 4.5
         axes.plot(ns, y, look.marker, color=look.colour, markerfacecolor=fill, markersize=size, zorder=3)
-        labels.append((str(number), ns, min(y, _HIGHEST), bold))
-    _label(axes, sorted(labels, key=lambda label: not label[3]))
+        labels.append(_Label(str(number), str(number), ns, min(y, _HIGHEST), bold))
+    _label(axes, sorted(labels, key=lambda label: not label.bold))
     axes.set_xlabel("ns a value, many directions at once")
     _headed(axes, "mean error over cost")
     axes.tick_params(labelleft=False)
