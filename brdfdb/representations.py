@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb import fresnel, misprints, models, tabulate
+from brdfdb.family import Family
 from brdfdb.geometry import checked_vectors, finished
 from brdfdb.grids import (
     ANISOTROPIC_AXES,
@@ -354,6 +355,23 @@ def _tables(
 def _table(layout: Layout, key: str, title: str) -> Representation:
     values = np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
     return replace(of_table(Table.of(layout, values), key, title), layout=layout)
+
+
+def of_family(family: Family) -> Representation:
+    """Lookups in the middle of a family: between the two middle values of each parameter."""
+    at: dict[str, Any] = {}
+    for name, nodes in family.axes.items():
+        cell = (nodes.size - 2) // 2
+        at[name] = float(nodes[cell : cell + 2].mean())
+    tables = family.around(**at)
+    count = 1 if family.wavelength_nm is None else family.wavelength_nm.size
+
+    def evaluate(wi: Floats, wr: Floats) -> Floats:
+        found: Floats = family.lookup_vectors(wi, wr, **at)
+        return found.reshape(len(wi), count)
+
+    size = sum(of_table(table, "", "").bytes for table in tables)
+    return Representation("between", "between members", "table", "Family.lookup_vectors", evaluate, size)
 
 
 def of_table(table: Table, key: str, title: str) -> Representation:
