@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.choose import Candidate, Decision, Left
+from brdfdb.choose import Candidate, Decision, Left, limit
 from brdfdb.representations import Kind
 from brdfdb.scene import Scene, Tolerance
 
@@ -94,7 +94,7 @@ def describe(
     pixels: Mapping[str, int],
     revisions: Mapping[str, str],
 ) -> list[Material]:
-    """What is chosen for each material of a scene: figures to three digits, and reasons."""
+    """What is chosen for each material of a scene: costs to three digits, and reasons."""
 
     def option(name: str, index: int, left: Left) -> Option:
         candidate, price = offered[name][index], prices[name][index]
@@ -112,6 +112,7 @@ def describe(
             error=_residue(left),
         )
 
+    tolerance, _ = limit(scene)
     found = []
     for name, decision in chosen.items():
         truth = option(name, 0, Left(0.0, 0.0))
@@ -129,20 +130,21 @@ def describe(
                 next_cheaper=cheaper,
                 refused=decision.refused,
                 whole=_residue(decision.whole),
-                reason=_reason(choice, cheaper, decision),
+                reason=_reason(choice, cheaper, decision, tolerance),
                 revision=revisions.get(name),
             )
         )
     return found
 
 
-def _reason(choice: Option, cheaper: Option | None, decision: Decision) -> str:
+def _reason(choice: Option, cheaper: Option | None, decision: Decision, tolerance: float) -> str:
     """Why this one, and where it costs more than a third of the truth, why."""
     said = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.counted:.2g}"
     if cheaper is None:
         said += "; nothing is cheaper"
     else:
-        said += f"; the best of what is cheaper, {cheaper.title}, would leave {cheaper.error.counted:.2g}"
+        left = _above(tolerance, cheaper.error.counted)
+        said += f"; the best of what is cheaper, {cheaper.title}, would leave {left}"
         said += " on the denser sampling" if decision.refused else ""
     if choice.share > THIRD:
         why = "there is nothing cheaper" if cheaper is None else "all that is cheaper breaks the tolerance"
@@ -150,8 +152,13 @@ def _reason(choice: Option, cheaper: Option | None, decision: Decision) -> str:
     return said
 
 
+def _above(tolerance: float, error: float) -> str:
+    """An error with as many digits as show that it is above the tolerance, two at least."""
+    return next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
+
+
 def _residue(left: Left) -> Residue:
-    return Residue(counted=_short(left.counted), most=_short(left.most))
+    return Residue(counted=left.counted, most=left.most)
 
 
 def _short(value: float) -> float:

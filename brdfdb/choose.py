@@ -20,6 +20,7 @@ from brdfdb.representations import Representation, representations
 from brdfdb.scene import Scene
 from brdfdb.shapes import Array
 
+GREY_TOLERANCES = (0.1, 0.01, 0.0005)  # of planned tables; 0.001, as in charts, leaves limbs 1.05 off
 SAMPLINGS = (3, 8)  # wavelengths, evenly over those of the scene, that a form may be evaluated at in place of all
 DARK = 1e-3  # exposed radiance: relative errors of what is darker are relative to this
 FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # integrals over facets are known to 1e-6
@@ -86,7 +87,7 @@ def candidates(
     wavelength_nm : array of shape (L,) [nm], or None
         Those of the scene, for spectral materials, and only for them.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.representations`.
+        Of planned tables: see `brdfdb.representations`. By default `GREY_TOLERANCES` of grey materials.
 
     Returns
     -------
@@ -98,6 +99,8 @@ def candidates(
     ValueError
         As `brdfdb.representations.representations` does.
     """
+    if tolerances is None and wavelength_nm is None:
+        tolerances = GREY_TOLERANCES
     found = [Candidate(form, wavelength_nm) for form in representations(material, wavelength_nm, tolerances)]
     for count in SAMPLINGS if wavelength_nm is not None else ():
         assert wavelength_nm is not None

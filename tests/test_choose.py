@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brdfdb.choose import Candidate, InfeasibleError, Left, Pick, Seen, candidates, choose, pick
+from brdfdb.choices import Price, describe
+from brdfdb.choose import Candidate, Decision, InfeasibleError, Left, Pick, Seen, candidates, choose, pick
 from brdfdb.cost import CHEAPER
 from brdfdb.gather import gather
 from brdfdb.materials import presets
@@ -226,6 +227,20 @@ def test_the_truth_is_what_is_left_when_all_else_is_refused() -> None:
     assert [one.pick.chosen for one in chosen.values()] == [0, 0]
     assert all(one.refused for one in chosen.values())
     assert [one.cheaper_left for one in chosen.values()] == [Left(2.0, 2.0), Left(5.0, 5.0)]
+
+
+@pytest.mark.parametrize(("refused", "where"), [(True, " on the denser sampling"), (False, "")])
+def test_the_reason_says_by_how_much_and_where_the_next_cheaper_breaks_the_tolerance(refused: bool, where: str) -> None:
+    scene = scene_of({"ciede2000": 1.0}, "rendered-sphere-40deg")
+    offered, _ = offered_and_seen(scene)
+    ((name, forms),) = offered.items()
+    keys = [each.form.key for each in forms]
+    pick = Pick(keys.index("fit"), keys.index("qualitative"))
+    decision = Decision(pick, Left(0.5, 0.5), Left(1.004, 1.004), refused, Left(0.6, 0.6))
+    prices = {name: [Price(1.0, 0.1 if index else 1.0) for index in range(len(forms))]}
+    (one,) = describe(scene, {name: decision}, offered, prices, {name: 1}, {})
+    assert one.refused == refused
+    assert one.reason == f"leaves 0.5; the best of what is cheaper, qualitative, eq. 30, would leave 1.004{where}"
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def run(
     store : Path, optional
         Where chosen tables are published, under the names of their materials.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.representations`.
+        Of planned tables: see `brdfdb.choose.candidates`.
 
     Returns
     -------
