@@ -112,12 +112,16 @@ class Object(BaseModel):
 
 
 class Tolerance(BaseModel):
-    """How far the picture may be from the true one: relative in radiance, or in CIEDE2000. One of the two."""
+    """How far the picture may be from the true one: relative in radiance, or in CIEDE2000. One of the two.
+
+    It holds at every pixel, or at a percentile of those of each material where isolated pixels do not matter.
+    """
 
     model_config = STRICT
 
     relative: float | None = Field(default=None, gt=0.0, lt=1.0)
     ciede2000: float | None = Field(default=None, gt=0.0, le=100.0)
+    percentile: float = Field(default=100.0, gt=0.0, le=100.0, description="of the pixels of each material; 100: all")
 
     @model_validator(mode="after")
     def _check(self) -> Tolerance:
