@@ -23,6 +23,7 @@ from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991 import checked_surface, cos_bisecting, v_squared
+from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, single_slope_part
 from brdfdb.parameters import Floats
 from brdfdb.plan import plan
 from brdfdb.tabulate import POLE_END_DEG
@@ -205,24 +206,23 @@ def _smooth(wi: Floats, wr: Floats, *, rho: float, **_: float) -> Floats:
 
 def _by_parts(direct: str, bounce: str | None) -> Callable[..., Floats]:
     """Direct light and second bounce, each by the "facets" or by the "closed" forms; None: no bounce."""
-    ways = {"facets": models.oren_nayar_gaussian_parts_vectors, "closed": _over_slopes}
+    ways = {"facets": gaussian_part, "closed": _over_slopes}
 
     def evaluate(wi: Floats, wr: Floats, **own: float) -> Floats:
-        parts = {way: ways[way](wi, wr, **own) for way in {direct, bounce or direct}}
-        return parts[direct].direct + (0.0 if bounce is None else parts[bounce].interreflected)
+        f_r = ways[direct](wi, wr, **own, part="direct")
+        return f_r if bounce is None else f_r + ways[bounce](wi, wr, **own, part="interreflected")
 
     return evaluate
 
 
-def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float) -> models.oren_nayar_1994.Parts:
+def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float, part: PartName) -> Floats:
     """The closed forms of appendix B.2, eqs 45 and 49, averaged over slopes with the weights of eqs 25 and 26."""
     x, w = np.polynomial.legendre.leggauss(_SLOPES)
     top = min(np.pi / 2, _WIDEST * max(sigma, 1e-9))  # a flat surface: all slopes are 0
     theta_a = (x + 1.0) * top / 2.0
     weight = w * np.exp(-(theta_a**2) / (2.0 * max(sigma, 1e-9) ** 2)) * np.sin(theta_a)
     weight /= weight.sum()
-    parts = models.oren_nayar_single_slope_parts_vectors(wi[:, np.newaxis], wr[:, np.newaxis], rho=rho, theta_a=theta_a)
-    return models.oren_nayar_1994.Parts(parts.direct @ weight, parts.interreflected @ weight)
+    return single_slope_part(wi[:, np.newaxis], wr[:, np.newaxis], rho=rho, theta_a=theta_a, part=part) @ weight
 
 
 # Ward 1992

@@ -12,6 +12,7 @@ from brdfdb import accuracy
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.misprints import MISPRINTS
+from brdfdb.models import oren_nayar_1994_surfaces
 from brdfdb.reference import he_torrance_1991, oren_nayar_1994, ward_1992
 from brdfdb.representations import Representation, representations
 
@@ -167,6 +168,41 @@ def test_the_closed_forms_over_slopes_are_those_of_the_misprint() -> None:
     both, direct = (values(of(each)[0]["closed-forms"], wi, wr) for each in (material, once))
     assert where["rho"] == material.parameters["rho"]
     np.testing.assert_allclose(both - direct, printed.as_printed(**where), rtol=CLOSED)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "asked"),
+    [
+        pytest.param("foam", "facets", {"facets direct"}, id="no-bounce"),
+        pytest.param("foam", "closed-forms", {"eq. 45"}, id="no-bounce-in-closed-forms"),
+        pytest.param("wall-plaster", "closed-forms", {"eq. 45", "eq. 49"}, id="closed-forms"),
+        pytest.param("wall-plaster", "bounce-49", {"facets direct", "eq. 49"}, id="bounce-of-eq-49"),
+        pytest.param("wall-plaster", "direct-45", {"eq. 45", "facets bounce"}, id="direct-light-of-eq-45"),
+    ],
+)
+def test_a_form_computes_what_it_shows_and_nothing_else(
+    name: str, key: str, asked: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = set()
+
+    def spy(kernel: str, what: Any) -> None:
+        original = getattr(oren_nayar_1994_surfaces, kernel)
+
+        def called(*features: Any, **parts: bool) -> Any:
+            found.update(what(**parts))
+            return original(*features, **parts)
+
+        monkeypatch.setattr(oren_nayar_1994_surfaces, kernel, called)
+
+    def of_facets(lit: bool = True, bounce: bool = True) -> list[str]:
+        return ["facets direct"] * lit + ["facets bounce"] * bounce
+
+    spy("gaussian", of_facets)
+    spy("_evaluate_direct", lambda: ["eq. 45"])
+    spy("_evaluate_bounce", lambda: ["eq. 49"])
+    forms, drawn = of(presets()[name])
+    values(forms[key], drawn.wi[:3], drawn.wr[:3])
+    assert found == asked
 
 
 def test_ten_terms_do_where_g_is_small_and_beckmanns_limit_does_not() -> None:
