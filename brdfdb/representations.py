@@ -59,7 +59,9 @@ class Representation:
     bytes : int
         Of the numbers that an evaluation reads: parameters and spectra, or the nodes of a table.
     dtype : float32 or float64
-        Of the vectors to give it.
+        Of the vectors to give it, and of the values.
+    rounded : bool
+        Whether it is another form but for float32 in and out: as much work, and rounding for an error.
     layout : Layout or None
         Of a table that was tabulated here: what it takes to do so again.
     """
@@ -71,6 +73,7 @@ class Representation:
     evaluate: Evaluate
     bytes: int
     dtype: type[np.floating[Any]] = np.float64
+    rounded: bool = False
     layout: Layout | None = None
 
 
@@ -132,13 +135,23 @@ def _of_itself(
     title: str = "",
     kind: Kind = "exact",
 ) -> Iterator[Representation]:
-    """The model of a material in both precisions."""
+    """The model of a material, and the same with float32 in and out: its arithmetic is float64 all the same."""
     evaluate, size = _direct(material, wavelength_nm)
     python = f"models.{material.model}"
     title = title or f"{material.spec.title}, {material.spec.equation}"
-    yield Representation(key, title, kind, python, evaluate, size)
-    yield Representation(
-        f"{key}-float32", f"{title}, float32", kind, f"{python}, float32 vectors", evaluate, size, np.float32
+    double = Representation(key, title, kind, python, evaluate, size)
+    yield from (double, _single(double))
+
+
+def _single(form: Representation) -> Representation:
+    """A form with float32 in and out."""
+    return replace(
+        form,
+        key=f"{form.key}-float32",
+        title=f"{form.title}, float32 in and out",
+        python=f"{form.python}, float32 vectors",
+        dtype=np.float32,
+        rounded=True,
     )
 
 
@@ -155,9 +168,7 @@ def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[R
     own = {"rho": float(values["rho"]), "sigma": float(values["sigma"])}
     bounces = bool(values.get("interreflection", True))
 
-    def form(
-        key: str, title: str, kind: Kind, python: str, body: Callable[..., Floats], dtype: Any = np.float64, **more: Any
-    ) -> Representation:
+    def form(key: str, title: str, kind: Kind, python: str, body: Callable[..., Floats], **more: Any) -> Representation:
         def evaluate(wi: Floats, wr: Floats) -> Floats:
             f_r = body(wi, wr, **own, **more)
             if "k_s" in values:  # Eq. (32)
@@ -165,21 +176,22 @@ def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[R
                 f_r = values["k_b"] * f_r + values["k_s"] * surface
             return f_r[:, np.newaxis]
 
-        return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more)), dtype)
+        return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more)))
 
     truth = models.oren_nayar_gaussian_vectors if bounces else _by_parts("facets", None)
-    yield form("facets", "facets integrated, eqs 8-20 and 47", "exact", "oren_nayar_gaussian", truth)
-    yield form("facets-float32", "facets integrated, float32", "exact", "oren_nayar_gaussian", truth, dtype=np.float32)
-    single = "oren_nayar_single_slope over slopes"
+    facets = form("facets", "facets integrated, eqs 8-20 and 47", "exact", "oren_nayar_gaussian", truth)
+    yield from (facets, _single(facets))
+    averaged = "oren_nayar_single_slope over slopes"
     closed = _by_parts("closed", "closed" if bounces else None)
-    yield form("closed-forms", "closed forms of B.2, eqs 45 and 49", "closed form", single, closed)
+    equations = "eqs 45 and 49" if bounces else "eq. 45"
+    yield form("closed-forms", f"closed forms of B.2, {equations}", "closed form", averaged, closed)
     if bounces:
-        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", single, _by_parts("facets", "closed"))
+        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", averaged, _by_parts("facets", "closed"))
         exact = _by_parts("closed", "facets")
-        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", single, exact)
-    fit, with_bounce = models.oren_nayar_vectors, {"interreflection": bounces}
-    yield form("fit", "functional fit, eqs 27-29", "approximation", "oren_nayar", fit, **with_bounce)
-    yield form("fit-float32", "functional fit, float32", "approximation", "oren_nayar", fit, np.float32, **with_bounce)
+        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", averaged, exact)
+    fit = models.oren_nayar_vectors
+    whole = form("fit", "functional fit, eqs 27-29", "approximation", "oren_nayar", fit, interreflection=bounces)
+    yield from (whole, _single(whole))
     if bounces:
         yield form(
             "fit-direct", "fit without bounce, eq. 27", "approximation", "oren_nayar", fit, interreflection=False
@@ -249,10 +261,13 @@ def _ward(material: Material, _: NDArray[np.float64] | None) -> Iterator[Represe
 
 
 def _he_torrance(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Representation]:
-    yield from _of_itself(material, wavelength_nm, "sum", "the sum of eq. 78, whole")
+    double, single = _of_itself(material, wavelength_nm, "sum", "the sum of eq. 78, whole")
+    yield double
+    mirror = material.parameters["sigma_0_um"] == 0.0
+    yield single if mirror else replace(single, title="the sum of eq. 78, float32, half of its table", rounded=False)
     arguments = material.arguments(wavelength_nm)
     size = 8 * sum(np.size(each) for each in arguments.values())
-    if material.parameters["sigma_0_um"] == 0.0:  # a mirror: no sum to shorten
+    if mirror:  # no sum to shorten
         return
     printed = {misprint.key: misprint.as_printed for misprint in misprints.MISPRINTS}
     ten = _eq_71(arguments, printed["ten-terms"])

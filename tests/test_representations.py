@@ -121,6 +121,17 @@ def test_float32_is_off_by_rounding(name: str) -> None:
     assert 0.0 < l1(forms, drawn, single) < SINGLE
 
 
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_rounded_form_is_another_one_but_for_float32_in_and_out(name: str) -> None:
+    forms, drawn = of(presets()[name])
+    halved = {"sum-float32"} if presets()[name].parameters.get("sigma_0_um") else set()  # half of the terms
+    single = {key for key, form in forms.items() if form.dtype is np.float32}
+    assert single == {key for key, form in forms.items() if form.rounded} | halved
+    for key in single - halved:
+        assert forms[key].title == f"{forms[key.removesuffix('-float32')].title}, float32 in and out"
+        assert abs(l1(forms, drawn, key) - l1(forms, drawn, key.removesuffix("-float32"))) < SINGLE
+
+
 @pytest.mark.parametrize(("name", "tolerance"), [("wall-plaster", 0.01), ("rolled-brass", 0.1), ("blue-plastic", 0.1)])
 def test_a_planned_table_keeps_to_its_tolerance_of_the_truth(name: str, tolerance: float) -> None:
     forms, _ = of(presets()[name], tolerance)
