@@ -111,23 +111,6 @@ def representations(
     return [*forms, *tables]
 
 
-def _direct(material: Material, wavelength_nm: NDArray[np.float64] | None) -> tuple[Evaluate, int]:
-    """The model of a material as it is called, and the bytes of its parameters."""
-    vectors = material.spec.vectors
-    if wavelength_nm is None:
-        grey = material.arguments()
-        return lambda wi, wr: vectors(wi, wr, **grey)[:, np.newaxis], 8 * len(grey)
-    together = material.arguments(wavelength_nm)
-    apart = [material.arguments(w) for w in wavelength_nm]
-
-    def evaluate(wi: Floats, wr: Floats) -> Floats:
-        if len(wi) == 1:  # one call for all wavelengths
-            return vectors(wi[:, np.newaxis], wr[:, np.newaxis], **together)
-        return np.stack([vectors(wi, wr, **arguments) for arguments in apart], axis=-1)
-
-    return evaluate, 8 * sum(np.size(each) for each in together.values())
-
-
 def _of_itself(
     material: Material,
     wavelength_nm: NDArray[np.float64] | None,
@@ -136,10 +119,9 @@ def _of_itself(
     kind: Kind = "exact",
 ) -> Iterator[Representation]:
     """The model of a material, and the same with float32 in and out: its arithmetic is float64 all the same."""
-    evaluate, size = _direct(material, wavelength_nm)
-    python = f"models.{material.model}"
     title = title or f"{material.spec.title}, {material.spec.equation}"
-    double = Representation(key, title, kind, python, evaluate, size)
+    size = _bytes(material.arguments(wavelength_nm))
+    double = Representation(key, title, kind, f"models.{material.model}", material.brdf_at(wavelength_nm), size)
     yield from (double, _single(double))
 
 
@@ -153,6 +135,10 @@ def _single(form: Representation) -> Representation:
         dtype=np.float32,
         rounded=True,
     )
+
+
+def _bytes(arguments: dict[str, Any]) -> int:
+    return 8 * sum(np.size(each) for each in arguments.values())
 
 
 def _as(material: Material, model: str, **parameters: float) -> Material:
@@ -266,7 +252,7 @@ def _he_torrance(material: Material, wavelength_nm: NDArray[np.float64] | None) 
     mirror = material.parameters["sigma_0_um"] == 0.0
     yield single if mirror else replace(single, title="the sum of eq. 78, float32, half of its table", rounded=False)
     arguments = material.arguments(wavelength_nm)
-    size = 8 * sum(np.size(each) for each in arguments.values())
+    size = _bytes(arguments)
     if mirror:  # no sum to shorten
         return
     printed = {misprint.key: misprint.as_printed for misprint in misprints.MISPRINTS}
