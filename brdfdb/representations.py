@@ -20,7 +20,7 @@ from brdfdb.grids import (
 )
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Number
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991 import checked_surface, cos_bisecting, v_squared
 from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, single_slope_part
@@ -141,9 +141,14 @@ def _bytes(arguments: dict[str, Any]) -> int:
     return 8 * sum(np.size(each) for each in arguments.values())
 
 
-def _as(material: Material, model: str, **parameters: float) -> Material:
-    """A material of another model."""
-    return Material(name=material.name, title=material.title, model=model, parameters=parameters, source="derived")
+def _as(material: Material, model: str, **parameters: Number) -> Material:
+    """A material of another model, from the same sources; what is said of parameters that it lacks is left out."""
+    stated = {
+        "sources": {name: source for name, source in material.sources.items() if name in parameters},
+        "assumed": tuple(name for name in material.assumed if name in parameters),
+        "known_excess": None,  # of the other model
+    }
+    return material.model_copy(update={"model": model, "parameters": parameters, **stated})
 
 
 # Oren and Nayar 1994

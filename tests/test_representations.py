@@ -253,6 +253,32 @@ def test_the_half_vector_form_is_exact_at_the_peak_only() -> None:
     assert l1(forms, drawn, "half-vector") > 0.005
 
 
+@pytest.mark.parametrize("model", ["oren_nayar", "ward_half_vector"])
+def test_a_table_of_another_model_says_where_its_numbers_come_from(model: str) -> None:
+    preset = presets()["wall-plaster" if model == "oren_nayar" else "rolled-brass"]
+    first, second, *_ = preset.parameters
+    material = Material(
+        **preset.model_dump(exclude={"model", "sources", "assumed", "note"}),
+        model=model,
+        sources={first: "a figure", list(preset.parameters)[-1]: "a table"},
+        assumed=(second,),
+        note=f"{second} is a guess",
+    )
+    forms, _ = of(material, TOLERANCE)
+    layout = forms["table-10"].layout
+    assert layout is not None
+    table = layout.material
+    assert table.model != model
+    assert (table.source, table.title, table.assumed, table.note) == (
+        preset.source,
+        preset.title,
+        (second,),
+        material.note,
+    )
+    assert table.sources == {name: where for name, where in material.sources.items() if name in table.parameters}
+    assert table == Material(**table.model_dump())  # as valid as one that was read
+
+
 def test_a_table_takes_its_nodes_and_a_model_its_parameters() -> None:
     forms, _ = of(presets()["rolled-brass"], TOLERANCE)
     assert forms["elliptical"].bytes == 8 * len(presets()["rolled-brass"].parameters)
