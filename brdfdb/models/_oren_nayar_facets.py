@@ -283,7 +283,7 @@ def _gaussian(
         # the tie: t_large sin(azimuth) = t_small sin(span - azimuth)
         near = math.atan2(t_small * sin_dphi, t_large + t_small * cos)
         far = span - near
-        count = 0
+        count = int(np.int64(0))  # of the literal 0 all that takes it would be compiled once more
         for at_tie in (False, True):
             if far > 0.0:
                 count = _add_azimuths(t_small, t_large, far, near, rest, at_tie, sigma, x_max, rays, count)
