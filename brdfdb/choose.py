@@ -92,7 +92,7 @@ def candidates(
     Returns
     -------
     list of Candidate
-        Without models that are meant to differ.
+        Without models that are meant to differ, and forms that differ from another in rounding alone.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def candidates(
                 Candidate(_between(form, few, wavelength_nm), few)
                 for form in representations(material, few, tolerances)
             ]
-    return [each for each in found if each.form.kind != "other model"]
+    return [each for each in found if each.form.kind != "other model" and not each.form.rounded]
 
 
 def _between(form: Representation, few: Array, wavelength_nm: Array) -> Representation:

@@ -7,7 +7,7 @@ One TOML file a paper, one table a material. In the files an angle is written in
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import resources
@@ -20,11 +20,15 @@ from pydantic_core import ErrorDetails
 
 from brdfdb.geometry import degrees, radians
 from brdfdb.models import MODELS
-from brdfdb.parameters import ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter
 from brdfdb.spectra import refractive_index
 
 Text = Annotated[str, Field(min_length=1)]
 Number = float | bool
+
+# Directions from which on a call each is faster than one for all wavelengths: they are one row of the kernel then. One
+# call and a call each of copper at 8 wavelengths: 278 and 637 ns a value at 256 directions, 293 and 204 at 16384
+_MANY = 2000
 
 
 class KnownExcess(BaseModel):
@@ -204,6 +208,39 @@ class Material(BaseModel):
         wavelength = np.asarray(wavelength_nm, dtype=np.float64)
         n, k = refractive_index(self.refractive_index, wavelength)
         return {**self.parameters, "wavelength_nm": wavelength, "n": n, "k": k}
+
+    def brdf_at(self, wavelength_nm: NDArray[np.float64] | None) -> Callable[[Floats, Floats], Floats]:
+        """f_r of the model as a function of directions alone: spectra are looked up here, and not at every call.
+
+        Parameters
+        ----------
+        wavelength_nm : array of shape (L,) [nm], or None
+            For spectral models, and only for them.
+
+        Returns
+        -------
+        callable
+            ``brdf(wi, wr)``: f_r [1/sr], shape (N, L), L = 1 of a grey material, of unit vectors of shape (N, 3).
+
+        Raises
+        ------
+        ValueError
+            If the refractive index is not known at one of the wavelengths.
+        """
+        vectors, together = self.spec.vectors, self.arguments(wavelength_nm)
+        if wavelength_nm is None:
+            return lambda wi, wr: vectors(wi, wr, **together)[:, np.newaxis]
+        each = [
+            {name: value[w] if np.ndim(value) else value for name, value in together.items()}
+            for w in range(wavelength_nm.size)
+        ]
+
+        def brdf(wi: Floats, wr: Floats) -> Floats:
+            if len(wi) < _MANY:
+                return vectors(wi[:, np.newaxis], wr[:, np.newaxis], **together)
+            return np.stack([vectors(wi, wr, **arguments) for arguments in each], axis=-1)
+
+        return brdf
 
     def file_parameters(self) -> dict[str, Number]:
         """The parameters as a human reads and writes them: angles in degrees, under names that end in ``_deg``."""
