@@ -77,12 +77,11 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
 
 def model_values(material: Material, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:
     """f_r [1/sr] of the model, of shape (N, L), L = 1 for a grey material."""
-    spectrum = [material.arguments()] if wavelength_nm is None else [material.arguments(w) for w in wavelength_nm]
-    values = np.empty((len(wi), len(spectrum)))
+    brdf = material.brdf_at(wavelength_nm)
+    values = np.empty((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
     for start in range(0, len(wi), _MODEL):
         some = slice(start, start + _MODEL)
-        for w, arguments in enumerate(spectrum):
-            values[some, w] = material.spec.vectors(wi[some], wr[some], **arguments)
+        values[some] = brdf(wi[some], wr[some])
     return values
 
 

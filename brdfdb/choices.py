@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.choose import Candidate, Chosen, Decision, Left
+from brdfdb.choose import Candidate, Decision, Left, limit
 from brdfdb.representations import Kind
 from brdfdb.scene import Scene, Tolerance
 
@@ -32,7 +32,7 @@ class Residue(BaseModel):
 
     model_config = _STRICT
 
-    p99: float = Field(description="99th percentile: what keeps to the tolerance")
+    counted: float = Field(description="at the percentile of the tolerance: what keeps to it")
     most: float = Field(description="largest")
 
 
@@ -64,6 +64,7 @@ class Material(BaseModel):
     truth: Option
     choice: Option
     next_cheaper: Option | None = Field(description="the most accurate of what is cheaper; null without any")
+    refused: bool = Field(description="whether the next cheaper breaks it on the denser sampling only")
     whole: Residue = Field(description="of the choices all at once, sampled more densely")
     reason: str
     revision: str | None = Field(description="of the table in the store, if one was built")
@@ -79,7 +80,6 @@ class Choice(BaseModel):
     machine: str
     scene: str
     tolerance: Tolerance
-    allowed: float = Field(description="share of the tolerance that a material may use by itself")
     weigh: Weigh
     planned: tuple[int, int] = Field(description="pixels across and down where candidates are compared")
     checked: tuple[int, int] = Field(description="where the whole is held to the tolerance")
@@ -88,13 +88,13 @@ class Choice(BaseModel):
 
 def describe(
     scene: Scene,
-    chosen: Chosen,
+    chosen: Mapping[str, Decision],
     offered: Mapping[str, Sequence[Candidate]],
     prices: Mapping[str, Sequence[Price]],
     pixels: Mapping[str, int],
     revisions: Mapping[str, str],
 ) -> list[Material]:
-    """What is chosen for each material of a scene: figures to three digits, and reasons."""
+    """What is chosen for each material of a scene: costs to three digits, and reasons."""
 
     def option(name: str, index: int, left: Left) -> Option:
         candidate, price = offered[name][index], prices[name][index]
@@ -112,8 +112,9 @@ def describe(
             error=_residue(left),
         )
 
+    tolerance, _ = limit(scene)
     found = []
-    for name, decision in chosen.decisions.items():
+    for name, decision in chosen.items():
         truth = option(name, 0, Left(0.0, 0.0))
         choice = option(name, decision.pick.chosen, decision.left)
         cheaper = None
@@ -127,29 +128,37 @@ def describe(
                 truth=truth,
                 choice=choice,
                 next_cheaper=cheaper,
+                refused=decision.refused,
                 whole=_residue(decision.whole),
-                reason=_reason(choice, cheaper, decision),
+                reason=_reason(choice, cheaper, decision, tolerance),
                 revision=revisions.get(name),
             )
         )
     return found
 
 
-def _reason(choice: Option, cheaper: Option | None, decision: Decision) -> str:
+def _reason(choice: Option, cheaper: Option | None, decision: Decision, tolerance: float) -> str:
     """Why this one, and where it costs more than a third of the truth, why."""
-    said = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.p99:.2g}"
+    said = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.counted:.2g}"
     if cheaper is None:
         said += "; nothing is cheaper"
     else:
-        said += f"; the best of what is cheaper, {cheaper.title}, would leave {cheaper.error.p99:.2g}"
+        left = _above(tolerance, cheaper.error.counted)
+        said += f"; the best of what is cheaper, {cheaper.title}, would leave {left}"
+        said += " on the denser sampling" if decision.refused else ""
     if choice.share > THIRD:
         why = "there is nothing cheaper" if cheaper is None else "all that is cheaper breaks the tolerance"
         said += f"; more than a third of the truth's cost, as {why}"
     return said
 
 
+def _above(tolerance: float, error: float) -> str:
+    """An error with as many digits as show that it is above the tolerance, two at least."""
+    return next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
+
+
 def _residue(left: Left) -> Residue:
-    return Residue(p99=_short(left.p99), most=_short(left.most))
+    return Residue(counted=left.counted, most=left.most)
 
 
 def _short(value: float) -> float:

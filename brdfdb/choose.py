@@ -20,17 +20,16 @@ from brdfdb.representations import Representation, representations
 from brdfdb.scene import Scene
 from brdfdb.shapes import Array
 
+GREY_TOLERANCES = (0.1, 0.01, 0.0005)  # of planned tables; 0.001, as in charts, leaves limbs 1.05 off
 SAMPLINGS = (3, 8)  # wavelengths, evenly over those of the scene, that a form may be evaluated at in place of all
-PERCENTILE = 99.0  # of the pixels of a material: what keeps to the tolerance
 DARK = 1e-3  # exposed radiance: relative errors of what is darker are relative to this
-TIGHTER, ROUNDS = 0.8, 4  # what the tolerance of single materials is multiplied with, and how often it is tried
 FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # integrals over facets are known to 1e-6
 
 _ROWS = 512  # of products at a time: larger ones BLAS gives to threads, which wait for each other on a busy machine
 
 
 class InfeasibleError(ValueError):
-    """No choice keeps to the tolerance; str() is one sentence."""
+    """The tolerance is finer than the truth is known; str() is one sentence."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +49,9 @@ class Candidate:
 
 
 class Left(NamedTuple):
-    """The error that is left over the pixels of a material: percentile `PERCENTILE`, and the largest."""
+    """The error that is left over the pixels of a material: at the percentile of the tolerance, and the largest."""
 
-    p99: float
+    counted: float
     most: float
 
 
@@ -64,19 +63,16 @@ class Pick(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """What is chosen of a material: what it leaves by itself, the next cheaper, too, and it in the whole picture."""
+    """What is chosen of a material: what it leaves by itself, and in the whole picture, sampled more densely.
+
+    `cheaper_left` is how the next cheaper breaks the tolerance; `refused`, whether only on the denser sampling.
+    """
 
     pick: Pick
     left: Left
     cheaper_left: Left | None
+    refused: bool
     whole: Left
-
-
-class Chosen(NamedTuple):
-    """Decisions by material, and the share of the tolerance that each was allowed by itself."""
-
-    decisions: dict[str, Decision]
-    allowed: float
 
 
 def candidates(
@@ -91,18 +87,20 @@ def candidates(
     wavelength_nm : array of shape (L,) [nm], or None
         Those of the scene, for spectral materials, and only for them.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.representations`.
+        Of planned tables: see `brdfdb.representations`. By default `GREY_TOLERANCES` of grey materials.
 
     Returns
     -------
     list of Candidate
-        Without models that are meant to differ.
+        Without models that are meant to differ, and forms that differ from another in rounding alone.
 
     Raises
     ------
     ValueError
         As `brdfdb.representations.representations` does.
     """
+    if tolerances is None and wavelength_nm is None:
+        tolerances = GREY_TOLERANCES
     found = [Candidate(form, wavelength_nm) for form in representations(material, wavelength_nm, tolerances)]
     for count in SAMPLINGS if wavelength_nm is not None else ():
         assert wavelength_nm is not None
@@ -112,7 +110,7 @@ def candidates(
                 Candidate(_between(form, few, wavelength_nm), few)
                 for form in representations(material, few, tolerances)
             ]
-    return [each for each in found if each.form.kind != "other model"]
+    return [each for each in found if each.form.kind != "other model" and not each.form.rounded]
 
 
 def _between(form: Representation, few: Array, wavelength_nm: Array) -> Representation:
@@ -197,7 +195,7 @@ class Seen:
         """The error of a picture over the pixels of a material."""
         at = np.unravel_index(self.pixels(material), self.truth.shape[:2])
         errors = _differences(self.scene, self.truth[at], picture[at])
-        return Left(float(np.percentile(errors, PERCENTILE)), float(errors.max()))
+        return Left(float(np.percentile(errors, self.scene.tolerance.percentile)), float(errors.max()))
 
 
 def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
@@ -253,7 +251,7 @@ def choose(
     offered: Mapping[str, Sequence[Candidate]],
     costs: Mapping[str, Sequence[float]],
     tick: Callable[[], None] = lambda: None,
-) -> Chosen:
+) -> dict[str, Decision]:
     """Choose a candidate for each material of a scene, and check all of them together.
 
     Parameters
@@ -267,50 +265,58 @@ def choose(
     costs : mapping
         The same, what each of them costs.
     tick : callable
-        Called for each material, and for the check.
+        Called for each material, and when the check is over.
 
     Returns
     -------
-    Chosen
-        Where the whole breaks the tolerance, single materials are allowed `TIGHTER` times as much, `ROUNDS` times.
+    dict
+        A decision for each material. Where the whole breaks the tolerance, the choices that do so by themselves are
+        refused there, or, if only all of them together do, the one that leaves the most; the truth is never refused.
 
     Raises
     ------
     InfeasibleError
-        If the tolerance is finer than the truth is known, or the whole breaks it in the end.
+        If the tolerance is finer than the truth is known.
     """
-    tolerance, unit = limit(planned.scene)
+    tolerance, _ = limit(planned.scene)
+    refused: dict[tuple[str, int], Left] = {}
 
     @functools.cache
     def alone(name: str, index: int) -> Left:
         return planned.left(name, planned.picture({name: offered[name][index]}))
 
-    def error(name: str, index: int) -> float:
-        return alone(name, index).p99
+    def left(name: str, index: int) -> Left:
+        return refused[name, index] if (name, index) in refused else alone(name, index)
 
-    for allowed in TIGHTER ** np.arange(ROUNDS):
-        picks = {}
-        for name in offered:
-            picks[name] = pick(costs[name], functools.partial(error, name), allowed * tolerance)
-            tick()
-        picture = checked.picture({name: offered[name][one.chosen] for name, one in picks.items()})
-        whole = {name: checked.left(name, picture) for name in picks}
+    def picked(name: str) -> Pick:
+        return pick(costs[name], lambda index: left(name, index).counted, tolerance)
+
+    picks = {}
+    for name in offered:
+        picks[name] = picked(name)
         tick()
-        if max(left.p99 for left in whole.values()) <= tolerance:
-            return Chosen(
-                {
-                    name: Decision(
-                        one,
-                        alone(name, one.chosen),
-                        None if one.cheaper is None else alone(name, one.cheaper),
-                        whole[name],
-                    )
-                    for name, one in picks.items()
-                },
-                float(allowed),
-            )
-    worst = max(whole, key=lambda name: whole[name].p99)
-    raise InfeasibleError(
-        f"tolerance: {tolerance:g} ({unit}) is infeasible: the whole picture is {whole[worst].p99:.3g} off where it "
-        f"shows {worst}, with each material within {allowed * tolerance:.3g} by itself"
-    )
+    while True:
+        forms = {name: offered[name][one.chosen] for name, one in picks.items()}
+        picture = checked.picture(forms)
+        whole = {name: checked.left(name, picture) for name in forms}
+        worst = max(whole.values())
+        if worst.counted <= tolerance:
+            break
+        own = {
+            name: checked.left(name, checked.picture({name: forms[name]})) for name, one in picks.items() if one.chosen
+        }
+        broke = {name: each for name, each in own.items() if each.counted > tolerance}
+        for name, each in (broke or {max(own, key=lambda name: own[name]): worst}).items():
+            refused[name, picks[name].chosen] = each
+            picks[name] = picked(name)
+    tick()
+    return {
+        name: Decision(
+            one,
+            alone(name, one.chosen),
+            None if one.cheaper is None else left(name, one.cheaper),
+            (name, one.cheaper) in refused,
+            whole[name],
+        )
+        for name, one in picks.items()
+    }

@@ -384,6 +384,10 @@ class Family:
             return values[0]
         return blended(values, [part.weight for part in parts], self.record.interpolation.specular_offset)[()]
 
+    def around(self, **parameters: float) -> list[Table]:
+        """The members that a lookup at these parameters is made of; parameters and errors as `lookup` has them."""
+        return [part.table for part in self._parts(parameters)]
+
     def _blended(self, parts: Sequence[_Part], values: Sequence[Floats]) -> Floats:
         mean = blended(
             [np.asarray(value, dtype=np.float64) for value in values],

@@ -236,12 +236,12 @@ def tricubic(
 ) -> None:
     """Cubic interpolation on three axes of a table with one value a node, of the points that `locate` found."""
     at, w = np.empty((3, 4), np.uint64), np.empty((3, 4))
-    n_2 = axes.counts[2]
-    n_1 = axes.counts[1] * n_2
     for j in range(count):
-        _weigh(axes, 0, cell[0, j], share[0, j], n_1, at, w)
-        _weigh(axes, 1, cell[1, j], share[1, j], n_2, at, w)
-        _weigh(axes, 2, cell[2, j], share[2, j], 1, at, w)
+        stride = 1
+        for back in range(3):  # not one line for each axis: `_weigh` would be compiled three times
+            axis = 2 - back
+            _weigh(axes, axis, cell[axis, j], share[axis, j], stride, at, w)
+            stride *= axes.counts[axis]
         p, q, r, s = at[2, 0], at[2, 1], at[2, 2], at[2, 3]
         a, b, c, d = w[2, 0], w[2, 1], w[2, 2], w[2, 3]
         total = 0.0

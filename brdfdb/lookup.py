@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from brdfdb import _lookup_kernels
 from brdfdb._elementary import COS_HORIZON
@@ -202,7 +202,7 @@ class Table:
             if any(angle.dtype.kind not in "iuf" for angle in arrays):
                 checked_angles(*arrays)
             shape = np.broadcast_shapes(*(angle.shape for angle in arrays))
-            flat = [np.ascontiguousarray(np.broadcast_to(angle, shape), dtype=dtype).reshape(-1) for angle in arrays]
+            flat = [_flat(angle, shape, dtype) for angle in arrays]
         values = np.empty(flat[0].size * weight.size, dtype)
         horizon = float(dtype.type(HALF_PI))
         if not _lookup_kernels.by_angles(
@@ -237,10 +237,7 @@ class Table:
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
-        flat = [
-            np.ascontiguousarray(np.broadcast_to(w, shape), dtype=vectors.dtype).reshape(-1)
-            for w in (vectors.w_i, vectors.w_r)
-        ]
+        flat = [_flat(w, shape, vectors.dtype) for w in (vectors.w_i, vectors.w_r)]
         values = np.empty(flat[0].size // 3 * weight.size, vectors.dtype)
         _lookup_kernels.by_vectors(*self._kernel, low, weight, flat[0], flat[1], values)
         return values.reshape(shape[:-1] + wavelength_shape)[()]
@@ -386,11 +383,18 @@ def rebuilt(
     return np.asarray(np.where((np.maximum(theta_i, theta_r) > HALF_PI)[..., np.newaxis], 0.0, f_r))
 
 
+def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """One number after the other, and never writable: kernels are compiled anew for arrays that are, 10 s a time."""
+    flat = np.ascontiguousarray(np.broadcast_to(array, shape), dtype=dtype).reshape(-1)
+    flat.flags.writeable = False
+    return flat
+
+
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
     x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
     rule = _lookup_kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False)
-    flat = [np.ascontiguousarray(w, dtype=np.float64).reshape(-1) for w in (wi, wr)]
+    flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
     _lookup_kernels.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
     return x
 

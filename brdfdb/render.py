@@ -43,10 +43,8 @@ class Reflector:
 
     def __init__(self, material: Material, wavelength_nm: Array) -> None:
         self.material = material
-        stated = material.wavelengths_nm
-        at = None if not material.spectral else wavelength_nm if stated is None else np.array(stated[:1])
-        self.wavelength_nm = at
-        self._parameters = material.arguments(at)
+        self.wavelength_nm = material.evaluated_at(wavelength_nm)
+        self._parameters = material.arguments(self.wavelength_nm)
 
     @functools.cached_property
     def _each(self) -> list[dict[str, float]]:
@@ -136,10 +134,10 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
 
     Notes
     -----
-    Eq. (6) of Ward 1992 (``ward1992``) with deterministic lights and ambient light in place of sampled one; eq. (12) of
-    He et al. 1991 (``he1991``): mirror, lights, and rho_hd times ambient light, where rho_hd is the directional albedo
-    of the same model for the direction of the viewer, not a constant. The mirror has a light only where the disc of
-    the light holds the mirror direction. Albedo and mirror are those of the material whichever BRDF is given.
+    Eq. (6) of Ward 1992 (``ward1992``): lights are deterministic, the environment is sampled. Eq. (12) of He et al.
+    1991 (``he1991``): mirror, lights, and rho_hd times ambient light, where rho_hd is the directional albedo of the
+    same model for the direction of the viewer, not a constant. The mirror has a light only where the disc of the light
+    holds the mirror direction. Albedo and mirror are those of the material whichever BRDF is given.
     """
     wavelength = np.array(scene.wavelengths_nm)
     f_r = reflector.brdf if brdf is None else brdf
@@ -186,8 +184,8 @@ def render(
     Returns
     -------
     array (height, width, L)
-        Spectral radiance as multiples of the illuminant, averaged over each pixel; the ambient radiance where there is
-        no object.
+        Spectral radiance as multiples of the illuminant, averaged over each pixel; ambient radiance and environment
+        where there is no object.
     """
     known = reflectors(scene) if materials is None else materials
     replaced = {} if brdfs is None else brdfs
@@ -214,5 +212,5 @@ def composed(
         else:
             mirror = view.points[points.via]
             lists[points.via][points.at] += known[mirror.material].mirror(mirror.wr[points.at]) * values
-    pixels += scene.ambient * free[:, np.newaxis]
+    pixels += (scene.ambient * free + view.background)[:, np.newaxis]
     return pixels.reshape(view.height, view.width, -1) / view.samples

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb import fresnel, misprints, models, tabulate
+from brdfdb.family import Family
 from brdfdb.geometry import checked_vectors, finished
 from brdfdb.grids import (
     ANISOTROPIC_AXES,
@@ -20,9 +21,10 @@ from brdfdb.grids import (
 )
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Number
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991 import checked_surface, cos_bisecting, v_squared
+from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, single_slope_part
 from brdfdb.parameters import Floats
 from brdfdb.plan import plan
 from brdfdb.tabulate import POLE_END_DEG
@@ -58,7 +60,9 @@ class Representation:
     bytes : int
         Of the numbers that an evaluation reads: parameters and spectra, or the nodes of a table.
     dtype : float32 or float64
-        Of the vectors to give it.
+        Of the vectors to give it, and of the values.
+    rounded : bool
+        Whether it is another form but for float32 in and out: as much work, and rounding for an error.
     layout : Layout or None
         Of a table that was tabulated here: what it takes to do so again.
     """
@@ -70,6 +74,7 @@ class Representation:
     evaluate: Evaluate
     bytes: int
     dtype: type[np.floating[Any]] = np.float64
+    rounded: bool = False
     layout: Layout | None = None
 
 
@@ -107,23 +112,6 @@ def representations(
     return [*forms, *tables]
 
 
-def _direct(material: Material, wavelength_nm: NDArray[np.float64] | None) -> tuple[Evaluate, int]:
-    """The model of a material as it is called, and the bytes of its parameters."""
-    vectors = material.spec.vectors
-    if wavelength_nm is None:
-        grey = material.arguments()
-        return lambda wi, wr: vectors(wi, wr, **grey)[:, np.newaxis], 8 * len(grey)
-    together = material.arguments(wavelength_nm)
-    apart = [material.arguments(w) for w in wavelength_nm]
-
-    def evaluate(wi: Floats, wr: Floats) -> Floats:
-        if len(wi) == 1:  # one call for all wavelengths
-            return vectors(wi[:, np.newaxis], wr[:, np.newaxis], **together)
-        return np.stack([vectors(wi, wr, **arguments) for arguments in apart], axis=-1)
-
-    return evaluate, 8 * sum(np.size(each) for each in together.values())
-
-
 def _of_itself(
     material: Material,
     wavelength_nm: NDArray[np.float64] | None,
@@ -131,19 +119,37 @@ def _of_itself(
     title: str = "",
     kind: Kind = "exact",
 ) -> Iterator[Representation]:
-    """The model of a material in both precisions."""
-    evaluate, size = _direct(material, wavelength_nm)
-    python = f"models.{material.model}"
+    """The model of a material, and the same with float32 in and out: its arithmetic is float64 all the same."""
     title = title or f"{material.spec.title}, {material.spec.equation}"
-    yield Representation(key, title, kind, python, evaluate, size)
-    yield Representation(
-        f"{key}-float32", f"{title}, float32", kind, f"{python}, float32 vectors", evaluate, size, np.float32
+    size = _bytes(material.arguments(wavelength_nm))
+    double = Representation(key, title, kind, f"models.{material.model}", material.brdf_at(wavelength_nm), size)
+    yield from (double, _single(double))
+
+
+def _single(form: Representation) -> Representation:
+    """A form with float32 in and out."""
+    return replace(
+        form,
+        key=f"{form.key}-float32",
+        title=f"{form.title}, float32 in and out",
+        python=f"{form.python}, float32 vectors",
+        dtype=np.float32,
+        rounded=True,
     )
 
 
-def _as(material: Material, model: str, **parameters: float) -> Material:
-    """A material of another model."""
-    return Material(name=material.name, title=material.title, model=model, parameters=parameters, source="derived")
+def _bytes(arguments: dict[str, Any]) -> int:
+    return 8 * sum(np.size(each) for each in arguments.values())
+
+
+def _as(material: Material, model: str, **parameters: Number) -> Material:
+    """A material of another model, from the same sources; what is said of parameters that it lacks is left out."""
+    stated = {
+        "sources": {name: source for name, source in material.sources.items() if name in parameters},
+        "assumed": tuple(name for name in material.assumed if name in parameters),
+        "known_excess": None,  # of the other model
+    }
+    return material.model_copy(update={"model": model, "parameters": parameters, **stated})
 
 
 # Oren and Nayar 1994
@@ -154,9 +160,7 @@ def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[R
     own = {"rho": float(values["rho"]), "sigma": float(values["sigma"])}
     bounces = bool(values.get("interreflection", True))
 
-    def form(
-        key: str, title: str, kind: Kind, python: str, body: Callable[..., Floats], dtype: Any = np.float64, **more: Any
-    ) -> Representation:
+    def form(key: str, title: str, kind: Kind, python: str, body: Callable[..., Floats], **more: Any) -> Representation:
         def evaluate(wi: Floats, wr: Floats) -> Floats:
             f_r = body(wi, wr, **own, **more)
             if "k_s" in values:  # Eq. (32)
@@ -164,21 +168,22 @@ def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[R
                 f_r = values["k_b"] * f_r + values["k_s"] * surface
             return f_r[:, np.newaxis]
 
-        return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more)), dtype)
+        return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more)))
 
     truth = models.oren_nayar_gaussian_vectors if bounces else _by_parts("facets", None)
-    yield form("facets", "facets integrated, eqs 8-20 and 47", "exact", "oren_nayar_gaussian", truth)
-    yield form("facets-float32", "facets integrated, float32", "exact", "oren_nayar_gaussian", truth, dtype=np.float32)
-    single = "oren_nayar_single_slope over slopes"
+    facets = form("facets", "facets integrated, eqs 8-20 and 47", "exact", "oren_nayar_gaussian", truth)
+    yield from (facets, _single(facets))
+    averaged = "oren_nayar_single_slope over slopes"
     closed = _by_parts("closed", "closed" if bounces else None)
-    yield form("closed-forms", "closed forms of B.2, eqs 45 and 49", "closed form", single, closed)
+    equations = "eqs 45 and 49" if bounces else "eq. 45"
+    yield form("closed-forms", f"closed forms of B.2, {equations}", "closed form", averaged, closed)
     if bounces:
-        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", single, _by_parts("facets", "closed"))
+        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", averaged, _by_parts("facets", "closed"))
         exact = _by_parts("closed", "facets")
-        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", single, exact)
-    fit, with_bounce = models.oren_nayar_vectors, {"interreflection": bounces}
-    yield form("fit", "functional fit, eqs 27-29", "approximation", "oren_nayar", fit, **with_bounce)
-    yield form("fit-float32", "functional fit, float32", "approximation", "oren_nayar", fit, np.float32, **with_bounce)
+        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", averaged, exact)
+    fit = models.oren_nayar_vectors
+    whole = form("fit", "functional fit, eqs 27-29", "approximation", "oren_nayar", fit, interreflection=bounces)
+    yield from (whole, _single(whole))
     if bounces:
         yield form(
             "fit-direct", "fit without bounce, eq. 27", "approximation", "oren_nayar", fit, interreflection=False
@@ -205,24 +210,23 @@ def _smooth(wi: Floats, wr: Floats, *, rho: float, **_: float) -> Floats:
 
 def _by_parts(direct: str, bounce: str | None) -> Callable[..., Floats]:
     """Direct light and second bounce, each by the "facets" or by the "closed" forms; None: no bounce."""
-    ways = {"facets": models.oren_nayar_gaussian_parts_vectors, "closed": _over_slopes}
+    ways = {"facets": gaussian_part, "closed": _over_slopes}
 
     def evaluate(wi: Floats, wr: Floats, **own: float) -> Floats:
-        parts = {way: ways[way](wi, wr, **own) for way in {direct, bounce or direct}}
-        return parts[direct].direct + (0.0 if bounce is None else parts[bounce].interreflected)
+        f_r = ways[direct](wi, wr, **own, part="direct")
+        return f_r if bounce is None else f_r + ways[bounce](wi, wr, **own, part="interreflected")
 
     return evaluate
 
 
-def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float) -> models.oren_nayar_1994.Parts:
+def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float, part: PartName) -> Floats:
     """The closed forms of appendix B.2, eqs 45 and 49, averaged over slopes with the weights of eqs 25 and 26."""
     x, w = np.polynomial.legendre.leggauss(_SLOPES)
     top = min(np.pi / 2, _WIDEST * max(sigma, 1e-9))  # a flat surface: all slopes are 0
     theta_a = (x + 1.0) * top / 2.0
     weight = w * np.exp(-(theta_a**2) / (2.0 * max(sigma, 1e-9) ** 2)) * np.sin(theta_a)
     weight /= weight.sum()
-    parts = models.oren_nayar_single_slope_parts_vectors(wi[:, np.newaxis], wr[:, np.newaxis], rho=rho, theta_a=theta_a)
-    return models.oren_nayar_1994.Parts(parts.direct @ weight, parts.interreflected @ weight)
+    return single_slope_part(wi[:, np.newaxis], wr[:, np.newaxis], rho=rho, theta_a=theta_a, part=part) @ weight
 
 
 # Ward 1992
@@ -249,10 +253,13 @@ def _ward(material: Material, _: NDArray[np.float64] | None) -> Iterator[Represe
 
 
 def _he_torrance(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Representation]:
-    yield from _of_itself(material, wavelength_nm, "sum", "the sum of eq. 78, whole")
+    double, single = _of_itself(material, wavelength_nm, "sum", "the sum of eq. 78, whole")
+    yield double
+    mirror = material.parameters["sigma_0_um"] == 0.0
+    yield single if mirror else replace(single, title="the sum of eq. 78, float32, half of its table", rounded=False)
     arguments = material.arguments(wavelength_nm)
-    size = 8 * sum(np.size(each) for each in arguments.values())
-    if material.parameters["sigma_0_um"] == 0.0:  # a mirror: no sum to shorten
+    size = _bytes(arguments)
+    if mirror:  # no sum to shorten
         return
     printed = {misprint.key: misprint.as_printed for misprint in misprints.MISPRINTS}
     ten = _eq_71(arguments, printed["ten-terms"])
@@ -354,6 +361,23 @@ def _tables(
 def _table(layout: Layout, key: str, title: str) -> Representation:
     values = np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
     return replace(of_table(Table.of(layout, values), key, title), layout=layout)
+
+
+def of_family(family: Family) -> Representation:
+    """Lookups in the middle of a family: between the two middle values of each parameter."""
+    at: dict[str, Any] = {}
+    for name, nodes in family.axes.items():
+        cell = (nodes.size - 2) // 2
+        at[name] = float(nodes[cell : cell + 2].mean())
+    tables = family.around(**at)
+    count = 1 if family.wavelength_nm is None else family.wavelength_nm.size
+
+    def evaluate(wi: Floats, wr: Floats) -> Floats:
+        found: Floats = family.lookup_vectors(wi, wr, **at)
+        return found.reshape(len(wi), count)
+
+    size = sum(of_table(table, "", "").bytes for table in tables)
+    return Representation("between", "between members", "table", "Family.lookup_vectors", evaluate, size)
 
 
 def of_table(table: Table, key: str, title: str) -> Representation:

@@ -79,12 +79,7 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     v1, v2 = _uniform("u1", u1), _uniform("u2", u2)
     i = checked_vectors(wi, wi).w_i.astype(np.float64)
     lobe = lobe_of(spec, i, parameters)
-    in_lobe = (v1 < lobe.share) | (lobe.share >= 1.0)
-    with np.errstate(divide="ignore", invalid="ignore"):  # of the component that is not taken
-        stretched = np.where(in_lobe, v1 / lobe.share, (v1 - lobe.share) / (1.0 - lobe.share))
-    angle = 2.0 * np.pi * v2
-    mirrored = mirrored_in_lobe(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
-    wr = np.where(in_lobe[..., np.newaxis], mirrored, _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle))
+    wr = directions(lobe, v1, v2, i)
     with np.errstate(all="ignore"):  # samples reach every corner; what is finite is tested, not flagged
         f_r = spec.vectors(i, wr, **parameters)
     wr = np.broadcast_to(wr, (*np.shape(f_r), 3)).copy()  # a lobe or none: parameters shape the result
@@ -223,6 +218,16 @@ def _uniform(name: str, u: ArrayLike) -> Array:
     if np.any(bad):
         raise ValueError(f"{name}: {array[bad].flat[0]:.9g} is outside [0, 1]")
     return array
+
+
+def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
+    """Directions (..., 3) whose density is `mixture_density`: u1 chooses lobe or cosine, stretched it serves again."""
+    in_lobe = (u1 < lobe.share) | (lobe.share >= 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of the component that is not taken
+        stretched = np.where(in_lobe, u1 / lobe.share, (u1 - lobe.share) / (1.0 - lobe.share))
+    angle = 2.0 * np.pi * u2
+    mirrored = mirrored_in_lobe(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
+    return np.where(in_lobe[..., np.newaxis], mirrored, _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle))
 
 
 def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:

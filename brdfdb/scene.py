@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field, field_validator, model_validator
 
+from brdfdb.environment import Environment
 from brdfdb.geometry import radians
 from brdfdb.materials import Material, presets
 from brdfdb.parameters import closest
@@ -111,12 +112,16 @@ class Object(BaseModel):
 
 
 class Tolerance(BaseModel):
-    """How far the picture may be from the true one: relative in radiance, or in CIEDE2000. One of the two."""
+    """How far the picture may be from the true one: relative in radiance, or in CIEDE2000. One of the two.
+
+    It holds at every pixel, or at a percentile of those of each material where isolated pixels do not matter.
+    """
 
     model_config = STRICT
 
     relative: float | None = Field(default=None, gt=0.0, lt=1.0)
     ciede2000: float | None = Field(default=None, gt=0.0, le=100.0)
+    percentile: float = Field(default=100.0, gt=0.0, le=100.0, description="of the pixels of each material; 100: all")
 
     @model_validator(mode="after")
     def _check(self) -> Tolerance:
@@ -141,6 +146,7 @@ class Scene(BaseModel):
     objects: list[Object] = Field(min_length=1)
     lights: list[Light] = []
     ambient: float = Field(default=0.0, ge=0.0, description="radiance that comes from everywhere, unshadowed")
+    environment: Environment | None = Field(default=None, description="radiance that differs with the direction")
     shadows: bool = Field(default=True, description="whether objects stand in each other's light, and in their own")
     camera: Camera
     exposure: float = Field(default=1.0, gt=0.0, description="what radiance is multiplied with to be 1 for white")
@@ -169,8 +175,8 @@ class Scene(BaseModel):
 
     @model_validator(mode="after")
     def _check(self) -> Scene:
-        if not self.lights and not self.ambient:
-            raise ValueError("lights, ambient: there is no light")
+        if not self.lights and not self.ambient and self.environment is None:
+            raise ValueError("lights, ambient, environment: there is no light")
         names = [item.name for item in self.objects]
         for name in names:
             if names.count(name) > 1:
@@ -191,7 +197,8 @@ class Scene(BaseModel):
             item.model_copy(update={"shape": item.shape.resolved(folder)}) if isinstance(item.shape, Recorded) else item
             for item in self.objects
         ]
-        return self.model_copy(update={"objects": objects})
+        environment = None if self.environment is None else self.environment.resolved(folder)
+        return self.model_copy(update={"objects": objects, "environment": environment})
 
 
 def _materials(scene: Scene) -> dict[str, Material]:

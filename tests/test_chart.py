@@ -1,4 +1,4 @@
-"""Charts: errors, costs and fronts of a material's representations in one document."""
+"""Charts: errors, costs and fronts of the representations of a material, or along a family, in one document."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import pytest
 from brdfdb import chart as charting
 from brdfdb import cost
 from brdfdb.accuracy import BANDS_DEG, Draw, classes, draw, mean_error
-from brdfdb.chart import STEPS, Chart, chart
+from brdfdb.chart import STEPS, Chart, FamilyChart, chart, chart_family
+from brdfdb.family import Sweep
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import presets
+from brdfdb.materials import Material, presets
 from brdfdb.representations import representations
 
 
@@ -93,3 +94,92 @@ def test_the_mean_error_is_that_of_the_weighted_light() -> None:
 def test_a_draw_has_viewers_of_every_class() -> None:
     drawn = draw(presets()["wall-plaster"], None, 50, 1)
     assert all(rows.sum() > (BANDS_DEG.size - 1) for rows in classes(drawn).values())
+
+
+# Families
+
+SIGMA_0_UM = (0.03, 0.06, 0.09, 0.12, 0.17, 0.24, 0.6, 1.2)  # at 550 nm g is 0.5 to 750
+TEN_TERMS = 1e-11  # mean error at the smallest g, where e^-g g^11 / 11! is 4e-12; measured: 2.9e-12
+LIMIT = 0.004  # of Beckmann's limit at the largest g, of the order of 1 / g; measured: 0.0036
+
+
+def copper(sigma_0_um: float) -> Material:
+    optical = {"model": "he_torrance", "source": "a sweep", "refractive_index": "main/Cu/Johnson"}
+    table = {"title": "Copper", "parameters": {"sigma_0_um": sigma_0_um, "tau_um": 4.0}, **optical}
+    return Material.from_table(f"copper-{round(1000.0 * sigma_0_um):04d}", table)
+
+
+@pytest.fixture(scope="module")
+def coppers() -> FamilyChart:
+    """Few directions and one round: enough to tell errors that differ by factors; no tables."""
+    materials = [copper(value) for value in SIGMA_0_UM]
+    sweep = Sweep(
+        name="coppers",
+        title="Copper over roughness",
+        model="he_torrance",
+        axes={"sigma_0_um": list(SIGMA_0_UM)},
+        members=[material.name for material in materials],
+        request_sha256=[""] * len(materials),
+    )
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(charting, "DIRECTIONS", 200)
+        patched.setattr(charting, "SINGLES", 1)
+        patched.setattr(cost, "ROUNDS", 1)
+        return chart_family(sweep, materials, np.array([550.0]), ())
+
+
+def test_a_family_has_every_form_with_an_error_at_every_member(coppers: FamilyChart) -> None:
+    forms = representations(copper(SIGMA_0_UM[0]), np.array([550.0]), ())
+    assert [curve.key for curve in coppers.curves] == [form.key for form in forms]
+    assert coppers.members == [copper(value).name for value in SIGMA_0_UM]
+    for curve in coppers.curves:
+        assert len(curve.l1) == len(curve.p99) == len(coppers.fronts) == len(SIGMA_0_UM)
+        assert None not in (*curve.l1, *curve.p99)
+        assert curve.timed == coppers.members[len(SIGMA_0_UM) // 2]
+    assert coppers.curves[0].l1 == [0.0] * len(SIGMA_0_UM)
+    assert all(front[0] == coppers.truth == "sum" for front in coppers.fronts)
+    assert coppers.between is None
+
+
+def test_ten_terms_are_exact_for_small_g_and_get_worse_with_it(coppers: FamilyChart) -> None:
+    errors = np.array(next(curve.l1 for curve in coppers.curves if curve.key == "ten-terms"), dtype=float)
+    assert errors[0] < TEN_TERMS
+    assert np.all(np.diff(errors) > 0.0)
+
+
+def test_beckmanns_limit_gets_better_with_g(coppers: FamilyChart) -> None:
+    for key in ("beckmann", "beckmann-corrected"):
+        errors = np.array(next(curve.l1 for curve in coppers.curves if curve.key == key), dtype=float)
+        assert np.all(np.diff(errors) < 0.0)
+        assert errors[-1] < LIMIT
+
+
+def test_the_g_of_a_family_is_that_of_eq_79_along_the_normal(coppers: FamilyChart) -> None:
+    # Eq. (79) with both cosines 1 and sigma = sigma_0: nothing is hidden along the normal
+    expected = [(2.0 * np.pi * value / 0.55 * 2.0) ** 2 for value in SIGMA_0_UM]
+    np.testing.assert_allclose(coppers.g or [], expected, rtol=5e-3)  # three digits
+
+
+def test_errors_of_a_member_are_those_of_its_chart(coppers: FamilyChart, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(charting, "DIRECTIONS", 200)
+    monkeypatch.setattr(charting, "SINGLES", 1)
+    monkeypatch.setattr(cost, "ROUNDS", 1)
+    alone = chart(copper(SIGMA_0_UM[2]), np.array([550.0]), ())
+    assert [(p.key, p.l1, p.p99) for p in alone.points] == [(c.key, c.l1[2], c.p99[2]) for c in coppers.curves]
+
+
+def test_a_form_that_some_members_lack_is_timed_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(charting, "DIRECTIONS", 50)
+    monkeypatch.setattr(charting, "SINGLES", 1)
+    monkeypatch.setattr(cost, "ROUNDS", 1)
+    materials = [copper(0.1), copper(0.0)]  # a mirror has no sum to shorten
+    names = [material.name for material in materials]
+    sweep = Sweep(name="m", title="m", model="he_torrance", axes={}, members=names, request_sha256=["", ""])
+    ticks: list[None] = []
+    found = chart_family(sweep, materials, np.array([550.0]), (), tick=lambda: ticks.append(None))
+    curves = {curve.key: curve for curve in found.curves}
+    assert curves["sum"].timed == names[1]
+    assert curves["ten-terms"].timed == names[0]
+    assert curves["ten-terms"].l1[1] is None
+    assert "ten-terms" not in found.fronts[1]
+    assert len(ticks) == len(materials) + cost.ROUNDS + charting.SINGLES

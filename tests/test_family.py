@@ -18,6 +18,7 @@ from brdfdb.layout import Interpolation, Layout
 from brdfdb.lookup import Table, table_from
 from brdfdb.manifest import StoreError
 from brdfdb.materials import Material
+from brdfdb.representations import of_family, of_table
 from brdfdb.tabulate import tabulate
 
 AGREEMENT = 0.2  # promised, between a stated p99 and one measured afresh; measured: 0.03 at most
@@ -321,3 +322,13 @@ def test_a_record_comes_back_and_a_damaged_one_is_named(tmp_path: Path, families
     path.write_text(json.dumps({**content, "points": "many"}), encoding="utf-8")
     with pytest.raises(StoreError, match=r"copper\.json is damaged: points: "):
         read_record(path)
+
+
+def test_a_lookup_is_made_of_the_members_around_and_a_form_of_the_middle_ones(families: Families) -> None:
+    family, tables = families["grey"]  # linear: two members, or the one that is there
+    assert family.around(rho=0.7) == [tables["grey-002"], tables["grey-003"]]
+    assert family.around(rho=0.5) == [tables["grey-002"]]
+    form = of_family(family)
+    wi = wr = np.array([[0.0, 0.6, 0.8]])
+    np.testing.assert_allclose(form.evaluate(wi, wr), [[0.25 / np.pi]], rtol=FLOAT32)  # between rho of 0 and 0.5
+    assert form.bytes == sum(of_table(tables[f"grey-00{number}"], "", "").bytes for number in (1, 2))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
+from brdfdb import _lookup_kernels, lookup
+from brdfdb.geometry import unit_vector
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout
-from brdfdb.lookup import Table
+from brdfdb.lookup import Table, points
 from brdfdb.materials import Material
 from brdfdb.tabulate import tabulate
 
@@ -247,6 +250,39 @@ def test_broadcasting_is_looking_up_one_by_one() -> None:
     assert specular.shape == (3, 1, 1, 1, 2)
     for index, m in np.ndindex(3, 2):
         assert specular[index, 0, 0, 0, m] == table.specular_reflectance(theta_i[index, 0, 0, 0], asked[m])
+
+
+def test_kernels_see_arguments_of_one_type_whether_lookups_are_of_arrays_or_numbers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # they are compiled for each type, and what may be written to is another
+    seen: dict[str, set[Any]] = {}
+
+    def spy(name: str) -> Any:
+        kernel = getattr(_lookup_kernels, name)
+
+        def called(*arguments: Any) -> Any:
+            types = [
+                (each.dtype, each.ndim, each.flags.writeable) for each in arguments if isinstance(each, np.ndarray)
+            ]
+            seen.setdefault(name, set()).add(tuple(types))
+            return kernel(*arguments)
+
+        return called
+
+    spies = {name: spy(name) for name in ("by_angles", "by_vectors", "points_of_vectors")}
+    monkeypatch.setattr(lookup, "_lookup_kernels", SimpleNamespace(Rule=_lookup_kernels.Rule, **spies))
+    table, theta = made_up("isotropic"), np.linspace(0.0, 1.5, 4)
+    w = unit_vector(theta, 0.0)
+    table.lookup(0.5, 0.0, theta, np.pi)
+    table.lookup(theta, theta, theta, theta)
+    table.lookup(0.5, 0.0, 0.5, np.pi)
+    table.lookup_vectors(w[0], w)
+    table.lookup_vectors(w, w)
+    points(table.grid, w, w)
+    assert {name: len(types) for name, types in seen.items()} == dict.fromkeys(spies, 1)
+    ((wi, wr, *_),) = seen["points_of_vectors"]
+    assert wi == wr == (np.float64, 1, False)  # as `by_vectors` gives them
 
 
 def test_float32_angles_give_float32_and_all_else_float64() -> None:

@@ -1,14 +1,18 @@
 """The presets against the numbers of the papers, typed again here, and what a wrong material is told."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
+
+TOGETHER = 3e-13  # relative, of copper in one call or in a call each, through the table of eq. 78: 1.9e-13
 
 # Ward 1992, section 6, first table: rho_d, rho_r, alpha_x, alpha_y
 WARD_SURFACES = {
@@ -241,6 +245,31 @@ def test_arguments_of_a_spectral_material():
 
 def test_arguments_of_a_grey_material_need_no_wavelength():
     assert preset("rolled-brass").arguments([550.0]) == preset("rolled-brass").parameters
+
+
+@pytest.mark.parametrize(("directions", "calls"), [(1, 1), (256, 1), (16384, 3)])
+def test_few_directions_are_one_call_for_all_wavelengths_and_many_a_call_each(directions, calls, monkeypatch):
+    copper, wavelength_nm, shapes = presets()["scene-copper-sphere"], np.array([450.0, 550.0, 650.0]), []
+    spec = MODELS["he_torrance"]
+
+    def vectors(wi, wr, **arguments):
+        shapes.append(np.shape(wi))
+        return spec.vectors(wi, wr, **arguments)
+
+    monkeypatch.setitem(MODELS, "he_torrance", replace(spec, vectors=vectors))
+    wi = unit_vector(np.linspace(0.0, 1.5, directions), 0.2)
+    wr = unit_vector(np.linspace(0.3, 1.2, directions), 3.0)
+    found = copper.brdf_at(wavelength_nm)(wi, wr)
+    assert len(shapes) == calls
+    expected = [spec.vectors(wi, wr, **copper.arguments(w)) for w in wavelength_nm]
+    np.testing.assert_allclose(found, np.stack(expected, axis=-1), rtol=TOGETHER)
+
+
+def test_f_r_of_a_grey_material_has_one_column():
+    wi, wr = unit_vector([0.1, 0.9], 0.0), unit_vector([0.4, 1.2], 2.0)
+    brass = presets()["rolled-brass"]
+    expected = MODELS["ward"].vectors(wi, wr, **brass.parameters)
+    np.testing.assert_array_equal(brass.brdf_at(None)(wi, wr), expected[:, np.newaxis])
 
 
 def test_presets_can_be_taken_apart_without_harm():

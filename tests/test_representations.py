@@ -12,6 +12,7 @@ from brdfdb import accuracy
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.misprints import MISPRINTS
+from brdfdb.models import oren_nayar_1994_surfaces
 from brdfdb.reference import he_torrance_1991, oren_nayar_1994, ward_1992
 from brdfdb.representations import Representation, representations
 
@@ -120,6 +121,17 @@ def test_float32_is_off_by_rounding(name: str) -> None:
     assert 0.0 < l1(forms, drawn, single) < SINGLE
 
 
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_rounded_form_is_another_one_but_for_float32_in_and_out(name: str) -> None:
+    forms, drawn = of(presets()[name])
+    halved = {"sum-float32"} if presets()[name].parameters.get("sigma_0_um") else set()  # half of the terms
+    single = {key for key, form in forms.items() if form.dtype is np.float32}
+    assert single == {key for key, form in forms.items() if form.rounded} | halved
+    for key in single - halved:
+        assert forms[key].title == f"{forms[key.removesuffix('-float32')].title}, float32 in and out"
+        assert abs(l1(forms, drawn, key) - l1(forms, drawn, key.removesuffix("-float32"))) < SINGLE
+
+
 @pytest.mark.parametrize(("name", "tolerance"), [("wall-plaster", 0.01), ("rolled-brass", 0.1), ("blue-plastic", 0.1)])
 def test_a_planned_table_keeps_to_its_tolerance_of_the_truth(name: str, tolerance: float) -> None:
     forms, _ = of(presets()[name], tolerance)
@@ -169,6 +181,41 @@ def test_the_closed_forms_over_slopes_are_those_of_the_misprint() -> None:
     np.testing.assert_allclose(both - direct, printed.as_printed(**where), rtol=CLOSED)
 
 
+@pytest.mark.parametrize(
+    ("name", "key", "asked"),
+    [
+        pytest.param("foam", "facets", {"facets direct"}, id="no-bounce"),
+        pytest.param("foam", "closed-forms", {"eq. 45"}, id="no-bounce-in-closed-forms"),
+        pytest.param("wall-plaster", "closed-forms", {"eq. 45", "eq. 49"}, id="closed-forms"),
+        pytest.param("wall-plaster", "bounce-49", {"facets direct", "eq. 49"}, id="bounce-of-eq-49"),
+        pytest.param("wall-plaster", "direct-45", {"eq. 45", "facets bounce"}, id="direct-light-of-eq-45"),
+    ],
+)
+def test_a_form_computes_what_it_shows_and_nothing_else(
+    name: str, key: str, asked: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = set()
+
+    def spy(kernel: str, what: Any) -> None:
+        original = getattr(oren_nayar_1994_surfaces, kernel)
+
+        def called(*features: Any, **parts: bool) -> Any:
+            found.update(what(**parts))
+            return original(*features, **parts)
+
+        monkeypatch.setattr(oren_nayar_1994_surfaces, kernel, called)
+
+    def of_facets(lit: bool = True, bounce: bool = True) -> list[str]:
+        return ["facets direct"] * lit + ["facets bounce"] * bounce
+
+    spy("gaussian", of_facets)
+    spy("_evaluate_direct", lambda: ["eq. 45"])
+    spy("_evaluate_bounce", lambda: ["eq. 49"])
+    forms, drawn = of(presets()[name])
+    values(forms[key], drawn.wi[:3], drawn.wr[:3])
+    assert found == asked
+
+
 def test_ten_terms_do_where_g_is_small_and_beckmanns_limit_does_not() -> None:
     forms, drawn = of(rough_copper(sigma_0_um=0.04, tau_um=1.0))  # g of at most 1.3, at 450 nm
     assert l1(forms, drawn, "ten-terms") < SHORT
@@ -204,6 +251,32 @@ def test_the_half_vector_form_is_exact_at_the_peak_only() -> None:
     exact, half = (values(forms[key], drawn.wi, mirror) for key in ("elliptical", "half-vector"))
     np.testing.assert_allclose(half, exact, rtol=1e-12)
     assert l1(forms, drawn, "half-vector") > 0.005
+
+
+@pytest.mark.parametrize("model", ["oren_nayar", "ward_half_vector"])
+def test_a_table_of_another_model_says_where_its_numbers_come_from(model: str) -> None:
+    preset = presets()["wall-plaster" if model == "oren_nayar" else "rolled-brass"]
+    first, second, *_ = preset.parameters
+    material = Material(
+        **preset.model_dump(exclude={"model", "sources", "assumed", "note"}),
+        model=model,
+        sources={first: "a figure", list(preset.parameters)[-1]: "a table"},
+        assumed=(second,),
+        note=f"{second} is a guess",
+    )
+    forms, _ = of(material, TOLERANCE)
+    layout = forms["table-10"].layout
+    assert layout is not None
+    table = layout.material
+    assert table.model != model
+    assert (table.source, table.title, table.assumed, table.note) == (
+        preset.source,
+        preset.title,
+        (second,),
+        material.note,
+    )
+    assert table.sources == {name: where for name, where in material.sources.items() if name in table.parameters}
+    assert table == Material(**table.model_dump())  # as valid as one that was read
 
 
 def test_a_table_takes_its_nodes_and_a_model_its_parameters() -> None:

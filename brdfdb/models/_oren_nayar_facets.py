@@ -188,8 +188,11 @@ def _weight(x: float, S: float) -> float:
 
 
 @kernel
-def _add_slopes(sign: float, sigma: float, x_max: float, rays: NDArray[np.float64], count: int) -> tuple[float, float]:
-    """Direct and twice reflected light of all slopes along the first `count` of `rays`, with their weights.
+def _add_slopes(
+    sign: float, sigma: float, x_max: float, lit: bool, bounce: bool, rays: NDArray[np.float64], count: int
+) -> tuple[float, float]:
+    """Light of all slopes along the first `count` of `rays`, with their weights: direct if `lit`, reflected twice if
+    `bounce`; 0 of what is not asked for.
 
     A ray holds both facets of every cavity at one azimuth, and is cut where one of them, then both begin to be hidden.
     `sign` is that of slope_i slope_r: whether the facet that faces the light faces the viewer, too. All rays take a
@@ -207,24 +210,28 @@ def _add_slopes(sign: float, sigma: float, x_max: float, rays: NDArray[np.float6
             S, C = _sin_cos(sigma * x)
             weight = _weight(x, S) * w * first[j]
             p, q = S * high[j], sign * S * low[j]
-            direct[j] += weight * 2.0 * (C + p * q / C)
-            bounced[j] += weight * (_bounce_open(-p, q, S, C) + _bounce_open(p, -q, S, C))
+            if lit:
+                direct[j] += weight * 2.0 * (C + p * q / C)
+            if bounce:
+                bounced[j] += weight * (_bounce_open(-p, q, S, C) + _bounce_open(p, -q, S, C))
         # one hidden: of the two facets one is half lit and the other half seen, or one both
         for j in range(count):
             x = first[j] + g * (second[j] - first[j])
             S, C = _sin_cos(sigma * x)
             weight = _weight(x, S) * w * (second[j] - first[j])
             p, q = S * high[j], sign * S * low[j]
-            direct[j] += weight * 2.0 * (C + q)
-            bounced[j] += weight * _bounce_one_hidden(p, -q, S, C)
-        if sign > 0.0:
+            if lit:
+                direct[j] += weight * 2.0 * (C + q)
+            if bounce:
+                bounced[j] += weight * _bounce_one_hidden(p, -q, S, C)
+        if sign > 0.0 and lit:
             # one facet half lit and half seen, the other in the dark
             for j in range(count):
                 x = second[j] + g * (x_max - second[j])
                 S, C = _sin_cos(sigma * x)
                 weight = _weight(x, S) * w * (x_max - second[j])
                 direct[j] += weight * 2.0 * (C + S * low[j])
-        else:
+        if sign < 0.0 and bounce:
             # one facet half lit, the other half seen; nodes crowd as g^2 to the end where R of eq. (19) may be 0
             for j in range(count):
                 x = second[j] + g * g * (x_max - second[j])
@@ -251,7 +258,14 @@ def _normalisation(sigma: float, x_max: float) -> float:
 
 @kernel
 def _gaussian(
-    t_i: float, t_r: float, cos_dphi: float, sin_dphi: float, sigma: float, rays: NDArray[np.float64]
+    t_i: float,
+    t_r: float,
+    cos_dphi: float,
+    sin_dphi: float,
+    sigma: float,
+    lit: bool,
+    bounce: bool,
+    rays: NDArray[np.float64],
 ) -> tuple[float, float]:
     """Eq. (8) with eqs (10) to (20), for the tangents of the polar angles: direct and twice reflected light."""
     if math.isnan(t_i + t_r + cos_dphi + sin_dphi):
@@ -269,13 +283,13 @@ def _gaussian(
         # the tie: t_large sin(azimuth) = t_small sin(span - azimuth)
         near = math.atan2(t_small * sin_dphi, t_large + t_small * cos)
         far = span - near
-        count = 0
+        count = int(np.int64(0))  # of the literal 0 all that takes it would be compiled once more
         for at_tie in (False, True):
             if far > 0.0:
                 count = _add_azimuths(t_small, t_large, far, near, rest, at_tie, sigma, x_max, rays, count)
             if near > 0.0:
                 count = _add_azimuths(t_large, t_small, near, far, rest, at_tie, sigma, x_max, rays, count)
-        one, two = _add_slopes(sign, sigma, x_max, rays, count)
+        one, two = _add_slopes(sign, sigma, x_max, lit, bounce, rays, count)
         direct += one
         bounced += two
     scale = 0.5 / (np.pi * _normalisation(sigma, x_max))
@@ -283,21 +297,23 @@ def _gaussian(
 
 
 @kernel
-def _gaussian_loop(features: NDArray[np.float64], direct: NDArray[np.float64], bounced: NDArray[np.float64]) -> None:
+def _gaussian_loop(
+    features: NDArray[np.float64], lit: bool, bounce: bool, direct: NDArray[np.float64], bounced: NDArray[np.float64]
+) -> None:
     rays = np.empty((7, _RAYS))
     for j in range(direct.size):
         f = features[:, j]
-        direct[j], bounced[j] = _gaussian(f[0], f[1], f[2], f[3], f[4], rays)
+        direct[j], bounced[j] = _gaussian(f[0], f[1], f[2], f[3], f[4], lit, bounce, rays)
 
 
-def gaussian(*features: Floats) -> tuple[Floats, Floats]:
+def gaussian(*features: Floats, lit: bool = True, bounce: bool = True) -> tuple[Floats, Floats]:
     """Direct and twice reflected light of Gaussian slopes, for tan(theta_i), tan(theta_r), cos and sin of the azimuths'
-    difference, and sigma [rad]."""
+    difference, and sigma [rad]; what is not asked for, by `lit` or `bounce`, is not computed."""
     shape = np.broadcast_shapes(*(np.shape(each) for each in features))
     columns = np.empty((len(features), int(np.prod(shape))))
     for column, each in zip(columns, features, strict=True):
         column[:] = np.broadcast_to(each, shape).ravel()
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     with np.errstate(all="ignore"):  # as `elementwise`: nan goes through
-        _gaussian_loop(columns, direct, bounced)
+        _gaussian_loop(columns, lit, bounce, direct, bounced)
     return direct.reshape(shape), bounced.reshape(shape)

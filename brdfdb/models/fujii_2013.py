@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from brdfdb._elementary import cosine
 from brdfdb._numba import elementwise, kernel
-from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.geometry import checked_angles, checked_vectors, finished
+from brdfdb.models._rows import by_rows_of_vectors
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of the unnormalised lobe")
@@ -14,9 +16,8 @@ SIGMA = Parameter("sigma", "σ'", "1", 0.0, 1.0, "ratio of the non-diffuse to th
 
 
 @kernel
-def _fujii(cos_i: float, sin_i: float, cos_r: float, sin_r: float, cos_dphi: float, rho: float, sigma: float) -> float:
-    # s = <l,v> - <n,l> <n,v>
-    s = sin_i * sin_r * cos_dphi
+def _fujii(cos_i: float, cos_r: float, s: float, rho: float, sigma: float) -> float:
+    """Of s = <l,v> - <n,l> <n,v>."""
     t = max(cos_i, cos_r) if s > 0.0 else 1.0
     A = 1.0 / (np.pi + (np.pi / 2.0 - 2.0 / 3.0) * sigma)
     B = sigma * A
@@ -25,6 +26,18 @@ def _fujii(cos_i: float, sin_i: float, cos_r: float, sin_r: float, cos_dphi: flo
 
 
 _evaluate = elementwise(_fujii)
+
+
+@kernel
+def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
+    for row in range(f_r.shape[0]):
+        f, rho, sigma = f_r[row], scalars[row, 0], scalars[row, 1]
+        i, r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
+        for j in range(f.shape[0]):
+            z_i, z_r = np.float64(i[3 * j + 2]), np.float64(r[3 * j + 2])
+            s = np.float64(i[3 * j]) * r[3 * j] + np.float64(i[3 * j + 1]) * r[3 * j + 1]
+            value = _fujii(cosine(z_i), cosine(z_r), s, rho, sigma)
+            f[j] = value if z_i >= 0.0 and z_r >= 0.0 else 0.0 * (z_i + z_r + s)  # 0, or nan
 
 
 def oren_nayar_fujii(
@@ -74,17 +87,15 @@ def oren_nayar_fujii(
     >>> round(float(oren_nayar_fujii(0.3, 0.0, 0.4, 0.0, rho=0.9, sigma=0.5)), 4)
     0.2655
     """
-    return _f_r(checked_angles(theta_i, phi_i, theta_r, phi_r), rho, sigma)
+    angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
+    s = angles.sin_i * angles.sin_r * angles.cos_dphi
+    return finished(_evaluate(angles.cos_i, angles.cos_r, s, RHO.check(rho), SIGMA.check(sigma)), angles)
 
 
 def oren_nayar_fujii_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Floats:
     """`oren_nayar_fujii` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
-    return _f_r(checked_vectors(wi, wr), rho, sigma)
-
-
-def _f_r(directions: Directions, rho: ArrayLike, sigma: ArrayLike) -> Floats:
-    pair = directions.cos_i, directions.sin_i, directions.cos_r, directions.sin_r, directions.cos_dphi
-    return finished(_evaluate(*pair, RHO.check(rho), SIGMA.check(sigma)), directions)
+    parameters = RHO.check(rho), SIGMA.check(sigma)
+    return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), parameters)
 
 
 SPEC = ModelSpec(

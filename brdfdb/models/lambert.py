@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from brdfdb._numba import kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
+from brdfdb.models._rows import by_rows_of_vectors
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo")
+
+
+@kernel
+def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
+    for row in range(f_r.shape[0]):
+        f, value = f_r[row], scalars[row, 0] / np.pi
+        i, r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
+        for j in range(f.shape[0]):
+            x, y, z = 3 * j, 3 * j + 1, 3 * j + 2
+            nothing = 0.0 * (i[x] + i[y] + i[z] + r[x] + r[y] + r[z])  # 0, or nan
+            f[j] = nothing + (value if i[z] >= 0.0 and r[z] >= 0.0 else 0.0)
 
 
 def lambert(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike, *, rho: ArrayLike) -> Floats:
@@ -46,7 +59,7 @@ def lambert(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: Arr
 
 def lambert_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike) -> Floats:
     """`lambert` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
-    return finished(RHO.check(rho) / np.pi, checked_vectors(wi, wr))
+    return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), (RHO.check(rho),))
 
 
 SPEC = ModelSpec(

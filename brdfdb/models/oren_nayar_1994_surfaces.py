@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,8 @@ from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 THETA_A = Parameter("theta_a", "θ_a", "rad", 0.0, np.pi / 2, "slope of the facets")
 PHI_A = Parameter("phi_a", "φ_a", "rad", 0.0, np.pi, "azimuth of the facets' normals, and half a turn from it")
+
+PartName = Literal["direct", "interreflected"]  # a field of `Parts`
 
 _TINY = 1e-300  # guards 0 / 0 and nothing else
 
@@ -227,6 +230,10 @@ def _parts(direct: Floats, bounce: Floats, directions: Directions) -> Parts:
     return Parts(finished(direct, directions), finished(bounce, directions))
 
 
+def _part(part: PartName, direct: Floats, bounce: Floats, directions: Directions) -> Floats:
+    return finished(direct if part == "direct" else bounce, directions)
+
+
 def oren_nayar_single_slope(
     theta_i: ArrayLike,
     phi_i: ArrayLike,
@@ -324,13 +331,23 @@ def oren_nayar_single_slope_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: 
     return _parts(*_single_slope(checked_vectors(wi, wr), rho, theta_a))
 
 
-def _single_slope(directions: Directions, rho: ArrayLike, theta_a: ArrayLike) -> tuple[Floats, Floats, Directions]:
+def single_slope_part(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike, part: PartName) -> Floats:
+    """One part of `oren_nayar_single_slope_parts_vectors`, without the work of the other."""
+    return _part(part, *_single_slope(checked_vectors(wi, wr), rho, theta_a, part))
+
+
+def _single_slope(
+    directions: Directions, rho: ArrayLike, theta_a: ArrayLike, only: PartName | None = None
+) -> tuple[Floats, Floats, Directions]:
+    """Both parts, or only one, and then 0 for the other."""
     albedo, slope = RHO.check(rho), THETA_A.check(theta_a)
     cos_dphi = directions.cos_dphi
     one_less_cos = directions.sin_dphi**2 / (1.0 + np.abs(cos_dphi))
     tangents = directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r
     facet = *tangents, cos_dphi, one_less_cos, np.sin(slope), np.cos(slope)
-    return _scaled(_evaluate_direct(*facet), _evaluate_bounce(*facet), albedo, directions)
+    direct = np.zeros(()) if only == "interreflected" else _evaluate_direct(*facet)
+    bounce = np.zeros(()) if only == "direct" else _evaluate_bounce(*facet)
+    return _scaled(direct, bounce, albedo, directions)
 
 
 def oren_nayar_gaussian(
@@ -433,10 +450,19 @@ def oren_nayar_gaussian_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: Arra
     return _parts(*_gaussian(checked_vectors(wi, wr), rho, sigma))
 
 
-def _gaussian(directions: Directions, rho: ArrayLike, sigma: ArrayLike) -> tuple[Floats, Floats, Directions]:
+def gaussian_part(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, part: PartName) -> Floats:
+    """One part of `oren_nayar_gaussian_parts_vectors`, without the work of the other."""
+    return _part(part, *_gaussian(checked_vectors(wi, wr), rho, sigma, part))
+
+
+def _gaussian(
+    directions: Directions, rho: ArrayLike, sigma: ArrayLike, only: PartName | None = None
+) -> tuple[Floats, Floats, Directions]:
+    """Both parts, or only one, and then nothing of use for the other."""
     albedo, deviation = RHO.check(rho), SIGMA.check(sigma)
     tangents = directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r
-    direct, bounce = gaussian(*tangents, directions.cos_dphi, directions.sin_dphi, deviation)
+    features = *tangents, directions.cos_dphi, directions.sin_dphi, deviation
+    direct, bounce = gaussian(*features, lit=only != "interreflected", bounce=only != "direct")
     return _scaled(direct, bounce, albedo, directions)
 
 

@@ -1,7 +1,9 @@
-"""Charting speed against accuracy: measures materials, writes chart.json and a picture of each, prints the fronts."""
+"""Charting speed against accuracy: measures materials and families, writes and prints what is worth having."""
 
 from __future__ import annotations
 
+import functools
+import itertools
 import os
 import platform
 from collections.abc import Sequence
@@ -15,7 +17,9 @@ from numpy.typing import NDArray
 
 import brdfdb
 from brdfdb.albedo import material_of
-from brdfdb.chart import STEPS, Chart, Charts, Point, chart
+from brdfdb.chart import STEPS, TIMED, Chart, Charts, FamilyChart, Point, chart, chart_family
+from brdfdb.family import Family, Sweep
+from brdfdb.family_records import recorded
 from brdfdb.materials import Material
 from brdfdb.representations import Representation, of_table
 from brdfdb.store import Store
@@ -30,6 +34,15 @@ class _Subject(NamedTuple):
     stored: tuple[Representation, ...] = ()
 
 
+class _Family(NamedTuple):
+    """A family that is charted: its members at their wavelengths, and what the store has of it."""
+
+    sweep: Sweep
+    materials: list[Material]
+    wavelength_nm: NDArray[np.float64] | None
+    stored: Family | None
+
+
 def run(
     names: Sequence[str],
     out: Path,
@@ -38,18 +51,18 @@ def run(
     recipe_file: Path | None = None,
     tolerances: Sequence[float] | None = None,
 ) -> Charts:
-    """Chart materials, and write ``chart.json`` and, of each, ``NAME.svg`` and ``NAME.png``.
+    """Chart materials and families, and write ``chart.json`` and, of each, ``NAME.svg`` and ``NAME.png``.
 
     Parameters
     ----------
     names : sequence of str
-        Materials of the recipe, which by default has every built-in one, or else of the store.
+        Materials or families of the recipe, which by default has every built-in material, or else of the store.
     out : Path
         Directory to write to; made if it is not there.
     store : Path, optional
-        Its tables are charted beside the planned ones; it need not exist.
+        Its tables are charted beside the planned ones, and its families' lookups; it need not exist.
     recipe_file : Path, optional
-        A recipe that defines materials, and the wavelengths of spectral ones.
+        A recipe that defines materials or families, and the wavelengths of spectral ones.
     tolerances : sequence of float, optional
         Of planned tables: see `brdfdb.representations`.
 
@@ -64,43 +77,64 @@ def run(
         If a name is neither of the recipe nor of the store, or a tolerance is none.
     """
     subjects = _subjects(names, store, recipe_file)
-    found = []
+    found: list[Chart] = []
+    families: list[FamilyChart] = []
     with terminal.progress(counted=False) as bar:
         for subject in subjects:
+            if isinstance(subject, _Family):
+                task = bar.add_task(subject.sweep.name, total=len(subject.materials) + TIMED)
+                tick = functools.partial(bar.advance, task)
+                members = (subject.sweep, subject.materials, subject.wavelength_nm)
+                families.append(chart_family(*members, tolerances, family=subject.stored, tick=tick))
+                continue
             task = bar.add_task(subject.material.name, total=STEPS)
-            found.append(
-                chart(
-                    subject.material,
-                    subject.wavelength_nm,
-                    tolerances,
-                    also=subject.stored,
-                    tick=lambda task=task: bar.advance(task),  # type: ignore[misc]  # lambda of a default
-                )
-            )
-    charts = Charts(brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=_machine(), charts=found)
+            tick = functools.partial(bar.advance, task)
+            found.append(chart(subject.material, subject.wavelength_nm, tolerances, also=subject.stored, tick=tick))
+    charts = Charts(
+        brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=_machine(), charts=found, families=families
+    )
     out.mkdir(parents=True, exist_ok=True)
     (out / "chart.json").write_text(charts.model_dump_json(indent=1) + "\n", encoding="utf-8")
     for one in found:
         (out / f"{one.material}.svg").write_text(scatter.svg(one), encoding="utf-8")
         (out / f"{one.material}.png").write_bytes(scatter.png(one))
         _print(one)
-    print(f"{out}: chart.json and the pictures of {', '.join(one.material for one in found)}")
+    for whole in families:
+        (out / f"{whole.family}.svg").write_text(scatter.svg(whole), encoding="utf-8")
+        (out / f"{whole.family}.png").write_bytes(scatter.png(whole))
+        _print_family(whole)
+    pictures = [*(one.material for one in found), *(whole.family for whole in families)]
+    print(f"{out}: chart.json and the pictures of {', '.join(pictures)}")
     return charts
 
 
-def _subjects(names: Sequence[str], root: Path | None, recipe_file: Path | None) -> list[_Subject]:
-    jobs = {job.material.name: job for job in recipe.load(recipe_file).jobs()}
+def _subjects(names: Sequence[str], root: Path | None, recipe_file: Path | None) -> list[_Subject | _Family]:
+    asked = recipe.load(recipe_file)
+    listed = asked.jobs()
+    jobs, sweeps = {job.material.name: job for job in listed}, {sweep.name: sweep for sweep in asked.sweeps(listed)}
     store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None
-    subjects = []
+    subjects: list[_Subject | _Family] = []
     for name in dict.fromkeys(names):
         table = store[name] if store is not None and name in store else None
         if name in jobs:
             subject = _Subject(jobs[name].material, jobs[name].wavelength_nm)
         elif table is not None:
             subject = _Subject(material_of(table), table.wavelength_nm)
+        elif name in sweeps:
+            members = [jobs[member] for member in sweeps[name].members]
+            materials = [job.material for job in members]
+            same = store is not None and recorded(store.root, sweeps[name]) is not None
+            stored = store.family(name) if store is not None and same else None
+            subjects.append(_Family(sweeps[name], materials, members[0].wavelength_nm, stored))
+            continue
+        elif store is not None and name in store.families():
+            family = store.family(name)
+            materials = [material_of(store[member]) for member in family.record.members]
+            subjects.append(_Family(family.record, materials, family.wavelength_nm, family))
+            continue
         else:
             known = "the recipe" if recipe_file else "the built-in ones; `brdfdb list --presets` names them"
-            raise ValueError(f"{name}: no such material, neither in the store nor among {known}")
+            raise ValueError(f"{name}: no such material or family, neither in the store nor among {known}")
         if table is not None and _fits(table.wavelength_nm, subject.wavelength_nm):
             title = f"table of the store, {terminal.error(table.error.overall.p99 if table.error else None)}"
             subject = subject._replace(stored=(of_table(table, "table-stored", title),))
@@ -141,3 +175,49 @@ def _said(point: Point) -> str:
     off = f"{scatter.percent(point.l1)} off in the mean, p99 {scatter.percent(point.p99)}"
     error = "the truth" if point.l1 == 0.0 else off
     return f"{point.title} ({scatter.count(point.batch.ns)} ns, {error})"
+
+
+def _print_family(whole: FamilyChart) -> None:
+    """The mean error of every form along each parameter, and what is worth having where in a sentence each."""
+    for axis, values in whole.axes.items():
+        rows = []
+        for curve in whole.curves:
+            cells = []
+            for some in scatter.along(whole, axis):
+                chosen = 2 * sum(curve.key in whole.fronts[index] for index in some) > len(some)
+                middle = scatter.middle([curve.l1[index] for index in some])
+                cells.append("-" if middle is None else f"{'*' if chosen else ''}{scatter.percent(middle)}")
+            rows.append((curve.key, curve.title, scatter.count(curve.batch.ns), *cells))
+        columns = [f"{value:g}" for value in values]
+        if whole.g is not None and len(whole.axes) == 1:
+            rows.insert(0, ("", "g along the normal", "", *map(scatter.count, whole.g)))
+        title = f"{whole.family}: {whole.title}. Mean error along {axis}; * is worth having"
+        terminal.print_table(title, ("key", "form", "ns a value", *columns), rows, numbers=("ns a value", *columns))
+    print(f"  times are those of one member, {whole.curves[0].timed} for most")
+    for curve in whole.curves:
+        if where := [index for index, front in enumerate(whole.fronts) if curve.key in front]:
+            print(f"  worth having: {curve.title} ({scatter.count(curve.batch.ns)} ns) {_where(whole, where)}")
+    for curve in whole.curves:
+        if curve.kind in ("closed form", "approximation", "printed"):
+            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= scatter.CLOSE]
+            where_close = _where(whole, close) if close else "nowhere"
+            print(f"  within {scatter.percent(scatter.CLOSE)} in the mean: {curve.title} {where_close}")
+    if whole.between is not None:
+        off = f"{scatter.percent(whole.between.l1)} off in the mean, p99 {scatter.percent(whole.between.p99)}"
+        time = f"{scatter.count(whole.between.batch.ns)} ns, {scatter.count(whole.between.single.ns)} of one"
+        print(f"  between members: {off}, as the family states ({time}, {terminal.size(whole.between.bytes)})")
+
+
+def _where(whole: FamilyChart, members: Sequence[int]) -> str:
+    """The part of a family that some members lie in."""
+    points = list(itertools.product(*whole.axes.values()))
+    spans = []
+    for number, axis in enumerate(whole.axes):
+        inside = [points[index][number] for index in members]
+        least, most = min(inside), max(inside)
+        spans.append(f"{axis} {least:g} to {most:g}" if least < most else f"{axis} {least:g}")
+    if whole.g is not None:
+        inside = [whole.g[index] for index in members]
+        least, most = min(inside), max(inside)
+        spans.append(f"g {least:g} to {most:g}" if least < most else f"g {least:g}")
+    return f"at {len(members)} of {len(points)} members, {', '.join(spans)}"

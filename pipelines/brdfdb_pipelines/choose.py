@@ -13,7 +13,7 @@ import numpy as np
 
 from brdfdb import cost, picture
 from brdfdb.choices import Choice, Price, Weigh, describe
-from brdfdb.choose import Candidate, Chosen, Seen, candidates, choose, limit
+from brdfdb.choose import Candidate, Decision, Seen, candidates, choose, limit
 from brdfdb.gather import View, gather
 from brdfdb.render import reflectors
 from brdfdb.scene import Scene
@@ -52,7 +52,7 @@ def run(
     store : Path, optional
         Where chosen tables are published, under the names of their materials.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.representations`.
+        Of planned tables: see `brdfdb.choose.candidates`.
 
     Returns
     -------
@@ -81,8 +81,10 @@ def _run(
     tolerances: Sequence[float] | None,
 ) -> Choice:
     limit(scene)  # infeasible before minutes of work
-    # another resolution puts every ray at another place
-    view, denser = gather(scene, width), gather(scene, width + width // 2 + 1)
+    with terminal.progress(counted=False, transient=True) as bar:
+        bar.add_task("tracing rays", total=None)
+        # another resolution puts every ray at another place
+        view, denser = gather(scene, width), gather(scene, width + width // 2 + 1)
     materials = reflectors(scene)
     with terminal.progress(counted=False) as bar:
         task = bar.add_task("tabulating, timing", total=2 * len(materials))
@@ -104,7 +106,6 @@ def _run(
         machine=f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}",
         scene=Path(name).stem,
         tolerance=scene.tolerance,
-        allowed=chosen.allowed,
         weigh=weigh,
         planned=(view.width, view.height),
         checked=(denser.width, denser.height),
@@ -148,21 +149,23 @@ def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> l
     return prices
 
 
-def _built(store: Path | None, offered: Mapping[str, Sequence[Candidate]], chosen: Chosen) -> dict[str, str]:
+def _built(
+    store: Path | None, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]
+) -> dict[str, str]:
     """Revisions of the chosen tables, published in a store, by material."""
     revisions: dict[str, str] = {}
-    for key, decision in chosen.decisions.items():
+    for key, decision in chosen.items():
         layout = offered[key][decision.pick.chosen].form.layout
         if store is not None and layout is not None:
             revisions[key], _ = publish_dataset(store, key, tabulate(layout))
     return revisions
 
 
-def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Chosen) -> None:
+def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]) -> None:
     """The comparison as a picture of four panels; truth and choice as spectral EXR."""
     from matplotlib.figure import Figure
 
-    picks = {key: decision.pick for key, decision in chosen.decisions.items()}
+    picks = {key: decision.pick for key, decision in chosen.items()}
     choice = seen.picture({key: offered[key][one.chosen] for key, one in picks.items()})
     cheaper = seen.picture(
         {key: offered[key][one.chosen if one.cheaper is None else one.cheaper] for key, one in picks.items()}
@@ -190,13 +193,13 @@ def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], ch
 
 def _print(choice: Choice) -> None:
     """The choices as a table, and reasons."""
-    numbers = ("p99", "whole", "maximum", "ns", "bytes", "share of the truth")
+    numbers = ("alone", "whole", "largest", "ns", "bytes", "share of the truth")
     rows = [
         (
             one.material,
             one.choice.title,
-            f"{one.choice.error.p99:.2g}",
-            f"{one.whole.p99:.2g}",
+            f"{one.choice.error.counted:.2g}",
+            f"{one.whole.counted:.2g}",
             f"{one.whole.most:.2g}",
             f"{one.choice.ns:.3g}",
             terminal.size(one.choice.bytes),
@@ -206,11 +209,10 @@ def _print(choice: Choice) -> None:
     ]
     said = choice.tolerance
     tolerance = f"{said.relative:g} relative" if said.relative is not None else f"CIEDE2000 {said.ciede2000:g}"
-    title = f"{choice.scene}: within {tolerance} at 99 of 100 pixels of each material"
+    where = "every pixel" if said.percentile == 100.0 else f"{said.percentile:g} % of the pixels of each material"
+    title = f"{choice.scene}: within {tolerance} at {where}"
     terminal.print_table(title, ("material", "choice", *numbers), rows, numbers=numbers)
     for one in choice.materials:
         print(f"  {one.material}: {one.choice.title} {one.reason}")
         if one.revision is not None:
             print(f"    {one.revision} in the store")
-    if choice.allowed < 1.0:
-        print(f"  The whole keeps to the tolerance with each material within {choice.allowed:.2g} of it by itself.")

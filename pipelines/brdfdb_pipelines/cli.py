@@ -121,9 +121,14 @@ def _parser() -> argparse.ArgumentParser:
     audit.add_argument("--no-figures", action="store_true", help="neither stability atlas nor gallery, as with names")
 
     chart = command(
-        "chart", _chart, "Chart the cost of every form of a material against its error, as pictures and JSON."
+        "chart", _chart, "Chart the cost of every form of a material or family against its error: pictures, JSON."
     )
-    chart.add_argument("names", nargs="+", metavar="NAME", help="built-in materials, or those of a recipe or the store")
+    chart.add_argument(
+        "names",
+        nargs="+",
+        metavar="NAME",
+        help="built-in materials, or materials and families of a recipe or the store",
+    )
     chart.add_argument(
         "--out",
         type=Path,
@@ -131,7 +136,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="directory to write to (default: %(default)s)",
     )
-    chart.add_argument("--recipe", type=Path, metavar="FILE", help="a TOML file that defines materials and wavelengths")
+    chart.add_argument(
+        "--recipe", type=Path, metavar="FILE", help="a TOML file that defines materials, families and wavelengths"
+    )
     chart.add_argument(
         "--tolerance",
         type=float,

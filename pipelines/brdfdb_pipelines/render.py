@@ -15,7 +15,9 @@ def run(name: str, directory: Path, *, width: int, across: int) -> None:
     """Render a scene by its file or name, write NAME.png and NAME.exr, and say where they are."""
     scene = load(name)
     try:
-        view, materials = gather(scene, width, across=across), reflectors(scene)
+        with terminal.progress(counted=False, transient=True) as bar:
+            bar.add_task("tracing rays", total=None)
+            view, materials = gather(scene, width, across=across), reflectors(scene)
     except ValueError as error:
         raise SceneError(f"{name}: {error}") from None
     with terminal.progress() as bar:

@@ -1,20 +1,24 @@
-"""The picture of a chart: error over time and bytes, the front drawn and named, and a table of all points below."""
+"""Pictures of charts: error over time and bytes, or along a family; what is worth having, and a table of all below."""
 
 from __future__ import annotations
 
 import html
 import io
 import math
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
+from matplotlib.text import OffsetFrom
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
-from brdfdb.chart import Chart, Point
+from brdfdb.chart import Between, Chart, Curve, FamilyChart, Form, Point
+from brdfdb.representations import Kind
 from brdfdb_pipelines import charts, terminal
 
 WIDTH, _PLOT, _ABOVE, _BELOW, _ROW = 860.0, 270.0, 52.0, 58.0, 12.0  # points
@@ -22,7 +26,8 @@ _LEFT, _GAP, _RIGHT = 66.0, 14.0, 12.0
 _SHARES = (0.44, 0.26, 0.30)  # of the width, of the panels
 _DPI = 110
 SMALLEST = 1e-6  # errors below are drawn here: the truth, and what differs from it by rounding
-_LETTER, _LINE = 4.3, 9.0  # width and height of a letter of a label, on average
+_LETTER, _LINE = 4.1, 9.0  # width and height of a letter of a label, on average
+_LEADER: dict[str, Any] = {"arrowstyle": "-", "color": charts.MUTED, "linewidth": 0.5}
 _NEAR = 10.0  # what is written further from its point has a line to it
 _COLUMNS = (18.0, 250.0, 318.0, 386.0, 454.0, 522.0, 590.0, 690.0, 770.0, 848.0)  # left end of titles, right ends
 
@@ -32,7 +37,7 @@ class _Look(NamedTuple):
     marker: str
 
 
-_LOOKS = {
+_LOOKS: dict[Kind, _Look] = {
     "exact": _Look(charts.TRUTH, "o"),
     "closed form": _Look(charts.OURS, "D"),
     "approximation": _Look(charts.TEXTBOOK, "s"),
@@ -44,32 +49,33 @@ _STYLE: dict[Any, Any] = charts.STYLE | {"svg.hashsalt": "brdfdb", "font.family"
 _BLANK: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 
-def svg(chart: Chart) -> str:
+def svg(chart: Chart | FamilyChart) -> str:
     """The picture as a document of its own."""
     with mpl.rc_context(_STYLE):
         text = io.StringIO()
-        _drawn(chart).savefig(text, format="svg", metadata=_BLANK)
+        _canvas(chart).savefig(text, format="svg", metadata=_BLANK)
     opening, rest = charts.kept_ids(charts.shortened(text.getvalue()), "c").split(">", 1)
     described = html.escape(f"{chart.title}: error of each representation over its cost")
     plate = '<rect width="100%" height="100%" fill="#fff"/>'
     return f'{opening} font-family="sans-serif" role="img" aria-label="{described}">{plate}{rest}\n'
 
 
-def png(chart: Chart) -> bytes:
+def png(chart: Chart | FamilyChart) -> bytes:
     """The picture in pixels."""
     with mpl.rc_context(_STYLE):
         data = io.BytesIO()
-        _drawn(chart).savefig(data, format="png", dpi=_DPI, metadata={"Software": None})
+        _canvas(chart).savefig(data, format="png", dpi=_DPI, metadata={"Software": None})
     return data.getvalue()
+
+
+def _canvas(chart: Chart | FamilyChart) -> Canvas:
+    return _drawn(chart) if isinstance(chart, Chart) else _drawn_family(chart)
 
 
 def _drawn(chart: Chart) -> Canvas:
     height = _ABOVE + _PLOT + _BELOW + _ROW * (len(chart.points) + 2)
-    canvas = Canvas(figsize=(WIDTH / 72.0, height / 72.0), facecolor="white")
-    wavelengths = "grey" if chart.wavelength_nm is None else f"{len(chart.wavelength_nm)} wavelengths"
-    canvas.text(8.0 / WIDTH, 1.0 - 8.0 / height, chart.title, va="top", fontsize=12, fontweight="bold")
-    said = f"{chart.material}, {chart.model}, {wavelengths}. Lines go up from the mean error to the 99th percentile"
-    canvas.text(8.0 / WIDTH, 1.0 - 25.0 / height, f"{said}; bars are quartiles of the time.", va="top")
+    said = "Lines go up from the mean error to the 99th percentile; bars are quartiles of the time."
+    canvas = _titled(height, chart.title, f"{chart.material}, {chart.model}, {_wavelengths(chart)}. {said}")
     room = WIDTH - _LEFT - _RIGHT - 2.0 * _GAP
     left = _LEFT
     panels: tuple[tuple[str, Callable[[Point], tuple[float, float, float]], list[str]], ...] = (
@@ -87,9 +93,31 @@ def _drawn(chart: Chart) -> Canvas:
         else:
             axes.tick_params(labelleft=False)
         left += share * room + _GAP
-    _legend(canvas, chart, height)
-    _table(canvas, chart, height)
+    front_line = Line2D([], [], color=charts.OURS, linewidth=5.0, alpha=0.16, label="front")
+    _legend(canvas, {point.kind for point in chart.points}, front_line, _ABOVE + _PLOT, height)
+    fronts = {*chart.fronts.batch, *chart.fronts.single}
+    rows = []
+    for point in chart.points:
+        errors = (point.l1, point.p99, point.forward, point.back, point.grazing)
+        times = f"{count(point.batch.ns)} ({count(point.batch.low)}-{count(point.batch.high)})", count(point.single.ns)
+        rows.append((point, (*map(percent, errors), *times, terminal.size(point.bytes)), point.key in fronts))
+    heads = ("mean error", "p99", "forward", "back", "grazing", "ns, many (quartiles)", "ns, one", "bytes")
+    _table(canvas, heads, rows, _ABOVE + _PLOT + _BELOW, height)
     return canvas
+
+
+def _titled(height: float, title: str, said: str) -> Canvas:
+    canvas = Canvas(figsize=(WIDTH / 72.0, height / 72.0), facecolor="white")
+    canvas.text(8.0 / WIDTH, 1.0 - 8.0 / height, title, va="top", fontsize=12, fontweight="bold")
+    canvas.text(8.0 / WIDTH, 1.0 - 25.0 / height, said, va="top")
+    return canvas
+
+
+def _wavelengths(chart: Chart | FamilyChart) -> str:
+    if chart.wavelength_nm is None:
+        return "grey"
+    first, *others = chart.wavelength_nm
+    return f"{1 + len(others)} wavelengths" if others else f"{first:g} nm"
 
 
 def _panel(
@@ -112,9 +140,25 @@ def _panel(
         size, fill = 6.5 if key in front else 4.5, look.colour if point.dtype == "float64" else "white"
         axes.plot(middle, y, look.marker, markerfacecolor=fill, markersize=size, **line | {"zorder": 3})
     numbers = {point.key: str(number) for number, point in enumerate(chart.points, 1)}
-    texts = {key: f"{numbers[key]} {points[key].title}" if named and key in front else numbers[key] for key in points}
     ordered = [*front, *(key for key in points if key not in front)]
-    _label(axes, [(texts[k], costs[k][1], _height(points[k].l1), k in front) for k in ordered])
+    labels = []
+    for key in ordered:
+        full = f"{numbers[key]} {points[key].title}" if named else numbers[key]
+        least = full if key in front else numbers[key]
+        labels.append(_Label(least, full, costs[key][1], _height(points[key].l1), key in front))
+    _label(axes, labels)
+
+
+def _error_axis(axes: Axes, top: float) -> None:
+    axes.set_yscale("log")
+    axes.set_ylim(SMALLEST / 2.0, top)
+    axes.grid(color=charts.GRID, linewidth=0.6, clip_on=False)
+    axes.tick_params(length=0)
+    axes.spines[["top", "right"]].set_visible(False)
+    powers = range(round(math.log10(SMALLEST)), math.floor(math.log10(top)) + 1)
+    axes.yaxis.set_major_locator(FixedLocator([10.0**power for power in powers]))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: percent(value)))
+    axes.yaxis.set_minor_locator(NullLocator())
 
 
 def _axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
@@ -122,42 +166,59 @@ def _axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
     decades = max(math.log10(high / low), 1.0)
     axes.set_xscale("log")
     axes.set_xlim(low / 10 ** (0.06 * decades), high * 10 ** (0.09 * decades))
-    axes.set_yscale("log")
-    axes.set_ylim(SMALLEST / 2.0, max(3.0, 2.0 * max(errors)))
-    axes.grid(color=charts.GRID, linewidth=0.6, clip_on=False)
-    axes.tick_params(length=0)
-    axes.spines[["top", "right"]].set_visible(False)
-    top = math.floor(math.log10(axes.get_ylim()[1]))
-    axes.yaxis.set_major_locator(FixedLocator([10.0**power for power in range(round(math.log10(SMALLEST)), top + 1)]))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: percent(value)))
-    axes.yaxis.set_minor_locator(NullLocator())
+    _error_axis(axes, max(3.0, 2.0 * max(errors)))
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,), numticks=6))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: count(value)))
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def _label(axes: Axes, labels: Iterable[tuple[str, float, float, bool]]) -> None:
-    """Texts beside points, each where it hides neither a point nor another text; bold ones come first."""
-    labels = list(labels)
+class _Label(NamedTuple):
+    """What is written beside a point: in full where there is room, else what has to be."""
+
+    least: str
+    full: str
+    x: float
+    y: float
+    bold: bool
+
+    def width(self, text: str) -> float:
+        return _LETTER * len(text) * (1.12 if self.bold else 1.0) + 1.0
+
+
+def _label(axes: Axes, labels: Sequence[_Label]) -> None:
+    """Texts beside points, each where it hides neither a point nor another text; those given first come first."""
     scale = 72.0 / mpl.rcParams["figure.dpi"]
-    at = [axes.transData.transform((x, y)) * scale for _, x, y, _ in labels]
+    at = [axes.transData.transform((label.x, label.y)) * scale for label in labels]
     frame = axes.get_window_extent().extents * scale
     taken = [(x - 3.0, y - 3.0, x + 3.0, y + 3.0) for x, y in at]
-    for (text, x, y, bold), here in zip(labels, at, strict=True):
-        width = _LETTER * len(text) * (1.12 if bold else 1.0) + 1.0
+    chosen = []
+    for label, here in zip(labels, at, strict=True):
+        width = label.width(label.least)
         best = min(offsets(width), key=lambda offset: hidden(box(here, offset, width), taken, frame))
         taken.append(box(here, best, width))
+        chosen.append(best)
+    for index, (label, here, best) in enumerate(zip(labels, at, chosen, strict=True)):
+        text, own, width = label.least, len(at) + index, label.width(label.full)
+        others = [*taken[:own], *taken[own + 1 :]]
+        near = [offset for offset in offsets(width) if abs(offset[1]) <= _NEAR]
+        free = [offset for offset in near if hidden(box(here, offset, width), others, frame) == 0.0]
+        if free:
+            text, best, taken[own] = label.full, free[0], box(here, free[0], width)
+        width = label.width(text)
+        side = min(max(-best[0] / width, 0.0), 1.0)  # of the text, what is next to its point: left, middle or right
         axes.annotate(
             text,
-            (x, y),
-            (best[0], best[1]),
+            (label.x, label.y),
+            (best[0] + side * width, best[1]),
             textcoords="offset points",
+            ha={0.0: "left", 1.0: "right"}.get(side, "center"),
             va="center",
             fontsize=7.5,
-            fontweight="bold" if bold else "normal",
-            color=charts.TRUTH if bold else charts.MUTED,
+            fontweight="bold" if label.bold else "normal",
+            color=charts.TRUTH if label.bold else charts.MUTED,
             zorder=4,
-            arrowprops={"arrowstyle": "-", "color": charts.MUTED, "linewidth": 0.5} if abs(best[1]) > _NEAR else None,
+            bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.3},
+            arrowprops={**_LEADER, "relpos": (side, 0.5)} if abs(best[1]) > _NEAR else None,
         )
 
 
@@ -191,31 +252,31 @@ def hidden(box: Box, taken: list[Box], frame: Any) -> float:
     return float(area + 100.0 * beyond)
 
 
-def _legend(canvas: Canvas, chart: Chart, height: float) -> None:
-    kinds = [kind for kind in _LOOKS if any(point.kind == kind for point in chart.points)]
+def _legend(canvas: Canvas, present: set[Kind], last: Line2D, top: float, height: float) -> None:
     handles = [
         Line2D([], [], linestyle="", color=_LOOKS[k].colour, marker=_LOOKS[k].marker, markersize=5, label=k)
-        for k in kinds
+        for k in _LOOKS
+        if k in present
     ]
     handles.append(Line2D([], [], linestyle="", color=charts.TRUTH, marker="o", markersize=5, label="hollow: float32"))
     handles[-1].set_markerfacecolor("white")
-    handles.append(Line2D([], [], color=charts.OURS, linewidth=5.0, alpha=0.16, label="front"))
+    handles.append(last)
     canvas.legend(
         handles=handles,
         loc="upper left",
-        bbox_to_anchor=(_LEFT / WIDTH - 0.01, 1.0 - (_ABOVE + _PLOT + 26.0) / height),
+        bbox_to_anchor=(_LEFT / WIDTH - 0.01, 1.0 - (top + 26.0) / height),
         ncols=len(handles),
         frameon=False,
         columnspacing=1.4,
         handlelength=1.5,
-        handletextpad=0.3,
+        handletextpad=0.5,
     )
 
 
-def _table(canvas: Canvas, chart: Chart, height: float) -> None:
-    heads = ("", "mean error", "p99", "forward", "back", "grazing", "ns, many (quartiles)", "ns, one", "bytes")
-    fronts = {*chart.fronts.batch, *chart.fronts.single}
-    top = _ABOVE + _PLOT + _BELOW
+def _table(
+    canvas: Canvas, heads: Iterable[str], rows: Iterable[tuple[Form, Iterable[str], bool]], top: float, height: float
+) -> None:
+    """A row for each form, numbered, those that are worth having in bold."""
 
     def row(number: int, cells: Iterable[str], **how: Any) -> None:
         for column, (end, cell) in enumerate(zip(_COLUMNS, cells, strict=True)):
@@ -225,13 +286,203 @@ def _table(canvas: Canvas, chart: Chart, height: float) -> None:
             if cell:
                 canvas.text(x / WIDTH, y, cell, ha=align, va="center", fontsize=7.5, **how)
 
-    row(0, ("", *heads), color=charts.MUTED)
-    for number, point in enumerate(chart.points, 1):
-        errors = (point.l1, point.p99, point.forward, point.back, point.grazing)
-        times = f"{count(point.batch.ns)} ({count(point.batch.low)}-{count(point.batch.high)})", count(point.single.ns)
-        cells = (str(number), point.title, *map(percent, errors), *times, terminal.size(point.bytes))
-        bold = "bold" if point.key in fronts else "normal"
-        row(number, cells, fontweight=bold, color=_LOOKS[point.kind].colour)
+    row(0, ("", "", *heads), color=charts.MUTED)
+    for number, (form, cells, bold) in enumerate(rows, 1):
+        weight = "bold" if bold else "normal"
+        row(number, (str(number), form.title, *cells), fontweight=weight, color=_LOOKS[form.kind].colour)
+
+
+# Families
+
+CLOSE = 0.01  # mean error of what the truth need not be evaluated for
+_MEAN, _NAMES, _TAIL = 216.0, 172.0, 150.0  # widths: panel of means, names beside it, panel of the 99th percentile
+_FAMILY_ABOVE, _FAMILY_ROW = 76.0, 310.0  # below the title, room for g; from one parameter to the next
+_HIGHEST = 10.0  # of errors drawn: ten times the light that there is
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)))
+_APART = 26.0  # of ticks that are numbers of their own
+
+
+def along(whole: FamilyChart, axis: str) -> list[list[int]]:
+    """The members at each value of one parameter of a family."""
+    shape = [len(values) for values in whole.axes.values()]
+    numbers = np.arange(len(whole.members)).reshape(shape)
+    return np.moveaxis(numbers, list(whole.axes).index(axis), 0).reshape(len(whole.axes[axis]), -1).tolist()
+
+
+def middle(errors: Iterable[float | None]) -> float | None:
+    """The median of those that are there."""
+    there = [error for error in errors if error is not None]
+    return float(np.median(there)) if there else None
+
+
+def _drawn_family(whole: FamilyChart) -> Canvas:
+    """For each parameter two panels, error along it; cost against error; all forms as a table."""
+    bottom = _FAMILY_ABOVE + _PLOT + (len(whole.axes) - 1) * _FAMILY_ROW
+    count_of = len(whole.curves) + (whole.between is not None)
+    height = bottom + _BELOW + _ROW * (count_of + 2)
+    several = "; lines are medians, bands all members of a value" if len(whole.axes) > 1 else ""
+    said = f"{whole.family}, {whole.model}, {_wavelengths(whole)}, {len(whole.members)} members{several}."
+    canvas = _titled(height, whole.title, f"{said} Large: worth having there. Times are those of one member.")
+
+    def box(left: float, top: float, width: float) -> tuple[float, float, float, float]:
+        return left / WIDTH, 1.0 - (top + _PLOT) / height, width / WIDTH, _PLOT / height
+
+    tail = _LEFT + _MEAN + _NAMES
+    for number, axis in enumerate(whole.axes):
+        top = _FAMILY_ABOVE + number * _FAMILY_ROW
+        mean = canvas.add_axes(box(_LEFT, top, _MEAN))
+        _sweep(mean, whole, axis, lambda curve: curve.l1, None if whole.between is None else whole.between.l1)
+        mean.set_ylabel("mean error against the truth")
+        _named(mean, whole, axis)
+        if whole.g is None or len(whole.axes) > 1:
+            _headed(mean, "mean error")
+        else:
+            _heights(mean, whole.axes[axis], whole.g)
+        high = canvas.add_axes(box(tail, top, _TAIL))
+        _sweep(high, whole, axis, lambda curve: curve.p99, None if whole.between is None else whole.between.p99)
+        _headed(high, "99th percentile")
+        high.tick_params(labelleft=False)
+    left = tail + _TAIL + 2.0 * _GAP
+    _costs(canvas.add_axes(box(left, _FAMILY_ABOVE, WIDTH - _RIGHT - left)), whole)
+    forms: list[Curve | Between] = [*whole.curves, *([whole.between] if whole.between else [])]
+    bar = Line2D(
+        [], [], color=charts.MUTED, linewidth=3.0, alpha=0.3, label="from the least to the most of the members"
+    )
+    _legend(canvas, {form.kind for form in forms}, bar, bottom, height)
+    _table(canvas, _FAMILY_HEADS, [_family_row(whole, form) for form in forms], bottom + _BELOW, height)
+    return canvas
+
+
+def _sweep(
+    axes: Axes, whole: FamilyChart, axis: str, errors: Callable[[Curve], list[float | None]], between: float | None
+) -> None:
+    """Errors along one parameter; what is worth having at most of the members of a value is drawn large."""
+    x = whole.axes[axis]
+    _error_axis(axes, _HIGHEST)
+    if x[0] > 0.0 and x[-1] > 8.0 * x[0]:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if x[-1] < 50.0 * x[0] else (1.0,), numticks=8))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlabel(axis)
+    members = along(whole, axis)
+    used: Counter[str] = Counter()
+    for curve in whole.curves:
+        look, values = _LOOKS[curve.kind], errors(curve)
+        rows = [[v for index in some if (v := values[index]) is not None] for some in members]
+        there = [index for index, row in enumerate(rows) if row]
+        at = [x[index] for index in there]
+        y = [_height(float(np.median(rows[index]))) for index in there]
+        if len(whole.axes) > 1:
+            least, most = ([_height(pick(rows[index])) for index in there] for pick in (min, max))
+            axes.fill_between(at, least, most, color=look.colour, alpha=0.08, linewidth=0.0)
+        axes.plot(at, y, color=look.colour, linestyle=_DASHES[used[curve.kind] % len(_DASHES)], linewidth=1.1)
+        used[curve.kind] += 1
+        fill = look.colour if curve.dtype == "float64" else "white"
+        for index, value, height in zip(there, at, y, strict=True):
+            chosen = 2 * sum(curve.key in whole.fronts[m] for m in members[index]) > len(members[index])
+            size = 6.5 if chosen else 2.8
+            axes.plot(value, height, look.marker, color=look.colour, markerfacecolor=fill, markersize=size, zorder=3)
+    if between is not None:
+        axes.axhline(_height(between), color=_LOOKS["table"].colour, linestyle=(0, (3, 2)), linewidth=0.9)
+
+
+def _headed(axes: Axes, text: str) -> None:
+    axes.set_title(text, fontsize=8, color=charts.MUTED, loc="left")
+
+
+def _heights(axes: Axes, x: list[float], g: list[float]) -> None:
+    """The g of members above the panel, of as many as there is room for."""
+    shown = [len(x) - 1]
+    for index in range(len(x) - 1, -1, -1):
+        at, after = (axes.transData.transform((x[i], 1.0))[0] for i in (index, shown[-1]))
+        if after - at > _APART * mpl.rcParams["figure.dpi"] / 72.0:
+            shown.append(index)
+    above = axes.secondary_xaxis("top")
+    above.set_xticks([x[index] for index in shown], labels=[count(float(f"{g[index]:.2g}")) for index in shown])
+    above.xaxis.set_minor_locator(NullLocator())
+    above.set_xlabel("g along the normal, eq. 79")
+    above.tick_params(length=0)
+    above.spines["top"].set_visible(False)
+
+
+def _named(axes: Axes, whole: FamilyChart, axis: str) -> None:
+    """Number and name of each curve beside its right end, bold if it is worth having anywhere."""
+    ends = []
+    for number, curve in enumerate(whole.curves, 1):
+        values = [middle([curve.l1[index] for index in some]) for some in along(whole, axis)]
+        last = max(index for index, value in enumerate(values) if value is not None)
+        bold = any(curve.key in front for front in whole.fronts)
+        ends.append((_height(values[last] or 0.0), whole.axes[axis][last], f"{number} {curve.title}", bold, curve.kind))
+    if whole.between is not None:
+        text = f"{len(whole.curves) + 1} {whole.between.title}"
+        ends.append((_height(whole.between.l1), whole.axes[axis][-1], text, False, whole.between.kind))
+    ends.sort(key=lambda end: end[0])
+    low, high = (math.log10(y) for y in axes.get_ylim())
+    wanted = [_PLOT * (math.log10(min(y, _HIGHEST)) - low) / (high - low) for y, *_ in ends]
+    for (y, x, text, bold, kind), here in zip(ends, apart(wanted, _LINE, _PLOT), strict=True):
+        axes.annotate(
+            text,
+            (x, min(y, _HIGHEST)),
+            (_MEAN + 10.0, here),
+            textcoords=OffsetFrom(axes, (0.0, 0.0)),
+            va="center",
+            fontsize=7.0,
+            fontweight="bold" if bold else "normal",
+            color=_LOOKS[kind].colour,
+            annotation_clip=False,
+            arrowprops={**_LEADER, "relpos": (0.0, 0.5), "shrinkA": 1.0, "shrinkB": 2.0},
+        )
+
+
+def apart(wanted: Sequence[float], least: float, most: float) -> list[float]:
+    """Increasing heights, moved as little as makes them `least` apart and keeps them between 0 and `most`."""
+    blocks: list[tuple[float, int]] = []  # of names that touch: where the first would be, and how many
+    for index, height in enumerate(wanted):
+        start, number = height - least * index, 1
+        while blocks and blocks[-1][0] > start:
+            before, several = blocks.pop()
+            start, number = (before * several + start * number) / (several + number), several + number
+        blocks.append((start, number))
+    highest = most - least * (len(wanted) - 1)
+    starts = [min(max(start, 0.0), highest) for start, number in blocks for _ in range(number)]
+    return [start + least * index for index, start in enumerate(starts)]
+
+
+def _costs(axes: Axes, whole: FamilyChart) -> None:
+    """Error over cost: a bar from the least to the largest mean error of the members, a mark at the median."""
+    labels = []
+    forms: list[tuple[Form, list[float | None]]] = [(curve, curve.l1) for curve in whole.curves]
+    if whole.between is not None:
+        forms.append((whole.between, [whole.between.l1]))
+    _axes(axes, [t for form, _ in forms for t in (form.batch.low, form.batch.high)], [_HIGHEST / 2.0])
+    for number, (form, values) in enumerate(forms, 1):
+        look, ns = _LOOKS[form.kind], form.batch.ns
+        there = [_height(value) for value in values if value is not None]
+        y, bold = float(np.median(there)), any(form.key in front for front in whole.fronts)
+        axes.plot([ns, ns], [min(there), max(there)], color=look.colour, linewidth=3.0, alpha=0.3, zorder=2)
+        fill = look.colour if form.dtype == "float64" else "white"
+        size = 6.5 if bold else 4.5
+        axes.plot(ns, y, look.marker, color=look.colour, markerfacecolor=fill, markersize=size, zorder=3)
+        labels.append(_Label(str(number), str(number), ns, min(y, _HIGHEST), bold))
+    _label(axes, sorted(labels, key=lambda label: not label.bold))
+    axes.set_xlabel("ns a value, many directions at once")
+    _headed(axes, "mean error over cost")
+    axes.tick_params(labelleft=False)
+
+
+_FAMILY_HEADS = ("mean: least", "median", "most", "within 1 %", "p99: median", "ns, many", "ns, one", "worth having")
+
+
+def _family_row(whole: FamilyChart, form: Curve | Between) -> tuple[Form, tuple[str, ...], bool]:
+    times = count(form.batch.ns), count(form.single.ns)
+    if isinstance(form, Between):
+        return form, ("", percent(form.l1), "", "", percent(form.p99), *times, ""), False
+    means, tails = ([v for v in values if v is not None] for values in (form.l1, form.p99))
+    errors = (percent(min(means)), percent(float(np.median(means))), percent(max(means)))
+    close, fronts = sum(v <= CLOSE for v in means), sum(form.key in front for front in whole.fronts)
+    shares = [f"{number} of {len(whole.members)}" if number else "" for number in (close, fronts)]
+    return form, (*errors, shares[0], percent(float(np.median(tails))), *times, shares[1]), fronts > 0
 
 
 def _height(error: float) -> float:

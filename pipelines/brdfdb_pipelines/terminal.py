@@ -12,8 +12,12 @@ from rich.table import Table
 _MANY = 200  # rows, of which rich makes a page in a tenth of a second
 
 
-def progress(counted: bool = True, text: str = "") -> Progress:
-    """A progress bar; `counted` shows how many of how many, for tasks that count things; `text` what else to show."""
+def progress(counted: bool = True, text: str = "", transient: bool = False) -> Progress:
+    """A progress bar; `counted` shows how many of how many, for tasks that count things; `text` what else to show.
+
+    A `transient` one leaves nothing behind, and is not for files: for what may end with a sentence of its own.
+    """
+    console = Console(stderr=True)
     count = [MofNCompleteColumn()] if counted else []
     return Progress(
         TextColumn("{task.description}"),
@@ -23,7 +27,9 @@ def progress(counted: bool = True, text: str = "") -> Progress:
         *([TextColumn(text)] if text else []),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=console,
+        transient=transient,
+        disable=transient and not console.is_terminal,
     )
 
 

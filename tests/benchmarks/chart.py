@@ -13,6 +13,7 @@ from brdfdb.chart import Chart
 from brdfdb_pipelines import chart, scatter, terminal
 
 NAMES = ("wall-plaster", "rolled-brass", "scene-copper-sphere")
+FAMILY, RECIPE = "copper-roughness", Path("pipelines/brdfdb_pipelines/recipes/copper-roughness.toml")
 PICTURES = Path("docs")
 
 
@@ -34,7 +35,8 @@ if __name__ == "__main__":
     PICTURES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         found = chart.run(NAMES, Path(folder))
-        for name in NAMES:
+        chart.run((FAMILY,), Path(folder), recipe_file=RECIPE)
+        for name in (*NAMES, FAMILY):
             shutil.copy(Path(folder, f"{name}.svg"), PICTURES)
     print("| material | form | mean error | p99 | forward | ns a value | times as fast | bytes |")
     print("|---|---|---|---|---|---|---|---|")

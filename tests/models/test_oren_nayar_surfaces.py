@@ -13,6 +13,8 @@ from brdfdb import models
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
+from brdfdb.models._oren_nayar_facets import gaussian
+from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, single_slope_part
 from brdfdb.reference import fujii_2013, mp, oren_nayar_1994, portsmouth_2025, torrance_sparrow_1967
 
 PAPER_VALUES = Path(__file__).parents[1] / "paper_values"
@@ -304,6 +306,23 @@ def test_gaussian_is_the_mean_of_parallel_cavities() -> None:
     parts = models.oren_nayar_gaussian_parts(*angles, rho=0.8, sigma=sigma)
     for part, of_cavities in zip(parts, cavities, strict=True):
         assert part == pytest.approx(weights @ of_cavities.mean(axis=1) / weights.sum(), rel=INTEGRAL)
+
+
+@pytest.mark.parametrize("part", ["direct", "interreflected"])
+def test_a_part_alone_is_that_of_both_without_the_work_of_the_other(part: PartName) -> None:
+    rng = np.random.default_rng(11)
+    wi, wr = (unit_vector(rng.uniform(0.0, HALF_PI, 500), rng.uniform(0.0, 7.0, 500)) for _ in range(2))
+    both = models.oren_nayar_gaussian_parts_vectors(wi, wr, rho=0.8, sigma=0.6)
+    np.testing.assert_array_equal(gaussian_part(wi, wr, rho=0.8, sigma=0.6, part=part), getattr(both, part))
+    both = models.oren_nayar_single_slope_parts_vectors(wi, wr, rho=0.8, theta_a=0.6)
+    np.testing.assert_array_equal(single_slope_part(wi, wr, rho=0.8, theta_a=0.6, part=part), getattr(both, part))
+    cosines = np.cos(np.linspace(0.0, np.pi, 9))
+    lit, bounce = part == "direct", part == "interreflected"
+    direct, bounced = gaussian(
+        np.array(1.1), np.array(2.3), cosines, np.sqrt(1.0 - cosines**2), 0.6, lit=lit, bounce=bounce
+    )
+    assert np.all((bounced if lit else direct) == 0.0)
+    assert np.all((direct if lit else bounced) > 0.0)
 
 
 def test_single_slope_is_the_mean_of_parallel_cavities_in_the_plane_of_incidence_and_across_it() -> None:

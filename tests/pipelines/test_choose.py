@@ -60,10 +60,10 @@ def test_the_choice_costs_less_than_a_third_of_the_truth_and_what_is_cheaper_bre
     assert one.truth.key == "facets"
     assert one.choice.kind == "table"
     assert one.choice.share <= 1 / 3
-    assert one.choice.error.p99 <= done[0].allowed * 0.5
-    assert one.whole.p99 <= 0.5
+    assert one.choice.error.most <= 0.5
+    assert one.whole.most <= 0.5
     assert one.next_cheaper is not None
-    assert one.next_cheaper.error.p99 > done[0].allowed * 0.5
+    assert one.next_cheaper.error.counted > 0.5
     assert one.next_cheaper.title in one.reason
 
 
@@ -110,10 +110,23 @@ def test_bytes_can_be_weighed(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "more than a third of the truth's cost" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("percentile", "where"), [("", "every pixel"), (", percentile = 90", "90 % of the pixels")])
+def test_what_is_printed_says_how_many_pixels_keep_to_the_tolerance(
+    percentile: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = written(tmp_path, "ciede2000 = 0.5", f"ciede2000 = 0.5{percentile}")
+    choice = choose.run(name, tmp_path / "out", width=16, tolerances=[])
+    (one,) = choice.materials
+    assert f"scene: within CIEDE2000 0.5 at {where}" in capsys.readouterr().out
+    assert one.whole.counted <= 0.5
+    assert one.whole.counted <= one.whole.most
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
         ("{ ciede2000 = 0.5 }", "{ relative = 1e-9 }", "tolerance: 1e-09 (relative) is finer than the truth is known"),
+        ("0.5 }", "0.5, percentile = 0 }", "tolerance.percentile: Input should be greater than 0"),
         ('"rendered-sphere-40deg"', '"no-such"', "objects.ball.material: 'no-such' is unknown"),
         ("[0, -1, 0.5]", "[0, 1, 0]", "lights.0: falls on nothing that is seen"),
         ('kind = "sphere", radius = 1', 'kind = "recorded", file = "none.exr"', "none.exr"),

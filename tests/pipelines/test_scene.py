@@ -87,7 +87,7 @@ def test_the_scenes_of_the_papers_are_there() -> None:
         ("[0, -1, 0]", "[0, 1]", "lights.0.direction.2: Field required"),
         ("height = 2.5", "height = 2.5, fov_deg = 3", "camera.fov_deg, height: give one of the two"),
         ("[0, -5, 0]", "[0, 0, 5]", "camera.target: the camera must look at another place"),
-        ("ambient = 0.1\nlights = [{ direction = [0, -1, 0] }]", "", "lights, ambient: there is no light"),
+        ("ambient = 0.1\nlights = [{ direction = [0, -1, 0] }]", "", "lights, ambient, environment: there is no light"),
         ('title = "one"', "tolerance = {}", "tolerance.relative, ciede2000: give one of the two"),
         ('title = "one"', "tolerance = { relative = -1 }", "tolerance.relative: Input should be greater than 0"),
         ('title = "one"', "title = ", "not TOML: Invalid value (at line 1"),
