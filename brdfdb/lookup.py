@@ -195,7 +195,9 @@ class Table:
         given: Sequence[ArrayLike] = (theta_i, phi_i, theta_r, phi_r)
         shape: tuple[int, ...] = ()
         if all(type(angle) is float for angle in given):  # broadcasting takes longer than the lookup of one point
-            dtype, flat = np.dtype(np.float64), list(np.array(given).reshape(4, 1))
+            numbers = np.array(given).reshape(4, 1)
+            numbers.flags.writeable = False  # as by `_flat`
+            dtype, flat = numbers.dtype, list(numbers)
         else:
             arrays = [np.asarray(angle) for angle in given]
             dtype = asked_for(theta_i, phi_i, theta_r, phi_r)
