@@ -50,10 +50,15 @@ class Problem(BaseModel):
     closest: list[str] = Field(default=[], description="for an unknown material: the names most like it")
 
 
-class Health(BaseModel):
-    """The store can be read."""
+class Alive(BaseModel):
+    """The process answers."""
 
     status: str
+
+
+class Health(Alive):
+    """The store can be read."""
+
     materials: int = Field(description="number of materials in the store")
 
 
