@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from brdfdb.manifest import check_manifest, manifest_of
-from brdfdb.store import StoreError
+from brdfdb.store import StoreError, UnknownRevisionError
 from brdfdb_api.documented import answers
 from brdfdb_api.responses import RequestError, cache_headers, not_modified
 from brdfdb_api.routes import both, query_names, shelf_of
@@ -66,9 +66,7 @@ def _group(request: Request, name: str, revision: str | None) -> Path:
     shelf = shelf_of(request)
     current = shelf.head(name)
     if revision not in (None, current) and revision not in shelf.store.revisions(name):
-        raise RequestError(
-            404, f"{name} has no revision {str(revision)[:40]!r}; the current one is {current}", "revision"
-        )
+        raise UnknownRevisionError(f"{name} has no revision {str(revision)[:40]!r}; the current one is {current}")
     group = shelf.store.path(name).with_name(revision or current)
     if not manifest_of(group).is_file():
         raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")

@@ -1,14 +1,19 @@
-"""What tests of the HTTP layer share: materials that are quick to tabulate, and a client without a network."""
+"""What tests of the HTTP layer share: materials, quick to tabulate, a client without a network, and a server."""
 
 from __future__ import annotations
 
 import asyncio
 import io
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
+import uvicorn
 
 from brdfdb.accuracy import measure
 from brdfdb.grids import Grid
@@ -77,6 +82,21 @@ class Client:
 def client_of(root: Path, **settings: Any) -> Client:
     """A client of an application that serves a store."""
     return Client(create_app(Settings(store=root, **settings)))
+
+
+@contextmanager
+def serving(root: Path, **settings: Any) -> Iterator[str]:
+    """The address of a service in a thread of this process."""
+    app = create_app(Settings(store=root, log_level="error", **settings))
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        server = uvicorn.Server(uvicorn.Config(app, log_level="error", timeout_graceful_shutdown=1, lifespan="off"))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+        finally:
+            server.should_exit = True
+            thread.join()
 
 
 def read_npy(content: bytes) -> np.ndarray:

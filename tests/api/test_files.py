@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import io
-import socket
-import threading
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import uvicorn
 import xarray as xr
 from zarr.storage import ZipStore
 
 from brdfdb.store import Store
-from brdfdb_api.app import create_app
-from brdfdb_api.settings import Settings
-from tests.api.a_store import Client, client_of, publish
+from tests.api.a_store import Client, client_of, publish, serving
 
 FOIL = "/v1/materials/copper-foil"
 STORED = "/v1/store/materials/copper-foil/r000001"
@@ -114,20 +108,11 @@ def test_a_zip_of_a_revision_is_kept_for_good(own: Path) -> None:
     assert (current.status_code, current.headers["cache-control"]) == (200, "no-cache")
 
 
-@pytest.fixture
-def address(root: Path) -> Iterator[str]:
-    """Of a service in a thread of this process."""
-    app = create_app(Settings(store=root, log_level="error"))
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        server = uvicorn.Server(uvicorn.Config(app, log_level="error", timeout_graceful_shutdown=1, lifespan="off"))
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
-        thread.start()
-        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
-        server.should_exit = True
-        thread.join()
-
-
-def test_xarray_reads_over_http(address: str, store: Store) -> None:
+def test_xarray_reads_over_http(root: Path, store: Store) -> None:
     pytest.importorskip("aiohttp")
-    with xr.open_zarr(f"{address}{STORED}") as found, xr.open_zarr(store.path("copper-foil")) as expected:
+    with (
+        serving(root) as url,
+        xr.open_zarr(f"{url}{STORED}") as found,
+        xr.open_zarr(store.path("copper-foil")) as expected,
+    ):
         assert found.load().identical(expected.load())

@@ -14,35 +14,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-import uvicorn
 
 import brdfdb
 from brdfdb import remote
 from brdfdb.geometry import unit_vector
 from brdfdb.store import Store, StoreError, UnknownMaterialError, UnknownRevisionError
-from brdfdb_api.app import create_app
-from brdfdb_api.settings import Settings
-from tests.api.a_store import publish
+from tests.api.a_store import publish, serving
 
 # Of the value plus the median; 2.7e-14 is the worst measured, on the flanks of copper: degrees round the angles
 AGREEMENT = 3e-14
 KEPT = ("white-tile", "r000001")
 NAMES = ("white-tile", "grey-felt", "brushed-metal", "copper-foil")
-
-
-@contextmanager
-def serving(root: Path, **settings: Any) -> Iterator[str]:
-    """The address of a service in a thread of this process."""
-    app = create_app(Settings(store=root, log_level="error", **settings))
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        server = uvicorn.Server(uvicorn.Config(app, log_level="error", timeout_graceful_shutdown=1, lifespan="off"))
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
-        thread.start()
-        try:
-            yield f"http://127.0.0.1:{listener.getsockname()[1]}"
-        finally:
-            server.should_exit = True
-            thread.join()
 
 
 @pytest.fixture(scope="module")
