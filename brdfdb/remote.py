@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.described import Described, Stated
-from brdfdb.geometry import HALF_PI, Directions, checked_angles, checked_vectors, degrees, finished, spherical_angles
+from brdfdb.geometry import Directions, checked_angles, checked_vectors, degrees, finished, spherical_angles
 from brdfdb.grids import Axis
 from brdfdb.parameters import Floats
 from brdfdb.store import NAME, StoreError, UnknownMaterialError, UnknownRevisionError
@@ -257,7 +257,7 @@ class RemoteTable(Described):
         values = np.zeros((given.theta_i.size, count))
         if self._specular and values.size:
             at = None if wavelength_nm is None else np.asarray(wavelength_nm, dtype=np.float64).tolist()
-            theta = _sendable(given.theta_i, polar=True).reshape(-1)
+            theta = _sendable(given.theta_i).reshape(-1)
 
             def ask(part: slice) -> Any:
                 body = {"theta_i": theta[part].tolist(), "theta_r": 0, "wavelength_nm": at}
@@ -283,8 +283,7 @@ class RemoteTable(Described):
             parts = (self._looked_up(angles, given, part) for part in np.split(np.asarray(wavelength_nm), starts))
             return np.concatenate(list(parts), axis=-1)
         shape = np.broadcast_shapes(*(angle.shape for angle in angles))
-        sent = [_sendable(angle, polar) for angle, polar in zip(angles, (True, False, True, False), strict=True)]
-        flat = [np.broadcast_to(angle, shape).reshape(-1) for angle in sent]
+        flat = [np.broadcast_to(_sendable(angle), shape).reshape(-1) for angle in angles]
         values = np.empty((flat[0].size, count))
         if values.size:
             at = [] if wavelength_nm is None else np.ravel(np.asarray(wavelength_nm, dtype=np.float64)).tolist()
@@ -428,14 +427,9 @@ class RemoteStore(Mapping[str, RemoteTable]):
         )
 
 
-def _sendable(angle: NDArray[Any], polar: bool) -> NDArray[np.float64]:
-    """Degrees that a service takes: thetas at the horizon at most, azimuths of one turn, 0 for nan.
-
-    `geometry.finished` puts back what that hides: 0 below the horizon, and nan.
-    """
+def _sendable(angle: NDArray[Any]) -> NDArray[np.float64]:
+    """Degrees that a service takes: azimuths of one turn, and 0 for nan, which `geometry.finished` puts back."""
     known = np.nan_to_num(angle.astype(np.float64), nan=0.0)
-    if polar:
-        return degrees(np.minimum(known, HALF_PI))
     # far from 0 degrees have fewer digits than radians
     return degrees(np.where(np.abs(known) > np.pi, np.arctan2(np.sin(known), np.cos(known)), known))
 
