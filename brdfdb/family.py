@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from brdfdb.described import Stated
 from brdfdb.error import Error
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
-from brdfdb.lookup import Stated, Table
+from brdfdb.lookup import Table
 from brdfdb.manifest import StoreError, read_json
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS

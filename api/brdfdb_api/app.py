@@ -77,6 +77,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
         description=DESCRIPTION,
         generate_unique_id_function=lambda route: route.name,
         lifespan=_warmed,
+        redirect_slashes=False,  # what is not an address is 404
     )
     app.state.settings = settings or Settings.from_environment()
     app.state.shelf = Shelf(app.state.settings, store)

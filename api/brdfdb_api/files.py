@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from brdfdb.manifest import check_manifest, manifest_of
-from brdfdb.store import StoreError
+from brdfdb.store import StoreError, UnknownRevisionError
 from brdfdb_api.documented import answers
 from brdfdb_api.responses import RequestError, cache_headers, not_modified
 from brdfdb_api.routes import both, query_names, shelf_of
@@ -64,12 +64,12 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
 def _group(request: Request, name: str, revision: str | None) -> Path:
     """Directory of a revision that the store has; names are compared with what is there, never joined unseen."""
     shelf = shelf_of(request)
-    table_revision = shelf.head(name) if revision is None else revision
-    if table_revision not in shelf.store.revisions(name):
-        raise RequestError(404, f"{name} has no revision {table_revision[:40]!r}", "revision")
-    group = shelf.store.path(name).with_name(table_revision)
+    current = shelf.head(name)
+    if revision not in (None, current) and revision not in shelf.store.revisions(name):
+        raise UnknownRevisionError(f"{name} has no revision {str(revision)[:40]!r}; the current one is {current}")
+    group = shelf.store.path(name).with_name(revision or current)
     if not manifest_of(group).is_file():
-        raise StoreError(f"{name} {table_revision} is damaged: its manifest is missing")
+        raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
     return group
 
 

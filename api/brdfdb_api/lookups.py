@@ -30,6 +30,7 @@ Source = Literal["table", "model"]
 Output = Literal["spectrum", "xyz", "linear-srgb"]
 Format = Literal["json", "npy"]
 
+_TURN = 360.0  # degrees; fmod is exact, and radians have no digits left at 1e15
 _HEADER_BYTES = 4096  # of a .npy file: dtype and shape take a hundred
 
 
@@ -106,7 +107,7 @@ class Points:
             degrees = _number(name, query.get(name, "0"))
             if name.startswith("theta") and not 0.0 <= degrees <= 180.0:
                 raise RequestError(422, f"{name}: {degrees} is outside [0, 180] degrees", name)
-            angles.append(math.radians(degrees))
+            angles.append(math.radians(math.fmod(degrees, _TURN)))
         at = [_number("wavelength_nm", text) for text in wavelengths]
         wavelength_nm = None if not at else at[0] if len(at) == 1 else np.array(at)
         return cls((angles[0], angles[1], angles[2], angles[3]), (), wavelength_nm)
@@ -317,7 +318,7 @@ def _in_radians(name: str, degrees: NDArray[Any]) -> NDArray[Any]:
             raise RequestError(422, f"{name}: {degrees[bad].flat[0]} is outside [0, 180] degrees", name)
     elif not np.all(finite := np.isfinite(degrees)):
         raise RequestError(422, f"{name}: {degrees[~finite].flat[0]} is not a finite number", name)
-    return radians(degrees)
+    return radians(np.fmod(degrees, _TURN))
 
 
 def _npy(body: bytes) -> NDArray[Any]:

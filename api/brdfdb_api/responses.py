@@ -50,11 +50,16 @@ class Problem(BaseModel):
     closest: list[str] = Field(default=[], description="for an unknown material: the names most like it")
 
 
-class Health(BaseModel):
-    """The process answers; where `materials` is there, the store can be read."""
+class Alive(BaseModel):
+    """The process answers."""
 
     status: str
-    materials: int | None = Field(default=None, description="in the store")
+
+
+class Health(Alive):
+    """The store can be read."""
+
+    materials: int = Field(description="number of materials in the store")
 
 
 class Summary(BaseModel):

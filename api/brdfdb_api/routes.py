@@ -19,6 +19,7 @@ from brdfdb_api.documented import BODY, ERROR, NPY_ANSWER, POINT, WAVELENGTHS, a
 from brdfdb_api.lookups import FIELDS, OPTIONS, Options, Points, evaluate, parsed
 from brdfdb_api.responses import (
     NPY,
+    Alive,
     Catalogue,
     Health,
     Lookup,
@@ -63,7 +64,7 @@ def shelf_of(request: Request) -> Shelf:
     return shelf
 
 
-@router.get("/healthz", tags=["service"], dependencies=[query_names()], responses=answers(Health, 422))
+@router.get("/healthz", tags=["service"], dependencies=[query_names()], responses=answers(Alive, 422))
 async def healthz() -> Response:
     """Whether the process answers at all."""
     return json_response({"status": "ok"})

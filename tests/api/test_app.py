@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,15 @@ import pytest
 
 import brdfdb_api
 from brdfdb.store import StoreError
-from brdfdb_api.app import create_app, openapi_json, serve
+from brdfdb_api.app import create_app, openapi_json
+from brdfdb_api.server import serve
 from brdfdb_api.settings import Settings
+from tests.api.a_store import Client
 
 OPENAPI = Path(__file__).parents[2] / "api" / "openapi.json"
-LOOKUP = "/v1/materials/blue-foil/lookup"
+FOIL = "/v1/materials/copper-foil"
+LOOKUP = f"{FOIL}/lookup"
+STORED = "/v1/store/materials/{name}/{revision}/{file}"
 
 
 def test_settings_default() -> None:
@@ -24,17 +29,38 @@ def test_settings_default() -> None:
 
 
 def test_settings_of_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("BRDFDB_STORE", str(tmp_path))
-    monkeypatch.setenv("BRDFDB_MAX_POINTS", "7")
-    monkeypatch.setenv("BRDFDB_MAX_BODY_BYTES", "99")
-    assert create_app().state.settings == Settings(store=tmp_path, max_points=7, max_body_bytes=99)
+    told = {
+        "BRDFDB_STORE": str(tmp_path),
+        "BRDFDB_AUDIT": "other.json",
+        "BRDFDB_MAX_POINTS": "7",
+        "BRDFDB_MAX_BODY_BYTES": "99",
+        "BRDFDB_CACHE_BYTES": "1000",
+        "BRDFDB_CORS_ORIGINS": "https://a.example, https://b.example",
+        "BRDFDB_LOG_LEVEL": "warning",
+    }
+    for variable, value in told.items():
+        monkeypatch.setenv(variable, value)
+    expected = Settings(
+        tmp_path, Path("other.json"), 7, 99, 1000, ("https://a.example", "https://b.example"), "warning"
+    )
+    assert create_app().state.settings == expected
 
 
-@pytest.mark.parametrize("variable", ["BRDFDB_MAX_POINTS", "BRDFDB_MAX_BODY_BYTES"])
+def test_the_audit_lies_in_the_store_unless_it_is_named(tmp_path: Path) -> None:
+    assert Settings(store=tmp_path).audit_file == tmp_path / "audit.json"
+    assert Settings(store=tmp_path, audit=Path("other.json")).audit_file == Path("other.json")
+
+
+@pytest.mark.parametrize("variable", ["BRDFDB_MAX_POINTS", "BRDFDB_MAX_BODY_BYTES", "BRDFDB_CACHE_BYTES"])
 @pytest.mark.parametrize("value", ["0", "-1", "1e4", "", "many", "²"])
 def test_a_bad_setting_is_named(variable: str, value: str) -> None:
     with pytest.raises(ValueError, match=f"^{variable}: '.*' is not a positive whole number$"):
         Settings.from_environment({variable: value})
+
+
+def test_an_unknown_level_of_the_log_is_named() -> None:
+    with pytest.raises(ValueError, match=r"^BRDFDB_LOG_LEVEL: 'loud' is not one of info, warning, error$"):
+        Settings.from_environment({"BRDFDB_LOG_LEVEL": "loud"})
 
 
 def test_openapi_document_is_the_reviewed_one() -> None:
@@ -43,7 +69,7 @@ def test_openapi_document_is_the_reviewed_one() -> None:
     )
 
 
-def test_openapi_is_served(client: Any) -> None:
+def test_openapi_is_served(client: Client) -> None:
     document = client.get("/openapi.json").json()
     assert document == json.loads(OPENAPI.read_text())
     assert client.get("/openapi.json").json() == document
@@ -55,8 +81,25 @@ def test_openapi_is_served(client: Any) -> None:
     [
         ("GET", "/healthz", "/healthz", 200),
         ("GET", "/v1/materials", "/v1/materials", 200),
-        ("GET", "/v1/materials/blue-foil", "/v1/materials/{name}", 200),
+        ("GET", "/v1/materials/copper-foil", "/v1/materials/{name}", 200),
+        ("GET", "/readyz", "/readyz", 200),
+        ("GET", "/metrics", "/metrics", 200),
+        ("GET", "/v1/materials?limit=0", "/v1/materials", 422),
         ("GET", "/v1/materials/grey-felt", "/v1/materials/{name}", 200),
+        ("GET", f"{FOIL}/revisions/r000001", "/v1/materials/{name}/revisions/{revision}", 200),
+        ("GET", f"{FOIL}/revisions/r000002", "/v1/materials/{name}/revisions/{revision}", 404),
+        ("GET", f"{FOIL}/albedo", "/v1/materials/{name}/albedo", 200),
+        ("GET", f"{FOIL}/lobe", "/v1/materials/{name}/lobe", 200),
+        ("GET", f"{FOIL}/lobe?view=hemisphere&output=xyz", "/v1/materials/{name}/lobe", 200),
+        ("GET", f"{FOIL}/lobe?format=npy", "/v1/materials/{name}/lobe", 200),
+        ("GET", f"{FOIL}/slice.exr", "/v1/materials/{name}/slice.exr", 200),
+        ("GET", f"{FOIL}/audit", "/v1/materials/{name}/audit", 404),
+        ("GET", f"{FOIL}/download.zarr", "/v1/materials/{name}/download.zarr", 200),
+        ("GET", "/v1/store/materials/copper-foil/r000001/brdf/c/0/0/0/0", STORED, 200),
+        ("GET", "/v1/store/materials/copper-foil/r000001/nothing", STORED, 404),
+        ("GET", f"{LOOKUP}?theta_i=1&theta_r=2&error=true", "/v1/materials/{name}/lookup", 200),
+        ("GET", f"{LOOKUP}?theta_i=1&theta_r=2&output=linear-srgb", "/v1/materials/{name}/lookup", 200),
+        ("GET", f"{LOOKUP}?theta_i=1&theta_r=2&from=model", "/v1/materials/{name}/lookup", 200),
         ("GET", "/v1/materials/grey-fell", "/v1/materials/{name}", 404),
         ("GET", f"{LOOKUP}?theta_i=1&theta_r=2", "/v1/materials/{name}/lookup", 200),
         ("GET", f"{LOOKUP}?theta_i=1&theta_r=2&format=npy", "/v1/materials/{name}/lookup", 200),
@@ -65,7 +108,7 @@ def test_openapi_is_served(client: Any) -> None:
         ("POST", f"{LOOKUP}?thetai=1", "/v1/materials/{name}/lookup", 422),
     ],
 )
-def test_answers_are_as_documented(client: Any, method: str, address: str, path: str, status: int) -> None:
+def test_answers_are_as_documented(client: Client, method: str, address: str, path: str, status: int) -> None:
     document = json.loads(OPENAPI.read_text())
     operation = document["paths"][path][method.lower()]
     content = {}
@@ -75,38 +118,43 @@ def test_answers_are_as_documented(client: Any, method: str, address: str, path:
         content = {"json": documented["example"]}
     answer = client.request(method, address, **content)
     assert answer.status_code == status
-    media = operation["responses"][str(status)]["content"][answer.headers["content-type"]]
+    media = operation["responses"][str(status)]["content"][answer.headers["content-type"].partition(";")[0]]
     if "json" in answer.headers["content-type"]:
         jsonschema.validate(answer.json(), {**media["schema"], "components": document["components"]})
 
 
-def test_serve_needs_a_store(tmp_path: Path) -> None:
+def test_serve_needs_a_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     with pytest.raises(StoreError):
         serve(tmp_path, "127.0.0.1", 0)
 
 
-def test_serve_on_a_port_that_is_taken(store: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("brdfdb.open", lambda _: store)
+def test_serve_on_a_port_that_is_taken(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(OSError, match=f"^cannot listen on 127.0.0.1, port {port}: Address already in use$"):
-            serve(tmp_path, "127.0.0.1", port)
+            serve(root, "127.0.0.1", port)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
-def test_serve(store: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, host: str) -> None:
+def test_serve(root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], host: str) -> None:
+    ports = []
+
     def run(server: Any, sockets: list[socket.socket]) -> None:
         (listener,) = sockets
         assert listener.getsockname()[0] == "127.0.0.1"
         # an accepted socket inherits this; asyncio turns the 40 ms delay of small answers off only where it is named
         assert listener.proto == socket.IPPROTO_TCP
-        assert server.config.app.state.store is store
-        assert server.config.app.state.settings.store == tmp_path
+        server.config.load()
+        assert os.environ["BRDFDB_STORE"] == str(root)
+        ports.append(listener.getsockname()[1])
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("brdfdb.open", lambda _: store)
+    monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     monkeypatch.setattr("uvicorn.Server.run", run)
-    serve(tmp_path, host, 0)
+    serve(root, host, 0)
+    assert capsys.readouterr().out == f"serving {root} at http://{host}:{ports[0]}/\n"
 
 
 def test_serve_on_no_port(tmp_path: Path) -> None:

@@ -2,74 +2,143 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from brdfdb.store import StoreError
+from brdfdb.store import Store
 from brdfdb_api.app import create_app
 from brdfdb_api.settings import Settings
+from brdfdb_api.shelf import Shelf
+from tests.api.a_store import VISIBLE_NM, Client, client_of, publish
 
-FOIL = "/v1/materials/blue-foil"
+FOIL = "/v1/materials/copper-foil"
 FOIL_POINT = f"{FOIL}/lookup?theta_i=10&theta_r=20"
 
 
-def test_catalogue(client: Any) -> None:
-    materials = client.get("/v1/materials").json()["materials"]
-    assert [material["name"] for material in materials] == ["blue-foil", "grey-felt"]
-    assert materials[0] == {
-        "name": "blue-foil",
-        "title": "Made-up blue-foil",
-        "model": "formula",
-        "anisotropic": True,
-        "wavelength_range_nm": [400.0, 600.0],
+def test_catalogue(client: Client, store: Store) -> None:
+    page = client.get("/v1/materials").json()
+    assert (page["total"], page["next"]) == (4, None)
+    materials = {material["name"]: material for material in page["materials"]}
+    assert list(materials) == ["brushed-metal", "copper-foil", "grey-felt", "white-tile"]
+    head = store.summary("copper-foil")
+    assert materials["copper-foil"] == {
+        "name": "copper-foil",
+        "title": "Test copper-foil",
+        "model": "he_torrance",
+        "model_title": store.attributes("copper-foil")["model_title"],
+        "paper": "he1991",
+        "source": "no paper, copper-foil",
+        "anisotropic": False,
+        "wavelength_range_nm": [400.0, 700.0],
+        "error_p99": head["error_p99"],
+        "verdict": None,
+        "colour": materials["copper-foil"]["colour"],
         "revision": "r000001",
+        "created": head["created"],
+        "bytes": head["bytes"],
         "href": FOIL,
     }
-    assert materials[1]["wavelength_range_nm"] is None
-    assert client.get(materials[1]["href"]).status_code == 200
+    assert materials["grey-felt"]["wavelength_range_nm"] is None
+    assert materials["brushed-metal"]["anisotropic"] is True
+    assert client.get(materials["grey-felt"]["href"]).status_code == 200
 
 
-def test_catalogue_follows_the_store(client: Any, store: Any) -> None:
-    assert client.get("/v1/materials").json()["materials"][1]["title"] == "Made-up grey-felt"
-    store["grey-felt"].attrs["title"] = "Other felt"
-    store["grey-felt"].revision = "r000002"
-    del store.tables["blue-foil"]
-    (material,) = client.get("/v1/materials").json()["materials"]
-    assert (material["title"], material["revision"]) == ("Other felt", "r000002")
+def test_colours_of_the_catalogue(own: Path) -> None:
+    publish(own, "half-tile", "lambert", rho=0.5)
+    colours = {line["name"]: line["colour"] for line in client_of(own).get("/v1/materials").json()["materials"]}
+    # of sRGB (IEC 61966-2-1), 0.5 is 1.055 * 0.5 ** (1 / 2.4) - 0.055 = 187.5 / 255
+    assert (colours["white-tile"], colours["half-tile"]) == ("#ffffff", "#bcbcbc")
 
 
-def test_material(client: Any) -> None:
+@pytest.mark.parametrize(
+    ("query", "names"),
+    [
+        ("model=ward", ["brushed-metal"]),
+        ("model=phong", []),
+        ("paper=he1991", ["copper-foil"]),
+        ("paper=NO+PAPER,+GREY", ["grey-felt"]),
+        ("q=felt+test", ["grey-felt"]),
+        ("q=FELT+copper", []),
+        ("q=torrance", ["copper-foil"]),
+    ],
+)
+def test_filters_of_the_catalogue(client: Client, query: str, names: list[str]) -> None:
+    page = client.get(f"/v1/materials?{query}").json()
+    assert [line["name"] for line in page["materials"]] == names
+    assert (page["total"], page["next"]) == (len(names), None)
+
+
+@pytest.mark.parametrize("query", ["", "&q=no+paper", "&model=ward"])
+def test_pages_of_the_catalogue(client: Client, query: str) -> None:
+    whole = client.get(f"/v1/materials?{query[1:]}").json()
+    names, address = [], f"/v1/materials?limit=1{query}"
+    while address is not None:
+        page = client.get(address).json()
+        assert (len(page["materials"]), page["total"]) == (1, whole["total"])
+        names += [line["name"] for line in page["materials"]]
+        address = page["next"]
+    assert names == [line["name"] for line in whole["materials"]]
+
+
+@pytest.mark.parametrize("query", ["limit=0", "limit=1001", "limit=many", "limits=3", "model=a&model=b"])
+def test_a_bad_page_names_the_parameter(client: Client, query: str) -> None:
+    problem = client.problem("GET", f"/v1/materials?{query}", 422)
+    assert problem["parameter"] == query.partition("=")[0]
+
+
+def test_catalogue_follows_the_store(own: Path) -> None:
+    client = client_of(own)
+    assert client.get("/v1/materials").json()["total"] == 4
+    publish(own, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=20.0)
+    shutil.rmtree(own / "materials" / "copper-foil")
+    lines = client.get("/v1/materials").json()["materials"]
+    assert [(line["name"], line["revision"]) for line in lines] == [
+        ("brushed-metal", "r000001"),
+        ("grey-felt", "r000002"),
+        ("white-tile", "r000001"),
+    ]
+
+
+def test_material(client: Client, store: Store) -> None:
     material = client.get(FOIL).json()
-    assert material["axes_deg"] == {
-        "theta_i": [0.0, 30.0, 60.0, 90.0],
-        "theta_r": pytest.approx([0.0, 180 / 7, 360 / 7, 540 / 7]),
-    }
-    assert material["wavelength_nm"] == [400.0, 500.0, 600.0]
-    assert material["anisotropic"] is True
+    table = store["copper-foil"]
+    assert material["axes_deg"] == {name: nodes.tolist() for name, nodes in table.axes_deg.items()}
+    assert material["wavelength_nm"] == VISIBLE_NM.tolist()
+    assert material["anisotropic"] is False
     assert material["specular"] is True
-    assert material["attributes"]["source"] == "no paper"
-    assert material["attributes"]["parameters"] == {"rho": 0.5, "n": [1.5, None]}
-    assert client.get(material["links"]["self"]).json() == material
-    assert client.get(material["links"]["materials"]).status_code == 200
-    assert client.get(material["links"]["lookup"], params={"theta_i": 1, "theta_r": 2}).status_code == 200
+    assert material["error"] == table.attrs["error"]
+    assert material["audit"] is None
+    assert material["revisions"] == ["r000001"]
+    assert material["attributes"]["source"] == "no paper, copper-foil"
+    (sigma,) = (each for each in material["parameters"] if each["name"] == "sigma_0_um")
+    assert (sigma["value"], sigma["source"], sigma["assumed"]) == (0.1, "no paper, copper-foil", False)
+    links = material["links"]
+    assert client.get(links["self"]).json() == material
+    assert client.get(links["revision"]).json()["links"]["lookup"] == f"{FOIL}/revisions/r000001/lookup"
+    for name in ("materials", "albedo", "lobe", "slice.exr", "download.zarr"):
+        assert client.get(links[name]).status_code == 200
+    assert client.get(links["lookup"], params={"theta_i": 1, "theta_r": 2}).status_code == 200
+    assert client.get(f"{links['store']}/zarr.json").status_code == 200
 
 
-def test_grey_material(client: Any) -> None:
+def test_grey_material(client: Client) -> None:
     material = client.get("/v1/materials/grey-felt").json()
     assert material["wavelength_nm"] is None
     assert material["specular"] is False
 
 
 @pytest.mark.parametrize("address", ["", "/lookup?theta_i=1&theta_r=2"])
-def test_unknown_material_names_the_closest(client: Any, address: str) -> None:
-    problem = client.problem("GET", f"/v1/materials/blue-foul{address}", 404)
-    assert problem["closest"][0] == "blue-foil"
-    assert "blue-foul" in problem["detail"]
+def test_unknown_material_names_the_closest(client: Client, address: str) -> None:
+    problem = client.problem("GET", f"/v1/materials/copper-foul{address}", 404)
+    assert problem["closest"][0] == "copper-foil"
+    assert "copper-foul" in problem["detail"]
 
 
-@pytest.mark.parametrize("name", ["..", "%2e%2e", "..%2F..%2Fetc%2Fpasswd", "%00", "blue-foil%2F..", "BLUE-FOIL"])
-def test_a_name_is_not_a_path(client: Any, name: str) -> None:
+@pytest.mark.parametrize("name", ["..", "%2e%2e", "..%2F..%2Fetc%2Fpasswd", "%00", "copper-foil%2F..", "COPPER-FOIL"])
+def test_a_name_is_not_a_path(client: Client, name: str) -> None:
     assert client.request("GET", f"/v1/materials/{name}/lookup?theta_i=1&theta_r=2").status_code == 404
 
 
@@ -77,60 +146,113 @@ def test_a_name_is_not_a_path(client: Any, name: str) -> None:
     ("method", "address", "status"),
     [("GET", "/", 404), ("GET", "/v2", 404), ("DELETE", FOIL, 405), ("PUT", f"{FOIL}/lookup", 405)],
 )
-def test_addresses_and_methods_that_do_not_exist(client: Any, method: str, address: str, status: int) -> None:
+def test_addresses_and_methods_that_do_not_exist(client: Client, method: str, address: str, status: int) -> None:
     client.problem(method, address, status)
 
 
-@pytest.mark.parametrize("address", [FOIL, FOIL_POINT])
-def test_etag_follows_the_revision(client: Any, store: Any, address: str) -> None:
+@pytest.mark.parametrize(("address", "tag"), [(FOIL, "copper-foil-{}-"), (FOIL_POINT, "copper-foil-{}")])
+def test_etag_follows_the_revision(own: Path, address: str, tag: str) -> None:
+    client = client_of(own)
     first = client.get(address)
-    assert first.headers["etag"] == '"blue-foil-r000001"'
+    assert first.headers["etag"] == f'W/"{tag.format("r000001")}"'  # weak: JSON may be compressed
     assert first.headers["cache-control"] == "no-cache"
-    for held in (first.headers["etag"], f'"other", W/{first.headers["etag"]}', "*"):
+    for held in (first.headers["etag"], f'"other", {first.headers["etag"]}', first.headers["etag"][2:], "*"):
         again = client.get(address, headers={"If-None-Match": held})
         assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", first.headers["etag"])
-    store["blue-foil"].revision = "r000002"
-    assert client.get(address, headers={"If-None-Match": first.headers["etag"]}).status_code == 200
+    publish(own, "copper-foil", "lambert", rho=0.5)
+    answer = client.get(address, headers={"If-None-Match": first.headers["etag"]})
+    assert (answer.status_code, answer.headers["etag"]) == (200, f'W/"{tag.format("r000002")}"')
 
 
-def test_etag_of_npy_is_another(client: Any) -> None:
+def test_etag_of_npy_is_another(client: Client) -> None:
     tag = client.get(FOIL_POINT).headers["etag"]
     answer = client.get(FOIL_POINT, headers={"If-None-Match": tag, "Accept": "application/x-npy"})
-    assert (answer.status_code, answer.headers["etag"]) == (200, '"blue-foil-r000001-npy"')
+    assert (answer.status_code, answer.headers["etag"]) == (200, '"copper-foil-r000001-npy"')
     assert answer.headers["vary"] == "Accept"
 
 
-def test_etag_does_not_hide_an_error(client: Any) -> None:
+def test_etag_does_not_hide_an_error(client: Client) -> None:
     client.problem("GET", f"{FOIL_POINT}&thetai=3", 422, headers={"If-None-Match": "*"})
-    client.problem("GET", "/v1/materials/blue-foul", 404, headers={"If-None-Match": "*"})
+    client.problem("GET", "/v1/materials/copper-foul", 404, headers={"If-None-Match": "*"})
 
 
-def test_health(client: Any) -> None:
-    assert client.get("/healthz").json() == {"status": "ok", "materials": 2}
+def test_an_answer_of_a_revision_is_kept_for_good(own: Path) -> None:
+    client = client_of(own)
+    address = "/v1/materials/white-tile/revisions/r000001/lookup?theta_i=10&theta_r=20"
+    first = client.get(address)
+    assert first.headers["cache-control"] == "public, max-age=31536000, immutable"
+    publish(own, "white-tile", "lambert", rho=0.25)
+    assert client.get(address).json() == first.json()
+    current = client.get("/v1/materials/white-tile/lookup?theta_i=10&theta_r=20").json()
+    assert (current["revision"], current["brdf"]) == ("r000002", pytest.approx(first.json()["brdf"] / 4, rel=1e-7))
+    assert client.get("/v1/materials/white-tile").json()["revisions"] == ["r000001", "r000002"]
+    posted = client.post(address.partition("?")[0], json={"theta_i": 10, "theta_r": 20})
+    assert posted.json() == first.json()
 
 
-@pytest.mark.parametrize("address", ["/healthz", "/v1/materials", FOIL, FOIL_POINT])
-def test_a_store_that_cannot_be_read(client: Any, tmp_path: Any, address: str) -> None:
+@pytest.mark.parametrize("revision", ["r000002", "r1", "latest", "%2e%2e", "..%2fr000001"])
+@pytest.mark.parametrize(
+    "rest", ["", "/lookup?theta_i=1&theta_r=2", "/albedo", "/lobe", "/slice.exr", "/download.zarr"]
+)
+def test_an_unknown_revision(client: Client, revision: str, rest: str) -> None:
+    problem = client.problem("GET", f"{FOIL}/revisions/{revision}{rest}", 404)
+    assert problem.get("parameter", "revision") == "revision"
+    if revision == "r000002":
+        assert problem["detail"].startswith("copper-foil has no revision 'r000002'")
+
+
+def test_health(client: Client, tmp_path: Path) -> None:
+    assert client.get("/healthz").json() == {"status": "ok"}
+    assert client.get("/readyz").json() == {"status": "ok", "materials": 4}
+    client.app = create_app(Settings(store=tmp_path / "nothing"))
+    assert client.get("/healthz").json() == {"status": "ok"}
+
+
+@pytest.mark.parametrize("address", ["/readyz", "/v1/materials", FOIL, FOIL_POINT, f"{FOIL}/albedo"])
+def test_a_store_that_cannot_be_read(client: Client, tmp_path: Path, address: str) -> None:
     client.app = create_app(Settings(store=tmp_path / "nothing"))
     assert "nothing" in client.problem("GET", address, 503)["detail"]
 
 
-def test_a_store_that_appears_later(client: Any, store: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    client.app = create_app(Settings(store=tmp_path / "later"))
-    client.problem("GET", "/healthz", 503)
-    monkeypatch.setattr("brdfdb.open", {tmp_path / "later": store}.get)
-    assert client.get("/healthz").json()["materials"] == 2
+def test_a_store_that_appears_later(root: Path, tmp_path: Path) -> None:
+    client = client_of(tmp_path / "later")
+    client.problem("GET", "/readyz", 503)
+    shutil.copytree(root, tmp_path / "later")
+    assert client.get("/readyz").json()["materials"] == 4
 
 
-def test_a_store_that_breaks(client: Any, store: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(_: Any) -> int:
-        raise StoreError("the pointer of blue-foil is not readable")
+def test_a_damaged_material_is_named_and_the_others_go_on(own: Path) -> None:
+    (own / "materials" / "grey-felt" / "r000001" / "zarr.json").write_bytes(b"{}")
+    client = client_of(own)
+    said = client.problem("GET", "/v1/materials/grey-felt", 503)["detail"]
+    assert said.startswith("grey-felt r000001 is damaged: ")
+    assert client.problem("GET", "/v1/materials/grey-felt/lookup?theta_i=1&theta_r=2", 503)["detail"] == said
+    lines = client.get("/v1/materials").json()["materials"]
+    assert lines[2] == {"name": "grey-felt", "damaged": said, "href": "/v1/materials/grey-felt"}
+    assert len(lines) == 4
+    assert client.get("/readyz").json()["materials"] == 4
+    assert client.get(FOIL_POINT).status_code == 200
 
-    monkeypatch.setattr(type(store), "__len__", fail)
-    assert client.problem("GET", "/healthz", 503)["detail"] == "the pointer of blue-foil is not readable"
+
+def test_what_is_removed_while_it_is_served_may_come_back(own: Path) -> None:
+    client = client_of(own)
+    assert client.get(FOIL_POINT).status_code == 200
+    shutil.move(own / "materials" / "copper-foil", own / "aside")
+    assert client.problem("GET", FOIL_POINT, 503)["detail"] == "copper-foil is gone from the store"
+    assert client.problem("GET", FOIL, 503)["detail"] == "copper-foil is gone from the store"
+    shutil.move(own / "aside", own / "materials" / "copper-foil")
+    assert client.get(FOIL_POINT).status_code == 200
+    shutil.move(own, own.with_name("aside"))
+    client.problem("GET", FOIL_POINT, 503)
+    client.problem("GET", "/readyz", 503)
+    shutil.move(own.with_name("aside"), own)
+    assert client.get("/readyz").json()["materials"] == 4
 
 
-def test_an_unexpected_error_tells_nothing(client: Any, store: Any) -> None:
-    del store["blue-foil"].attrs["title"]
-    problem = client.problem("GET", "/v1/materials", 500)
-    assert "title" not in problem["detail"]
+def test_an_unexpected_error_tells_nothing(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> Any:
+        raise RuntimeError("secret")
+
+    monkeypatch.setattr(Shelf, "names", fail)
+    problem = client_of(own).problem("GET", "/v1/materials", 500)
+    assert "secret" not in problem["detail"]

@@ -1,0 +1,115 @@
+"""What tests of the HTTP layer share: materials, quick to tabulate, a client without a network, and a server."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import uvicorn
+
+from brdfdb.accuracy import measure
+from brdfdb.grids import Grid
+from brdfdb.layout import Layout
+from brdfdb.materials import Material
+from brdfdb.staging import publish_dataset
+from brdfdb.store import Store
+from brdfdb.tabulate import tabulate
+from brdfdb_api.app import create_app
+from brdfdb_api.settings import Settings
+
+PROBLEM = "application/problem+json"
+NPY = "application/x-npy"
+
+THETA = [0, 30, 60, 85]
+GREY = Grid({"theta_i": THETA, "theta_r": THETA, "delta_phi": [0, 90, 180]})
+TURNED = Grid({"theta_i": THETA, "phi_i": [0, 45, 90], "theta_r": THETA, "phi_r": np.arange(0, 361, 45)})
+VISIBLE_NM = np.arange(400.0, 701.0, 20.0)
+
+
+def publish(root: Path, name: str, model: str, grid: Grid = GREY, *, error: bool = False, **entries: Any) -> str:
+    """Tabulate a material and publish it; returns its revision. What is neither of these names is a parameter."""
+    beside = {key: entries.pop(key) for key in ("refractive_index",) if key in entries}
+    about = {"title": f"Test {name}", "model": model, "source": f"no paper, {name}", **beside, "parameters": entries}
+    layout = Layout(Material.from_table(name, about), grid, VISIBLE_NM if beside else None)
+    dataset = tabulate(layout)
+    if error:
+        found = measure(layout, lambda rows: dataset["brdf"].values[rows], count=64)
+        dataset = dataset.assign_attrs(error=found.model_dump())
+    return publish_dataset(root, name, dataset)[0]
+
+
+class Client:
+    """Send requests to an application, each in an event loop of its own."""
+
+    def __init__(self, app: Any) -> None:
+        self.app = app
+
+    def request(self, method: str, url: str, **request: Any) -> httpx.Response:
+        async def send() -> httpx.Response:
+            transport = httpx.ASGITransport(self.app, raise_app_exceptions=False)
+            async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+                return await client.request(method, url, **request)
+
+        return asyncio.run(send())
+
+    def get(self, url: str, **request: Any) -> httpx.Response:
+        return self.request("GET", url, **request)
+
+    def post(self, url: str, **request: Any) -> httpx.Response:
+        return self.request("POST", url, **request)
+
+    def problem(self, method: str, url: str, status: int, **request: Any) -> dict[str, Any]:
+        """Send a request that must end in a problem with `status`."""
+        response = self.request(method, url, **request)
+        assert (response.status_code, response.headers["content-type"]) == (status, PROBLEM), response.text
+        problem: dict[str, Any] = response.json()
+        assert problem["status"] == status
+        assert problem["type"] == "about:blank"
+        assert problem["title"]
+        assert problem["detail"]
+        assert "Traceback" not in response.text
+        return problem
+
+
+def client_of(root: Path, **settings: Any) -> Client:
+    """A client of an application that serves a store."""
+    return Client(create_app(Settings(store=root, **settings)))
+
+
+@contextmanager
+def serving(root: Path, **settings: Any) -> Iterator[str]:
+    """The address of a service in a thread of this process."""
+    app = create_app(Settings(store=root, log_level="error", **settings))
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        server = uvicorn.Server(uvicorn.Config(app, log_level="error", timeout_graceful_shutdown=1, lifespan="off"))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+        finally:
+            server.should_exit = True
+            thread.join()
+
+
+def read_npy(content: bytes) -> np.ndarray:
+    return np.load(io.BytesIO(content), allow_pickle=False)
+
+
+def npy(array: Any) -> bytes:
+    """The bytes of a .npy file."""
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    return buffer.getvalue()
+
+
+def degrees(store: Store, name: str, *angles_deg: Any, **keywords: Any) -> Any:
+    """What Python looks up at angles in degrees."""
+    return store[name].lookup(*np.deg2rad(np.broadcast_arrays(*angles_deg)), **keywords)

@@ -1,0 +1,136 @@
+"""Around every answer: compression, pages of other origins, ids, the log, and what is counted."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.api.a_store import Client, client_of, npy
+
+FELT = "/v1/materials/grey-felt"
+POINT = f"{FELT}/lookup?theta_i=10&theta_r=20"
+
+
+def test_json_is_compressed_for_those_who_ask(client: Client) -> None:
+    body = {"theta_i": 1, "theta_r": [2] * 500}
+    answers = [
+        client.post(f"{FELT}/lookup", json=body, headers={"Accept-Encoding": how}) for how in ("gzip", "identity")
+    ]
+    assert [answer.headers.get("content-encoding") for answer in answers] == ["gzip", None]
+    assert int(answers[0].headers["content-length"]) < int(answers[1].headers["content-length"])
+    assert answers[0].json() == answers[1].json()
+    assert "accept-encoding" in answers[0].headers["vary"].lower()
+
+
+@pytest.mark.parametrize("rest", ["lobe?format=npy", "slice.exr", "download.zarr"])
+def test_numbers_as_bytes_are_not_compressed(client: Client, rest: str) -> None:
+    answer = client.get(f"{FELT}/{rest}", headers={"Accept-Encoding": "gzip"})
+    assert answer.status_code == 200
+    assert len(answer.content) > 1024
+    assert "content-encoding" not in answer.headers
+
+
+def test_pages_of_other_origins_may_ask_only_where_that_is_set(root: Path) -> None:
+    origin = {"Origin": "https://a.example"}
+    asked = {**origin, "Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "content-type"}
+    assert "access-control-allow-origin" not in client_of(root).get(POINT, headers=origin).headers
+    client = client_of(root, cors_origins=("https://a.example",))
+    answer = client.get(POINT, headers=origin)
+    assert answer.headers["access-control-allow-origin"] == "https://a.example"
+    assert "ETag" in answer.headers["access-control-expose-headers"]
+    assert client.request("OPTIONS", f"{FELT}/lookup", headers=asked).status_code == 200
+    other = client.get(POINT, headers={"Origin": "https://b.example"})
+    assert "access-control-allow-origin" not in other.headers
+
+
+ADDRESSES = [POINT, FELT, "/healthz", "/nothing", "/v1/materials/grey-fell", f"{FELT}/lookup?theta_i=900&theta_r=1"]
+
+
+@pytest.mark.parametrize("address", ADDRESSES)
+def test_a_request_has_an_id(client: Client, address: str) -> None:
+    assert client.get(address, headers={"X-Request-ID": "my-id.7_A"}).headers["x-request-id"] == "my-id.7_A"
+    made = [client.get(address).headers["x-request-id"] for _ in range(2)]
+    assert all(re.fullmatch("[0-9a-f]{16}", each) for each in made)
+    assert made[0] != made[1]
+
+
+@pytest.mark.parametrize("sent", ["", "two words", "a" * 65, 'a"b', "a\tb"])
+def test_an_id_that_could_harm_a_log_is_replaced(client: Client, sent: str) -> None:
+    answer = client.get(POINT, headers={"X-Request-ID": sent})
+    assert re.fullmatch("[0-9a-f]{16}", answer.headers["x-request-id"])
+
+
+@pytest.fixture
+def log(caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
+    caplog.set_level(logging.INFO, "brdfdb.http")
+    return caplog
+
+
+@pytest.mark.parametrize(
+    ("address", "status", "level"),
+    [(POINT, 200, "INFO"), (FELT, 200, "INFO"), ("/nothing", 404, "WARNING"), (f"{FELT}/lookup", 422, "WARNING")],
+)
+def test_the_log_has_a_line_of_json_for_each_request(
+    client: Client, log: pytest.LogCaptureFixture, address: str, status: int, level: str
+) -> None:
+    client.get(address, headers={"X-Request-ID": "mine"})
+    (record,) = [record for record in log.records if record.name == "brdfdb.http"]
+    assert record.levelname == level
+    line = json.loads(record.message)
+    path, _, query = address.partition("?")
+    told = {"request": "mine", "method": "GET", "path": path, "query": query, "status": status}
+    assert {key: line[key] for key in told} == told
+    assert line["ms"] > 0.0
+
+
+def test_a_failure_is_in_the_log_and_not_in_the_answer(
+    client: Client, log: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> Any:
+        raise RuntimeError("secret")
+
+    monkeypatch.setattr("brdfdb_api.shelf.Shelf.held", fail)
+    assert "secret" not in client.problem("GET", POINT, 500, headers={"X-Request-ID": "mine"})["detail"]
+    failed, answered = (json.loads(record.message) for record in log.records if record.name == "brdfdb.http")
+    assert (failed["request"], failed["failed"]) == ("mine", "RuntimeError: secret")
+    assert (answered["request"], answered["status"]) == ("mine", 500)
+
+
+def counted(client: Client, line: str) -> float:
+    """The value of a line of /metrics, 0 where there is none."""
+    values = [
+        text.rpartition(" ")[2] for text in client.get("/metrics").text.splitlines() if text.startswith(line + " ")
+    ]
+    return float(values[0]) if values else 0.0
+
+
+@pytest.mark.parametrize(
+    ("ask", "line", "more"),
+    [
+        (POINT, 'brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"}', 1),
+        (POINT, 'brdfdb_points_total{source="table"}', 1),
+        (POINT + "&from=model", 'brdfdb_points_total{source="model"}', 1),
+        (POINT, 'brdfdb_request_seconds_count{route="/v1/materials/{name}/lookup"}', 1),
+        (FELT, 'brdfdb_requests_total{route="/v1/materials/{name}",status="200"}', 1),
+        (f"{FELT}/lookup", 'brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="422"}', 1),
+        ("/nothing/at/all", 'brdfdb_requests_total{route="other",status="404"}', 1),
+    ],
+)
+def test_requests_and_points_are_counted(client: Client, ask: str, line: str, more: int) -> None:
+    before = counted(client, line)
+    client.get(ask)
+    assert counted(client, line) - before == more
+
+
+def test_points_of_a_body_are_counted(client: Client) -> None:
+    line = 'brdfdb_points_total{source="table"}'
+    before = counted(client, line)
+    client.post(
+        f"{FELT}/lookup", content=npy([[10.0, 0.0, 20.0, 0.0]] * 17), headers={"Content-Type": "application/x-npy"}
+    )
+    assert counted(client, line) - before == 17

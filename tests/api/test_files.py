@@ -1,0 +1,118 @@
+"""The files of the store over HTTP: one by one, as xarray reads them, and a revision as a zip."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from zarr.storage import ZipStore
+
+from brdfdb.store import Store
+from tests.api.a_store import Client, client_of, publish, serving
+
+FOIL = "/v1/materials/copper-foil"
+STORED = "/v1/store/materials/copper-foil/r000001"
+CHUNK = "brdf/c/0/0/0/0"
+
+
+def files(directory: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+def test_each_file_is_served_as_it_is(client: Client, store: Store) -> None:
+    stored = files(store.path("copper-foil"))
+    assert {"zarr.json", CHUNK} < stored.keys()
+    for name, content in stored.items():
+        answer = client.get(f"{STORED}/{name}")
+        assert (answer.status_code, answer.content) == (200, content)
+        kind = "application/json" if name.endswith(".json") else "application/octet-stream"
+        assert answer.headers["content-type"] == kind
+        assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
+
+
+def test_a_part_of_a_file(client: Client, store: Store) -> None:
+    answer = client.get(f"{STORED}/{CHUNK}", headers={"Range": "bytes=4-11"})
+    assert (answer.status_code, answer.content) == (206, (store.path("copper-foil") / CHUNK).read_bytes()[4:12])
+
+
+def test_a_file_that_is_held_is_not_sent_again(client: Client) -> None:
+    tag = client.get(f"{STORED}/zarr.json").headers["etag"]
+    again = client.get(f"{STORED}/zarr.json", headers={"If-None-Match": tag})
+    assert (again.status_code, again.content) == (304, b"")
+    assert client.get(f"{STORED}/{CHUNK}", headers={"If-None-Match": tag}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        f"{STORED}/nothing",
+        f"{STORED}/",
+        f"{STORED}/brdf",
+        f"{STORED}/stranger.txt",
+        f"{STORED}/../r000001.MANIFEST.json",
+        f"{STORED}/%2e%2e/r000001.MANIFEST.json",
+        f"{STORED}/..%2fHEAD.json",
+        f"{STORED}/%2e%2e%2f%2e%2e%2f%2e%2e%2fbrdfdb.json",
+        f"{STORED}//etc/passwd",
+        f"{STORED}/%2fetc%2fpasswd",
+        f"{STORED}/zarr.json%00",
+        "/v1/store/materials/copper-foil/r000002/zarr.json",
+        "/v1/store/materials/copper-foil/%2e%2e/HEAD.json",
+        "/v1/store/materials/copper-foil/HEAD.json",
+        "/v1/store/materials/copper-foil/.staging/zarr.json",
+        "/v1/store/materials/%2e%2e/materials/copper-foil/r000001/zarr.json",
+        "/v1/store/materials/copper-fool/r000001/zarr.json",
+        "/v1/store/brdfdb.json",
+    ],
+)
+def test_nothing_but_the_files_of_a_manifest(own: Path, address: str) -> None:
+    (own / "materials" / "copper-foil" / "r000001" / "stranger.txt").write_text("nobody's")
+    client_of(own).problem("GET", address, 404)
+
+
+def test_a_file_that_is_missing_is_an_error_not_nan(own: Path) -> None:
+    (own / "materials" / "copper-foil" / "r000001" / CHUNK).unlink()
+    client = client_of(own)
+    for address in (f"{STORED}/{CHUNK}", f"{STORED}/zarr.json", f"{FOIL}/download.zarr"):
+        assert "damaged" in client.problem("GET", address, 503)["detail"]
+    (own / "materials" / "white-tile" / "r000001.MANIFEST.json").unlink()
+    said = client.problem("GET", "/v1/materials/white-tile/download.zarr", 503)["detail"]
+    assert said.startswith("white-tile")
+
+
+def test_a_zip_that_xarray_opens(client: Client, store: Store, tmp_path: Path) -> None:
+    answer = client.get(f"{FOIL}/download.zarr")
+    assert answer.headers["content-type"] == "application/zip"
+    assert answer.headers["content-disposition"] == 'attachment; filename="copper-foil-r000001.zarr.zip"'
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert archive.testzip() is None
+        assert {name: archive.read(name) for name in archive.namelist()} == files(store.path("copper-foil"))
+    (tmp_path / "copper.zip").write_bytes(answer.content)
+    zipped = ZipStore(tmp_path / "copper.zip", mode="r")
+    with xr.open_zarr(zipped) as found, xr.open_zarr(store.path("copper-foil")) as expected:
+        assert found.load().identical(expected.load())
+    zipped.close()
+
+
+def test_a_zip_of_a_revision_is_kept_for_good(own: Path) -> None:
+    client = client_of(own)
+    first = client.get(f"{FOIL}/revisions/r000001/download.zarr")
+    assert first.headers["cache-control"] == "public, max-age=31536000, immutable"
+    publish(own, "copper-foil", "lambert", rho=0.5)
+    again = client.get(f"{FOIL}/revisions/r000001/download.zarr", headers={"If-None-Match": first.headers["etag"]})
+    assert again.status_code == 304
+    current = client.get(f"{FOIL}/download.zarr", headers={"If-None-Match": first.headers["etag"]})
+    assert (current.status_code, current.headers["cache-control"]) == (200, "no-cache")
+
+
+def test_xarray_reads_over_http(root: Path, store: Store) -> None:
+    pytest.importorskip("aiohttp")
+    with (
+        serving(root) as url,
+        xr.open_zarr(f"{url}{STORED}") as found,
+        xr.open_zarr(store.path("copper-foil")) as expected,
+    ):
+        assert found.load().identical(expected.load())

@@ -1,0 +1,232 @@
+"""Albedos, lobes, slices and verdicts: what a page shows of a material."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from brdfdb import exr
+from brdfdb.albedo import directional_albedo
+from brdfdb.geometry import directions_from_half_difference
+from brdfdb.spectra import srgb_weights
+from brdfdb.store import Store
+from tests.api.a_store import VISIBLE_NM, Client, client_of, degrees, publish, read_npy
+
+FOIL, FELT, TILE, METAL = (
+    f"/v1/materials/{name}" for name in ("copper-foil", "grey-felt", "white-tile", "brushed-metal")
+)
+EXACT = {"rtol": 1e-12}
+
+
+# Albedo
+
+
+def test_a_white_tile_reflects_everything(client: Client) -> None:
+    albedo = client.get(f"{TILE}/albedo").json()
+    np.testing.assert_allclose(albedo["albedo"], 1.0, rtol=2**-23)  # stored as float32
+    np.testing.assert_allclose(albedo["hemispherical"], 1.0, rtol=2**-23)
+    assert not np.any(albedo["specular_reflectance"])
+    assert albedo["wavelength_nm"] is None
+
+
+def test_albedo_is_that_of_the_table(client: Client, store: Store) -> None:
+    albedo = client.get(f"{FOIL}/albedo").json()
+    table = store["copper-foil"]
+    expected = directional_albedo(table)
+    assert albedo["wavelength_nm"] == VISIBLE_NM.tolist()
+    np.testing.assert_array_equal(albedo["theta_i"], expected.theta_i_deg)
+    np.testing.assert_array_equal(albedo["albedo"], expected.mean)
+    specular = table.specular_reflectance(np.deg2rad(albedo["theta_i"]))
+    np.testing.assert_allclose(albedo["specular_reflectance"], specular, **EXACT)
+    whole = np.array(albedo["albedo"]) + albedo["specular_reflectance"]
+    assert np.all(whole.min(axis=0) <= albedo["hemispherical"])
+    assert np.all(albedo["hemispherical"] <= whole.max(axis=0))
+
+
+# Lobes
+
+
+@pytest.mark.parametrize("name", ["copper-foil", "grey-felt", "brushed-metal"])
+def test_a_cut_is_lookups_at_its_axis(client: Client, store: Store, name: str) -> None:
+    lobe = client.get(f"/v1/materials/{name}/lobe?theta_i=40&phi_i=20").json()
+    theta_r = np.array(lobe["axes_deg"]["theta_r"])
+    assert (theta_r[0], theta_r[-1]) == (-90.0, 90.0)
+    assert {40.0, 40.5, 39.5, -40.0} <= set(theta_r)
+    expected = degrees(store, name, 40, 20, np.abs(theta_r), np.where(theta_r > 0, 200, 20))
+    np.testing.assert_allclose(lobe["brdf"], expected, **EXACT)
+    specular = store[name].specular_reflectance(math.radians(40))
+    np.testing.assert_array_equal(lobe["specular_reflectance"], specular)
+
+
+def test_a_hemisphere_is_lookups_at_its_axes(client: Client, store: Store) -> None:
+    lobe = client.get(f"{METAL}/lobe?view=hemisphere&theta_i=40&phi_i=20").json()
+    theta_r, phi = (np.array(lobe["axes_deg"][axis]) for axis in ("theta_r", "phi"))
+    assert (theta_r[0], theta_r[-1], phi[0], phi[-1]) == (0.0, 90.0, 0.0, 360.0)
+    expected = degrees(store, "brushed-metal", 40, 20, theta_r[:, None], 20 + phi)
+    np.testing.assert_allclose(lobe["brdf"], expected, **EXACT)
+
+
+def test_half_and_difference_angles_are_lookups_at_their_axes(client: Client, store: Store) -> None:
+    lobe = client.get(f"{FELT}/lobe?view=half-difference&phi_i=20").json()
+    axes = lobe["axes_deg"]
+    assert axes["theta_h"] == axes["theta_d"] == (np.arange(90) + 0.5).tolist()
+    theta_h, theta_d = np.deg2rad(axes["theta_h"])[:, None], np.deg2rad(axes["theta_d"])
+    directions = directions_from_half_difference(theta_h, math.radians(20), theta_d, math.pi / 2)
+    np.testing.assert_allclose(lobe["brdf"], store["grey-felt"].lookup(*directions), **EXACT)
+    assert lobe["theta_i"] is lobe["specular_reflectance"] is None
+
+
+def test_a_lobe_in_colour_at_wavelengths_and_as_npy(client: Client) -> None:
+    spectra = np.array(client.get(f"{FOIL}/lobe").json()["brdf"])
+    colour = client.get(f"{FOIL}/lobe?output=linear-srgb&illuminant=A").json()
+    of = srgb_weights(tuple(VISIBLE_NM.tolist()), "A")
+    np.testing.assert_allclose(colour["brdf"], spectra @ of, **EXACT)
+    assert colour["illuminant"] == "A"
+    two = client.get(f"{FOIL}/lobe?wavelength_nm=700&wavelength_nm=400").json()
+    np.testing.assert_array_equal(two["brdf"], spectra[:, [-1, 0]])
+    np.testing.assert_array_equal(read_npy(client.get(f"{FOIL}/lobe?format=npy").content), spectra)
+
+
+@pytest.mark.parametrize(
+    ("query", "parameter"),
+    [
+        ("theta_i=91", "theta_i"),
+        ("theta_i=nan", "theta_i"),
+        ("phi_i=721", "phi_i"),
+        ("view=top", "view"),
+        ("theta_r=3", "theta_r"),
+        ("wavelength_nm=200", "wavelength_nm"),
+        ("output=rgb", "output"),
+        ("error=true", "error"),
+    ],
+)
+def test_a_bad_lobe_names_the_parameter(client: Client, query: str, parameter: str) -> None:
+    assert client.problem("GET", f"{FOIL}/lobe?{query}", 422)["parameter"] == parameter
+
+
+# Slices
+
+
+@pytest.mark.parametrize(
+    ("query", "kind"),
+    [
+        ("", "lobe"),
+        ("?kind=lobe&theta_i=30&phi_i=10", "lobe"),
+        ("?kind=in_plane", "in_plane"),
+        ("?kind=half_difference", "half_difference"),
+    ],
+)
+@pytest.mark.parametrize("address", [FOIL, FELT])
+def test_a_slice_is_what_the_export_writes(
+    client: Client, store: Store, tmp_path: Path, address: str, query: str, kind: str
+) -> None:
+    answer = client.get(f"{address}/slice.exr{query}")
+    name = address.rpartition("/")[2]
+    assert answer.headers["content-disposition"] == f'attachment; filename="{name}_{kind}.exr"'
+    at = (30.0, 10.0) if "theta_i" in query else (45.0, 0.0)
+    image = {
+        "lobe": lambda: exr.lobe_map(store[name], theta_i_deg=at[0], phi_i_deg=at[1]),
+        "in_plane": lambda: exr.in_plane_slice(store[name], phi_i_deg=0.0),
+        "half_difference": lambda: exr.half_difference_slice(store[name], phi_h_deg=0.0),
+    }[kind]()
+    exr.write(tmp_path / "expected.exr", image, store[name])
+    found, expected = (
+        pixels(content, tmp_path) for content in (answer.content, (tmp_path / "expected.exr").read_bytes())
+    )
+    assert found.keys() == expected.keys()
+    for channel, values in expected.items():
+        assert values.dtype == np.float32
+        np.testing.assert_array_equal(found[channel], values)
+
+
+def test_a_slice_of_16_bits(client: Client, tmp_path: Path) -> None:
+    channels = pixels(client.get(f"{FELT}/slice.exr?half=true").content, tmp_path)
+    assert {values.dtype for values in channels.values()} == {np.dtype(np.float16)}
+
+
+def pixels(content: bytes, folder: Path) -> dict[str, Any]:
+    """The channels of an EXR file."""
+    (folder / "read.exr").write_bytes(content)
+    with OpenEXR.File(str(folder / "read.exr"), separate_channels=True) as file:
+        return {name: channel.pixels.copy() for name, channel in file.channels().items()}
+
+
+@pytest.mark.parametrize("query", ["kind=map", "theta_i=-1", "half=perhaps", "wavelength_nm=500"])
+def test_a_bad_slice_names_the_parameter(client: Client, query: str) -> None:
+    assert client.problem("GET", f"{FOIL}/slice.exr?{query}", 422)["parameter"] == query.partition("=")[0]
+
+
+# Verdicts
+
+
+def report(root: Path, revision: str = "r000001", when: str = "2026-11-21T12:00:00Z") -> dict[str, Any]:
+    """Write what an audit of the white tile would, as far as the service reads it."""
+    passes = {"verdict": "passes"}
+    finding = {
+        "material": "white-tile",
+        "revision": revision,
+        "verdict": "passes",
+        "energy": {"verdict": "conserves", "reason": "it reflects 1 at all angles"},
+        "reciprocity": passes,
+        "validity": {"standing": "inside", "limits": []},
+    }
+    document = {"format": "brdfdb-audit", "when": when, "materials": [finding]}
+    (root / "audit.json").write_text(json.dumps(document), encoding="utf-8")
+    return finding
+
+
+def test_the_verdict_of_the_last_audit(own: Path) -> None:
+    client = client_of(own)
+    assert "no audit of it is here" in client.problem("GET", f"{TILE}/audit", 404)["detail"]
+    finding = report(own)
+    answer = client.get(f"{TILE}/audit").json()
+    assert answer == {
+        "material": "white-tile",
+        "revision": "r000001",
+        "current": True,
+        "when": "2026-11-21T12:00:00Z",
+        "finding": finding,
+    }
+    assert client.get(f"{TILE}/revisions/r000001/audit").json() == answer
+    assert client.get(TILE).json()["audit"] == {
+        "verdict": "passes",
+        "findings": {"energy": "conserves", "reciprocity": "passes"},
+        "reason": "it reflects 1 at all angles",
+        "validity": "inside",
+        "revision": "r000001",
+        "current": True,
+        "when": "2026-11-21T12:00:00Z",
+    }
+    lines = {line["name"]: line["verdict"] for line in client.get("/v1/materials").json()["materials"]}
+    assert (lines["white-tile"], lines["grey-felt"]) == ("passes", None)
+    client.problem("GET", f"{FELT}/audit", 404)
+
+
+def test_a_verdict_of_another_revision_says_so(own: Path) -> None:
+    report(own)
+    client = client_of(own)
+    tags = [client.get(address).headers["etag"] for address in (TILE, f"{TILE}/audit")]
+    publish(own, "white-tile", "lambert", rho=0.5)
+    assert client.get(f"{TILE}/audit").json()["current"] is False
+    assert client.get(TILE).json()["audit"]["current"] is False
+    line = next(line for line in client.get("/v1/materials?q=white").json()["materials"])
+    assert line["verdict"] is None
+    client.problem("GET", f"{TILE}/revisions/r000002/audit", 404)
+    report(own, "r000002", "2026-11-22T12:00:00Z")
+    for address, tag in zip((TILE, f"{TILE}/audit"), tags, strict=True):
+        assert client.get(address, headers={"If-None-Match": tag}).status_code == 200
+    assert client.get(TILE).json()["audit"]["current"] is True
+
+
+@pytest.mark.parametrize("content", ["", "{}", "[]", '{"when": "", "materials": [1]}', '{"materials": {}}'])
+def test_a_report_that_is_none_is_no_verdict(own: Path, content: str) -> None:
+    (own / "audit.json").write_text(content)
+    client = client_of(own)
+    assert client.get(TILE).json()["audit"] is None
+    client.problem("GET", f"{TILE}/audit", 404)
