@@ -148,9 +148,11 @@ def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface
     """What the mirror of some points shows; in place of what lies beyond, which is then 0."""
     facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
     origins, directions = _lifted(surface)[facing], _mirror(surface)[facing]
-    found, *_ = _seen(scene, origins, directions, facing, number)
-    for each in found:
+    found, surfaces, _ = _seen(scene, origins, directions, facing, number)
+    for each, shown in zip(found, surfaces, strict=True):
         points[number].beyond[each.at] = 0.0
+        if scene.materials[each.material].spec.specular is not None:  # what its mirror would show is not traced
+            each.beyond[np.isfinite(_trace(scene, _lifted(shown), _mirror(shown))[0])] = 0.0
     return found
 
 

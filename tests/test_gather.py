@@ -146,6 +146,27 @@ def test_a_mirror_shows_what_stands_before_it() -> None:
     assert np.abs(shown.wr - [0.0, 0.0, 1.0]).max() < ROUNDING  # the floor is seen from straight above
 
 
+def test_a_mirror_in_a_mirror_shows_no_light_through_what_stands_in_the_way() -> None:
+    # a periscope: by the lower mirror the camera sees the upper one, which faces the light; a lid covers its left half
+    def mirror(z: float, axis: list[float]) -> dict[str, Any]:
+        return {"kind": "plane", "position": [0.0, 0.0, z], "axis": axis, "size": [1.0, 1.0]}
+
+    lid = {"kind": "plane", "position": [-0.5, -3.0, 3.0], "axis": [0.0, -1.0, 0.0], "size": [1.0, 4.0]}
+    more = [
+        {"name": "upper", "material": "aluminum-cylinder-13b", "shape": mirror(3.0, [0.0, -1.0, -1.0])},
+        {"name": "lid", "material": "foam", "shape": lid},
+    ]
+    lights = [{"direction": [0.0, -1.0, 0.0], "solid_angle_sr": 0.2}]
+    of = scene(mirror(0.0, [0.0, -1.0, 1.0]), material="aluminum-cylinder-13b", lights=lights, ambient=0.1, more=more)
+    points = gather(of, WIDTH).points
+    (upper,) = (each for each in points if each.name == "upper" and each.via == 0)
+    covered = upper.beyond == 0.0
+    # the lid ends in the middle: mirrors keep left and right
+    column = points[0].at[upper.at] % WIDTH
+    assert np.array_equal(covered, column < WIDTH // 2)
+    assert np.all(upper.beyond[~covered] > 10.0)
+
+
 def test_more_rays_fall_on_the_same_pixels() -> None:
     one, four = (gather(scene(), WIDTH, across=across) for across in (1, 2))
     assert four.samples == 4
