@@ -14,7 +14,9 @@ from brdfdb.recorded import Recorded
 from brdfdb.scene import Camera, Object, Scene
 from brdfdb.shapes import Array, unit
 
-_LIFT = 1e-4  # of 1, or of coordinates beyond: how far off their surface shadow and mirror rays begin
+# How far off their surface shadow and mirror rays begin: of the height that the picture has there, and of coordinates,
+# which are rounded
+_LIFT, _ROUNDED = 1e-4, 1e-14
 _BATCH = 40_000  # shadow rays at a time: fewer are slow for the calls, twice as many leave the cache
 _LENGTH_OFF = 0.05  # how far from 1 a recorded vector may be, which is then made 1 long: EXR with 16 bits is at 5e-4
 
@@ -103,7 +105,7 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         height = max(1, round(width / scene.camera.aspect))
         pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
         rays = scene.camera.rays(width * across, height * across)
-        points, surfaces, missed = _seen(scene, *rays, pixels.ravel(), None)
+        points, surfaces, missed = _seen(scene, *rays, pixels.ravel())
         background = _background(scene, rays[1][missed], pixels.ravel()[missed], width * height)
         for number, surface in enumerate(surfaces):
             if scene.materials[points[number].material].spec.specular is not None:
@@ -117,25 +119,38 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
 
 
 class _Surface(NamedTuple):
-    """Points (N, 3), frames with tangent, across and normal as rows (N, 3, 3), and viewers (N, 3), all in the scene."""
+    """Points (N, 3), frames with tangent, across and normal as rows (N, 3, 3), and viewers (N, 3), all in the scene.
+
+    `away` (N,) is how far the camera is, by way of the mirror.
+    """
 
     position: Array
     frame: Array
     viewer: Array
+    away: Array
 
 
 def _seen(
-    scene: Scene, origins: Array, directions: Array, at: NDArray[np.int64], via: int | None
+    scene: Scene,
+    origins: Array,
+    directions: Array,
+    at: NDArray[np.int64],
+    via: int | None = None,
+    before: Array | float = 0.0,
 ) -> tuple[list[Points], list[_Surface], NDArray[np.int64]]:
-    """What rays meet first: points of each object that is met, the surfaces that they lie on; rays that meet none."""
+    """What rays meet first: points of each object that is met, the surfaces that they lie on; rays that meet none.
+
+    `before` is how far the origins are from the camera.
+    """
     distance, nearest = _trace(scene, origins, directions)
+    away = before + distance
     points, surfaces = [], []
     for number, item in enumerate(scene.objects):
         rays = np.flatnonzero((nearest == number) & np.isfinite(distance))
         if not rays.size or isinstance(item.shape, Recorded):
             continue
         position = origins[rays] + distance[rays, np.newaxis] * directions[rays]
-        surface = _Surface(position, _turned(item.shape.frame(position), item.grain_deg), -directions[rays])
+        surface = _Surface(position, _turned(item.shape.frame(position), item.grain_deg), -directions[rays], away[rays])
         wr = _viewed(surface)
         wi, irradiance = _lit(scene, item, surface, wr, (number, 0 if via is None else via + 1))
         beyond = _from_afar(scene, _mirror(surface))
@@ -147,12 +162,12 @@ def _seen(
 def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface) -> list[Points]:
     """What the mirror of some points shows; in place of what lies beyond, which is then 0."""
     facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
-    origins, directions = _lifted(surface)[facing], _mirror(surface)[facing]
-    found, surfaces, _ = _seen(scene, origins, directions, facing, number)
+    origins, directions = _lifted(scene.camera, surface)[facing], _mirror(surface)[facing]
+    found, surfaces, _ = _seen(scene, origins, directions, facing, number, surface.away[facing])
     for each, shown in zip(found, surfaces, strict=True):
         points[number].beyond[each.at] = 0.0
         if scene.materials[each.material].spec.specular is not None:  # what its mirror would show is not traced
-            each.beyond[np.isfinite(_trace(scene, _lifted(shown), _mirror(shown))[0])] = 0.0
+            each.beyond[np.isfinite(_trace(scene, _lifted(scene.camera, shown), _mirror(shown))[0])] = 0.0
     return found
 
 
@@ -185,7 +200,7 @@ def _shadow(scene: Scene, surface: _Surface, towards: Array, irradiance: Array) 
     """Make irradiance (E, N) 0 where an object stands in its direction (E, N, 3), in the frame of the scene."""
     if not scene.shadows:
         return
-    origins = _lifted(surface)
+    origins = _lifted(scene.camera, surface)
     sample, point = np.nonzero(irradiance)
     for start in range(0, point.size, _BATCH):
         which = sample[start : start + _BATCH], point[start : start + _BATCH]
@@ -210,9 +225,10 @@ def _background(scene: Scene, directions: Array, at: NDArray[np.int64], pixels: 
     return background
 
 
-def _lifted(surface: _Surface) -> Array:
-    scale = np.maximum(1.0, np.abs(surface.position).max(axis=1, keepdims=True))
-    return np.asarray(surface.position + _LIFT * scale * surface.frame[:, 2])
+def _lifted(camera: Camera, surface: _Surface) -> Array:
+    """Where rays from a surface begin: outside it, but by no more than a small part of a pixel."""
+    lift = _LIFT * camera.covered(surface.away) + _ROUNDED * np.abs(surface.position).max(axis=1)
+    return np.asarray(surface.position + lift[:, np.newaxis] * surface.frame[:, 2])
 
 
 def _mirror(surface: _Surface) -> Array:
@@ -278,7 +294,7 @@ def _frames(
     tangent = unit(tangent)
     frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
     directions = camera.rays(width, height)[1]
-    return _Surface(np.zeros_like(normal), _turned(frame, grain_deg), -directions[at])
+    return _Surface(np.zeros_like(normal), _turned(frame, grain_deg), -directions[at], np.zeros(len(normal)))
 
 
 def _is_unit(vectors: Array) -> NDArray[np.bool_]:

@@ -81,9 +81,17 @@ class Camera(BaseModel):
     def _check(self) -> Camera:
         if (self.fov_deg is None) == (self.height is None):
             raise ValueError("fov_deg, height: give one of the two")
-        if np.linalg.norm(np.cross(np.subtract(self.target, self.position), self.up)) < 1e-9:
+        forward = np.subtract(self.target, self.position)
+        if np.linalg.norm(np.cross(forward, self.up)) <= 1e-9 * np.linalg.norm(forward) * np.linalg.norm(self.up):
             raise ValueError("target: the camera must look at another place than its own, and not along `up`")
         return self
+
+    def covered(self, distance: Array) -> Array:
+        """How high what the camera sees is, at distances from it, from the lower to the upper edge of the picture."""
+        if self.fov_deg is None:
+            assert self.height is not None
+            return np.full_like(distance, self.height)
+        return 2.0 * np.tan(radians(self.fov_deg) / 2.0) * distance
 
     def rays(self, width: int, height: int) -> tuple[Array, Array]:
         """Origins and unit directions (height * width, 3) through the middles of pixels, row by row from the top."""

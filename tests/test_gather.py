@@ -17,6 +17,7 @@ from brdfdb.shapes import Array
 ROUNDING = 1e-15  # 3.3e-16 measured
 LIMB = 3e-13  # of a radius of 1, next to the limb, where a normal is least certain: 2e-13 measured
 SINGLE = 2e-7  # the same of 32 bit floats: 1.2e-7 measured
+MOVED = 1.5e-9  # 1.3e-9 measured, moved by ten thousand radii: next to limbs, where hits are least certain
 SPHERE = {"kind": "sphere", "radius": 1.0}
 FAR = {"position": [0.0, -5.0, 0.0], "height": 2.2, "aspect": 1.0}
 ABOVE = {"position": [0.0, 0.0, 5.0], "up": [0.0, 1.0, 0.0], "height": 2.0, "aspect": 1.0}
@@ -113,6 +114,33 @@ def test_a_sphere_casts_a_round_shadow(shadows: bool) -> None:
     (plane,) = (each for each in view.points if each.name == "thing")
     area = np.count_nonzero(plane.irradiance[0] == 0.0) * (4.0 / 200) ** 2 * np.sqrt(2.0)
     assert abs(area - np.pi * shadows) < 0.004  # 0.0036 measured: whole pixels at the edge
+
+
+@pytest.mark.parametrize("camera", [{"fov_deg": 24.0}, {"height": 2.5}], ids=["pinhole", "far"])
+@pytest.mark.parametrize(("scale", "offset"), [(1e-4, 0.0), (1e5, 0.0), (1.0, 100.0), (1.0, 1e4)])
+def test_a_scaled_and_a_moved_scene_are_the_same_picture(camera: dict[str, float], scale: float, offset: float) -> None:
+    def put(scale: float, offset: float) -> list[Points]:
+        def at(*place: float) -> list[float]:
+            return [scale * each + offset for each in place]
+
+        ball = {"kind": "sphere", "radius": 0.5 * scale, "position": at(0.0, 0.0, 0.5)}
+        vase = {"kind": "revolution", "position": at(1.0, 0.0, 0.0)}
+        vase["profile"] = [[scale * radius, scale * height] for radius, height in ((0.4, 0.0), (0.2, 0.5), (0.4, 1.0))]
+        more = [
+            {"name": "ball", "material": "aluminum-cylinder-13b", "shape": ball},
+            {"name": "vase", "material": "foam", "shape": vase},
+        ]
+        seen_from = {"position": at(0.3, -6.0, 2.0), "target": at(0.0, 0.0, 0.5)}
+        seen_from |= {key: value * (scale if key == "height" else 1.0) for key, value in camera.items()}
+        lights = [{"direction": [-1.0, -0.5, 1.0], "solid_angle_sr": 0.1}, {"direction": [0.3, -1.0, 0.1]}]
+        floor = {"kind": "plane", "position": at(0.0, 0.0, 0.0)}
+        return gather(scene(floor, camera=seen_from, lights=lights, more=more), 60).points
+
+    for one, other in zip(put(1.0, 0.0), put(scale, offset), strict=True):
+        assert (one.name, one.via) == (other.name, other.via)
+        assert np.array_equal(one.at, other.at)
+        for name in ("wr", "wi", "irradiance", "beyond"):
+            assert np.abs(getattr(one, name) - getattr(other, name)).max() < MOVED, name
 
 
 def test_a_disc_of_light_is_as_strong_as_a_direction() -> None:
