@@ -181,11 +181,11 @@ def _trace(scene: Scene, origins: Array, directions: Array) -> tuple[Array, NDAr
 
 def _lit(scene: Scene, item: Object, surface: _Surface, wr: Array, stream: tuple[int, int]) -> tuple[Array, Array]:
     """Directions of all samples of all light in the frame of the surface, and irradiances; 0 in shadow."""
-    lights = [(light.towards(), light.strength) for light in scene.lights]
+    lights = [(light.towards(), light.intensity) for light in scene.lights]
     towards = np.concatenate([np.zeros((0, 3)), *(samples for samples, _ in lights)])
-    strength = np.concatenate([np.zeros(0), *(np.full(len(samples), each / len(samples)) for samples, each in lights)])
+    weight = np.concatenate([np.zeros(0), *(np.full(len(samples), each / len(samples)) for samples, each in lights)])
     wi = unit(np.einsum("nij,ej->eni", surface.frame, towards))
-    irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
+    irradiance = weight[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
     _shadow(scene, surface, np.broadcast_to(towards[:, np.newaxis], wi.shape), irradiance)
     if scene.environment is None:
         return wi, irradiance

@@ -23,8 +23,8 @@ class Light(BaseModel):
     """A light far away: the same from everywhere in the scene.
 
     `strength` [1] is its irradiance over pi, that of a surface which faces it: the radiance that a white Lambertian
-    surface has there. With a solid angle the light is a round disc that glossy surfaces blur and mirrors show; without
-    one mirrors miss it.
+    surface has there, whatever the solid angle. With one the light is a round disc that glossy surfaces blur and
+    mirrors show; without one mirrors miss it.
     """
 
     model_config = STRICT
@@ -47,9 +47,14 @@ class Light(BaseModel):
         return 1.0 - self.solid_angle_sr / (2.0 * np.pi)
 
     @property
+    def intensity(self) -> float:
+        """Radiance times solid angle: pi times the strength over the mean cosine, on a surface that faces the disc."""
+        return np.pi * self.strength / ((1.0 + self.cos_radius) / 2.0)
+
+    @property
     def radiance(self) -> float:
         """Radiance of the disc; 0 if the light has no solid angle."""
-        return np.pi * self.strength / self.solid_angle_sr if self.solid_angle_sr else 0.0
+        return self.intensity / self.solid_angle_sr if self.solid_angle_sr else 0.0
 
     def towards(self) -> Array:
         """Unit vectors (samples, 3) towards the disc, each of which stands for the same solid angle."""

@@ -162,7 +162,10 @@ THETA = np.arccos(0.8)
     ("fields", "seen"),
     [
         ({"ambient": 0.5}, 0.5),
-        ({"lights": [{"direction": [0.0, 0.6, 0.8], "strength": 0.1, "solid_angle_sr": 0.01}]}, np.pi * 0.1 / 0.01),
+        (
+            {"lights": [{"direction": [0.0, 0.6, 0.8], "strength": 0.1, "solid_angle_sr": 0.01}]},
+            np.pi * 0.1 / (0.01 * (1.0 - 0.01 / (4.0 * np.pi))),  # over the projected solid angle
+        ),
         ({"lights": [{"direction": [0.0, 0.6, 0.8]}]}, 0.0),  # a direction is no disc: mirrors miss it
         ({"lights": [{"direction": [0.0, -0.6, 0.8], "solid_angle_sr": 0.01}]}, 0.0),
     ],
