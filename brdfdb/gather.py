@@ -258,7 +258,7 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
     )
     at = np.flatnonzero(good)
     if not at.size:
-        raise ValueError(f"{shape.file}: no pixel has unit vectors")
+        raise ValueError(f"{shape.file}: shows nothing: at every pixel a vector is not finite, or not 1 long")
     flat = {name: unit(array.reshape(-1, height * width, 3)[:, at]) for name, array in arrays.items()}
     if "normal" in flat:
         surface = _frames(flat, scene.camera, width, height, at, item.grain_deg)

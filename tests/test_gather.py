@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -268,7 +269,13 @@ def test_recorded_directions_are_used_as_they_are(tmp_path: Path) -> None:
         ({"albedo": np.ones((2, 2, 3))}, "has neither `normal`, nor `wr` and `wi`"),
         ({"wr": np.ones((2, 2, 3))}, "has neither `normal`, nor `wr` and `wi`"),
         ({"normal": np.ones((2, 2))}, "which is not that of a picture of vectors"),
-        ({"normal": np.zeros((2, 2, 3))}, "no pixel has unit vectors"),
+        ({"normal": np.ones((4, 4, 6))}, r"normal has the shape \(4, 4, 6\), .* of vectors, \(height, width, 3\)$"),
+        ({"normal": np.ones((4, 4, 2))}, r"normal has the shape \(4, 4, 2\), .* of vectors, \(height, width, 3\)$"),
+        ({"normal": np.ones((2, 2, 3)), "tangent": np.ones((3, 2, 3))}, r"as many pixels as normal has, \(2, 2\)$"),
+        ({"wr": np.ones((2, 2, 3)), "wi": np.ones((2, 2, 3))}, r"wi has .* \(lights, height, width, 3\)"),
+        ({"normal": np.zeros((2, 2, 3))}, "shows nothing: at every pixel a vector is not finite, or not 1 long"),
+        ({"normal": np.full((2, 2, 3), np.nan)}, "shows nothing: at every pixel a vector is not finite"),
+        ({"normal": np.array([[None]])}, "is no .npz of numbers, or a damaged one"),
         ({"normal": np.array([["x"]])}, "is not made of numbers"),
         (
             {"wr": np.tile([0.0, 0.0, 1.0], (2, 2, 1)), "wi": np.tile([0.0, 0.0, 1.0], (2, 2, 2, 1))},
@@ -278,18 +285,32 @@ def test_recorded_directions_are_used_as_they_are(tmp_path: Path) -> None:
 )
 def test_a_file_without_directions_is_said_so(tmp_path: Path, arrays: dict[str, Array], said: str) -> None:
     np.savez(tmp_path / "bad.npz", **arrays)
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=rf"bad\.npz: .*{said}"):
         gather(recorded(tmp_path / "bad.npz"), 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "said"),
+    [
+        ("text.npz", b"not an archive", "is no .npz of numbers, or a damaged one"),
+        ("empty.npz", b"", "is no .npz of numbers, or a damaged one"),
+        ("text.exr", b"not a picture", "is no OpenEXR file, or a damaged one"),
+        ("empty.exr", b"", "is no OpenEXR file, or a damaged one"),
+        ("no.npz", None, "there is no such file"),
+    ],
+)
+def test_a_file_of_another_kind_is_said_so(tmp_path: Path, name: str, held: bytes | None, said: str) -> None:
+    path = tmp_path / name
+    if held is not None:
+        path.write_bytes(held)
+    with pytest.raises(ValueError, match=f"^{re.escape(f'{path}: {said}')}$"):
+        gather(recorded(path), 1)
 
 
 def test_a_picture_is_no_file_of_directions(tmp_path: Path) -> None:
     write_channels(tmp_path / "picture.exr", {}, {name: np.zeros((2, 2)) for name in "RGB"})
     with pytest.raises(ValueError, match=r"has neither `normal`, nor `wr` and `wi`.*it has no vectors"):
         gather(recorded(tmp_path / "picture.exr"), 1)
-    for name, said in (("no.npz", "there is no such file"), ("text.npz", "cannot be read as .npz")):
-        (tmp_path / "text.npz").write_text("not an archive", encoding="utf-8")
-        with pytest.raises(ValueError, match=said):
-            gather(recorded(tmp_path / name), 1)
 
 
 def test_a_light_that_falls_on_nothing_is_said_so() -> None:
