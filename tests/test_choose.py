@@ -158,6 +158,19 @@ def test_the_choice_for_a_shipped_scene_keeps_its_tolerance_where_it_was_not_pla
             assert planned.left(key, broken).p99 > chosen.allowed * tolerance
 
 
+@pytest.mark.parametrize(
+    "name", [name for name in shipped() if any(light.solid_angle_sr for light in load(name).lights)]
+)
+def test_samples_of_lights_leave_less_than_half_the_tolerance(name: str) -> None:
+    scene = load(name).model_copy(update={"wavelengths_nm": COARSE})
+    lights = [light.model_copy(update={"samples": 512}) for light in scene.lights]
+    offered, (given,) = offered_and_seen(scene, 32)
+    _, (finer,) = offered_and_seen(scene.model_copy(update={"lights": lights}), 32)
+    assert scene.tolerance.ciede2000 is not None
+    for key in offered:
+        assert given.left(key, finer.truth).p99 < scene.tolerance.ciede2000 / 2.0
+
+
 def test_where_the_whole_breaks_the_tolerance_single_materials_are_allowed_less() -> None:
     # three pixels across, the fit is 0.58 off, but 1.2 where it was not looked at
     scene = scene_of({"ciede2000": 0.8}, "rendered-sphere-40deg")
