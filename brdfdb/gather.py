@@ -268,7 +268,8 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
     else:
         if scene.environment is not None:
             raise ValueError(f"{shape.file}: has wr and wi; an environment needs normals, to know what is above them")
-        wr, wi = flat["wr"][0], flat["wi"]
+        turn = _turned(np.eye(3)[np.newaxis], item.grain_deg)[0]
+        wr, wi = flat["wr"][0] @ turn.T, flat["wi"] @ turn.T
         if len(wi) != len(scene.lights) or any(light.solid_angle_sr for light in scene.lights):
             raise ValueError(
                 f"{shape.file}: wi has {len(wi)} lights, the scene {len(scene.lights)}; "

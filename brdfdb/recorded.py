@@ -21,8 +21,8 @@ class Recorded(BaseModel):
     """What a picture of directions shows, in place of a shape; `file` is an EXR or .npz.
 
     It has either ``normal`` and, if the material is anisotropic, ``tangent``, vectors in the frame of the scene; or
-    ``wr`` and ``wi``, towards the viewer and towards each light of the scene in the frame of the surface (x along the
-    grain, z the normal), for lights without a solid angle. In an .npz these are arrays (height, width, 3), ``wi``
+    ``wr`` and ``wi``, towards the viewer and towards each light of the scene in the frame of the surface (x the
+    tangent, z the normal), for lights without a solid angle. In an .npz these are arrays (height, width, 3), ``wi``
     (lights, height, width, 3). In an EXR they are channels such as ``normal.X``, ``normal.Y`` and ``normal.Z``, those
     of the lights ``wi0.X``, ``wi1.X`` and on. Pixels where a vector is 0 or not finite show nothing. Nothing casts a
     shadow.

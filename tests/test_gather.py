@@ -263,6 +263,14 @@ def test_recorded_directions_are_used_as_they_are(tmp_path: Path) -> None:
     assert np.abs(view.points[0].irradiance - np.pi * 0.8).max() < ROUNDING
 
 
+def test_recorded_directions_are_turned_with_the_grain(tmp_path: Path) -> None:
+    wr, wi = np.tile([0.0, 0.6, 0.8], (2, 2, 1)), np.tile([0.6, 0.0, 0.8], (1, 2, 2, 1))
+    np.savez(tmp_path / "directions.npz", wr=wr, wi=wi)
+    points = only(recorded(tmp_path / "directions.npz", grain_deg=90.0), 1)
+    assert np.abs(points.wr - [0.6, 0.0, 0.8]).max() < ROUNDING
+    assert np.abs(points.wi - [0.0, -0.6, 0.8]).max() < ROUNDING
+
+
 @pytest.mark.parametrize(
     ("arrays", "said"),
     [
