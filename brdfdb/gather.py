@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from brdfdb.geometry import radians
 from brdfdb.recorded import Recorded
 from brdfdb.scene import Camera, Object, Scene
-from brdfdb.shapes import Array, unit
+from brdfdb.shapes import Array, Plane, unit
 
 # How far off their surface shadow and mirror rays begin: of the height that the picture has there, and of coordinates,
 # which are rounded
 _LIFT, _ROUNDED = 1e-4, 1e-14
 _BATCH = 40_000  # shadow rays at a time: fewer are slow for the calls, twice as many leave the cache
+_BEHIND = -0.1  # cosine: the smooth normals of cones turn away by half a degree at limbs, backs of surfaces by more
+_WIDEST, _MOST = 8192, 16384  # pixels on either side of a picture, and rays: a spectral one of 8192 x 6144 takes 16 GB
 _LENGTH_OFF = 0.05  # how far from 1 a recorded vector may be, which is then made 1 long: EXR with 16 bits is at 5e-4
 
 
@@ -78,9 +80,9 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
     scene : Scene
         What is seen. One that is recorded has the size of its file.
     width : int
-        Pixels across the picture; the aspect of the camera says how many down.
+        Pixels across the picture; the aspect of the camera says how many down. 8192 on either side at most.
     across : int
-        Rays across each pixel and down: `across` squared are averaged.
+        Rays across each pixel and down: `across` squared are averaged. 16384 rays on either side at most.
 
     Returns
     -------
@@ -90,8 +92,8 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
     Raises
     ------
     ValueError
-        If no ray meets an object, or a light shines on nothing that is seen; if a recorded file holds no directions,
-        or that of an environment no picture.
+        If a side has too many pixels or rays; if no ray meets an object, or the camera is inside one, or a light shines
+        on nothing that is seen; if a recorded file holds no directions, or that of an environment no picture.
 
     Notes
     -----
@@ -102,7 +104,7 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
     if isinstance(first.shape, Recorded):
         view = _recorded(scene, first, first.shape)
     else:
-        height = max(1, round(width / scene.camera.aspect))
+        height = _height(scene.camera, width, across)
         pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
         rays = scene.camera.rays(width * across, height * across)
         points, surfaces, missed = _seen(scene, *rays, pixels.ravel())
@@ -113,6 +115,7 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         unseen = [item.name for item in scene.objects if item.name not in {each.name for each in points}]
         if unseen:
             raise ValueError(f"objects: no ray of {width} x {height} pixels meets {', '.join(unseen)}")
+        _check_outside(scene, points)
         view = View(points, width, height, across**2, background)
     _check_lights(scene, view.points)
     return view
@@ -301,6 +304,30 @@ def _frames(
 def _is_unit(vectors: Array) -> NDArray[np.bool_]:
     length = np.linalg.norm(np.nan_to_num(vectors, nan=0.0, posinf=0.0, neginf=0.0), axis=-1)
     return np.asarray(np.abs(length - 1.0) < _LENGTH_OFF)
+
+
+def _height(camera: Camera, width: int, across: int) -> int:
+    """Pixels from the top of a picture to its bottom; ValueError if there are too many, or none."""
+    for name, value in (("width", width), ("across", across)):
+        if value < 1:
+            raise ValueError(f"{name}: {value} must be at least 1")
+    height = max(1, round(width / camera.aspect))
+    if max(width, height) > _WIDEST:
+        raise ValueError(f"width: {width} x {height} pixels are too many; either side may have {_WIDEST} at most")
+    if across * max(width, height) > _MOST:
+        raise ValueError(
+            f"across: {across} rays across each of {width} x {height} pixels are too many; either side may have "
+            f"{_MOST} rays at most"
+        )
+    return height
+
+
+def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
+    """ValueError if the camera is inside an object: it sees backs alone, which are black; a plane has a back, too."""
+    shapes = {item.name: item.shape for item in scene.objects}
+    for each in points:
+        if each.via is None and not isinstance(shapes[each.name], Plane) and np.median(each.wr[:, 2]) < _BEHIND:
+            raise ValueError(f"camera.position: is inside {each.name}, which is black from there")
 
 
 def _check_lights(scene: Scene, points: Sequence[Points]) -> None:

@@ -326,6 +326,30 @@ def test_a_light_that_falls_on_nothing_is_said_so() -> None:
         gather(scene({"kind": "plane"}, light=(0.0, 0.0, -1.0), camera=ABOVE), WIDTH)
 
 
+@pytest.mark.parametrize(
+    "kind", [SPHERE, {"kind": "cylinder", "radius": 1.0, "height": 2.0}], ids=lambda kind: kind["kind"]
+)
+@pytest.mark.parametrize("camera", [{"fov_deg": 60.0}, {"height": 0.5}], ids=["pinhole", "far"])
+def test_a_camera_inside_an_object_is_said_so(kind: dict[str, Any], camera: dict[str, Any]) -> None:
+    inside = {"position": [0.0, 0.1, 0.5], "target": [0.0, 1.0, 0.5], **camera}
+    with pytest.raises(ValueError, match=r"camera\.position: is inside thing, which is black from there"):
+        gather(scene(kind, camera=inside, ambient=0.1), WIDTH)
+
+
+@pytest.mark.parametrize(
+    ("width", "across", "said"),
+    [
+        (10_000_000, 1, "width: 10000000 x 10000000 pixels are too many; either side may have 8192 at most"),
+        (8192, 3, "across: 3 rays across each of 8192 x 8192 pixels are too many; either side may have 16384 rays"),
+        (0, 1, "width: 0 must be at least 1"),
+        (4, 0, "across: 0 must be at least 1"),
+    ],
+)
+def test_a_picture_that_is_too_large_is_said_so(width: int, across: int, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        gather(scene(), width, across=across)
+
+
 def test_an_object_that_no_ray_meets_is_said_so() -> None:
     behind = {"name": "behind", "material": "foam", "shape": {**SPHERE, "position": [0.0, -9.0, 0.0]}}
     with pytest.raises(ValueError, match="objects: no ray of 40 x 40 pixels meets behind"):

@@ -196,10 +196,9 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument(
         "--out", type=Path, default=Path("brdf-scenes"), metavar="DIR", help="directory (default: %(default)s)"
     )
-    render.add_argument("--width", type=_positive, default=256, metavar="N", help="pixels (default: %(default)s)")
-    render.add_argument(
-        "--across", type=_positive, default=1, metavar="N", help="rays across a pixel, and down (default: %(default)s)"
-    )
+    # no defaults: what is recorded has the pixels of its file
+    render.add_argument("--width", type=_positive, metavar="N", help="pixels (default: 256)")
+    render.add_argument("--across", type=_positive, metavar="N", help="rays across a pixel, and down (default: 1)")
 
     listing = command("list", _list, "List the materials and families of the store, or the built-in presets.")
     listing.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")

@@ -158,6 +158,16 @@ def test_a_scene_that_shows_nothing_is_one_sentence(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_recorded_scene_has_the_pixels_of_its_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    np.savez(tmp_path / "flat.npz", normal=np.tile([0.0, -1.0, 0.0], (2, 3, 1)))
+    path = changed(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.npz"')
+    for option in ("--width", "--across"):
+        assert cli.main(["render", path, "--out", str(tmp_path), option, "8"]) == cli.FAILED
+        assert f"{path}: is recorded, and has the pixels of its file" in capsys.readouterr().err
+    assert cli.main(["render", path, "--out", str(tmp_path)]) == 0
+    assert "3 x 2 pixels" in capsys.readouterr().out
+
+
 def test_files_that_a_scene_names_lie_beside_it(tmp_path: Path) -> None:
     np.savez(tmp_path / "flat.npz", normal=np.tile([0.0, -1.0, 0.0], (2, 3, 1)))
     scene = load(changed(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.npz"'))
