@@ -108,6 +108,7 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
         rays = scene.camera.rays(width * across, height * across)
         points, surfaces, missed = _seen(scene, *rays, pixels.ravel())
+        _check_outside(scene, points)
         background = _background(scene, rays[1][missed], pixels.ravel()[missed], width * height)
         for number, surface in enumerate(surfaces):
             if scene.materials[points[number].material].spec.specular is not None:
@@ -115,7 +116,6 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         unseen = [item.name for item in scene.objects if item.name not in {each.name for each in points}]
         if unseen:
             raise ValueError(f"objects: no ray of {width} x {height} pixels meets {', '.join(unseen)}")
-        _check_outside(scene, points)
         view = View(points, width, height, across**2, background)
     _check_lights(scene, view.points)
     return view
@@ -326,7 +326,7 @@ def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
     """ValueError if the camera is inside an object: it sees backs alone, which are black; a plane has a back, too."""
     shapes = {item.name: item.shape for item in scene.objects}
     for each in points:
-        if each.via is None and not isinstance(shapes[each.name], Plane) and np.median(each.wr[:, 2]) < _BEHIND:
+        if not isinstance(shapes[each.name], Plane) and np.median(each.wr[:, 2]) < _BEHIND:
             raise ValueError(f"camera.position: is inside {each.name}, which is black from there")
 
 

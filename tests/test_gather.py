@@ -332,8 +332,9 @@ def test_a_light_that_falls_on_nothing_is_said_so() -> None:
 @pytest.mark.parametrize("camera", [{"fov_deg": 60.0}, {"height": 0.5}], ids=["pinhole", "far"])
 def test_a_camera_inside_an_object_is_said_so(kind: dict[str, Any], camera: dict[str, Any]) -> None:
     inside = {"position": [0.0, 0.1, 0.5], "target": [0.0, 1.0, 0.5], **camera}
+    hidden = {"name": "hidden", "material": "foam", "shape": {**SPHERE, "position": [0.0, 9.0, 0.0]}}
     with pytest.raises(ValueError, match=r"camera\.position: is inside thing, which is black from there"):
-        gather(scene(kind, camera=inside, ambient=0.1), WIDTH)
+        gather(scene(kind, camera=inside, ambient=0.1, more=[hidden]), WIDTH)
 
 
 @pytest.mark.parametrize(
@@ -348,6 +349,12 @@ def test_a_camera_inside_an_object_is_said_so(kind: dict[str, Any], camera: dict
 def test_a_picture_that_is_too_large_is_said_so(width: int, across: int, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         gather(scene(), width, across=across)
+
+
+def test_the_back_of_a_plane_may_be_seen() -> None:
+    back = {"kind": "plane", "axis": [0.0, 0.0, -1.0]}
+    points = only(scene(back, camera=ABOVE, lights=[], ambient=0.1))
+    assert np.abs(points.wr - [0.0, 0.0, -1.0]).max() < ROUNDING
 
 
 def test_an_object_that_no_ray_meets_is_said_so() -> None:
