@@ -118,7 +118,7 @@ def test_a_sphere_casts_a_round_shadow(shadows: bool) -> None:
 
 
 @pytest.mark.parametrize("camera", [{"fov_deg": 24.0}, {"height": 2.5}], ids=["pinhole", "far"])
-@pytest.mark.parametrize(("scale", "offset"), [(1e-4, 0.0), (1e5, 0.0), (1.0, 100.0), (1.0, 1e4)])
+@pytest.mark.parametrize(("scale", "offset"), [(1e-10, 0.0), (1e-4, 0.0), (1e5, 0.0), (1.0, 100.0), (1.0, 1e4)])
 def test_a_scaled_and_a_moved_scene_are_the_same_picture(camera: dict[str, float], scale: float, offset: float) -> None:
     def put(scale: float, offset: float) -> list[Points]:
         def at(*place: float) -> list[float]:
