@@ -12,7 +12,7 @@ from brdfdb.gather import gather
 from brdfdb.materials import presets
 from brdfdb.render import reflectors, render
 from brdfdb.representations import representations
-from brdfdb.scene import Scene
+from brdfdb.scene import Scene, Tolerance
 from brdfdb_pipelines.scene import load, shipped
 
 COARSE = [float(wavelength) for wavelength in range(420, 681, 20)]
@@ -207,6 +207,19 @@ def test_the_choice_for_a_shipped_scene_keeps_its_tolerance_where_it_was_not_pla
                 if index == one.pick.cheaper:
                     assert one.cheaper_left is not None
                     assert one.cheaper_left.most == broken[1 if one.refused else 0] > tolerance
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in shipped() if any(light.solid_angle_sr for light in load(name).lights)]
+)
+def test_samples_of_lights_leave_less_than_half_the_tolerance(name: str) -> None:
+    tolerance = Tolerance(ciede2000=load(name).tolerance.value, percentile=99.0)
+    scene = load(name).model_copy(update={"wavelengths_nm": COARSE, "tolerance": tolerance})
+    lights = [light.model_copy(update={"samples": 512}) for light in scene.lights]
+    offered, (given,) = offered_and_seen(scene, 32)
+    _, (finer,) = offered_and_seen(scene.model_copy(update={"lights": lights}), 32)
+    for key in offered:
+        assert given.left(key, finer.truth).counted < tolerance.value / 2.0
 
 
 def test_what_breaks_the_tolerance_on_the_denser_sampling_is_refused() -> None:
