@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.choose import Candidate, Decision, Left, limit
+from brdfdb.choose import Candidate, Decision, Left
 from brdfdb.representations import Kind
 from brdfdb.scene import Scene, Tolerance
 
@@ -112,7 +112,6 @@ def describe(
             error=_residue(left),
         )
 
-    tolerance, _ = limit(scene)
     found = []
     for name, decision in chosen.items():
         truth = option(name, 0, Left(0.0, 0.0))
@@ -130,7 +129,7 @@ def describe(
                 next_cheaper=cheaper,
                 refused=decision.refused,
                 whole=_residue(decision.whole),
-                reason=_reason(choice, cheaper, decision, tolerance),
+                reason=_reason(choice, cheaper, decision, scene.tolerance.value),
                 revision=revisions.get(name),
             )
         )

@@ -11,7 +11,7 @@ from brdfdb.cost import CHEAPER
 from brdfdb.gather import gather
 from brdfdb.materials import presets
 from brdfdb.render import reflectors, render
-from brdfdb.scene import Scene
+from brdfdb.scene import Scene, Tolerance
 from brdfdb_pipelines.scene import load, shipped
 
 COARSE = [float(wavelength) for wavelength in range(420, 681, 20)]
@@ -255,6 +255,11 @@ def test_a_tolerance_finer_than_the_truth_is_known_is_infeasible(tolerance: dict
     offered, (seen,) = offered_and_seen(scene, 8)
     with pytest.raises(InfeasibleError, match=said):
         choose(seen, seen, offered, made_up_costs(offered))
+
+
+def test_a_tolerance_has_one_value_and_its_unit() -> None:
+    found = [(each.value, each.unit) for each in (Tolerance(relative=0.02), Tolerance(ciede2000=3.0))]
+    assert found == [(0.02, "relative"), (3.0, "CIEDE2000")]
 
 
 def test_with_an_environment_all_forms_meet_the_same_directions() -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import os
-import platform
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -91,7 +89,7 @@ def run(
             tick = functools.partial(bar.advance, task)
             found.append(chart(subject.material, subject.wavelength_nm, tolerances, also=subject.stored, tick=tick))
     charts = Charts(
-        brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=_machine(), charts=found, families=families
+        brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=terminal.machine(), charts=found, families=families
     )
     out.mkdir(parents=True, exist_ok=True)
     (out / "chart.json").write_text(charts.model_dump_json(indent=1) + "\n", encoding="utf-8")
@@ -146,10 +144,6 @@ def _fits(stored: NDArray[np.float64] | None, wanted: NDArray[np.float64] | None
     return (None if stored is None else stored.tolist()) == (None if wanted is None else wanted.tolist())
 
 
-def _machine() -> str:
-    return f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
-
-
 def _print(one: Chart) -> None:
     """All points as a table, and the front in a sentence."""
     percent = scatter.percent
@@ -159,8 +153,8 @@ def _print(one: Chart) -> None:
             point.key,
             point.title,
             *map(percent, (point.l1, point.p99, point.forward, point.back, point.grazing)),
-            f"{scatter.count(point.batch.ns)} ({scatter.count(point.batch.low)}-{scatter.count(point.batch.high)})",
-            scatter.count(point.single.ns),
+            f"{terminal.count(point.batch.ns)} ({terminal.count(point.batch.low)}-{terminal.count(point.batch.high)})",
+            terminal.count(point.single.ns),
             terminal.size(point.bytes),
         )
         for point in one.points
@@ -174,7 +168,7 @@ def _print(one: Chart) -> None:
 def _said(point: Point) -> str:
     off = f"{scatter.percent(point.l1)} off in the mean, p99 {scatter.percent(point.p99)}"
     error = "the truth" if point.l1 == 0.0 else off
-    return f"{point.title} ({scatter.count(point.batch.ns)} ns, {error})"
+    return f"{point.title} ({terminal.count(point.batch.ns)} ns, {error})"
 
 
 def _print_family(whole: FamilyChart) -> None:
@@ -187,16 +181,16 @@ def _print_family(whole: FamilyChart) -> None:
                 chosen = 2 * sum(curve.key in whole.fronts[index] for index in some) > len(some)
                 middle = scatter.middle([curve.l1[index] for index in some])
                 cells.append("-" if middle is None else f"{'*' if chosen else ''}{scatter.percent(middle)}")
-            rows.append((curve.key, curve.title, scatter.count(curve.batch.ns), *cells))
+            rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
         columns = [f"{value:g}" for value in values]
         if whole.g is not None and len(whole.axes) == 1:
-            rows.insert(0, ("", "g along the normal", "", *map(scatter.count, whole.g)))
+            rows.insert(0, ("", "g along the normal", "", *map(terminal.count, whole.g)))
         title = f"{whole.family}: {whole.title}. Mean error along {axis}; * is worth having"
         terminal.print_table(title, ("key", "form", "ns a value", *columns), rows, numbers=("ns a value", *columns))
     print(f"  times are those of one member, {whole.curves[0].timed} for most")
     for curve in whole.curves:
         if where := [index for index, front in enumerate(whole.fronts) if curve.key in front]:
-            print(f"  worth having: {curve.title} ({scatter.count(curve.batch.ns)} ns) {_where(whole, where)}")
+            print(f"  worth having: {curve.title} ({terminal.count(curve.batch.ns)} ns) {_where(whole, where)}")
     for curve in whole.curves:
         if curve.kind in ("closed form", "approximation", "printed"):
             close = [index for index, error in enumerate(curve.l1) if error is not None and error <= scatter.CLOSE]
@@ -204,7 +198,7 @@ def _print_family(whole: FamilyChart) -> None:
             print(f"  within {scatter.percent(scatter.CLOSE)} in the mean: {curve.title} {where_close}")
     if whole.between is not None:
         off = f"{scatter.percent(whole.between.l1)} off in the mean, p99 {scatter.percent(whole.between.p99)}"
-        time = f"{scatter.count(whole.between.batch.ns)} ns, {scatter.count(whole.between.single.ns)} of one"
+        time = f"{terminal.count(whole.between.batch.ns)} ns, {terminal.count(whole.between.single.ns)} of one"
         print(f"  between members: {off}, as the family states ({time}, {terminal.size(whole.between.bytes)})")
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -13,7 +11,7 @@ import numpy as np
 
 from brdfdb import cost, picture
 from brdfdb.choices import Choice, Price, Weigh, describe
-from brdfdb.choose import Candidate, Decision, Seen, candidates, choose, limit
+from brdfdb.choose import Candidate, Decision, Seen, candidates, check_feasible, choose
 from brdfdb.gather import View, gather
 from brdfdb.render import reflectors
 from brdfdb.scene import Scene
@@ -80,7 +78,7 @@ def _run(
     store: Path | None,
     tolerances: Sequence[float] | None,
 ) -> Choice:
-    limit(scene)  # infeasible before minutes of work
+    check_feasible(scene.tolerance)  # infeasible before minutes of work
     with terminal.progress(counted=False, transient=True) as bar:
         bar.add_task("tracing rays", total=None)
         # another resolution puts every ray at another place
@@ -103,7 +101,7 @@ def _run(
     choice = Choice(
         brdfdb=version("brdfdb"),
         when=datetime.now(UTC),
-        machine=f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}",
+        machine=terminal.machine(),
         scene=Path(name).stem,
         tolerance=scene.tolerance,
         weigh=weigh,
@@ -183,8 +181,7 @@ def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], ch
         panel.imshow(picture.srgb(seen.scene, image))
         panel.set_title(title)
     shown = axes[1, 0].imshow(seen.differences(choice), vmin=0.0, cmap="viridis")
-    unit = "relative" if seen.scene.tolerance.relative is not None else "CIEDE2000"
-    axes[1, 0].set_title(f"difference of the choice, {unit}")
+    axes[1, 0].set_title(f"difference of the choice, {seen.scene.tolerance.unit}")
     canvas.colorbar(shown, ax=axes[1, 0], shrink=0.8)
     for panel in axes.flat:
         panel.set_axis_off()
@@ -201,16 +198,15 @@ def _print(choice: Choice) -> None:
             f"{one.choice.error.counted:.2g}",
             f"{one.whole.counted:.2g}",
             f"{one.whole.most:.2g}",
-            f"{one.choice.ns:.3g}",
+            terminal.count(one.choice.ns),
             terminal.size(one.choice.bytes),
             f"{one.choice.share:.2g}",
         )
         for one in choice.materials
     ]
     said = choice.tolerance
-    tolerance = f"{said.relative:g} relative" if said.relative is not None else f"CIEDE2000 {said.ciede2000:g}"
     where = "every pixel" if said.percentile == 100.0 else f"{said.percentile:g} % of the pixels of each material"
-    title = f"{choice.scene}: within {tolerance} at {where}"
+    title = f"{choice.scene}: within {said.value:g} ({said.unit}) at {where}"
     terminal.print_table(title, ("material", "choice", *numbers), rows, numbers=numbers)
     for one in choice.materials:
         print(f"  {one.material}: {one.choice.title} {one.reason}")

@@ -18,7 +18,7 @@ from brdfdb import cost, family_records
 from brdfdb.chart import Between, Chart, Charts, Cost, Curve, FamilyChart, Fronts, Point
 from brdfdb.materials import presets
 from brdfdb.representations import representations
-from brdfdb_pipelines import cli, scatter
+from brdfdb_pipelines import cli, scatter, terminal
 from brdfdb_pipelines.recipe import load
 
 Captured = pytest.CaptureFixture[str]
@@ -160,7 +160,7 @@ def test_errors_are_written_for_people(value: float, text: str) -> None:
 
 @pytest.mark.parametrize(("value", "text"), [(4.26, "4.26"), (999.6, "1k"), (34800.0, "34.8k"), (1.3e6, "1.3M")])
 def test_counts_are_written_for_people(value: float, text: str) -> None:
-    assert scatter.count(value) == text
+    assert terminal.count(value) == text
 
 
 def test_labels_hide_neither_points_nor_each_other_where_there_is_room() -> None:

@@ -14,7 +14,7 @@ from matplotlib.image import imread
 import brdfdb
 from brdfdb.choices import Choice
 from brdfdb.models import oren_nayar_gaussian_vectors
-from brdfdb_pipelines import choose, cli
+from brdfdb_pipelines import choose, cli, terminal
 from brdfdb_pipelines.documents import schema
 
 TABLE_OFF = 1.5e-4  # 1.21e-4 measured, of a table planned for 1e-3
@@ -51,6 +51,7 @@ def test_what_is_written_keeps_to_the_schema_and_says_what_was_returned(done: tu
     text = (folder / "out" / "choice.json").read_text(encoding="utf-8")
     jsonschema.validate(json.loads(text), json.loads(schema("choice")))
     assert Choice.model_validate_json(text) == choice
+    assert choice.machine == terminal.machine()
 
 
 def test_the_choice_costs_less_than_a_third_of_the_truth_and_what_is_cheaper_breaks_the_tolerance(
@@ -117,7 +118,7 @@ def test_what_is_printed_says_how_many_pixels_keep_to_the_tolerance(
     name = written(tmp_path, "ciede2000 = 0.5", f"ciede2000 = 0.5{percentile}")
     choice = choose.run(name, tmp_path / "out", width=16, tolerances=[])
     (one,) = choice.materials
-    assert f"scene: within CIEDE2000 0.5 at {where}" in capsys.readouterr().out
+    assert f"scene: within 0.5 (CIEDE2000) at {where}" in capsys.readouterr().out
     assert one.whole.counted <= 0.5
     assert one.whole.counted <= one.whole.most
 
