@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.cost import CHEAPER
+from brdfdb.cost import ALIKE, CHEAPER
 from brdfdb.gather import View
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
@@ -219,8 +219,10 @@ def pick(costs: Sequence[float], error: Callable[[int], float], tolerance: float
     Returns
     -------
     Pick
-        About the same is less than `brdfdb.cost.CHEAPER` times as much. Everything that costs less than the cheapest
-        one that keeps to the tolerance breaks it; the most accurate of that is the next cheaper.
+        About the same cost is less than `brdfdb.cost.CHEAPER` times as much, about the same error less than
+        `brdfdb.cost.ALIKE` times: of those alike in both it is the one given first, whatever the clock says. Everything
+        that costs less than the cheapest one that keeps to the tolerance breaks it; the most accurate of that is the
+        next cheaper.
     """
     errors: dict[int, float] = {}
     least = np.inf
@@ -230,8 +232,9 @@ def pick(costs: Sequence[float], error: Callable[[int], float], tolerance: float
         errors[index] = error(index)
         if errors[index] <= tolerance:
             least = min(least, costs[index])
-    chosen = min((index for index in errors if errors[index] <= tolerance), key=lambda index: errors[index])
-    cheaper = [index for index in errors if costs[index] < least]
+    kept = {index: errors[index] for index in sorted(errors) if errors[index] <= tolerance}
+    chosen = next(index for index in kept if kept[index] <= ALIKE * min(kept.values()))
+    cheaper = [index for index in sorted(errors) if costs[index] < least]
     return Pick(chosen, min(cheaper, key=lambda index: errors[index], default=None))
 
 

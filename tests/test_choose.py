@@ -7,7 +7,7 @@ import pytest
 
 from brdfdb.choices import Price, describe
 from brdfdb.choose import Candidate, Decision, InfeasibleError, Left, Pick, Seen, candidates, choose, pick
-from brdfdb.cost import CHEAPER
+from brdfdb.cost import ALIKE, CHEAPER
 from brdfdb.gather import gather
 from brdfdb.materials import presets
 from brdfdb.render import reflectors, render
@@ -91,6 +91,22 @@ def test_the_cheapest_that_keeps_to_the_tolerance_is_picked(tolerance: float, ex
     costs = [100.0, 50.0, 10.0 * (1.0 + CHEAPER) / 2.0, 10.0, 1.0]  # the third and fourth cost about the same
     errors = [0.0, 0.1, 0.2, 0.3, 1.0]
     assert pick(costs, errors.__getitem__, tolerance) == expected
+
+
+@pytest.mark.parametrize(
+    ("costs", "errors", "expected"),
+    [
+        pytest.param([1.0, 0.96, 0.9], [0.0, 0.0, 0.0], Pick(0, None), id="equals"),
+        pytest.param([1.0, 0.9], [0.5 * ALIKE, 0.5], Pick(0, None), id="a-hairs-breadth"),
+        pytest.param([1.0, 0.9], [0.51 * ALIKE, 0.5], Pick(1, None), id="more-accurate"),
+        pytest.param([1.0, 0.9], [0.7 * ALIKE, 0.7], Pick(1, None), id="the-first-breaks-the-tolerance"),
+        pytest.param([9.0, 1.0, 0.9], [0.0, 2.0, 2.0], Pick(0, 1), id="equals-that-are-cheaper"),
+    ],
+)
+def test_of_what_is_alike_in_cost_and_error_the_first_is_picked(
+    costs: list[float], errors: list[float], expected: Pick
+) -> None:
+    assert pick(costs, errors.__getitem__, 0.75) == expected
 
 
 def test_errors_of_what_costs_clearly_more_are_not_asked_for() -> None:
