@@ -245,6 +245,32 @@ def test_the_truth_is_what_is_left_when_all_else_is_refused() -> None:
     assert [one.cheaper_left for one in chosen.values()] == [Left(2.0, 2.0), Left(5.0, 5.0)]
 
 
+FIT = "the best of what is cheaper, functional fit, eqs 27-29, would leave 1.2"
+
+
+@pytest.mark.parametrize(
+    ("chosen", "cheaper", "share", "reason"),
+    [
+        ("facets", None, 1.0, "is the truth itself, and nothing is cheaper"),
+        ("facets", "fit", 1.0, f"is the truth itself; {FIT}"),
+        ("bounce-49", None, 0.2, "leaves 0.5, and nothing is cheaper"),
+        ("bounce-49", None, 0.9, "leaves 0.5 at 0.9 of the truth's cost, more than a third, and nothing is cheaper"),
+        ("bounce-49", "fit", 0.9, f"leaves 0.5 at 0.9 of the truth's cost, more than a third; {FIT}"),
+    ],
+)
+def test_a_reason_says_each_thing_once(chosen: str, cheaper: str | None, share: float, reason: str) -> None:
+    scene = scene_of({"ciede2000": 1.0}, "rendered-sphere-40deg")
+    offered, _ = offered_and_seen(scene)
+    ((name, forms),) = offered.items()
+    keys = [each.form.key for each in forms]
+    pick = Pick(keys.index(chosen), None if cheaper is None else keys.index(cheaper))
+    left = None if cheaper is None else Left(1.2, 1.2)
+    prices = {name: [Price(1.0, share if index else 1.0) for index in range(len(forms))]}
+    decision = Decision(pick, Left(0.5, 0.5), left, False, Left(0.6, 0.6))
+    (one,) = describe(scene, {name: decision}, offered, prices, {name: 1}, {})
+    assert one.reason == reason
+
+
 @pytest.mark.parametrize(("refused", "where"), [(True, " on the denser sampling"), (False, "")])
 def test_the_reason_says_by_how_much_and_where_the_next_cheaper_breaks_the_tolerance(refused: bool, where: str) -> None:
     scene = scene_of({"ciede2000": 1.0}, "rendered-sphere-40deg")

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from brdfdb import cost, picture
-from brdfdb.choices import Choice, Price, Weigh, describe
+from brdfdb.choices import Choice, Price, Weigh, describe, within
 from brdfdb.choose import Candidate, Decision, Seen, candidates, check_feasible, choose
 from brdfdb.gather import View, gather
 from brdfdb.render import reflectors
 from brdfdb.scene import Scene
 from brdfdb.shapes import Array
-from brdfdb.staging import publish_dataset
-from brdfdb.tabulate import tabulate
+from brdfdb.staging import make_store
 from brdfdb_pipelines import terminal
+from brdfdb_pipelines.chosen import Built, build, with_reason
 from brdfdb_pipelines.scene import SceneError, load
 
 TIMED = 20_000  # pairs of directions of a material, drawn from those that the scene uses
@@ -48,7 +48,8 @@ def run(
     weigh : str
         What is to be small: "time", "bytes", or "both", which is their product.
     store : Path, optional
-        Where chosen tables are published, under the names of their materials.
+        Where chosen tables are published, under the names of their materials, each with its error; made if it is not
+        there.
     tolerances : sequence of float, optional
         Of planned tables: see `brdfdb.choose.candidates`.
 
@@ -61,6 +62,8 @@ def run(
     ------
     SceneError
         If the scene is none or cannot be looked at, or its tolerance is infeasible.
+    StoreError
+        If the store cannot be written, or is something else: before any work.
     """
     scene = load(name)
     try:
@@ -78,7 +81,9 @@ def _run(
     store: Path | None,
     tolerances: Sequence[float] | None,
 ) -> Choice:
-    check_feasible(scene.tolerance)  # infeasible before minutes of work
+    check_feasible(scene.tolerance)  # before minutes of work, as the store
+    if store is not None:
+        make_store(store)
     with terminal.progress(counted=False, transient=True) as bar:
         bar.add_task("tracing rays", total=None)
         # another resolution puts every ray at another place
@@ -97,7 +102,12 @@ def _run(
         planned, checked = (Seen(scene, each, truths, materials) for each in (view, denser))
         costs = {key: [price.cost for price in each] for key, each in prices.items()}
         chosen = choose(planned, checked, offered, costs, tick=lambda: bar.advance(task))
-    revisions = _built(store, offered, chosen)
+    forms = {key: offered[key][decision.pick.chosen].form for key, decision in chosen.items()}
+    wanted = f"{Path(name).stem}, {within(scene.tolerance)}"
+    layouts = {
+        key: with_reason(form.layout, form.title, wanted) for key, form in forms.items() if form.layout is not None
+    }
+    built = build(store, layouts) if store is not None and layouts else {}
     choice = Choice(
         brdfdb=version("brdfdb"),
         when=datetime.now(UTC),
@@ -108,13 +118,20 @@ def _run(
         planned=(view.width, view.height),
         checked=(denser.width, denser.height),
         materials=describe(
-            scene, chosen, offered, prices, {key: planned.pixels(key).size for key in offered}, revisions
+            scene,
+            chosen,
+            offered,
+            prices,
+            {key: planned.pixels(key).size for key in offered},
+            {key: each.revision for key, each in built.items()},
         ),
     )
     out.mkdir(parents=True, exist_ok=True)
     (out / "choice.json").write_text(choice.model_dump_json(indent=1) + "\n", encoding="utf-8")
     _draw(out / Path(name).stem, checked, offered, chosen)
-    _print(choice)
+    _print(choice, built)
+    if store is not None and not built:
+        print("nothing to build: no table was chosen")
     print(f"{out}: choice.json, {choice.scene}.png, {choice.scene}-truth.exr and {choice.scene}-choice.exr")
     return choice
 
@@ -147,18 +164,6 @@ def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> l
     return prices
 
 
-def _built(
-    store: Path | None, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]
-) -> dict[str, str]:
-    """Revisions of the chosen tables, published in a store, by material."""
-    revisions: dict[str, str] = {}
-    for key, decision in chosen.items():
-        layout = offered[key][decision.pick.chosen].form.layout
-        if store is not None and layout is not None:
-            revisions[key], _ = publish_dataset(store, key, tabulate(layout))
-    return revisions
-
-
 def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]) -> None:
     """The comparison as a picture of four panels; truth and choice as spectral EXR."""
     from matplotlib.figure import Figure
@@ -188,8 +193,8 @@ def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], ch
     canvas.savefig(stem.with_name(f"{stem.name}.png"), dpi=110, metadata={"Software": None})
 
 
-def _print(choice: Choice) -> None:
-    """The choices as a table, and reasons."""
+def _print(choice: Choice, built: Mapping[str, Built]) -> None:
+    """The choices as a table, reasons, and what became of the tables of a store."""
     numbers = ("alone", "whole", "largest", "ns", "bytes", "share of the truth")
     rows = [
         (
@@ -204,11 +209,9 @@ def _print(choice: Choice) -> None:
         )
         for one in choice.materials
     ]
-    said = choice.tolerance
-    where = "every pixel" if said.percentile == 100.0 else f"{said.percentile:g} % of the pixels of each material"
-    title = f"{choice.scene}: within {said.value:g} ({said.unit}) at {where}"
+    title = f"{choice.scene}: {within(choice.tolerance)}"
     terminal.print_table(title, ("material", "choice", *numbers), rows, numbers=numbers)
     for one in choice.materials:
         print(f"  {one.material}: {one.choice.title} {one.reason}")
-        if one.revision is not None:
-            print(f"    {one.revision} in the store")
+        if one.material in built:
+            print(f"    {built[one.material].said}")
