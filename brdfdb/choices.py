@@ -64,8 +64,8 @@ class Material(BaseModel):
     truth: Option
     choice: Option
     next_cheaper: Option | None = Field(description="the most accurate of what is cheaper; null without any")
-    refused: bool = Field(description="whether the next cheaper breaks it on the denser sampling only")
-    whole: Residue = Field(description="of the choices all at once, sampled more densely")
+    refused: bool = Field(description="whether the next cheaper breaks it only where it is checked")
+    whole: Residue = Field(description="of the choices all at once, where they are checked")
     reason: str
     revision: str | None = Field(description="of the table in the store, if a store was named and a table chosen")
 
@@ -82,7 +82,9 @@ class Choice(BaseModel):
     tolerance: Tolerance
     weigh: Weigh
     planned: tuple[int, int] = Field(description="pixels across and down where candidates are compared")
-    checked: tuple[int, int] = Field(description="where the whole is held to the tolerance")
+    checked: tuple[int, int] = Field(
+        description="where the whole is held to the tolerance: half as many more across; if recorded, those of the file"
+    )
     materials: list[Material]
 
 

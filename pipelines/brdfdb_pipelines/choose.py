@@ -44,7 +44,8 @@ def run(
     out : Path
         Directory to write to; made if it is not there.
     width : int
-        Pixels across where candidates are compared; the whole is checked with half as many more.
+        Pixels across where candidates are compared; the whole is checked with half as many more. A recorded scene has
+        the size of its file in both.
     weigh : str
         What is to be small: "time", "bytes", or "both", which is their product.
     store : Path, optional
@@ -165,32 +166,17 @@ def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> l
 
 
 def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]) -> None:
-    """The comparison as a picture of four panels; truth and choice as spectral EXR."""
-    from matplotlib.figure import Figure
+    """The comparison as a picture; truth and choice as spectral EXR."""
+    from brdfdb_pipelines import comparison  # which loads matplotlib
 
     picks = {key: decision.pick for key, decision in chosen.items()}
     choice = seen.picture({key: offered[key][one.chosen] for key, one in picks.items()})
-    cheaper = seen.picture(
-        {key: offered[key][one.chosen if one.cheaper is None else one.cheaper] for key, one in picks.items()}
-    )
+    lesser = {key: offered[key][one.cheaper] for key, one in picks.items() if one.cheaper is not None}
+    best = {key: offered[key][one.chosen] for key, one in picks.items() if one.cheaper is None}
     for image, suffix in ((seen.truth, "truth"), (choice, "choice")):
         picture.write_exr(stem.with_name(f"{stem.name}-{suffix}.exr"), seen.scene, image)
-    height, width = seen.truth.shape[:2]
-    canvas = Figure(figsize=(10.0, 0.6 + 10.0 * height / width), layout="constrained")
-    axes = canvas.subplots(2, 2)
-    for panel, image, title in (
-        (axes[0, 0], seen.truth, "truth"),
-        (axes[0, 1], choice, "choice"),
-        (axes[1, 1], cheaper, "next cheaper"),
-    ):
-        panel.imshow(picture.srgb(seen.scene, image))
-        panel.set_title(title)
-    shown = axes[1, 0].imshow(seen.differences(choice), vmin=0.0, cmap="viridis")
-    axes[1, 0].set_title(f"difference of the choice, {seen.scene.tolerance.unit}")
-    canvas.colorbar(shown, ax=axes[1, 0], shrink=0.8)
-    for panel in axes.flat:
-        panel.set_axis_off()
-    canvas.savefig(stem.with_name(f"{stem.name}.png"), dpi=110, metadata={"Software": None})
+    cheaper = seen.picture({**best, **lesser}) if lesser else None
+    stem.with_name(f"{stem.name}.png").write_bytes(comparison.png(seen, choice, cheaper))
 
 
 def _print(choice: Choice, built: Mapping[str, Built]) -> None:
@@ -209,7 +195,8 @@ def _print(choice: Choice, built: Mapping[str, Built]) -> None:
         )
         for one in choice.materials
     ]
-    title = f"{choice.scene}: {within(choice.tolerance)}"
+    compared, checked = (f"{across} x {down}" for across, down in (choice.planned, choice.checked))
+    title = f"{choice.scene}: {within(choice.tolerance)}; {compared} pixels compared, {checked} checked"
     terminal.print_table(title, ("material", "choice", *numbers), rows, numbers=numbers)
     for one in choice.materials:
         print(f"  {one.material}: {one.choice.title} {one.reason}")

@@ -112,12 +112,15 @@ def test_truth_and_choice_are_pictures_that_differ_by_little(done: tuple[Choice,
     assert np.percentile(np.abs(chosen - truth)[truth > 0.1] / truth[truth > 0.1], 95.0) < 0.02
 
 
-def test_the_comparison_is_a_picture_of_four_panels(done: tuple[Choice, Path]) -> None:
+def test_the_comparison_is_a_picture_of_truth_choice_next_cheaper_and_their_differences(
+    done: tuple[Choice, Path],
+) -> None:
     image = imread(done[1] / "out" / "scene.png")
-    assert image.shape[1] == 1100
     top, bottom = np.array_split(image[..., :3], 2)
-    for half in (*np.array_split(top, 2, axis=1), *np.array_split(bottom, 2, axis=1)):
-        assert np.std(half) > 0.05
+    panels = [*np.array_split(top, 3, axis=1), *np.array_split(bottom, 3, axis=1)]
+    assert all(np.std(panel) > 0.05 for panel in panels)
+    # next cheaper differs visibly, the choice hardly: no yellow
+    assert [bool(np.any((panel[..., 0] > 0.8) & (panel[..., 2] < 0.3))) for panel in panels[4:]] == [False, True]
 
 
 def test_without_a_chosen_table_there_is_nothing_to_build(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -134,6 +137,18 @@ def test_a_file_is_no_store_and_is_said_so_before_the_work(
     (tmp_path / "store").write_text("", encoding="utf-8")
     assert cli.main(["choose", written(tmp_path), "--build", str(tmp_path / "store")]) == 2
     assert capsys.readouterr().err == f"brdfdb: cannot write a store at {tmp_path / 'store'}: File exists\n"
+
+
+def test_a_recorded_scene_is_compared_and_checked_at_the_size_of_its_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    normals = np.zeros((5, 7, 3))
+    normals[..., 1:] = -0.6, 0.8
+    np.savez(tmp_path / "flat.npz", normal=normals)
+    name = written(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.npz"')
+    choice = choose.run(name, tmp_path / "out", width=16, tolerances=[])
+    assert choice.planned == choice.checked == (7, 5)
+    assert "at every pixel; 7 x 5 pixels compared, 7 x 5 checked" in capsys.readouterr().out
 
 
 def test_bytes_can_be_weighed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
