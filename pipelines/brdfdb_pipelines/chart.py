@@ -19,6 +19,7 @@ from brdfdb.chart import STEPS, TIMED, Chart, Charts, FamilyChart, Point, chart,
 from brdfdb.family import Family, Sweep
 from brdfdb.family_records import recorded
 from brdfdb.materials import Material
+from brdfdb.plan import check_tolerance
 from brdfdb.representations import Representation, of_table
 from brdfdb.store import Store
 from brdfdb_pipelines import recipe, scatter, terminal
@@ -49,7 +50,7 @@ def run(
     recipe_file: Path | None = None,
     tolerances: Sequence[float] | None = None,
 ) -> Charts:
-    """Chart materials and families, and write ``chart.json`` and, of each, ``NAME.svg`` and ``NAME.png``.
+    """Chart materials and families, and write of each ``NAME.json``, ``NAME.svg`` and ``NAME.png``.
 
     Parameters
     ----------
@@ -67,13 +68,15 @@ def run(
     Returns
     -------
     Charts
-        What was written.
+        All of them; each is written by itself, beside its pictures: other runs replace what they chart anew, no more.
 
     Raises
     ------
     ValueError
         If a name is neither of the recipe nor of the store, or a tolerance is none.
     """
+    for tolerance in tolerances or ():
+        check_tolerance(tolerance)
     subjects = _subjects(names, store, recipe_file)
     found: list[Chart] = []
     families: list[FamilyChart] = []
@@ -92,18 +95,22 @@ def run(
         brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=terminal.machine(), charts=found, families=families
     )
     out.mkdir(parents=True, exist_ok=True)
-    (out / "chart.json").write_text(charts.model_dump_json(indent=1) + "\n", encoding="utf-8")
     for one in found:
-        (out / f"{one.material}.svg").write_text(scatter.svg(one), encoding="utf-8")
-        (out / f"{one.material}.png").write_bytes(scatter.png(one))
+        _write(out / one.material, charts.model_copy(update={"charts": [one], "families": []}), one)
         _print(one)
     for whole in families:
-        (out / f"{whole.family}.svg").write_text(scatter.svg(whole), encoding="utf-8")
-        (out / f"{whole.family}.png").write_bytes(scatter.png(whole))
+        _write(out / whole.family, charts.model_copy(update={"charts": [], "families": [whole]}), whole)
         _print_family(whole)
-    pictures = [*(one.material for one in found), *(whole.family for whole in families)]
-    print(f"{out}: chart.json and the pictures of {', '.join(pictures)}")
+    written = [*(one.material for one in found), *(whole.family for whole in families)]
+    print(f"{out}: .json, .svg and .png of {', '.join(written)}")
     return charts
+
+
+def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
+    """A chart as data and as pictures; the names of materials have no dots."""
+    stem.with_suffix(".json").write_text(document.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    stem.with_suffix(".svg").write_text(scatter.svg(drawn), encoding="utf-8")
+    stem.with_suffix(".png").write_bytes(scatter.png(drawn))
 
 
 def _subjects(names: Sequence[str], root: Path | None, recipe_file: Path | None) -> list[_Subject | _Family]:
