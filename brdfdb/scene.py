@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field, field_validator, model_validator
@@ -141,6 +141,18 @@ class Tolerance(BaseModel):
         if (self.relative is None) == (self.ciede2000 is None):
             raise ValueError("relative, ciede2000: give one of the two")
         return self
+
+    @property
+    def unit(self) -> Literal["relative", "CIEDE2000"]:
+        """What `value` counts."""
+        return "CIEDE2000" if self.relative is None else "relative"
+
+    @property
+    def value(self) -> float:
+        """The largest error, in `unit`."""
+        found = self.ciede2000 if self.relative is None else self.relative
+        assert found is not None  # as `_check` saw
+        return found
 
 
 class Scene(BaseModel):
