@@ -128,7 +128,7 @@ class FamilyChart(BaseModel):
 
 
 class Charts(BaseModel):
-    """Charts of several materials and families, made in one go."""
+    """Charts of materials and families, made in one go; a file holds one of them."""
 
     model_config = _STRICT
 

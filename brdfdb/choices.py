@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.choose import Candidate, Decision, Left, limit
+from brdfdb.choose import Candidate, Decision, Left
 from brdfdb.representations import Kind
 from brdfdb.scene import Scene, Tolerance
 
@@ -64,10 +64,10 @@ class Material(BaseModel):
     truth: Option
     choice: Option
     next_cheaper: Option | None = Field(description="the most accurate of what is cheaper; null without any")
-    refused: bool = Field(description="whether the next cheaper breaks it on the denser sampling only")
-    whole: Residue = Field(description="of the choices all at once, sampled more densely")
+    refused: bool = Field(description="whether the next cheaper breaks it only where it is checked")
+    whole: Residue = Field(description="of the choices all at once, where they are checked")
     reason: str
-    revision: str | None = Field(description="of the table in the store, if one was built")
+    revision: str | None = Field(description="of the table in the store, if a store was named and a table chosen")
 
 
 class Choice(BaseModel):
@@ -82,8 +82,17 @@ class Choice(BaseModel):
     tolerance: Tolerance
     weigh: Weigh
     planned: tuple[int, int] = Field(description="pixels across and down where candidates are compared")
-    checked: tuple[int, int] = Field(description="where the whole is held to the tolerance")
+    checked: tuple[int, int] = Field(
+        description="where the whole is held to the tolerance: half as many more across; if recorded, those of the file"
+    )
     materials: list[Material]
+
+
+def within(tolerance: Tolerance) -> str:
+    """How far a picture may be off, and where, in words."""
+    share = tolerance.percentile
+    where = "every pixel" if share == 100.0 else f"{share:g} % of the pixels of each material"
+    return f"within {tolerance.value:g} ({tolerance.unit}) at {where}"
 
 
 def describe(
@@ -112,7 +121,6 @@ def describe(
             error=_residue(left),
         )
 
-    tolerance, _ = limit(scene)
     found = []
     for name, decision in chosen.items():
         truth = option(name, 0, Left(0.0, 0.0))
@@ -130,7 +138,7 @@ def describe(
                 next_cheaper=cheaper,
                 refused=decision.refused,
                 whole=_residue(decision.whole),
-                reason=_reason(choice, cheaper, decision, tolerance),
+                reason=_reason(choice, cheaper, decision, scene.tolerance.value),
                 revision=revisions.get(name),
             )
         )
@@ -138,18 +146,15 @@ def describe(
 
 
 def _reason(choice: Option, cheaper: Option | None, decision: Decision, tolerance: float) -> str:
-    """Why this one, and where it costs more than a third of the truth, why."""
+    """Why this one, and that it costs more than a third of the truth where it does."""
     said = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.counted:.2g}"
+    if decision.pick.chosen != 0 and choice.share > THIRD:
+        said += f" at {choice.share:.2g} of the truth's cost, more than a third"
     if cheaper is None:
-        said += "; nothing is cheaper"
-    else:
-        left = _above(tolerance, cheaper.error.counted)
-        said += f"; the best of what is cheaper, {cheaper.title}, would leave {left}"
-        said += " on the denser sampling" if decision.refused else ""
-    if choice.share > THIRD:
-        why = "there is nothing cheaper" if cheaper is None else "all that is cheaper breaks the tolerance"
-        said += f"; more than a third of the truth's cost, as {why}"
-    return said
+        return f"{said}, and nothing is cheaper"
+    where = " on the denser sampling" if decision.refused else ""
+    left = _above(tolerance, cheaper.error.counted)
+    return f"{said}; the best of what is cheaper, {cheaper.title}, would leave {left}{where}"
 
 
 def _above(tolerance: float, error: float) -> str:

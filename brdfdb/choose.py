@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.cost import CHEAPER
+from brdfdb.cost import ALIKE, CHEAPER
 from brdfdb.gather import View
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 from brdfdb.picture import difference
 from brdfdb.render import Reflector, composed, radiance
 from brdfdb.representations import Representation, representations
-from brdfdb.scene import Scene
+from brdfdb.scene import Scene, Tolerance
 from brdfdb.shapes import Array
 
 GREY_TOLERANCES = (0.1, 0.01, 0.0005)  # of planned tables; 0.001, as in charts, leaves limbs 1.05 off
@@ -199,7 +199,7 @@ class Seen:
 
 
 def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
-    if scene.tolerance.relative is None:
+    if scene.tolerance.unit == "CIEDE2000":
         return difference(scene, truth, picture)
     return np.asarray((np.abs(picture - truth) / np.maximum(truth, DARK / scene.exposure)).max(axis=-1))
 
@@ -219,8 +219,10 @@ def pick(costs: Sequence[float], error: Callable[[int], float], tolerance: float
     Returns
     -------
     Pick
-        About the same is less than `brdfdb.cost.CHEAPER` times as much. Everything that costs less than the cheapest
-        one that keeps to the tolerance breaks it; the most accurate of that is the next cheaper.
+        About the same cost is less than `brdfdb.cost.CHEAPER` times as much, about the same error less than
+        `brdfdb.cost.ALIKE` times: of those alike in both it is the one given first, whatever the clock says. Everything
+        that costs less than the cheapest one that keeps to the tolerance breaks it; the most accurate of that is the
+        next cheaper.
     """
     errors: dict[int, float] = {}
     least = np.inf
@@ -230,19 +232,17 @@ def pick(costs: Sequence[float], error: Callable[[int], float], tolerance: float
         errors[index] = error(index)
         if errors[index] <= tolerance:
             least = min(least, costs[index])
-    chosen = min((index for index in errors if errors[index] <= tolerance), key=lambda index: errors[index])
-    cheaper = [index for index in errors if costs[index] < least]
+    kept = {index: errors[index] for index in sorted(errors) if errors[index] <= tolerance}
+    chosen = next(index for index in kept if kept[index] <= ALIKE * min(kept.values()))
+    cheaper = [index for index in sorted(errors) if costs[index] < least]
     return Pick(chosen, min(cheaper, key=lambda index: errors[index], default=None))
 
 
-def limit(scene: Scene) -> tuple[float, str]:
-    """The tolerance of a scene and its unit; InfeasibleError if it is finer than the truth is known."""
-    stated = scene.tolerance
-    tolerance, unit = (stated.relative, "relative") if stated.relative is not None else (stated.ciede2000, "CIEDE2000")
-    assert tolerance is not None
-    if tolerance < FINEST[unit]:
-        raise InfeasibleError(f"tolerance: {tolerance:g} ({unit}) is finer than the truth is known, {FINEST[unit]:g}")
-    return tolerance, unit
+def check_feasible(tolerance: Tolerance) -> None:
+    """InfeasibleError if a tolerance is finer than the truth is known."""
+    value, unit = tolerance.value, tolerance.unit
+    if value < FINEST[unit]:
+        raise InfeasibleError(f"tolerance: {value:g} ({unit}) is finer than the truth is known, {FINEST[unit]:g}")
 
 
 def choose(
@@ -278,7 +278,8 @@ def choose(
     InfeasibleError
         If the tolerance is finer than the truth is known.
     """
-    tolerance, _ = limit(planned.scene)
+    check_feasible(planned.scene.tolerance)
+    tolerance = planned.scene.tolerance.value
     refused: dict[tuple[str, int], Left] = {}
 
     @functools.cache

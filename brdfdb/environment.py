@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import zipfile
+import zlib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -180,8 +181,8 @@ def _from_numpy(path: Path) -> NDArray[np.generic]:
         with found:
             if "radiance" in found:
                 return np.asarray(found["radiance"])
-    except (ValueError, OSError, zipfile.BadZipFile, EOFError, TypeError) as error:
-        raise ValueError(f"environment.file: {path}: cannot be read as .npz or .npy: {error}") from None
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error):
+        raise ValueError(f"environment.file: {path}: is no .npz or .npy of numbers, or a damaged one") from None
     raise ValueError(f"environment.file: {path}: has no array `radiance`")
 
 
@@ -191,8 +192,8 @@ def _from_exr(path: Path) -> NDArray[np.generic]:
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: np.asarray(each.pixels, dtype=np.float64) for name, each in file.channels().items()}
-    except RuntimeError as error:
-        raise ValueError(f"environment.file: {path}: cannot be read as OpenEXR: {error}") from None
+    except RuntimeError:
+        raise ValueError(f"environment.file: {path}: is no OpenEXR file, or a damaged one") from None
     if "Y" in channels:
         return channels["Y"]
     if channels.keys() >= _LUMINANCE.keys():

@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 from brdfdb.geometry import radians
 from brdfdb.recorded import Recorded
 from brdfdb.scene import Camera, Object, Scene
-from brdfdb.shapes import Array, unit
+from brdfdb.shapes import Array, Plane, unit
 
-_LIFT = 1e-4  # of 1, or of coordinates beyond: how far off their surface shadow and mirror rays begin
+# How far off their surface shadow and mirror rays begin: of the height that the picture has there, and of coordinates,
+# which are rounded
+_LIFT, _ROUNDED = 1e-4, 1e-14
 _BATCH = 40_000  # shadow rays at a time: fewer are slow for the calls, twice as many leave the cache
+_BEHIND = -0.1  # cosine: the smooth normals of cones turn away by half a degree at limbs, backs of surfaces by more
+_WIDEST, _MOST = 8192, 16384  # pixels on either side of a picture, and rays: a spectral one of 8192 x 6144 takes 16 GB
 _LENGTH_OFF = 0.05  # how far from 1 a recorded vector may be, which is then made 1 long: EXR with 16 bits is at 5e-4
 
 
@@ -76,9 +80,9 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
     scene : Scene
         What is seen. One that is recorded has the size of its file.
     width : int
-        Pixels across the picture; the aspect of the camera says how many down.
+        Pixels across the picture; the aspect of the camera says how many down. 8192 on either side at most.
     across : int
-        Rays across each pixel and down: `across` squared are averaged.
+        Rays across each pixel and down: `across` squared are averaged. 16384 rays on either side at most.
 
     Returns
     -------
@@ -88,8 +92,8 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
     Raises
     ------
     ValueError
-        If no ray meets an object, or a light shines on nothing that is seen; if a recorded file holds no directions,
-        or that of an environment no picture.
+        If a side has too many pixels or rays; if no ray meets an object, or the camera is inside one, or a light shines
+        on nothing that is seen; if a recorded file holds no directions, or that of an environment no picture.
 
     Notes
     -----
@@ -100,10 +104,11 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
     if isinstance(first.shape, Recorded):
         view = _recorded(scene, first, first.shape)
     else:
-        height = max(1, round(width / scene.camera.aspect))
+        height = _height(scene.camera, width, across)
         pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
         rays = scene.camera.rays(width * across, height * across)
-        points, surfaces, missed = _seen(scene, *rays, pixels.ravel(), None)
+        points, surfaces, missed = _seen(scene, *rays, pixels.ravel())
+        _check_outside(scene, points)
         background = _background(scene, rays[1][missed], pixels.ravel()[missed], width * height)
         for number, surface in enumerate(surfaces):
             if scene.materials[points[number].material].spec.specular is not None:
@@ -117,25 +122,38 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
 
 
 class _Surface(NamedTuple):
-    """Points (N, 3), frames with tangent, across and normal as rows (N, 3, 3), and viewers (N, 3), all in the scene."""
+    """Points (N, 3), frames with tangent, across and normal as rows (N, 3, 3), and viewers (N, 3), all in the scene.
+
+    `away` (N,) is how far the camera is, by way of the mirror.
+    """
 
     position: Array
     frame: Array
     viewer: Array
+    away: Array
 
 
 def _seen(
-    scene: Scene, origins: Array, directions: Array, at: NDArray[np.int64], via: int | None
+    scene: Scene,
+    origins: Array,
+    directions: Array,
+    at: NDArray[np.int64],
+    via: int | None = None,
+    before: Array | float = 0.0,
 ) -> tuple[list[Points], list[_Surface], NDArray[np.int64]]:
-    """What rays meet first: points of each object that is met, the surfaces that they lie on; rays that meet none."""
+    """What rays meet first: points of each object that is met, the surfaces that they lie on; rays that meet none.
+
+    `before` is how far the origins are from the camera.
+    """
     distance, nearest = _trace(scene, origins, directions)
+    away = before + distance
     points, surfaces = [], []
     for number, item in enumerate(scene.objects):
         rays = np.flatnonzero((nearest == number) & np.isfinite(distance))
         if not rays.size or isinstance(item.shape, Recorded):
             continue
         position = origins[rays] + distance[rays, np.newaxis] * directions[rays]
-        surface = _Surface(position, _turned(item.shape.frame(position), item.grain_deg), -directions[rays])
+        surface = _Surface(position, _turned(item.shape.frame(position), item.grain_deg), -directions[rays], away[rays])
         wr = _viewed(surface)
         wi, irradiance = _lit(scene, item, surface, wr, (number, 0 if via is None else via + 1))
         beyond = _from_afar(scene, _mirror(surface))
@@ -147,10 +165,12 @@ def _seen(
 def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface) -> list[Points]:
     """What the mirror of some points shows; in place of what lies beyond, which is then 0."""
     facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
-    origins, directions = _lifted(surface)[facing], _mirror(surface)[facing]
-    found, *_ = _seen(scene, origins, directions, facing, number)
-    for each in found:
+    origins, directions = _lifted(scene.camera, surface)[facing], _mirror(surface)[facing]
+    found, surfaces, _ = _seen(scene, origins, directions, facing, number, surface.away[facing])
+    for each, shown in zip(found, surfaces, strict=True):
         points[number].beyond[each.at] = 0.0
+        if scene.materials[each.material].spec.specular is not None:  # what its mirror would show is not traced
+            each.beyond[np.isfinite(_trace(scene, _lifted(scene.camera, shown), _mirror(shown))[0])] = 0.0
     return found
 
 
@@ -164,11 +184,11 @@ def _trace(scene: Scene, origins: Array, directions: Array) -> tuple[Array, NDAr
 
 def _lit(scene: Scene, item: Object, surface: _Surface, wr: Array, stream: tuple[int, int]) -> tuple[Array, Array]:
     """Directions of all samples of all light in the frame of the surface, and irradiances; 0 in shadow."""
-    lights = [(light.towards(), light.strength) for light in scene.lights]
+    lights = [(light.towards(), light.intensity) for light in scene.lights]
     towards = np.concatenate([np.zeros((0, 3)), *(samples for samples, _ in lights)])
-    strength = np.concatenate([np.zeros(0), *(np.full(len(samples), each / len(samples)) for samples, each in lights)])
+    weight = np.concatenate([np.zeros(0), *(np.full(len(samples), each / len(samples)) for samples, each in lights)])
     wi = unit(np.einsum("nij,ej->eni", surface.frame, towards))
-    irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
+    irradiance = weight[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
     _shadow(scene, surface, np.broadcast_to(towards[:, np.newaxis], wi.shape), irradiance)
     if scene.environment is None:
         return wi, irradiance
@@ -183,7 +203,7 @@ def _shadow(scene: Scene, surface: _Surface, towards: Array, irradiance: Array) 
     """Make irradiance (E, N) 0 where an object stands in its direction (E, N, 3), in the frame of the scene."""
     if not scene.shadows:
         return
-    origins = _lifted(surface)
+    origins = _lifted(scene.camera, surface)
     sample, point = np.nonzero(irradiance)
     for start in range(0, point.size, _BATCH):
         which = sample[start : start + _BATCH], point[start : start + _BATCH]
@@ -208,9 +228,10 @@ def _background(scene: Scene, directions: Array, at: NDArray[np.int64], pixels: 
     return background
 
 
-def _lifted(surface: _Surface) -> Array:
-    scale = np.maximum(1.0, np.abs(surface.position).max(axis=1, keepdims=True))
-    return np.asarray(surface.position + _LIFT * scale * surface.frame[:, 2])
+def _lifted(camera: Camera, surface: _Surface) -> Array:
+    """Where rays from a surface begin: outside it, but by no more than a small part of a pixel."""
+    lift = _LIFT * camera.covered(surface.away) + _ROUNDED * np.abs(surface.position).max(axis=1)
+    return np.asarray(surface.position + lift[:, np.newaxis] * surface.frame[:, 2])
 
 
 def _mirror(surface: _Surface) -> Array:
@@ -240,7 +261,7 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
     )
     at = np.flatnonzero(good)
     if not at.size:
-        raise ValueError(f"{shape.file}: no pixel has unit vectors")
+        raise ValueError(f"{shape.file}: shows nothing: at every pixel a vector is not finite, or not 1 long")
     flat = {name: unit(array.reshape(-1, height * width, 3)[:, at]) for name, array in arrays.items()}
     if "normal" in flat:
         surface = _frames(flat, scene.camera, width, height, at, item.grain_deg)
@@ -250,7 +271,8 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
     else:
         if scene.environment is not None:
             raise ValueError(f"{shape.file}: has wr and wi; an environment needs normals, to know what is above them")
-        wr, wi = flat["wr"][0], flat["wi"]
+        turn = _turned(np.eye(3)[np.newaxis], item.grain_deg)[0]
+        wr, wi = flat["wr"][0] @ turn.T, flat["wi"] @ turn.T
         if len(wi) != len(scene.lights) or any(light.solid_angle_sr for light in scene.lights):
             raise ValueError(
                 f"{shape.file}: wi has {len(wi)} lights, the scene {len(scene.lights)}; "
@@ -276,12 +298,36 @@ def _frames(
     tangent = unit(tangent)
     frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
     directions = camera.rays(width, height)[1]
-    return _Surface(np.zeros_like(normal), _turned(frame, grain_deg), -directions[at])
+    return _Surface(np.zeros_like(normal), _turned(frame, grain_deg), -directions[at], np.zeros(len(normal)))
 
 
 def _is_unit(vectors: Array) -> NDArray[np.bool_]:
     length = np.linalg.norm(np.nan_to_num(vectors, nan=0.0, posinf=0.0, neginf=0.0), axis=-1)
     return np.asarray(np.abs(length - 1.0) < _LENGTH_OFF)
+
+
+def _height(camera: Camera, width: int, across: int) -> int:
+    """Pixels from the top of a picture to its bottom; ValueError if there are too many, or none."""
+    for name, value in (("width", width), ("across", across)):
+        if value < 1:
+            raise ValueError(f"{name}: {value} must be at least 1")
+    height = max(1, round(width / camera.aspect))
+    if max(width, height) > _WIDEST:
+        raise ValueError(f"width: {width} x {height} pixels are too many; either side may have {_WIDEST} at most")
+    if across * max(width, height) > _MOST:
+        raise ValueError(
+            f"across: {across} rays across each of {width} x {height} pixels are too many; either side may have "
+            f"{_MOST} rays at most"
+        )
+    return height
+
+
+def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
+    """ValueError if the camera is inside an object: it sees backs alone, which are black; a plane has a back, too."""
+    shapes = {item.name: item.shape for item in scene.objects}
+    for each in points:
+        if not isinstance(shapes[each.name], Plane) and np.median(each.wr[:, 2]) < _BEHIND:
+            raise ValueError(f"camera.position: is inside {each.name}, which is black from there")
 
 
 def _check_lights(scene: Scene, points: Sequence[Points]) -> None:

@@ -119,6 +119,12 @@ class _Task(NamedTuple):
     tolerance: float
 
 
+def check_tolerance(tolerance: float) -> None:
+    """ValueError if no table is planned for a tolerance."""
+    if not 1e-4 <= tolerance <= 0.5:
+        raise ValueError(f"tolerance: {tolerance:g} is outside [0.0001, 0.5]")
+
+
 def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout:
     """The smallest table that keeps to a tolerance.
 
@@ -150,8 +156,7 @@ def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, toleranc
     interpolation, leave of an error; the numbers of nodes are those that leave the same error on each axis. The kinds
     that promise the fewest values are tabulated, measured, and made coarser or finer until they keep to the tolerance.
     """
-    if not 1e-4 <= tolerance <= 0.5:
-        raise ValueError(f"tolerance: {tolerance:g} is outside [0.0001, 0.5]")
+    check_tolerance(tolerance)
     task = _task(material, wavelength_nm, tolerance)
     if not task.truth.any():
         return Layout(material, coarsest(material), wavelength_nm, reason="f_r is 0: all light is in the Dirac part")

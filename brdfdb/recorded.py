@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
@@ -20,8 +21,8 @@ class Recorded(BaseModel):
     """What a picture of directions shows, in place of a shape; `file` is an EXR or .npz.
 
     It has either ``normal`` and, if the material is anisotropic, ``tangent``, vectors in the frame of the scene; or
-    ``wr`` and ``wi``, towards the viewer and towards each light of the scene in the frame of the surface (x along the
-    grain, z the normal), for lights without a solid angle. In an .npz these are arrays (height, width, 3), ``wi``
+    ``wr`` and ``wi``, towards the viewer and towards each light of the scene in the frame of the surface (x the
+    tangent, z the normal), for lights without a solid angle. In an .npz these are arrays (height, width, 3), ``wi``
     (lights, height, width, 3). In an EXR they are channels such as ``normal.X``, ``normal.Y`` and ``normal.Z``, those
     of the lights ``wi0.X``, ``wi1.X`` and on. Pixels where a vector is 0 or not finite show nothing. Nothing casts a
     shadow.
@@ -50,12 +51,16 @@ class Recorded(BaseModel):
         arrays = _from_exr(path) if path.suffix == ".exr" else _from_npz(path)
         if "normal" not in arrays and not {"wr", "wi"} <= arrays.keys():
             raise ValueError(f"{path}: has {WANTED}; it has {', '.join(arrays) or 'no vectors'}")
-        shape = arrays["normal" if "normal" in arrays else "wr"].shape
+        first = "normal" if "normal" in arrays else "wr"
+        pixels = arrays[first].shape[:2]
         for name, array in arrays.items():
-            if len(shape) != 3 or array.shape[-3:] != shape or array.ndim != (4 if name == "wi" else 3):
-                raise ValueError(
-                    f"{path}: {name} has the shape {array.shape}, which is not that of a picture of vectors"
+            lights = array.shape[:1] if name == "wi" else ()
+            if array.shape != (*lights, *pixels, 3):
+                wanted = "(lights, height, width, 3)" if name == "wi" else "(height, width, 3)"
+                said = (
+                    f"{path}: {name} has the shape {array.shape}, which is not that of a picture of vectors, {wanted}"
                 )
+                raise ValueError(said if name == first else f"{said}, of as many pixels as {first} has, {pixels}")
         return arrays
 
 
@@ -63,8 +68,8 @@ def _from_npz(path: Path) -> dict[str, Array]:
     try:
         with np.load(path) as file:
             found = {name: file[name] for name in ("normal", "tangent", "wr", "wi") if name in file}
-    except (ValueError, OSError, zipfile.BadZipFile, TypeError) as error:
-        raise ValueError(f"{path}: cannot be read as .npz: {error}") from None
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
+        raise ValueError(f"{path}: is no .npz of numbers, or a damaged one") from None
     if any(array.dtype.kind not in "iuf" for array in found.values()):
         raise ValueError(f"{path}: has {WANTED}: what has these names is not made of numbers")
     return {name: array.astype(np.float64) for name, array in found.items()}
@@ -76,8 +81,8 @@ def _from_exr(path: Path) -> dict[str, Array]:
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels: dict[str, NDArray[np.floating]] = {name: c.pixels for name, c in file.channels().items()}
-    except RuntimeError as error:
-        raise ValueError(f"{path}: cannot be read as OpenEXR: {error}") from None
+    except RuntimeError:
+        raise ValueError(f"{path}: is no OpenEXR file, or a damaged one") from None
     found = {name: vector for name in ("normal", "tangent", "wr") if (vector := _vector(channels, name)) is not None}
     lights: list[Array] = []
     while (light := _vector(channels, f"wi{len(lights)}")) is not None:

@@ -26,6 +26,7 @@ _DEGREE, _LAST = 20, float(radians(89.5))
 # Between the azimuths of anisotropic materials; the other half turn is the same: lobes are ellipses, grooves straight
 _PHI = np.pi / 6.0
 _TOLERANCE = 1e-3  # absolute, of the albedos that these go through
+_VISIBLE_NM = (380.0, 780.0)  # where a material may be stated whose picture is grey
 _BATCH = 20_000  # pairs of viewer and light at a time: calls cost little beside them, and their spectra are 7 MB
 
 
@@ -39,11 +40,21 @@ class Reflector:
     wavelength_nm : array (L,) [nm] or None
         Where it is evaluated: that of the scene, or of the material if its parameters are stated for some wavelengths
         only, which do not make a colour. None of a model that is not spectral.
+
+    Raises
+    ------
+    ValueError
+        If the parameters are stated for light that nobody sees.
     """
 
     def __init__(self, material: Material, wavelength_nm: Array) -> None:
         self.material = material
         self.wavelength_nm = material.evaluated_at(wavelength_nm)
+        if material.wavelengths_nm is not None and not _VISIBLE_NM[0] <= material.wavelengths_nm[0] <= _VISIBLE_NM[1]:
+            raise ValueError(
+                f"{material.name}: its parameters are stated for {material.wavelengths_nm[0]:g} nm, outside the "
+                f"visible, {_VISIBLE_NM[0]:g} to {_VISIBLE_NM[1]:g} nm"
+            )
         self._parameters = material.arguments(self.wavelength_nm)
 
     @functools.cached_property
@@ -132,6 +143,11 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
     array (N, L)
         Without what the mirror shows of other objects, which `render` adds.
 
+    Raises
+    ------
+    ValueError
+        If `brdf` returns another shape.
+
     Notes
     -----
     Eq. (6) of Ward 1992 (``ward1992``): lights are deterministic, the environment is sampled. Eq. (12) of He et al.
@@ -148,7 +164,13 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
         irradiance = points.irradiance[:, part].T
         number, light = np.nonzero(irradiance * (points.wr[part, 2:] > 0.0))
         if number.size:
-            reflected = f_r(points.wi[light, start + number], points.wr[start + number], wavelength)
+            reflected = np.asarray(f_r(points.wi[light, start + number], points.wr[start + number], wavelength))
+            shapes = (number.size, wavelength.size), (number.size, 1)
+            if reflected.shape not in shapes:
+                raise ValueError(
+                    f"f_r of {points.material}: {number.size} pairs of directions at {wavelength.size} wavelengths "
+                    f"gave the shape {reflected.shape}; must be {shapes[0]} or {shapes[1]}"
+                )
             first = np.flatnonzero(np.diff(number, prepend=-1))
             sums = np.add.reduceat(reflected * irradiance[number, light][:, np.newaxis], first)
             total[start + number[first]] += sums
@@ -186,9 +208,18 @@ def render(
     array (height, width, L)
         Spectral radiance as multiples of the illuminant, averaged over each pixel; ambient radiance and environment
         where there is no object.
+
+    Raises
+    ------
+    ValueError
+        If `brdfs` has a key that is no material of the scene, or one of them returns a wrong shape; if a material is
+        stated for light that nobody sees.
     """
     known = reflectors(scene) if materials is None else materials
     replaced = {} if brdfs is None else brdfs
+    for name in replaced:
+        if name not in scene.materials:
+            raise ValueError(f"brdfs: {name!r} is not one of the scene's materials: {', '.join(scene.materials)}")
     lists = []
     for points in view.points:
         lists.append(radiance(scene, points, known[points.material], replaced.get(points.material)))

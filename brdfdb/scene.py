@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field, field_validator, model_validator
@@ -23,8 +23,8 @@ class Light(BaseModel):
     """A light far away: the same from everywhere in the scene.
 
     `strength` [1] is its irradiance over pi, that of a surface which faces it: the radiance that a white Lambertian
-    surface has there. With a solid angle the light is a round disc that glossy surfaces blur and mirrors show; without
-    one mirrors miss it.
+    surface has there, whatever the solid angle. With one the light is a round disc that glossy surfaces blur and
+    mirrors show; without one mirrors miss it.
     """
 
     model_config = STRICT
@@ -47,9 +47,14 @@ class Light(BaseModel):
         return 1.0 - self.solid_angle_sr / (2.0 * np.pi)
 
     @property
+    def intensity(self) -> float:
+        """Radiance times solid angle: pi times the strength over the mean cosine, on a surface that faces the disc."""
+        return np.pi * self.strength / ((1.0 + self.cos_radius) / 2.0)
+
+    @property
     def radiance(self) -> float:
         """Radiance of the disc; 0 if the light has no solid angle."""
-        return np.pi * self.strength / self.solid_angle_sr if self.solid_angle_sr else 0.0
+        return self.intensity / self.solid_angle_sr if self.solid_angle_sr else 0.0
 
     def towards(self) -> Array:
         """Unit vectors (samples, 3) towards the disc, each of which stands for the same solid angle."""
@@ -81,9 +86,17 @@ class Camera(BaseModel):
     def _check(self) -> Camera:
         if (self.fov_deg is None) == (self.height is None):
             raise ValueError("fov_deg, height: give one of the two")
-        if np.linalg.norm(np.cross(np.subtract(self.target, self.position), self.up)) < 1e-9:
+        forward = np.subtract(self.target, self.position)
+        if np.linalg.norm(np.cross(forward, self.up)) <= 1e-9 * np.linalg.norm(forward) * np.linalg.norm(self.up):
             raise ValueError("target: the camera must look at another place than its own, and not along `up`")
         return self
+
+    def covered(self, distance: Array) -> Array:
+        """How high what the camera sees is, at distances from it, from the lower to the upper edge of the picture."""
+        if self.fov_deg is None:
+            assert self.height is not None
+            return np.full_like(distance, self.height)
+        return 2.0 * np.tan(radians(self.fov_deg) / 2.0) * distance
 
     def rays(self, width: int, height: int) -> tuple[Array, Array]:
         """Origins and unit directions (height * width, 3) through the middles of pixels, row by row from the top."""
@@ -128,6 +141,18 @@ class Tolerance(BaseModel):
         if (self.relative is None) == (self.ciede2000 is None):
             raise ValueError("relative, ciede2000: give one of the two")
         return self
+
+    @property
+    def unit(self) -> Literal["relative", "CIEDE2000"]:
+        """What `value` counts."""
+        return "CIEDE2000" if self.relative is None else "relative"
+
+    @property
+    def value(self) -> float:
+        """The largest error, in `unit`."""
+        found = self.ciede2000 if self.relative is None else self.relative
+        assert found is not None  # as `_check` saw
+        return found
 
 
 class Scene(BaseModel):

@@ -17,7 +17,6 @@ Pair = Annotated[tuple[float, float], Field(strict=False)]
 Length = Annotated[float, Field(gt=0.0)]
 
 STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
-_NEAR = 1e-9  # a ray does not hit what it starts on
 _FACETS = 24  # cones between two points of a profile: the contour turns by less than a degree from one to the next
 
 
@@ -95,7 +94,7 @@ class Plane(Shape):
         with np.errstate(divide="ignore", invalid="ignore"):  # rays along the plane
             t = -o[:, 2] / d[:, 2]
             p = o + t[:, np.newaxis] * d
-            inside = t > _NEAR
+            inside = t > 0.0
             if self.size is not None:
                 inside &= np.all(np.abs(p[:, :2]) <= np.asarray(self.size) / 2.0, axis=1)
         return np.where(inside, t, np.inf)
@@ -237,7 +236,7 @@ def _roots(a: Array, half_b: Array, c: Array) -> tuple[Array, Array]:
 
 def _nearest(*ts: Array) -> Array:
     """The smallest of the distances in front of each ray; inf where there is none."""
-    return np.asarray(np.min([np.where(t > _NEAR, t, np.inf) for t in ts], axis=0))  # nan is not
+    return np.asarray(np.min([np.where(t > 0.0, t, np.inf) for t in ts], axis=0))  # nan is not
 
 
 def _cone(o: Array, d: Array, r0: float, r1: float, z0: float, z1: float, open_ends: bool = False) -> Array:

@@ -369,9 +369,9 @@ def test_a_bad_environment_is_one_sentence_with_the_field(tmp_path: Path, table:
     ("name", "said"),
     [
         ("none.exr", "there is no such file"),
-        ("text.npz", "cannot be read as .npz or .npy"),
-        ("empty.npy", "cannot be read as .npz or .npy"),
-        ("text.exr", "cannot be read as OpenEXR"),
+        ("text.npz", "is no .npz or .npy of numbers, or a damaged one"),
+        ("empty.npy", "is no .npz or .npy of numbers, or a damaged one"),
+        ("text.exr", "is no OpenEXR file, or a damaged one"),
         ("other.npz", "has no array `radiance`"),
         ("depth.exr", "has neither a channel Y nor R, G, B; it has Z"),
         ("cube.npy", r"must hold numbers of shape \(rows, columns\)"),

@@ -162,7 +162,10 @@ THETA = np.arccos(0.8)
     ("fields", "seen"),
     [
         ({"ambient": 0.5}, 0.5),
-        ({"lights": [{"direction": [0.0, 0.6, 0.8], "strength": 0.1, "solid_angle_sr": 0.01}]}, np.pi * 0.1 / 0.01),
+        (
+            {"lights": [{"direction": [0.0, 0.6, 0.8], "strength": 0.1, "solid_angle_sr": 0.01}]},
+            np.pi * 0.1 / (0.01 * (1.0 - 0.01 / (4.0 * np.pi))),  # over the projected solid angle
+        ),
         ({"lights": [{"direction": [0.0, 0.6, 0.8]}]}, 0.0),  # a direction is no disc: mirrors miss it
         ({"lights": [{"direction": [0.0, -0.6, 0.8], "solid_angle_sr": 0.01}]}, 0.0),
     ],
@@ -196,6 +199,27 @@ def test_any_function_can_stand_in_for_a_model() -> None:
     image = rendered(of, brdfs={"clay-vase": brdf})
     lambert = rendered(scene(SPHERE, "white", lights=[{"direction": [0.0, -1.0, 0.0]}]))
     assert np.abs(image - lambert * np.array(COARSE) / 700.0).max() < ROUNDING
+
+
+def test_a_function_for_what_is_no_material_of_the_scene_is_said_so() -> None:
+    of = scene(SPHERE, "clay-vase", lights=[{"direction": [0.0, -1.0, 0.0]}])
+    with pytest.raises(ValueError, match=r"brdfs: 'thing' is not one of the scene's materials: clay-vase$"):
+        rendered(of, 4, brdfs={"thing": lambda wi, _wr, _wavelength_nm: np.ones((len(wi), 1))})
+
+
+@pytest.mark.parametrize("columns", [(), (2,), (16, 1)], ids=str)
+def test_f_r_of_a_wrong_shape_is_said_so(columns: tuple[int, ...]) -> None:
+    of = scene({"kind": "plane"}, "white", camera=ABOVE, lights=[{"direction": [0.0, 0.0, 1.0]}])
+    with pytest.raises(
+        ValueError, match=r"f_r of white: 4 pairs .* gave the shape \(4,.*; must be \(4, 16\) or \(4, 1\)"
+    ):
+        rendered(of, 2, brdfs={"white": lambda wi, _wr, _wavelength_nm: np.ones((len(wi), *columns))})
+
+
+def test_a_material_stated_for_light_that_nobody_sees_has_no_picture() -> None:
+    of = scene(SPHERE, "roughened-aluminum-2000nm", lights=[{"direction": [0.0, -1.0, 0.0]}])
+    with pytest.raises(ValueError, match="stated for 2000 nm, outside the visible, 380 to 780 nm"):
+        rendered(of, 4)
 
 
 def test_the_back_of_a_plane_is_black_whatever_the_function() -> None:

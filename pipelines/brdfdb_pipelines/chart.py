@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import os
-import platform
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -21,6 +19,7 @@ from brdfdb.chart import STEPS, TIMED, Chart, Charts, FamilyChart, Point, chart,
 from brdfdb.family import Family, Sweep
 from brdfdb.family_records import recorded
 from brdfdb.materials import Material
+from brdfdb.plan import check_tolerance
 from brdfdb.representations import Representation, of_table
 from brdfdb.store import Store
 from brdfdb_pipelines import recipe, scatter, terminal
@@ -51,7 +50,7 @@ def run(
     recipe_file: Path | None = None,
     tolerances: Sequence[float] | None = None,
 ) -> Charts:
-    """Chart materials and families, and write ``chart.json`` and, of each, ``NAME.svg`` and ``NAME.png``.
+    """Chart materials and families, and write of each ``NAME.json``, ``NAME.svg`` and ``NAME.png``.
 
     Parameters
     ----------
@@ -69,13 +68,15 @@ def run(
     Returns
     -------
     Charts
-        What was written.
+        All of them; each is written by itself, beside its pictures: other runs replace what they chart anew, no more.
 
     Raises
     ------
     ValueError
         If a name is neither of the recipe nor of the store, or a tolerance is none.
     """
+    for tolerance in tolerances or ():
+        check_tolerance(tolerance)
     subjects = _subjects(names, store, recipe_file)
     found: list[Chart] = []
     families: list[FamilyChart] = []
@@ -91,21 +92,25 @@ def run(
             tick = functools.partial(bar.advance, task)
             found.append(chart(subject.material, subject.wavelength_nm, tolerances, also=subject.stored, tick=tick))
     charts = Charts(
-        brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=_machine(), charts=found, families=families
+        brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=terminal.machine(), charts=found, families=families
     )
     out.mkdir(parents=True, exist_ok=True)
-    (out / "chart.json").write_text(charts.model_dump_json(indent=1) + "\n", encoding="utf-8")
     for one in found:
-        (out / f"{one.material}.svg").write_text(scatter.svg(one), encoding="utf-8")
-        (out / f"{one.material}.png").write_bytes(scatter.png(one))
+        _write(out / one.material, charts.model_copy(update={"charts": [one], "families": []}), one)
         _print(one)
     for whole in families:
-        (out / f"{whole.family}.svg").write_text(scatter.svg(whole), encoding="utf-8")
-        (out / f"{whole.family}.png").write_bytes(scatter.png(whole))
+        _write(out / whole.family, charts.model_copy(update={"charts": [], "families": [whole]}), whole)
         _print_family(whole)
-    pictures = [*(one.material for one in found), *(whole.family for whole in families)]
-    print(f"{out}: chart.json and the pictures of {', '.join(pictures)}")
+    written = [*(one.material for one in found), *(whole.family for whole in families)]
+    print(f"{out}: .json, .svg and .png of {', '.join(written)}")
     return charts
+
+
+def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
+    """A chart as data and as pictures; the names of materials have no dots."""
+    stem.with_suffix(".json").write_text(document.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    stem.with_suffix(".svg").write_text(scatter.svg(drawn), encoding="utf-8")
+    stem.with_suffix(".png").write_bytes(scatter.png(drawn))
 
 
 def _subjects(names: Sequence[str], root: Path | None, recipe_file: Path | None) -> list[_Subject | _Family]:
@@ -146,10 +151,6 @@ def _fits(stored: NDArray[np.float64] | None, wanted: NDArray[np.float64] | None
     return (None if stored is None else stored.tolist()) == (None if wanted is None else wanted.tolist())
 
 
-def _machine() -> str:
-    return f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
-
-
 def _print(one: Chart) -> None:
     """All points as a table, and the front in a sentence."""
     percent = scatter.percent
@@ -159,8 +160,8 @@ def _print(one: Chart) -> None:
             point.key,
             point.title,
             *map(percent, (point.l1, point.p99, point.forward, point.back, point.grazing)),
-            f"{scatter.count(point.batch.ns)} ({scatter.count(point.batch.low)}-{scatter.count(point.batch.high)})",
-            scatter.count(point.single.ns),
+            f"{terminal.count(point.batch.ns)} ({terminal.count(point.batch.low)}-{terminal.count(point.batch.high)})",
+            terminal.count(point.single.ns),
             terminal.size(point.bytes),
         )
         for point in one.points
@@ -174,7 +175,7 @@ def _print(one: Chart) -> None:
 def _said(point: Point) -> str:
     off = f"{scatter.percent(point.l1)} off in the mean, p99 {scatter.percent(point.p99)}"
     error = "the truth" if point.l1 == 0.0 else off
-    return f"{point.title} ({scatter.count(point.batch.ns)} ns, {error})"
+    return f"{point.title} ({terminal.count(point.batch.ns)} ns, {error})"
 
 
 def _print_family(whole: FamilyChart) -> None:
@@ -187,16 +188,16 @@ def _print_family(whole: FamilyChart) -> None:
                 chosen = 2 * sum(curve.key in whole.fronts[index] for index in some) > len(some)
                 middle = scatter.middle([curve.l1[index] for index in some])
                 cells.append("-" if middle is None else f"{'*' if chosen else ''}{scatter.percent(middle)}")
-            rows.append((curve.key, curve.title, scatter.count(curve.batch.ns), *cells))
+            rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
         columns = [f"{value:g}" for value in values]
         if whole.g is not None and len(whole.axes) == 1:
-            rows.insert(0, ("", "g along the normal", "", *map(scatter.count, whole.g)))
+            rows.insert(0, ("", "g along the normal", "", *map(terminal.count, whole.g)))
         title = f"{whole.family}: {whole.title}. Mean error along {axis}; * is worth having"
         terminal.print_table(title, ("key", "form", "ns a value", *columns), rows, numbers=("ns a value", *columns))
     print(f"  times are those of one member, {whole.curves[0].timed} for most")
     for curve in whole.curves:
         if where := [index for index, front in enumerate(whole.fronts) if curve.key in front]:
-            print(f"  worth having: {curve.title} ({scatter.count(curve.batch.ns)} ns) {_where(whole, where)}")
+            print(f"  worth having: {curve.title} ({terminal.count(curve.batch.ns)} ns) {_where(whole, where)}")
     for curve in whole.curves:
         if curve.kind in ("closed form", "approximation", "printed"):
             close = [index for index, error in enumerate(curve.l1) if error is not None and error <= scatter.CLOSE]
@@ -204,7 +205,7 @@ def _print_family(whole: FamilyChart) -> None:
             print(f"  within {scatter.percent(scatter.CLOSE)} in the mean: {curve.title} {where_close}")
     if whole.between is not None:
         off = f"{scatter.percent(whole.between.l1)} off in the mean, p99 {scatter.percent(whole.between.p99)}"
-        time = f"{scatter.count(whole.between.batch.ns)} ns, {scatter.count(whole.between.single.ns)} of one"
+        time = f"{terminal.count(whole.between.batch.ns)} ns, {terminal.count(whole.between.single.ns)} of one"
         print(f"  between members: {off}, as the family states ({time}, {terminal.size(whole.between.bytes)})")
 
 

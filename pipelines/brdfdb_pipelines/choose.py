@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -12,15 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from brdfdb import cost, picture
-from brdfdb.choices import Choice, Price, Weigh, describe
-from brdfdb.choose import Candidate, Decision, Seen, candidates, choose, limit
+from brdfdb.choices import Choice, Price, Weigh, describe, within
+from brdfdb.choose import Candidate, Decision, Seen, candidates, check_feasible, choose
 from brdfdb.gather import View, gather
 from brdfdb.render import reflectors
 from brdfdb.scene import Scene
 from brdfdb.shapes import Array
-from brdfdb.staging import publish_dataset
-from brdfdb.tabulate import tabulate
+from brdfdb.staging import make_store
 from brdfdb_pipelines import terminal
+from brdfdb_pipelines.chosen import Built, build, with_reason
 from brdfdb_pipelines.scene import SceneError, load
 
 TIMED = 20_000  # pairs of directions of a material, drawn from those that the scene uses
@@ -46,11 +44,13 @@ def run(
     out : Path
         Directory to write to; made if it is not there.
     width : int
-        Pixels across where candidates are compared; the whole is checked with half as many more.
+        Pixels across where candidates are compared; the whole is checked with half as many more. A recorded scene has
+        the size of its file in both.
     weigh : str
         What is to be small: "time", "bytes", or "both", which is their product.
     store : Path, optional
-        Where chosen tables are published, under the names of their materials.
+        Where chosen tables are published, under the names of their materials, each with its error; made if it is not
+        there.
     tolerances : sequence of float, optional
         Of planned tables: see `brdfdb.choose.candidates`.
 
@@ -63,6 +63,8 @@ def run(
     ------
     SceneError
         If the scene is none or cannot be looked at, or its tolerance is infeasible.
+    StoreError
+        If the store cannot be written, or is something else: before any work.
     """
     scene = load(name)
     try:
@@ -80,7 +82,9 @@ def _run(
     store: Path | None,
     tolerances: Sequence[float] | None,
 ) -> Choice:
-    limit(scene)  # infeasible before minutes of work
+    check_feasible(scene.tolerance)  # before minutes of work, as the store
+    if store is not None:
+        make_store(store)
     with terminal.progress(counted=False, transient=True) as bar:
         bar.add_task("tracing rays", total=None)
         # another resolution puts every ray at another place
@@ -99,24 +103,36 @@ def _run(
         planned, checked = (Seen(scene, each, truths, materials) for each in (view, denser))
         costs = {key: [price.cost for price in each] for key, each in prices.items()}
         chosen = choose(planned, checked, offered, costs, tick=lambda: bar.advance(task))
-    revisions = _built(store, offered, chosen)
+    forms = {key: offered[key][decision.pick.chosen].form for key, decision in chosen.items()}
+    wanted = f"{Path(name).stem}, {within(scene.tolerance)}"
+    layouts = {
+        key: with_reason(form.layout, form.title, wanted) for key, form in forms.items() if form.layout is not None
+    }
+    built = build(store, layouts) if store is not None and layouts else {}
     choice = Choice(
         brdfdb=version("brdfdb"),
         when=datetime.now(UTC),
-        machine=f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}",
+        machine=terminal.machine(),
         scene=Path(name).stem,
         tolerance=scene.tolerance,
         weigh=weigh,
         planned=(view.width, view.height),
         checked=(denser.width, denser.height),
         materials=describe(
-            scene, chosen, offered, prices, {key: planned.pixels(key).size for key in offered}, revisions
+            scene,
+            chosen,
+            offered,
+            prices,
+            {key: planned.pixels(key).size for key in offered},
+            {key: each.revision for key, each in built.items()},
         ),
     )
     out.mkdir(parents=True, exist_ok=True)
     (out / "choice.json").write_text(choice.model_dump_json(indent=1) + "\n", encoding="utf-8")
     _draw(out / Path(name).stem, checked, offered, chosen)
-    _print(choice)
+    _print(choice, built)
+    if store is not None and not built:
+        print("nothing to build: no table was chosen")
     print(f"{out}: choice.json, {choice.scene}.png, {choice.scene}-truth.exr and {choice.scene}-choice.exr")
     return choice
 
@@ -149,50 +165,22 @@ def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> l
     return prices
 
 
-def _built(
-    store: Path | None, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]
-) -> dict[str, str]:
-    """Revisions of the chosen tables, published in a store, by material."""
-    revisions: dict[str, str] = {}
-    for key, decision in chosen.items():
-        layout = offered[key][decision.pick.chosen].form.layout
-        if store is not None and layout is not None:
-            revisions[key], _ = publish_dataset(store, key, tabulate(layout))
-    return revisions
-
-
 def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]) -> None:
-    """The comparison as a picture of four panels; truth and choice as spectral EXR."""
-    from matplotlib.figure import Figure
+    """The comparison as a picture; truth and choice as spectral EXR."""
+    from brdfdb_pipelines import comparison  # which loads matplotlib
 
     picks = {key: decision.pick for key, decision in chosen.items()}
     choice = seen.picture({key: offered[key][one.chosen] for key, one in picks.items()})
-    cheaper = seen.picture(
-        {key: offered[key][one.chosen if one.cheaper is None else one.cheaper] for key, one in picks.items()}
-    )
+    lesser = {key: offered[key][one.cheaper] for key, one in picks.items() if one.cheaper is not None}
+    best = {key: offered[key][one.chosen] for key, one in picks.items() if one.cheaper is None}
     for image, suffix in ((seen.truth, "truth"), (choice, "choice")):
         picture.write_exr(stem.with_name(f"{stem.name}-{suffix}.exr"), seen.scene, image)
-    height, width = seen.truth.shape[:2]
-    canvas = Figure(figsize=(10.0, 0.6 + 10.0 * height / width), layout="constrained")
-    axes = canvas.subplots(2, 2)
-    for panel, image, title in (
-        (axes[0, 0], seen.truth, "truth"),
-        (axes[0, 1], choice, "choice"),
-        (axes[1, 1], cheaper, "next cheaper"),
-    ):
-        panel.imshow(picture.srgb(seen.scene, image))
-        panel.set_title(title)
-    shown = axes[1, 0].imshow(seen.differences(choice), vmin=0.0, cmap="viridis")
-    unit = "relative" if seen.scene.tolerance.relative is not None else "CIEDE2000"
-    axes[1, 0].set_title(f"difference of the choice, {unit}")
-    canvas.colorbar(shown, ax=axes[1, 0], shrink=0.8)
-    for panel in axes.flat:
-        panel.set_axis_off()
-    canvas.savefig(stem.with_name(f"{stem.name}.png"), dpi=110, metadata={"Software": None})
+    cheaper = seen.picture({**best, **lesser}) if lesser else None
+    stem.with_name(f"{stem.name}.png").write_bytes(comparison.png(seen, choice, cheaper))
 
 
-def _print(choice: Choice) -> None:
-    """The choices as a table, and reasons."""
+def _print(choice: Choice, built: Mapping[str, Built]) -> None:
+    """The choices as a table, reasons, and what became of the tables of a store."""
     numbers = ("alone", "whole", "largest", "ns", "bytes", "share of the truth")
     rows = [
         (
@@ -201,18 +189,16 @@ def _print(choice: Choice) -> None:
             f"{one.choice.error.counted:.2g}",
             f"{one.whole.counted:.2g}",
             f"{one.whole.most:.2g}",
-            f"{one.choice.ns:.3g}",
+            terminal.count(one.choice.ns),
             terminal.size(one.choice.bytes),
             f"{one.choice.share:.2g}",
         )
         for one in choice.materials
     ]
-    said = choice.tolerance
-    tolerance = f"{said.relative:g} relative" if said.relative is not None else f"CIEDE2000 {said.ciede2000:g}"
-    where = "every pixel" if said.percentile == 100.0 else f"{said.percentile:g} % of the pixels of each material"
-    title = f"{choice.scene}: within {tolerance} at {where}"
+    compared, checked = (f"{across} x {down}" for across, down in (choice.planned, choice.checked))
+    title = f"{choice.scene}: {within(choice.tolerance)}; {compared} pixels compared, {checked} checked"
     terminal.print_table(title, ("material", "choice", *numbers), rows, numbers=numbers)
     for one in choice.materials:
         print(f"  {one.material}: {one.choice.title} {one.reason}")
-        if one.revision is not None:
-            print(f"    {one.revision} in the store")
+        if one.material in built:
+            print(f"    {built[one.material].said}")

@@ -28,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()  # a reader that left shows here, not at exit
         return code
     except KeyboardInterrupt:
-        print("brdfdb: interrupted; what was published before stays", file=sys.stderr)
+        print("brdfdb: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -64,17 +64,18 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def command(
-        name: str, run: Callable[[argparse.Namespace], int], text: str, among: Any = commands
+        name: str, run: Callable[[argparse.Namespace], int], text: str, among: Any = commands, store: bool = True
     ) -> argparse.ArgumentParser:
         sub: argparse.ArgumentParser = among.add_parser(name, help=text, description=text)
         sub.set_defaults(run=run)
-        sub.add_argument(
-            "--store",
-            type=Path,
-            default=Path(os.environ.get("BRDFDB_STORE", "brdf-store")),
-            metavar="DIR",
-            help="directory of the store (default: $BRDFDB_STORE or %(default)s)",
-        )
+        if store:
+            sub.add_argument(
+                "--store",
+                type=Path,
+                default=Path(os.environ.get("BRDFDB_STORE", "brdf-store")),
+                metavar="DIR",
+                help="directory of the store (default: $BRDFDB_STORE or %(default)s)",
+            )
         return sub
 
     build = command("build", _build, "Tabulate what is missing of the materials of a recipe into the store.")
@@ -148,7 +149,10 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     choose = command(
-        "choose", _choose, "Choose the cheapest form of each material that a scene cannot tell from the truth."
+        "choose",
+        _choose,
+        "Choose the cheapest form of each material that a scene cannot tell from the truth.",
+        store=False,
     )
     choose.add_argument("scene", metavar="SCENE", help="a .toml file, or a scene that comes with the program")
     choose.add_argument(
@@ -191,15 +195,16 @@ def _parser() -> argparse.ArgumentParser:
     lookup.add_argument("--json", action="store_true", help="print JSON")
     lookup.add_argument("--with-error", action="store_true", help="print the error that the table states, too")
 
-    render = command("render", _render, "Render a scene with the models of its materials, as PNG and spectral EXR.")
+    render = command(
+        "render", _render, "Render a scene with the models of its materials, as PNG and spectral EXR.", store=False
+    )
     render.add_argument("scene", metavar="SCENE", help="a .toml file, or a scene that comes with the program")
     render.add_argument(
         "--out", type=Path, default=Path("brdf-scenes"), metavar="DIR", help="directory (default: %(default)s)"
     )
-    render.add_argument("--width", type=_positive, default=256, metavar="N", help="pixels (default: %(default)s)")
-    render.add_argument(
-        "--across", type=_positive, default=1, metavar="N", help="rays across a pixel, and down (default: %(default)s)"
-    )
+    # no defaults: what is recorded has the pixels of its file
+    render.add_argument("--width", type=_positive, metavar="N", help="pixels (default: 256)")
+    render.add_argument("--across", type=_positive, metavar="N", help="rays across a pixel, and down (default: 1)")
 
     listing = command("list", _list, "List the materials and families of the store, or the built-in presets.")
     listing.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")
@@ -337,7 +342,13 @@ def _chart(options: argparse.Namespace) -> int:
 def _choose(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import choose
 
-    choose.run(options.scene, options.out, width=options.width, weigh=options.weigh, store=options.build)
+    try:
+        choose.run(options.scene, options.out, width=options.width, weigh=options.weigh, store=options.build)
+    except KeyboardInterrupt:
+        if options.build is None:
+            raise
+        print("brdfdb: interrupted; what was published before stays", file=sys.stderr)
+        return INTERRUPTED
     return 0
 
 

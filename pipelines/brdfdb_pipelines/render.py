@@ -6,18 +6,23 @@ from pathlib import Path
 
 from brdfdb import picture
 from brdfdb.gather import gather
+from brdfdb.recorded import Recorded
 from brdfdb.render import reflectors, render
 from brdfdb_pipelines import terminal
 from brdfdb_pipelines.scene import SceneError, load
 
+WIDTH = 256  # pixels, where none are asked for
 
-def run(name: str, directory: Path, *, width: int, across: int) -> None:
+
+def run(name: str, directory: Path, *, width: int | None = None, across: int | None = None) -> None:
     """Render a scene by its file or name, write NAME.png and NAME.exr, and say where they are."""
     scene = load(name)
+    if isinstance(scene.objects[0].shape, Recorded) and (width is not None or across is not None):
+        raise SceneError(f"{name}: is recorded, and has the pixels of its file; leave out --width and --across")
     try:
         with terminal.progress(counted=False, transient=True) as bar:
             bar.add_task("tracing rays", total=None)
-            view, materials = gather(scene, width, across=across), reflectors(scene)
+            view, materials = gather(scene, width or WIDTH, across=across or 1), reflectors(scene)
     except ValueError as error:
         raise SceneError(f"{name}: {error}") from None
     with terminal.progress() as bar:

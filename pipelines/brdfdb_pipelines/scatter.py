@@ -99,8 +99,9 @@ def _drawn(chart: Chart) -> Canvas:
     rows = []
     for point in chart.points:
         errors = (point.l1, point.p99, point.forward, point.back, point.grazing)
-        times = f"{count(point.batch.ns)} ({count(point.batch.low)}-{count(point.batch.high)})", count(point.single.ns)
-        rows.append((point, (*map(percent, errors), *times, terminal.size(point.bytes)), point.key in fronts))
+        ns, low, high, one = map(terminal.count, (point.batch.ns, point.batch.low, point.batch.high, point.single.ns))
+        cells = (*map(percent, errors), f"{ns} ({low}-{high})", one, terminal.size(point.bytes))
+        rows.append((point, cells, point.key in fronts))
     heads = ("mean error", "p99", "forward", "back", "grazing", "ns, many (quartiles)", "ns, one", "bytes")
     _table(canvas, heads, rows, _ABOVE + _PLOT + _BELOW, height)
     return canvas
@@ -168,7 +169,7 @@ def _axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
     axes.set_xlim(low / 10 ** (0.06 * decades), high * 10 ** (0.09 * decades))
     _error_axis(axes, max(3.0, 2.0 * max(errors)))
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,), numticks=6))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: count(value)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: terminal.count(value)))
     axes.xaxis.set_minor_locator(NullLocator())
 
 
@@ -399,7 +400,8 @@ def _heights(axes: Axes, x: list[float], g: list[float]) -> None:
         if after - at > _APART * mpl.rcParams["figure.dpi"] / 72.0:
             shown.append(index)
     above = axes.secondary_xaxis("top")
-    above.set_xticks([x[index] for index in shown], labels=[count(float(f"{g[index]:.2g}")) for index in shown])
+    labels = [terminal.count(float(f"{g[index]:.2g}")) for index in shown]
+    above.set_xticks([x[index] for index in shown], labels=labels)
     above.xaxis.set_minor_locator(NullLocator())
     above.set_xlabel("g along the normal, eq. 79")
     above.tick_params(length=0)
@@ -475,7 +477,7 @@ _FAMILY_HEADS = ("mean: least", "median", "most", "within 1 %", "p99: median", "
 
 
 def _family_row(whole: FamilyChart, form: Curve | Between) -> tuple[Form, tuple[str, ...], bool]:
-    times = count(form.batch.ns), count(form.single.ns)
+    times = terminal.count(form.batch.ns), terminal.count(form.single.ns)
     if isinstance(form, Between):
         return form, ("", percent(form.l1), "", "", percent(form.p99), *times, ""), False
     means, tails = ([v for v in values if v is not None] for values in (form.l1, form.p99))
@@ -494,12 +496,3 @@ def percent(value: float) -> str:
     if value <= SMALLEST:
         return "0" if value == 0.0 else "≤ 0.0001 %"
     return f"{100.0 * value:.2g} %" if value < 1.0 else f"{100.0 * value:.0f} %"
-
-
-def count(value: float) -> str:
-    """A number to three digits, thousands with a k."""
-    for unit in ("", "k", "M"):
-        if value < 999.5:
-            return f"{value:.3g}{unit}"
-        value /= 1000.0
-    return f"{value:.3g}G"

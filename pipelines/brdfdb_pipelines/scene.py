@@ -52,14 +52,26 @@ def load(name: str) -> Scene:
 
 
 def _sentence(error: ValidationError) -> str:
-    """The first thing that pydantic finds fault with, and the field."""
-    first = error.errors(include_url=False)[0]
+    """The first thing that pydantic finds fault with, and the field; a mistyped key before what is then missing."""
+    errors = error.errors(include_url=False)
+    first = next((each for each in errors if each["type"] == "extra_forbidden"), errors[0])
     # after the key of a shape comes its kind, which is no key
     loc = [str(part) for before, part in zip((None, *first["loc"]), first["loc"], strict=False) if before != "shape"]
-    if first["type"] == "value_error":
-        said = str(first["ctx"]["error"])
-        if loc and said.startswith(loc[-1]):
-            loc.pop()
-        return ".".join([*loc, said])
-    said = "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+    match first["type"]:
+        case "value_error":
+            said = str(first["ctx"]["error"])
+            if loc and said.startswith(loc[-1]):
+                loc.pop()
+            return ".".join([*loc, said])
+        case "extra_forbidden":
+            missing = [str(each["loc"][-1]) for each in errors if each["type"] == "missing"]
+            said = f"unknown key{closest(loc[-1], missing)}"
+        case "union_tag_invalid":
+            loc.append("kind")
+            said = f"{first['ctx']['tag']!r} is not one of {first['ctx']['expected_tags'].replace(chr(39), '')}"
+        case "union_tag_not_found":
+            loc.append("kind")
+            said = "Field required"
+        case _:
+            said = first["msg"]
     return f"{'.'.join(loc)}: {said}"

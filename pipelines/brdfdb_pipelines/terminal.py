@@ -1,7 +1,9 @@
-"""What the command line shows: progress bars on stderr, tables on stdout."""
+"""What the command line shows: progress bars on stderr, tables on stdout, numbers and the machine in words."""
 
 from __future__ import annotations
 
+import os
+import platform
 from collections.abc import Sequence
 
 from rich.cells import cell_len
@@ -85,3 +87,17 @@ def error(p99: float | None) -> str:
     if p99 < 1e-5:
         return "< 0.001 %"
     return f"{100.0 * p99:.0f} %" if p99 >= 0.995 else f"{100.0 * p99:#.2g}".rstrip(".") + " %"
+
+
+def count(value: float) -> str:
+    """A number to three digits, thousands with a k."""
+    for unit in ("", "k", "M"):
+        if value < 999.5:
+            return f"{value:.3g}{unit}"
+        value /= 1000.0
+    return f"{value:.3g}G"
+
+
+def machine() -> str:
+    """What times were taken on."""
+    return f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"

@@ -26,7 +26,7 @@ def rows(one: Chart) -> list[str]:
         point = points[key]
         errors = f"{scatter.percent(point.l1)} | {scatter.percent(point.p99)} | {scatter.percent(point.forward)}"
         faster = float(f"{truth / point.batch.ns:.2g}")
-        time = f"{scatter.count(point.batch.ns)} | {scatter.count(faster)}"
+        time = f"{terminal.count(point.batch.ns)} | {terminal.count(faster)}"
         lines.append(f"| {one.material} | {point.title} | {errors} | {time} | {terminal.size(point.bytes)} |")
     return lines
 

@@ -18,7 +18,7 @@ from brdfdb import cost, family_records
 from brdfdb.chart import Between, Chart, Charts, Cost, Curve, FamilyChart, Fronts, Point
 from brdfdb.materials import presets
 from brdfdb.representations import representations
-from brdfdb_pipelines import cli, scatter
+from brdfdb_pipelines import cli, scatter, terminal
 from brdfdb_pipelines.recipe import load
 
 Captured = pytest.CaptureFixture[str]
@@ -28,6 +28,26 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 def run(*arguments: object) -> int:
     return cli.main(["chart", *map(str, arguments)])
+
+
+def read(folder: Path, name: str) -> Charts:
+    document = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+    jsonschema.validate(document, json.loads(SCHEMA.read_text(encoding="utf-8")))
+    return Charts.model_validate(document)
+
+
+def charted(folder: Path, name: str) -> Chart:
+    found = read(folder, name)
+    (one,) = found.charts
+    assert not found.families
+    return one
+
+
+def family_charted(folder: Path, name: str) -> FamilyChart:
+    found = read(folder, name)
+    (whole,) = found.families
+    assert not found.charts
+    return whole
 
 
 def point(key: str, l1: float, ns: float, **more: Any) -> Point:
@@ -64,11 +84,8 @@ def test_the_command_writes_the_data_and_a_picture_of_each(tmp_path: Path, capsy
     out = tmp_path / "charts" / "here"
     names = ["rolled-brass", "scene-plastic-cube"]
     assert run(*names, "--out", out, "--tolerance", 0.2, "--store", tmp_path / "none") == 0
-    files = {f"{name}.{end}" for name in names for end in ("svg", "png")}
-    assert {path.name for path in out.iterdir()} == files | {"chart.json"}
-    document = json.loads((out / "chart.json").read_text(encoding="utf-8"))
-    jsonschema.validate(document, json.loads(SCHEMA.read_text(encoding="utf-8")))
-    charts = Charts.model_validate(document).charts
+    assert {path.name for path in out.iterdir()} == {f"{n}.{end}" for n in names for end in ("json", "svg", "png")}
+    charts = [charted(out, name) for name in names]
     assert [each.material for each in charts] == names
     assert "table-20" in {each.key for each in charts[0].points}
     assert charts[1].wavelength_nm == [550.0]
@@ -78,7 +95,7 @@ def test_the_command_writes_the_data_and_a_picture_of_each(tmp_path: Path, capsy
     starred = [line.split()[1] for line in lines[: len(charts[0].points) + 2] if line.startswith("*")]
     assert starred == [each.key for each in charts[0].points if each.key in charts[0].fronts.batch]
     assert printed.count("worth having: ") == 2
-    assert lines[-1] == f"{out}: chart.json and the pictures of {', '.join(names)}"
+    assert lines[-1] == f"{out}: .json, .svg and .png of {', '.join(names)}"
     for name in names:
         assert (out / f"{name}.png").read_bytes().startswith(PNG)
         ElementTree.fromstring((out / f"{name}.svg").read_text(encoding="utf-8"))
@@ -89,7 +106,7 @@ def test_a_table_of_the_store_is_charted_beside_the_planned_ones(
 ) -> None:
     monkeypatch.setattr(cost, "ROUNDS", 1)
     assert run("rolled-brass", "mirror", "--store", built, "--tolerance", 0.2, "--out", tmp_path) == 0
-    brass, mirror = Charts.model_validate_json((tmp_path / "chart.json").read_text(encoding="utf-8")).charts
+    brass, mirror = charted(tmp_path, "rolled-brass"), charted(tmp_path, "mirror")
     stored = {each.key: each for each in brass.points}["table-stored"]
     assert stored.title.startswith("table of the store, ")
     assert stored.l1 > 0.1  # a coarse grid
@@ -101,7 +118,7 @@ def test_materials_of_a_recipe_can_be_charted(recipe: Path, tmp_path: Path, monk
     monkeypatch.setattr(cost, "ROUNDS", 1)
     none = tmp_path / "none"
     assert run("mirror", "--recipe", recipe, "--tolerance", 0.2, "--out", tmp_path, "--store", none) == 0
-    (mirror,) = Charts.model_validate_json((tmp_path / "chart.json").read_text(encoding="utf-8")).charts
+    mirror = charted(tmp_path, "mirror")
     assert mirror.wavelength_nm is not None
     assert mirror.wavelength_nm == [400.0 + 20.0 * step for step in range(16)]
 
@@ -110,7 +127,7 @@ def test_materials_of_a_recipe_can_be_charted(recipe: Path, tmp_path: Path, monk
     ("arguments", "sentence"),
     [
         (["nothing"], r"nothing: no such material or family, neither in the store nor among the built-in ones; .*"),
-        (["rolled-brass", "--tolerance", "0.7"], r"tolerance: 0.7 is outside \[0.0001, 0.5\]"),
+        (["rolled-brass", "--tolerance", "0.1", "--tolerance", "-1"], r"tolerance: -1 is outside \[0.0001, 0.5\]"),
         (["rolled-brass", "--recipe", "no.toml"], r"no.toml: No such file or directory"),
     ],
 )
@@ -120,9 +137,23 @@ def test_a_mistake_is_one_sentence_and_writes_nothing(
     assert run(*arguments, "--out", tmp_path / "out", "--store", tmp_path / "none") == 2
     printed, err = capsys.readouterr()
     assert printed == ""
-    assert "Traceback" not in err
-    assert re.fullmatch(f"brdfdb: {sentence}", err.splitlines()[-1])
+    assert re.fullmatch(f"brdfdb: {sentence}\n", err)  # and no bar before it
     assert not (tmp_path / "out").exists()
+
+
+def test_another_run_leaves_the_charts_of_others_as_they_were(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    monkeypatch.setattr(charting, "SINGLES", 1)
+    monkeypatch.setattr(cost, "ROUNDS", 1)
+    given = ("--store", tmp_path / "none", "--out", tmp_path, "--tolerance", 0.2)
+    assert run("rolled-brass", *given) == 0
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert run("glossy-grey-paper", *given) == 0
+    after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert before.items() <= after.items()
+    assert len(after) == 2 * len(before) == 6
+    assert capsys.readouterr().out.count(": .json, .svg and .png of ") == 2
 
 
 def test_a_picture_names_every_point_and_the_front() -> None:
@@ -160,7 +191,7 @@ def test_errors_are_written_for_people(value: float, text: str) -> None:
 
 @pytest.mark.parametrize(("value", "text"), [(4.26, "4.26"), (999.6, "1k"), (34800.0, "34.8k"), (1.3e6, "1.3M")])
 def test_counts_are_written_for_people(value: float, text: str) -> None:
-    assert scatter.count(value) == text
+    assert terminal.count(value) == text
 
 
 def test_labels_hide_neither_points_nor_each_other_where_there_is_room() -> None:
@@ -219,10 +250,7 @@ def brushed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_family_of_a_recipe_is_charted_as_a_whole(brushed: Path, tmp_path: Path, capsys: Captured) -> None:
     given = ("--recipe", brushed / "recipe.toml", "--store", tmp_path / "none", "--out", tmp_path, "--tolerance", 0.2)
     assert run("brushed", "brushed-003", *given) == 0
-    document = json.loads((tmp_path / "chart.json").read_text(encoding="utf-8"))
-    jsonschema.validate(document, json.loads(SCHEMA.read_text(encoding="utf-8")))
-    charts = Charts.model_validate(document)
-    (whole,), (member,) = charts.families, charts.charts
+    whole, member = family_charted(tmp_path, "brushed"), charted(tmp_path, "brushed-003")
     assert whole.axes == {"rho_s": [0.1, 0.3], "alpha_y": [0.2, 0.3, 0.4]}
     assert whole.members == [f"brushed-{number:03d}" for number in range(1, 7)]
     assert member.material == "brushed-003"  # a member named by itself is a chart of its own
@@ -235,7 +263,7 @@ def test_a_family_of_a_recipe_is_charted_as_a_whole(brushed: Path, tmp_path: Pat
     assert "Mean error along rho_s" in printed
     assert "Mean error along alpha_y" in printed
     assert "worth having: elliptical Gaussian, eq. 5a" in printed
-    assert printed.splitlines()[-1] == f"{tmp_path}: chart.json and the pictures of brushed-003, brushed"
+    assert printed.splitlines()[-1] == f"{tmp_path}: .json, .svg and .png of brushed-003, brushed"
     assert (tmp_path / "brushed.png").read_bytes().startswith(PNG)
     ElementTree.fromstring((tmp_path / "brushed.svg").read_text(encoding="utf-8"))
 
@@ -247,7 +275,7 @@ def test_a_family_of_the_store_is_charted_with_its_lookups_between_members(
 ) -> None:
     recipe = ["--recipe", brushed / "recipe.toml"] if named == "by its recipe" else []
     assert run("brushed", *recipe, "--store", brushed / "store", "--out", tmp_path, "--tolerance", 0.2) == 0
-    (whole,) = Charts.model_validate_json((tmp_path / "chart.json").read_text(encoding="utf-8")).families
+    whole = family_charted(tmp_path, "brushed")
     record = json.loads((brushed / "store" / "families" / "brushed.json").read_text(encoding="utf-8"))
     assert whole.between is not None
     stated = record["error"]["overall"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import jsonschema
@@ -12,9 +13,10 @@ import pytest
 from matplotlib.image import imread
 
 import brdfdb
-from brdfdb.choices import Choice
+from brdfdb.choices import Choice, Price
+from brdfdb.choose import Candidate
 from brdfdb.models import oren_nayar_gaussian_vectors
-from brdfdb_pipelines import choose, cli
+from brdfdb_pipelines import choose, cli, terminal
 from brdfdb_pipelines.documents import schema
 
 TABLE_OFF = 1.5e-4  # 1.21e-4 measured, of a table planned for 1e-3
@@ -38,11 +40,21 @@ def written(tmp_path: Path, old: str = "", new: str = "") -> str:
     return str(path)
 
 
+# Made up: a busy machine times what it likes
+COSTS = {"exact": 1000.0, "printed": 900.0, "closed form": 800.0, "table": 10.0, "approximation": 1.0}
+
+
+def made_up_prices(forms: Sequence[Candidate], *_: object) -> list[Price]:
+    return [Price(COSTS[each.form.kind], COSTS[each.form.kind]) for each in forms]
+
+
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Choice, Path]:
-    """A sphere that the fit is 1.2 off: facets take a thousand times as long as a table."""
+    """A sphere that the fit is 1.2 off: a table is what is left."""
     folder = tmp_path_factory.mktemp("choose")
-    choice = choose.run(written(folder), folder / "out", width=48, store=folder / "store", tolerances=[0.001])
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(choose, "_prices", made_up_prices)
+        choice = choose.run(written(folder), folder / "out", width=48, store=folder / "store", tolerances=[0.001])
     return choice, folder
 
 
@@ -51,6 +63,7 @@ def test_what_is_written_keeps_to_the_schema_and_says_what_was_returned(done: tu
     text = (folder / "out" / "choice.json").read_text(encoding="utf-8")
     jsonschema.validate(json.loads(text), json.loads(schema("choice")))
     assert Choice.model_validate_json(text) == choice
+    assert choice.machine == terminal.machine()
 
 
 def test_the_choice_costs_less_than_a_third_of_the_truth_and_what_is_cheaper_breaks_the_tolerance(
@@ -74,6 +87,12 @@ def test_the_chosen_table_is_built(done: tuple[Choice, Path]) -> None:
     assert one.revision == "r000001"
     assert store.head(one.material) == one.revision
     store.verify(one.material)
+    stated = store[one.material].error
+    assert stated is not None
+    assert 0.0 < stated.overall.p99 < 0.001
+    assert store.summary(one.material)["error_p99"] == stated.overall.p99
+    said = "table, planned for 0.1 %, chosen for scene, within 0.5 (CIEDE2000) at every pixel; for a tolerance of 0.001"
+    assert store[one.material].attrs["reason"].startswith(said)
     wi, wr = np.array([[0.6, 0.0, 0.8]]), np.array([[0.0, 0.6, 0.8]])
     truth = oren_nayar_gaussian_vectors(wi, wr, rho=0.9, sigma=np.radians(40.0))
     np.testing.assert_allclose(store[one.material].lookup_vectors(wi, wr), truth, rtol=TABLE_OFF)
@@ -93,21 +112,52 @@ def test_truth_and_choice_are_pictures_that_differ_by_little(done: tuple[Choice,
     assert np.percentile(np.abs(chosen - truth)[truth > 0.1] / truth[truth > 0.1], 95.0) < 0.02
 
 
-def test_the_comparison_is_a_picture_of_four_panels(done: tuple[Choice, Path]) -> None:
+def test_the_comparison_is_a_picture_of_truth_choice_next_cheaper_and_their_differences(
+    done: tuple[Choice, Path],
+) -> None:
     image = imread(done[1] / "out" / "scene.png")
-    assert image.shape[1] == 1100
     top, bottom = np.array_split(image[..., :3], 2)
-    for half in (*np.array_split(top, 2, axis=1), *np.array_split(bottom, 2, axis=1)):
-        assert np.std(half) > 0.05
+    panels = [*np.array_split(top, 3, axis=1), *np.array_split(bottom, 3, axis=1)]
+    assert all(np.std(panel) > 0.05 for panel in panels)
+    # next cheaper differs visibly, the choice hardly: no yellow
+    assert [bool(np.any((panel[..., 0] > 0.8) & (panel[..., 2] < 0.3))) for panel in panels[4:]] == [False, True]
+
+
+def test_without_a_chosen_table_there_is_nothing_to_build(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    choice = choose.run(written(tmp_path), tmp_path / "out", width=16, store=tmp_path / "store", tolerances=[])
+    assert [one.revision for one in choice.materials] == [None]
+    assert "nothing to build: no table was chosen" in capsys.readouterr().out.splitlines()
+    assert list(brdfdb.open(tmp_path / "store")) == []
+
+
+def test_a_file_is_no_store_and_is_said_so_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(choose, "gather", lambda *_: pytest.fail("rays were traced"))
+    (tmp_path / "store").write_text("", encoding="utf-8")
+    assert cli.main(["choose", written(tmp_path), "--build", str(tmp_path / "store")]) == 2
+    assert capsys.readouterr().err == f"brdfdb: cannot write a store at {tmp_path / 'store'}: File exists\n"
+
+
+def test_a_recorded_scene_is_compared_and_checked_at_the_size_of_its_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    normals = np.zeros((5, 7, 3))
+    normals[..., 1:] = -0.6, 0.8
+    np.savez(tmp_path / "flat.npz", normal=normals)
+    name = written(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.npz"')
+    choice = choose.run(name, tmp_path / "out", width=16, tolerances=[])
+    assert choice.planned == choice.checked == (7, 5)
+    assert "at every pixel; 7 x 5 pixels compared, 7 x 5 checked" in capsys.readouterr().out
 
 
 def test_bytes_can_be_weighed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     choice = choose.run(written(tmp_path), tmp_path / "out", width=16, weigh="bytes", tolerances=[])
     (one,) = choice.materials
-    # 16 bytes, as Lambert, which breaks the tolerance: the facets themselves, or eq. 49 for their bounce
-    assert one.choice.bytes == 16
-    assert one.choice.share == 1.0
-    assert "more than a third of the truth's cost" in capsys.readouterr().out
+    # 16 bytes, as Lambert, which breaks the tolerance
+    assert (one.choice.key, one.choice.bytes, one.choice.share) == ("facets", 16, 1.0)
+    said = "rendered-sphere-40deg: facets integrated, eqs 8-20 and 47 is the truth itself, and nothing is cheaper"
+    assert said in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("percentile", "where"), [("", "every pixel"), (", percentile = 90", "90 % of the pixels")])
@@ -117,7 +167,7 @@ def test_what_is_printed_says_how_many_pixels_keep_to_the_tolerance(
     name = written(tmp_path, "ciede2000 = 0.5", f"ciede2000 = 0.5{percentile}")
     choice = choose.run(name, tmp_path / "out", width=16, tolerances=[])
     (one,) = choice.materials
-    assert f"scene: within CIEDE2000 0.5 at {where}" in capsys.readouterr().out
+    assert f"scene: within 0.5 (CIEDE2000) at {where}" in capsys.readouterr().out
     assert one.whole.counted <= 0.5
     assert one.whole.counted <= one.whole.most
 

@@ -65,7 +65,7 @@ def usage(capsys: Captured, *arguments: object) -> str:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_that_names_the_store(command: str, capsys: Captured) -> None:
+def test_a_command_with_a_store_has_help_that_names_it(command: str, capsys: Captured) -> None:
     with pytest.raises(SystemExit) as caught:
         run(*command.split(), "--help")
     assert caught.value.code == 0
@@ -73,6 +73,35 @@ def test_every_command_has_help_that_names_the_store(command: str, capsys: Captu
     assert out.startswith(f"usage: brdfdb {command} ")
     assert "--store DIR" in out
     assert err == ""
+
+
+@pytest.mark.parametrize("command", ["choose", "render"])
+def test_a_command_without_a_store_does_not_take_one(command: str, capsys: Captured) -> None:
+    assert "unrecognized arguments: --store" in usage(capsys, command, "clay-vase", "--store", "somewhere")
+    with pytest.raises(SystemExit):
+        run(command, "--help")
+    assert "--store" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("render clay-vase", "interrupted"),
+        ("chart foam", "interrupted"),
+        ("choose clay-vase", "interrupted"),
+        ("choose clay-vase --build somewhere", "interrupted; what was published before stays"),
+    ],
+)
+def test_ctrl_c_says_that_tables_stay_only_where_some_are_published(
+    command: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    def interrupted(*_arguments: object, **_options: object) -> None:
+        raise KeyboardInterrupt
+
+    name, *arguments = command.split()
+    monkeypatch.setattr(f"brdfdb_pipelines.{name}.run", interrupted)
+    assert run(name, *arguments) == cli.INTERRUPTED
+    assert capsys.readouterr() == ("", f"brdfdb: {said}\n")
 
 
 def test_the_help_lists_every_command(capsys: Captured) -> None:

@@ -72,7 +72,14 @@ def test_the_scenes_of_the_papers_are_there() -> None:
         ("radius = 1", "radius = 1, wide = 2", "objects.0.shape.wide: unknown key"),
         ("radius = 1", "radius = 0", "objects.0.shape.radius: Input should be greater than 0"),
         ("radius = 1", 'radius = "1"', "objects.0.shape.radius: Input should be a valid number"),
-        ('kind = "sphere"', 'kind = "torus"', "objects.0.shape: Input tag 'torus' found"),
+        ("radius = 1", "raduis = 1", "objects.0.shape.raduis: unknown key; closest: radius"),
+        ("height = 2.5", "hieght = 2.5", "camera.hieght: unknown key"),
+        (
+            'kind = "sphere"',
+            'kind = "torus"',
+            "objects.0.shape.kind: 'torus' is not one of plane, sphere, box, cylinder, revolution, recorded",
+        ),
+        ('kind = "sphere", ', "", "objects.0.shape.kind: Field required"),
         ('material = "mine"', 'material = "foan"', "objects.ball.material: 'foan' is unknown; closest: foam"),
         ("rho = 0.5", "rho = 5", "define.mine: rho: 5 is outside [0, 1]"),
         ("[define.mine]", "[define.foam]", "define.foam: is the name of a built-in material; give yours another"),
@@ -149,6 +156,16 @@ def test_a_scene_that_shows_nothing_is_one_sentence(
     assert said in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_recorded_scene_has_the_pixels_of_its_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    np.savez(tmp_path / "flat.npz", normal=np.tile([0.0, -1.0, 0.0], (2, 3, 1)))
+    path = changed(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.npz"')
+    for option in ("--width", "--across"):
+        assert cli.main(["render", path, "--out", str(tmp_path), option, "8"]) == cli.FAILED
+        assert f"{path}: is recorded, and has the pixels of its file" in capsys.readouterr().err
+    assert cli.main(["render", path, "--out", str(tmp_path)]) == 0
+    assert "3 x 2 pixels" in capsys.readouterr().out
 
 
 def test_files_that_a_scene_names_lie_beside_it(tmp_path: Path) -> None:

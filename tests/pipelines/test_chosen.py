@@ -1,0 +1,88 @@
+"""Tables of choices in a store: they state their error, say where they come from, and replace others with a word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb.audit.pairs import pairs_of
+from brdfdb.audit.table_error import table_error_of
+from brdfdb.grids import Grid
+from brdfdb.layout import Layout
+from brdfdb.materials import presets
+from brdfdb.plan import plan
+from brdfdb.staging import make_store
+from brdfdb_pipelines import chosen, terminal
+from brdfdb_pipelines.chosen import Built, with_reason
+
+NAME = "clay-vase"
+
+
+def layout(steps: int) -> Layout:
+    """Even angles."""
+    quarter = np.linspace(0.0, 85.0, steps)
+    axes = {"theta_i": quarter, "theta_r": quarter, "delta_phi": np.linspace(0.0, 180.0, steps)}
+    return Layout(presets()["clay-vase"], Grid(axes))
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    make_store(tmp_path / "store")
+    return tmp_path / "store"
+
+
+def error_of(store: Path, name: str) -> float:
+    error = brdfdb.open(store)[name].error
+    assert error is not None
+    return error.overall.p99
+
+
+def test_a_chosen_table_states_its_error_and_where_it_comes_from(store: Path) -> None:
+    material = presets()["sandpaper-220-grit"]
+    planned = plan(material, np.array([550.0]), 0.1)
+    wanted = with_reason(planned, "table, planned for 10 %", "table-top, within 1 (CIEDE2000) at every pixel")
+    built = chosen.build(store, {material.name: wanted})
+    table = brdfdb.open(store)[material.name]
+    assert 0.0 < error_of(store, material.name) <= 0.1
+    stated = terminal.error(error_of(store, material.name))
+    assert built == {material.name: Built("r000001", f"r000001 is new in the store; its error is {stated}")}
+    assert table_error_of(table, material, pairs_of(table, material)).verdict == "passes"
+    attributes = table.attrs
+    for name in ("title", "source", "note", "refractive_index"):
+        assert attributes[name] == getattr(material, name)
+    assert attributes["assumed"] == list(material.assumed)
+    assert set(attributes["parameter_sources"].values()) == {material.source}
+    said = "table, planned for 10 %, chosen for table-top, within 1 (CIEDE2000) at every pixel; "
+    assert attributes["reason"] == said + planned.reason
+
+
+def test_a_table_that_replaces_another_says_so_with_both_errors(store: Path) -> None:
+    chosen.build(store, {NAME: layout(10)})
+    before = error_of(store, NAME)
+    built = chosen.build(store, {NAME: layout(19)})
+    after = error_of(store, NAME)
+    assert after < before
+    errors = f"whose error was {terminal.error(before)}; its error is {terminal.error(after)}"
+    assert built[NAME] == Built("r000002", f"r000002 replaces r000001, {errors}")
+    assert brdfdb.open(store).head(NAME) == "r000002"
+
+
+def test_a_table_that_answers_is_left_whatever_it_was_chosen_for(store: Path) -> None:
+    chosen.build(store, {NAME: with_reason(layout(10), "table", "spheres")})
+    same = chosen.build(store, {NAME: with_reason(layout(10), "table", "clay-vase")})
+    assert same[NAME] == Built("r000001", "r000001 of the store is this table")
+    retitled = layout(10).material.model_copy(update={"title": "Another"})
+    other = chosen.build(store, {NAME: replace(layout(10), material=retitled)})
+    assert other[NAME].revision == "r000002"
+
+
+def test_a_damaged_table_is_replaced(store: Path) -> None:
+    chosen.build(store, {NAME: layout(10)})
+    group = brdfdb.open(store).path(NAME)
+    (group / "brdf" / "c" / "0" / "0" / "0").write_bytes(b"")
+    assert chosen.build(store, {NAME: layout(10)})[NAME].revision == "r000002"
+    brdfdb.open(store).verify(NAME)
