@@ -1,0 +1,85 @@
+// The polar cut in the plane of incidence, as SVG: the first picture need not wait for a library of megabytes.
+
+import { element, percent } from "./dom.js";
+import { mirrorWords, relative, scaled, span, ticks } from "./scales.js";
+import { number, quantityWords } from "./series.js";
+import { MODEL } from "./state.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+const RADIAN = Math.PI / 180;
+const TOP = 26, STRIP = 110; // pixels: room for labels above, height of what tells the difference
+
+/** Draw the cut into an element; its caption. */
+export function cut(into, series, answers, state) {
+  const width = into.clientWidth, radius = Math.min((width - 80) / 2, 300);
+  const against = state.compare === MODEL;
+  const curves = answers.map((answer) => answer.brdf.map(number(answer)));
+  const range = span(curves.flat(), state), height = scaled(state, range[0]);
+  const out = (value) => ((height(value) - range[0]) / (range[1] - range[0])) * radius;
+  const at = (theta, r) => [width / 2 + r * Math.sin(theta * RADIAN), TOP + radius - r * Math.cos(theta * RADIAN)];
+  const thetas = answers.map((answer) => answer.axes_deg.theta_r);
+
+  const parts = [...frame(at, radius, range, state)];
+  for (const [theta, kind] of [[-state.theta_i, "light"], [state.theta_i, "mirror"]]) {
+    parts.push(path([at(theta, 0), at(theta, radius)], kind));
+  }
+  curves.forEach((curve, i) => {
+    parts.push(path(curve.map((value, k) => at(thetas[i][k], out(value))), i ? "second" : "first"));
+  });
+  const rows = series.map(({ label }, i) => [i ? "second" : "first", label]);
+  let words = `${quantityWords(series[0], state)} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.`;
+  let tall = TOP + radius + 24;
+  if (against) {
+    const off = relative(...curves).slice(1, -1); // at the horizon itself nothing is seen
+    const worst = Math.max(...off.map((value) => Math.abs(value ?? 0)));
+    parts.push(...strip(thetas[0].slice(1, -1), off, worst || 1, tall + 24, at, radius));
+    words += ` Below, table / model − 1: ${percent(worst)} at most.`;
+    tall += STRIP + 50;
+  }
+  const picture = svg("svg", { width, height: tall }, ...parts);
+  const legend = [...rows, ["light", "light"], ["mirror", "mirror direction"]].map(([kind, label]) =>
+    element("span", {}, svg("svg", { width: 28, height: 10 }, path([[0, 5], [28, 5]], kind)), ` ${label}`));
+  into.replaceChildren(picture, element("p", { className: "legend quiet" }, ...legend));
+  return words + mirrorWords(series, answers);
+}
+
+/** Rings of the scale and spokes of the angle. */
+function* frame(at, radius, range, state) {
+  for (const [value, label] of ticks(range, state)) {
+    const r = ((value - range[0]) / (range[1] - range[0])) * radius;
+    const [x, y] = at(90, r);
+    yield svg("path", { d: `M${at(-90, r)}A${r} ${r} 0 0 1 ${x} ${y}`, class: "grid" });
+    yield svg("text", { x, y: y + 17, class: "middle" }, label);
+  }
+  for (const theta of [-90, -60, -30, 0, 30, 60, 90]) {
+    yield path([at(theta, 0), at(theta, radius)], "grid");
+    if (Math.abs(theta) === 90) continue; // numbers of the scale stand there
+    const [x, y] = at(theta, radius + 12);
+    yield svg("text", { x, y: y + 4, class: "middle" }, `${String(theta).replace("-", "−")}°`);
+  }
+}
+
+/** The difference over theta_r, between its largest sizes. */
+function* strip(theta, off, worst, top, at, radius) {
+  const middle = top + STRIP / 2, left = at(-90, radius)[0];
+  const place = (each, value) => [left + ((each + 90) / 180) * 2 * radius, middle - (value / worst) * (STRIP / 2)];
+  for (const share of [-worst, 0, worst]) {
+    const [x, y] = place(-90, share);
+    yield path([[x, y], place(90, share)], "grid");
+    yield svg("text", { x: x + 2, y: y - 4 }, `${share > 0 ? "+" : ""}${percent(share).replace("-", "−")}`);
+  }
+  for (let each = -90; each <= 90; each += 30) {
+    const [x, y] = place(each, -worst);
+    yield svg("text", { x, y: y + 17, class: "middle" }, `${String(each).replace("-", "−")}°`);
+  }
+  yield path(theta.map((each, i) => place(each, off[i] ?? 0)), "off");
+}
+
+const path = (points, kind) => svg("path", { d: `M${points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}`, class: kind });
+
+function svg(tag, attributes, ...children) {
+  const made = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  made.append(...children);
+  return made;
+}
