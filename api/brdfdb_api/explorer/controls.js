@@ -63,5 +63,5 @@ export function show(state, series) {
 }
 
 function said(name, text) {
-  fields[name].closest("label").querySelector("output").textContent = text;
+  fields[name].closest("label").querySelector(".said").textContent = text;
 }

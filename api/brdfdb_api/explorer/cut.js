@@ -1,7 +1,7 @@
 // The polar cut in the plane of incidence, as SVG: the first picture need not wait for a library of megabytes.
 
 import { element, percent } from "./dom.js";
-import { mirrorWords, relative, scaled, span, ticks } from "./scales.js";
+import { mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
 import { number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
@@ -13,11 +13,12 @@ const TOP = 26, STRIP = 110; // pixels: room for labels above, height of what te
 export function cut(into, series, answers, state) {
   const width = into.clientWidth, radius = Math.min((width - 80) / 2, 300);
   const against = state.compare === MODEL;
-  const curves = answers.map((answer) => answer.brdf.map(number(answer)));
+  const kept = answers.map((answer) => shortOfHorizon(answer.axes_deg.theta_r));
+  const curves = answers.map((answer, i) => kept[i].map((k) => number(answer)(answer.brdf[k])));
   const range = span(curves.flat(), state), height = scaled(state, range[0]);
   const out = (value) => ((height(value) - range[0]) / (range[1] - range[0])) * radius;
   const at = (theta, r) => [width / 2 + r * Math.sin(theta * RADIAN), TOP + radius - r * Math.cos(theta * RADIAN)];
-  const thetas = answers.map((answer) => answer.axes_deg.theta_r);
+  const thetas = answers.map((answer, i) => kept[i].map((k) => answer.axes_deg.theta_r[k]));
 
   const parts = [...frame(at, radius, range, state)];
   for (const [theta, kind] of [[-state.theta_i, "light"], [state.theta_i, "mirror"]]) {
@@ -28,15 +29,15 @@ export function cut(into, series, answers, state) {
   });
   const rows = series.map(({ label }, i) => [i ? "second" : "first", label]);
   let words = `${quantityWords(series[0], state)} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.`;
-  let tall = TOP + radius + 24;
+  let bottom = TOP + radius + 24;
   if (against) {
-    const off = relative(...curves).slice(1, -1); // at the horizon itself nothing is seen
+    const off = relative(...curves);
     const worst = Math.max(...off.map((value) => Math.abs(value ?? 0)));
-    parts.push(...strip(thetas[0].slice(1, -1), off, worst || 1, tall + 24, at, radius));
-    words += ` Below, table / model − 1: ${percent(worst)} at most.`;
-    tall += STRIP + 50;
+    parts.push(...strip(thetas[0], off, worst || 1, bottom + 24, at, radius));
+    words += ` Below, to 89°, table / model − 1: ${percent(worst)} at most.`;
+    bottom += STRIP + 50;
   }
-  const picture = svg("svg", { width, height: tall }, ...parts);
+  const picture = svg("svg", { width, height: bottom }, ...parts);
   const legend = [...rows, ["light", "light"], ["mirror", "mirror direction"]].map(([kind, label]) =>
     element("span", {}, svg("svg", { width: 28, height: 10 }, path([[0, 5], [28, 5]], kind)), ` ${label}`));
   into.replaceChildren(picture, element("p", { className: "legend quiet" }, ...legend));

@@ -1,7 +1,7 @@
 // Figures, as Plotly takes them, and their captions, of the answers to the requests of a view.
 
 import { short } from "./dom.js";
-import { mirrorWords, relative, scaled, span, ticks } from "./scales.js";
+import { mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
 import { nearest, number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
@@ -10,12 +10,12 @@ const HEAT = "Viridis";
 const DIFFERENCE = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]];
 const RADIAN = Math.PI / 180;
 
-/** The figure of a view: `data` and `layout` of Plotly, and a caption. */
-export function figure(view, series, answers, state) {
+/** The figure of a view: `data` and `layout` of Plotly, and a caption; `stacked` where two stand on each other. */
+export function figure(view, series, answers, state, stacked) {
   const css = getComputedStyle(document.documentElement);
   const ink = (name) => css.getPropertyValue(`--${name}`).trim();
   const drawn = { hemisphere, "half-difference": halfDifference, spectrum, albedo }[view](
-    series, answers, state, ink);
+    series, answers, state, ink, stacked);
   const axis = { gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false };
   const layout = {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink("ink"), size: 13 },
@@ -29,14 +29,25 @@ export function figure(view, series, answers, state) {
 
 const line = (ink, at) => ({ color: ink(at ? "second" : "first"), dash: at ? "dash" : "solid", width: 2 });
 
+/** The part of the figure for one of some pictures, and a title above it. */
+function part(i, count, stacked, gap) {
+  const half = 0.5 - gap / 2, [low, high] = count === 1 ? [0, 1] : (i === 0) === !stacked ? [0, half] : [1 - half, 1];
+  const x = stacked ? [0, 1] : [low, high], y = stacked ? [low, high] : [0, 1];
+  const title = (text) => ({
+    text, showarrow: false, x: (x[0] + x[1]) / 2, y: y[1], xref: "paper", yref: "paper", yanchor: "bottom",
+  });
+  return { x, y, title };
+}
+
 /** Ticks of a colour bar. */
 function bars(range, state) {
   const found = ticks(range, state);
   return { tickvals: found.map(([at]) => at), ticktext: found.map(([, text]) => text) };
 }
 
-function hemisphere(series, answers, state, ink) {
-  const values = answers.map((answer) => answer.brdf.map((row) => row.map(number(answer))));
+function hemisphere(series, answers, state, ink, stacked) {
+  const kept = answers.map((answer) => shortOfHorizon(answer.axes_deg.theta_r));
+  const values = answers.map((answer, i) => kept[i].map((k) => answer.brdf[k].map(number(answer))));
   const range = span(values.flat(2), state), height = scaled(state, range[0]);
   const radius = (value) => (height(value) - range[0]) / (range[1] - range[0]);
   const towards = (theta, phi, r) => [
@@ -46,23 +57,19 @@ function hemisphere(series, answers, state, ink) {
   const layout = { showlegend: false, margin: { l: 0, r: 0, t: 25, b: 0 }, annotations: [] };
   const data = series.flatMap(({ label }, i) => {
     const { theta_r, phi } = answers[i].axes_deg;
-    const points = values[i].map((row, j) => row.map((value, k) => towards(theta_r[j], turned + phi[k], radius(value))));
+    const points = values[i].map((row, j) => row.map((value, k) => towards(theta_r[kept[i][j]], turned + phi[k], radius(value))));
     const scene = i ? "scene2" : "scene";
-    const x = series.length === 1 ? [0, 1] : [i / 2, (i + 1) / 2];
+    const { x, y, title: above } = part(i, series.length, stacked, 0.06);
     const sides = (title, range) => ({
       title: { text: title }, range, showticklabels: false, gridcolor: ink("grid"), backgroundcolor: "rgba(0,0,0,0)",
       showspikes: false, zeroline: false,
     });
     layout[scene] = {
-      domain: { x, y: [0, 1] }, hovermode: false, dragmode: "turntable", aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.65 },
+      domain: { x, y }, hovermode: false, dragmode: "turntable", aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.65 },
       xaxis: sides("x", [-1, 1]), yaxis: sides("y", [-1, 1]), zaxis: sides("normal", [0, 1]),
-      camera: { eye: { x: 0.7, y: -1.5, z: 0.85 }, center: { x: 0, y: 0, z: -0.15 } }, uirevision: state.material,
+      camera: { eye: { x: 0.85, y: -1.75, z: 1 }, center: { x: 0, y: 0, z: -0.15 } }, uirevision: state.material,
     };
-    if (series.length > 1) {
-      layout.annotations.push({
-        text: label, showarrow: false, x: (x[0] + x[1]) / 2, y: 1, xref: "paper", yref: "paper", yanchor: "bottom",
-      });
-    }
+    if (series.length > 1) layout.annotations.push(above(label));
     const [lx, ly, lz] = towards(state.theta_i, turned, 1);
     return [
       {
@@ -79,30 +86,25 @@ function hemisphere(series, answers, state, ink) {
     ];
   });
   const scale = state.scale === "log" ? `its logarithm, from ${short(10 ** range[0])}` : "it, from 0";
-  const caption = `${quantityWords(series[0], state)} over all viewers: the distance from the centre is ${scale}. The line points to the light.`;
+  const caption = `${quantityWords(series[0], state)} over all viewers, short of the horizon: the distance from the centre is ${scale}. The line points to the light.`;
   return { data, layout, caption: caption + mirrorWords(series, answers) };
 }
 
-function halfDifference(series, answers, state) {
+function halfDifference(series, answers, state, ink, stacked) {
   const against = state.compare === MODEL;
   const values = answers.map((answer) => answer.brdf.map((row) => row.map(number(answer))));
   const shown = against ? values.slice(0, 1) : values;
   const range = span(shown.flat(2), state), height = scaled(state, range[0]);
-  const bar = { thickness: 12, outlinewidth: 0 };
+  const bar = { thickness: 12, outlinewidth: 0, ...(stacked && { len: 0.42 }) };
   const title = (text) => ({ text, standoff: 6 });
   const layout = { showlegend: false, margin: { l: 55, r: 10, t: 35, b: 50 }, annotations: [] };
   const data = series.map(({ label }, i) => {
     const difference = against && i === 1;
-    const x = series.length === 1 ? [0, 1] : i ? [0.58, 1] : [0, 0.42];
+    const { x, y, title: above } = part(i, series.length, stacked, 0.16);
     const suffix = i ? "2" : "";
     layout[`xaxis${suffix}`] = { domain: x, title: title("θ<sub>d</sub> [degrees]"), dtick: 30, range: [0, 90], anchor: `y${suffix}` };
-    layout[`yaxis${suffix}`] = { title: title("θ<sub>h</sub> [degrees]"), dtick: 30, range: [90, 0], anchor: `x${suffix}` };
-    if (series.length > 1) {
-      layout.annotations.push({
-        text: difference ? "table / model − 1" : label, showarrow: false, x: (x[0] + x[1]) / 2, y: 1, xref: "paper",
-        yref: "paper", yanchor: "bottom",
-      });
-    }
+    layout[`yaxis${suffix}`] = { title: title("θ<sub>h</sub> [degrees]"), domain: y, dtick: 30, range: [90, 0], anchor: `x${suffix}` };
+    if (series.length > 1) layout.annotations.push(above(difference ? "table / model − 1" : label));
     const { theta_d, theta_h } = answers[i].axes_deg;
     const map = { type: "heatmap", x: theta_d, y: theta_h, xaxis: `x${suffix}`, yaxis: `y${suffix}` };
     const where = "θ<sub>h</sub> %{y}°, θ<sub>d</sub> %{x}°";
@@ -111,15 +113,15 @@ function halfDifference(series, answers, state) {
       const sizes = off.flat().filter((each) => each !== null).map(Math.abs).sort((a, b) => a - b);
       const most = sizes[Math.floor(0.99 * sizes.length)] || 1e-9;
       return { ...map, z: off, colorscale: DIFFERENCE, zmin: -most, zmax: most, hovertemplate: `${where}: %{z:.2%}<extra></extra>`,
-        colorbar: { ...bar, x: x[1], tickformat: "~%" } };
+        colorbar: { ...bar, x: x[1], y: (y[0] + y[1]) / 2, tickformat: "~%" } };
     }
     const z = values[i].map((row) => row.map((value) => (value > 0 ? height(value) : null)));
     return { ...map, z, customdata: values[i], colorscale: HEAT, zmin: range[0], zmax: range[1], showscale: i === 0,
       hovertemplate: `${where}: %{customdata:.4g} /sr<extra></extra>`,
-      colorbar: { ...bar, x: x[1], ...bars(range, state) } };
+      colorbar: { ...bar, x: x[1], y: (y[0] + y[1]) / 2, ...bars(range, state) } };
   });
   const caption = `${quantityWords(series[0], state)} in 1/sr over the half angle, down, and the difference angle; φ of the half vector is ${answers[0].phi_i}°, that of the difference 90°.` +
-    (against ? " Right, how far the table is off; the ends of the scale are the 99th percentile." : "");
+    (against ? ` ${stacked ? "Below" : "Right"}, how far the table is off; the ends of the scale are the 99th percentile.` : "");
   return { data, layout, caption };
 }
 
@@ -163,7 +165,7 @@ function albedo(series, answers, state, ink) {
     return nm.map((each, j) => {
       const column = each === null ? 0 : at.reduce((best, value, k) => (Math.abs(value - each) < Math.abs(at[best] - each) ? k : best), 0);
       const y = answer.albedo.map((row, k) => row[column] + answer.specular_reflectance[k][column]);
-      return { type: "scatter", mode: "lines", name: each === null ? series[i].label : `${series[i].label}, ${at[column]} nm`,
+      return { type: "scatter", mode: "lines", name: each === null ? series[i].label : `${series.length > 1 ? `${series[i].label}, ` : ""}${at[column]} nm`,
         x: answer.theta_i, y, line: { ...line(ink, i), ...(nm.length > 1 && { color: ["#4f7df0", "#2f9e6b", "#d8503f"][j] }) },
         hovertemplate: "θ<sub>i</sub> %{x}°: %{y:.4f}<extra></extra>" };
     });

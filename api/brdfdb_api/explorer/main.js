@@ -15,6 +15,7 @@ import { fromHash, toHash } from "./state.js";
 const [title, message, caption, picture] = ["title", "message", "caption", "picture"].map((id) => document.getElementById(id));
 const places = ["cut", "plot", "spheres"].map((id) => document.getElementById(id)); // of pictures, one shown at a time
 const DRAWN = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+const NARROW = 560; // pixels in which two pictures do not stand side by side
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 
 let state = fromHash(location.hash);
@@ -49,14 +50,13 @@ async function work() {
   working = true;
   while (wanted) {
     wanted = false;
-    const { signal } = stop;
-    const start = asked;
+    const now = state, start = asked, { signal } = stop;
     try {
-      await draw(signal);
+      await draw(now, signal);
       say("");
       performance.clearMeasures("picture");
       performance.measure("picture", { start, end: performance.now() });
-      picture.dataset.shown = toHash(state);
+      picture.dataset.shown = toHash(now);
     } catch (error) {
       if (signal.aborted) continue;
       say(error instanceof Problem ? error.message : `This cannot be drawn: ${error.message}`);
@@ -66,8 +66,7 @@ async function work() {
   working = false;
 }
 
-async function draw(signal) {
-  const now = state;
+async function draw(now, signal) {
   if (!series.length) await know(now, signal);
   facts.band(series[0].info, now);
   const draws = { cut: drawCut, sphere: drawSpheres }[now.view] ?? drawPlot;
@@ -107,8 +106,11 @@ async function drawSpheres(now, signal) {
 async function drawPlot(now, signal) {
   const [answers, Plotly] = await Promise.all([answersTo(now, signal), loaded()]);
   signal.throwIfAborted();
-  const { data, layout, caption: words } = figure(now.view, series, answers, now);
-  await Plotly.react(shown("plot"), data, layout, DRAWN);
+  const plot = shown("plot");
+  const stacked = plot.clientWidth < NARROW && answers.length > 1 && ["hemisphere", "half-difference"].includes(now.view);
+  plot.classList.toggle("stacked", stacked);
+  const { data, layout, caption: words } = figure(now.view, series, answers, now, stacked);
+  await Plotly.react(plot, data, layout, DRAWN);
   return words;
 }
 
@@ -146,7 +148,7 @@ let width = picture.clientWidth;
 new ResizeObserver(() => {
   if (picture.clientWidth === width) return;
   width = picture.clientWidth;
-  if (state.view === "cut" && series.length) redraw();
+  if (series.length) redraw();
 }).observe(picture);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
 if (state.material) redraw(0);

@@ -28,6 +28,9 @@ export function ticks([low, high], { scale }) {
   return Array.from({ length: Math.floor(high / step) + 1 }, (_, i) => [i * step, short(i * step)]);
 }
 
+/** Which of some theta_r are short of the horizon, where models have poles that no scale can show. */
+export const shortOfHorizon = (theta_r) => theta_r.flatMap((theta, i) => (Math.abs(theta) <= 89 ? [i] : []));
+
 /** What a table is off, table / model - 1; null where the model is 0. */
 export const relative = (table, model) => table.map((value, i) => (model[i] > 0 ? value / model[i] - 1 : null));
 

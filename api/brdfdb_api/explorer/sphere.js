@@ -35,19 +35,17 @@ function made() {
   return element("figure", {}, canvas, element("figcaption", { className: "quiet" }));
 }
 
-/** Pixels of the disc; of those that are lit directions [degrees], four numbers each, and cosines at the light. */
+/** Lit pixels: directions [degrees], four numbers each, places, and cosines at the light. */
 function geometry(theta, phi) {
   const sine = Math.sin(theta / DEGREE);
   const light = [sine * Math.cos(phi / DEGREE), sine * Math.sin(phi / DEGREE), Math.cos(theta / DEGREE)];
-  const disc = [], directions = [], pixels = [], cosines = [];
+  const directions = [], pixels = [], cosines = [];
   for (let row = 0; row < SIZE; row += 1) {
     for (let column = 0; column < SIZE; column += 1) {
       const x = (2 * column + 1) / SIZE - 1, y = 1 - (2 * row + 1) / SIZE;
       const z = Math.sqrt(1 - x * x - y * y); // the normal; the viewer is at (0, 0, 1)
       const cosine = x * light[0] + y * light[1] + z * light[2];
-      if (Number.isNaN(z)) continue; // past the limb
-      disc.push(row * SIZE + column);
-      if (cosine <= 0) continue;
+      if (!(cosine > 0)) continue; // past the limb z is not a number
       const across = Math.hypot(x, z); // the tangent runs around the vertical axis: (z, 0, -x) / across
       const tangent = (v) => (z * v[0] - x * v[2]) / across;
       const upward = (v) => (-x * y * v[0] + across * across * v[1] - y * z * v[2]) / across;
@@ -57,10 +55,10 @@ function geometry(theta, phi) {
       cosines.push(cosine);
     }
   }
-  return { disc, directions: new Float32Array(directions), pixels, cosines };
+  return { directions: new Float32Array(directions), pixels, cosines };
 }
 
-function paint(canvas, values, { disc, pixels, cosines }) {
+function paint(canvas, values, { pixels, cosines }) {
   const context = canvas.getContext("2d"), image = context.createImageData(SIZE, SIZE);
   const channels = values.length / pixels.length; // three, or one that is grey
   pixels.forEach((pixel, i) => {
@@ -68,8 +66,8 @@ function paint(canvas, values, { disc, pixels, cosines }) {
       const f_r = values[i * channels + (channels === 3 ? channel : 0)];
       image.data[4 * pixel + channel] = encoded(Math.PI * f_r * cosines[i]);
     }
+    image.data[4 * pixel + 3] = 255;
   });
-  for (const pixel of disc) image.data[4 * pixel + 3] = 255; // black where no light comes
   context.putImageData(image, 0, 0);
 }
 
