@@ -6,6 +6,7 @@ import { nearest, number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
 const NM = [450, 550, 650]; // of albedos, where none is chosen
+const BANDS = ["#4f7df0", "#2f9e6b", "#d8503f"]; // their colours
 const HEAT = "Viridis";
 const DIFFERENCE = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]];
 const RADIAN = Math.PI / 180;
@@ -158,26 +159,39 @@ function spectrum(series, answers, state, ink) {
   return { data, layout, caption: caption + said.join("") };
 }
 
+/** Albedos of an answer of the service, or of the audit, which tells that of the model, too. */
+function albedosOf(answer, source) {
+  const found = answer.finding?.energy[source];
+  if (found) return { theta_i: found.theta_i_deg, at: found.wavelength_nm, total: found.albedo };
+  const total = answer.albedo.map((row, k) => row.map((value, i) => value + answer.specular_reflectance[k][i]));
+  return { theta_i: answer.theta_i, at: answer.wavelength_nm, total };
+}
+
 function albedo(series, answers, state, ink) {
   const data = answers.flatMap((answer, i) => {
-    const at = answer.wavelength_nm;
-    const nm = at === null ? [null] : state.nm === null && at.length > 1 ? NM : [nearest({ wavelength_nm: at }, state.nm)];
-    return nm.map((each, j) => {
-      const column = each === null ? 0 : at.reduce((best, value, k) => (Math.abs(value - each) < Math.abs(at[best] - each) ? k : best), 0);
-      const y = answer.albedo.map((row, k) => row[column] + answer.specular_reflectance[k][column]);
-      return { type: "scatter", mode: "lines", name: each === null ? series[i].label : `${series.length > 1 ? `${series[i].label}, ` : ""}${at[column]} nm`,
-        x: answer.theta_i, y, line: { ...line(ink, i), ...(nm.length > 1 && { color: ["#4f7df0", "#2f9e6b", "#d8503f"][j] }) },
-        hovertemplate: "θ<sub>i</sub> %{x}°: %{y:.4f}<extra></extra>" };
+    const { theta_i, at, total } = albedosOf(answer, series[i].source);
+    const asked = at === null ? [null] : state.nm === null && at.length > 1 ? NM : [nearest({ wavelength_nm: at }, state.nm)];
+    return asked.map((nm, j) => {
+      const column = nm === null ? 0 : at.reduce((best, each, k) => (Math.abs(each - nm) < Math.abs(at[best] - nm) ? k : best), 0);
+      const words = [...(answers.length > 1 || nm === null ? [series[i].label] : []), ...(nm === null ? [] : [`${at[column]} nm`])];
+      return {
+        type: "scatter", mode: "lines", name: words.join(", "), x: theta_i, y: total.map((row) => row[column]),
+        line: { ...line(ink, i), ...(asked.length > 1 && { color: BANDS[j] }) },
+        hovertemplate: "θ<sub>i</sub> %{x}°: %{y:.4f}<extra></extra>",
+      };
     });
   });
-  data.push({ type: "scatter", mode: "lines", name: "all that arrives", x: [0, 90], y: [1, 1], hoverinfo: "skip",
-    line: { color: ink("muted"), dash: "dot", width: 1.5 } });
+  data.push({
+    type: "scatter", mode: "lines", name: "all that arrives", x: [0, 90], y: [1, 1], hoverinfo: "skip",
+    line: { color: ink("muted"), dash: "dot", width: 1.5 },
+  });
   const most = Math.max(...data.flatMap(({ y }) => y));
   const layout = {
     xaxis: { title: { text: "θ<sub>i</sub> [degrees]" }, range: [0, 90], dtick: 30 },
     yaxis: { title: { text: "albedo" }, range: [0, 1.05 * most] },
   };
-  const caption = "The share of light from θᵢ that is reflected, over all φᵢ, with the Dirac part, of the table." +
-    (state.compare === MODEL ? " The audit says the same of the model: see its page." : "");
+  const audited = answers[0].finding !== undefined;
+  const caption = `The share of light from θᵢ that is reflected, Dirac part included; over φᵢ the ${audited ? "most, as the audit found it" : "mean"}.` +
+    (state.compare === MODEL && !audited ? " Nobody audited it, so that of the model is not known." : "");
   return { data, layout, caption };
 }

@@ -76,7 +76,10 @@ function reach(option) {
   active?.classList.remove("active");
   active = option ?? null;
   active?.classList.add("active");
-  active?.scrollIntoView?.({ block: "nearest" });
+  if (active) { // within the list alone: the page stays where it is
+    const { offsetTop: top, offsetHeight: height } = active;
+    list.scrollTop = Math.min(top, Math.max(list.scrollTop, top + height - list.clientHeight));
+  }
   for (const each of [list, search]) each.setAttribute("aria-activedescendant", active?.id ?? "");
 }
 

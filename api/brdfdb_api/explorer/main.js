@@ -8,7 +8,7 @@ import { element } from "./dom.js";
 import * as facts from "./facts.js";
 import { figure } from "./figures.js";
 import * as list from "./list.js";
-import { request, seriesOf } from "./series.js";
+import { againstAudit, request, seriesOf } from "./series.js";
 import { spheres } from "./sphere.js";
 import { fromHash, toHash } from "./state.js";
 
@@ -114,10 +114,10 @@ async function drawPlot(now, signal) {
   return words;
 }
 
-/** What the service answers for a view; the albedo of a model it does not know. */
+/** What the service answers for a view; the albedo of a model that nobody audited it does not know. */
 async function answersTo(now, signal) {
-  const asked = now.view === "albedo" ? series.filter(({ source }) => source === "table") : series;
-  const answers = await Promise.all(asked.map((each) => json(request(each, now, series), signal)));
+  const known = now.view !== "albedo" ? series : series.filter((each) => each.source === "table" || againstAudit(each, now));
+  const answers = await Promise.all(known.map((each) => json(request(each, now, series), signal)));
   signal.throwIfAborted();
   return answers;
 }
@@ -134,12 +134,15 @@ function loaded() {
   return library;
 }
 
-const say = (sentence) => {
+/** Tell people: what failed, or in another colour what worked. */
+function say(sentence, tone = "bad") {
+  message.className = tone;
   message.textContent = sentence;
-};
+}
 
 controls.listen(change);
-copy.listen(() => request(series[0], state, series), say);
+copy.listen(
+  () => new URL(toHash(state), location.href), () => (series.length ? request(series[0], state, series) : "v1/materials"), say);
 addEventListener("hashchange", () => {
   const linked = fromHash(location.hash);
   change({ ...linked, material: linked.material || state.material });

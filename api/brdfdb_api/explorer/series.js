@@ -41,11 +41,14 @@ export function quantityWords({ info }, { nm }) {
   return nm === null && makesColour(info) ? "Luminance of fᵣ under D65" : `fᵣ at ${nearest(info, nm)} nm`;
 }
 
+/** Whether albedos are those of the audit: it alone knows that of a model. */
+export const againstAudit = ({ info }, { compare }) => compare === MODEL && info.audit !== null;
+
 /** The address of what a view shows of one series. */
 export function request(each, state, series) {
   const { view, theta_i } = state;
   const phi_i = anisotropic(series) ? state.phi_i : undefined;
-  if (view === "albedo") return address(each.name, "albedo");
+  if (view === "albedo") return address(each.name, againstAudit(each, state) ? "audit" : "albedo");
   if (view === "spectrum" || view === "sphere") {
     const of = view === "sphere" ? quantity(each, state, "linear-srgb") :
       each.source === "model" ? { from: "model" } : { error: true };
