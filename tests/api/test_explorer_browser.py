@@ -245,6 +245,7 @@ def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> Non
     said = chromium.until("document.querySelector('#message')?.textContent")
     assert "fome" in said
     assert chromium.evaluate("message.getAttribute('role')") == "status"
+    assert chromium.evaluate("[title.textContent, facts.textContent, picture.innerText.trim()]") == ["fome", "", ""]
     chromium.until("document.querySelectorAll('#list li').length === 3")
     chromium.evaluate("document.querySelector('#list li').click()")
     shown(chromium, "material=foam")

@@ -34,6 +34,9 @@ export function show(info) {
   );
 }
 
+/** Know nothing. */
+export const forget = () => aside.replaceChildren();
+
 /** Say the error at the light that is looked at. */
 export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
   const into = document.getElementById("band");

@@ -59,6 +59,7 @@ async function work() {
       picture.dataset.shown = toHash(now);
     } catch (error) {
       if (signal.aborted) continue;
+      forget(now);
       say(error instanceof Problem ? error.message : `This cannot be drawn: ${error.message}`);
       if (!(error instanceof Problem)) console.error(error);
     }
@@ -79,6 +80,15 @@ async function draw(now, signal) {
 function shown(id) {
   for (const each of places) each.hidden = each.id !== id;
   return document.getElementById(id);
+}
+
+/** Show no picture rather than one of something else. */
+function forget(now) {
+  shown(null);
+  caption.textContent = "";
+  if (series.length) return;
+  title.textContent = now.material;
+  facts.forget();
 }
 
 /** Learn what is shown. */
