@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.geometry import unit_vector
 from brdfdb_pipelines import cli
 from tests.api.chromium import SECONDS, Chromium
 
@@ -37,6 +39,19 @@ phi_i_deg = [{ start = 0, stop = 360, step = 30 }]
 theta_r_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
 phi_r_deg = [{ start = 0, stop = 360, step = 30 }]
 """
+ALBEDO = {"theta_i_deg": [0.0, 90.0], "wavelength_nm": None, "albedo": [[0.5], [1.2]]}
+FOUND = {each: {"verdict": "passes"} for each in ("reciprocity", "smoothness", "table_error", "sampling")} | {
+    "material": "rolled-brass",
+    "revision": "r000001",
+    "energy": {"verdict": "violates", "reason": "reflects 1.2 at 90 degrees", "model": ALBEDO, "table": ALBEDO},
+    "validity": {"standing": "at the edge"},
+    "verdict": "violates",
+}
+# Of three materials one is audited, one was at another revision
+AUDIT = {
+    "when": "2026-11-21T12:00:00Z",
+    "materials": [FOUND, FOUND | {"material": "scene-copper-sphere", "revision": "r000009"}],
+}
 # What a view has drawn once it is there
 DRAWN = {
     "cut": "#cut path.first",
@@ -47,7 +62,8 @@ DRAWN = {
     "sphere": "#spheres canvas",
 }
 PIXEL = 0.1  # paths are written to a tenth of a pixel
-LEVELS = 2.0  # of 255: the pixel beside the centre looks half a degree past it, and rounds
+LEVELS = 0.51  # of 255: levels are whole numbers, and angles travel as float32
+SIZE = 96  # pixels across a sphere
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +71,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("explored")
     (root / "recipe.toml").write_text(RECIPE, encoding="utf-8")
     assert cli.main(["build", str(root / "recipe.toml"), "--store", str(root / "store"), "--jobs", "2"]) == 0
+    (root / "store" / "audit.json").write_text(json.dumps(AUDIT), encoding="utf-8")
     return root / "store"
 
 
@@ -163,7 +180,27 @@ def test_the_filters_leave_what_they_name(chromium: Chromium, address: str) -> N
     chromium.evaluate("model.value = 'ward'; model.dispatchEvent(new Event('change'))")
     visible = "[...document.querySelectorAll('#list li:not([hidden])')].map(each => each.dataset.name)"
     assert chromium.evaluate(visible) == ["rolled-brass"]
-    assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited"]
+    assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
+    chromium.evaluate("verdict.value = 'not audited'; verdict.dispatchEvent(new Event('change'))")
+    assert chromium.evaluate(visible) == []
+    chromium.evaluate("model.value = ''; model.dispatchEvent(new Event('change'))")
+    assert chromium.evaluate(visible) == ["foam", "scene-copper-sphere"]
+
+
+def test_verdicts_are_words_in_colours_beside_the_picture(chromium: Chromium, address: str) -> None:
+    chromium.open(f"{address}#material=rolled-brass&view=albedo&compare=%3Amodel")
+    shown(chromium, "view=albedo")
+    chips = "[...document.querySelectorAll('#facts .chip')]"
+    assert chromium.evaluate(f"{chips}.map(each => each.innerText)") == [
+        *("violates", "violates", "passes", "passes", "passes", "passes", "at the edge")
+    ]
+    assert chromium.evaluate(f"new Set({chips}.map(each => getComputedStyle(each).color)).size") == 3
+    assert "reflects 1.2 at 90 degrees" in chromium.evaluate("facts.innerText")
+    curves = chromium.evaluate("plot.data.map(each => [each.name, each.y])")
+    assert curves == [["table", [0.5, 1.2]], ["model", [0.5, 1.2]], ["all that arrives", [1, 1]]]
+    chromium.open(f"{address}#material=scene-copper-sphere")
+    shown(chromium, "material=scene-copper-sphere")
+    assert "This is of revision r000009, not of the current one." in chromium.evaluate("facts.innerText")
 
 
 def test_the_cut_shows_the_numbers_of_the_table(chromium: Chromium, address: str, store: Path) -> None:
@@ -210,15 +247,31 @@ def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: s
     assert chromium.errors == []
 
 
-def test_the_sphere_has_the_radiance_of_the_table(chromium: Chromium, address: str, store: Path) -> None:
-    chromium.open(f"{address}#material=foam&view=sphere&theta_i=40")
+@pytest.mark.parametrize("name", ["foam", "rolled-brass"])
+def test_the_sphere_has_the_radiance_of_the_table(chromium: Chromium, address: str, store: Path, name: str) -> None:
+    theta, phi = 50.0, 70.0
+    chromium.open(f"{address}#material={name}&view=sphere&theta_i={theta}&phi_i={phi}")
     shown(chromium, "view=sphere")
-    level = chromium.evaluate(
-        "document.querySelector('canvas').getContext('2d').getImageData(48, 48, 1, 1).data[0]",
+    drawn = chromium.evaluate(
+        f"[...document.querySelector('canvas').getContext('2d').getImageData(0, 0, {SIZE}, {SIZE}).data]"
     )
-    theta = np.deg2rad(40.0)
-    radiance = np.pi * brdfdb.open(store)["foam"].lookup(theta, 0.0, 0.0, 0.0) * np.cos(theta)
-    assert level == pytest.approx(255.0 * (1.055 * radiance ** (1.0 / 2.4) - 0.055), abs=LEVELS)
+    levels = np.reshape(drawn, (SIZE, SIZE, 4))[..., 0]
+    # the same scene with vectors: x to the right, y up, z to the viewer; the tangent is up x normal
+    x, y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE * 2.0 - 1.0, 1.0 - (np.arange(SIZE) + 0.5) / SIZE * 2.0)
+    normal = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], axis=-1)
+    light = unit_vector(np.deg2rad(theta), np.deg2rad(phi))
+    lit = (normal[..., 2] > 0.0) & (normal @ light > 0.0)
+    normal = normal[lit]
+    tangent = np.cross([0.0, 1.0, 0.0], normal)
+    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
+    frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=-2)
+    table = brdfdb.open(store)[name]
+    radiance = np.pi * table.lookup_vectors(frame @ light, frame @ [0.0, 0.0, 1.0]) * (normal @ light)
+    linear = np.clip(radiance, 0.0, 1.0)
+    expected = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    assert np.ptp(levels[lit]) > 50
+    np.testing.assert_allclose(levels[lit], 255.0 * expected, atol=LEVELS)
+    assert not levels[~lit].any()
 
 
 def test_a_link_restores_the_view_and_copies_ask_for_the_same(chromium: Chromium, address: str, store: Path) -> None:
