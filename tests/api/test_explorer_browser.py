@@ -218,6 +218,19 @@ def test_the_cut_shows_the_numbers_of_the_table(chromium: Chromium, address: str
     np.testing.assert_allclose(radius, scale * expected, atol=2.0 * PIXEL)
 
 
+def test_the_pointer_reads_the_cut(chromium: Chromium, address: str, store: Path) -> None:
+    chromium.open(f"{address}#material=foam&theta_i=30")
+    shown(chromium, "material=foam")
+    (x, y), _ = curve(chromium, "mirror")
+    left, top = chromium.evaluate(
+        "(({ left, top }) => [left, top])(document.querySelector('#cut svg').getBoundingClientRect())"
+    )
+    aside = 100.0 * np.tan(np.deg2rad(-40.0))
+    chromium.send("Input.dispatchMouseEvent", type="mouseMoved", x=left + x + aside, y=top + y - 100.0)
+    value = brdfdb.open(store)["foam"].lookup(*np.deg2rad([30.0, 0.0, 40.0, 0.0]))
+    assert chromium.until("/sr$/.test(read.textContent) && read.textContent") == f"θᵣ −40°: {value:.3g} /sr"
+
+
 def test_table_and_model_stand_side_by_side(chromium: Chromium, address: str) -> None:
     chromium.open(f"{address}#material=scene-copper-sphere")
     shown(chromium)

@@ -1,6 +1,6 @@
 // The polar cut in the plane of incidence, as SVG: the first picture need not wait for a library of megabytes.
 
-import { element, percent } from "./dom.js";
+import { element, percent, short } from "./dom.js";
 import { mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
 import { number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
@@ -40,7 +40,14 @@ export function cut(into, series, answers, state) {
   const picture = svg("svg", { width, height: bottom }, ...parts);
   const legend = [...rows, ["light", "light"], ["mirror", "mirror direction"]].map(([kind, label]) =>
     element("span", {}, svg("svg", { width: 28, height: 10 }, path([[0, 5], [28, 5]], kind)), ` ${label}`));
-  into.replaceChildren(picture, element("p", { className: "legend quiet" }, ...legend));
+  const read = element("span", { id: "read" }, "point at the picture to read it");
+  picture.addEventListener("pointermove", ({ clientX, clientY }) => {
+    const { left, top } = picture.getBoundingClientRect();
+    const theta = Math.atan2(clientX - left - width / 2, top + TOP + radius - clientY) / RADIAN;
+    const found = thetas.map((each) => closest(each, theta));
+    read.textContent = `θᵣ ${degrees(thetas[0][found[0]])}: ${curves.map((curve, i) => `${short(curve[found[i]])} /sr`).join(", ")}`;
+  });
+  into.replaceChildren(picture, element("p", { className: "legend quiet" }, ...legend, read));
   return words + mirrorWords(series, answers);
 }
 
@@ -56,7 +63,7 @@ function* frame(at, radius, range, state) {
     yield path([at(theta, 0), at(theta, radius)], "grid");
     if (Math.abs(theta) === 90) continue; // numbers of the scale stand there
     const [x, y] = at(theta, radius + 12);
-    yield svg("text", { x, y: y + 4, class: "middle" }, `${String(theta).replace("-", "−")}°`);
+    yield svg("text", { x, y: y + 4, class: "middle" }, degrees(theta));
   }
 }
 
@@ -71,10 +78,14 @@ function* strip(theta, off, worst, top, at, radius) {
   }
   for (let each = -90; each <= 90; each += 30) {
     const [x, y] = place(each, -worst);
-    yield svg("text", { x, y: y + 17, class: "middle" }, `${String(each).replace("-", "−")}°`);
+    yield svg("text", { x, y: y + 17, class: "middle" }, degrees(each));
   }
   yield path(theta.map((each, i) => place(each, off[i] ?? 0)), "off");
 }
+
+const degrees = (theta) => `${String(theta).replace("-", "−")}°`;
+
+const closest = (values, to) => values.reduce((best, value, i) => (Math.abs(value - to) < Math.abs(values[best] - to) ? i : best), 0);
 
 const path = (points, kind) => svg("path", { d: `M${points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}`, class: kind });
 
