@@ -20,6 +20,7 @@ from starlette.responses import Response
 from brdfdb.store import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb_api.edge import Edge, log_to_stderr
 from brdfdb_api.files import files
+from brdfdb_api.pages import pages
 from brdfdb_api.responses import PROBLEM_JSON, RequestError, problem_response
 from brdfdb_api.routes import LARGE_AT_ONCE, answer_point, router
 from brdfdb_api.settings import Settings
@@ -85,6 +86,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     app.include_router(router)
     app.include_router(views)
     app.include_router(files)
+    app.include_router(pages)
     for kind in (
         *(RequestError, RequestValidationError, UnknownMaterialError, UnknownRevisionError, StoreError),
         HTTPException,

@@ -1,0 +1,67 @@
+// Sliders, switches and the choice of a view: they show the state, and tell what a hand changes of it.
+
+import { element } from "./dom.js";
+import { MODEL, VIEWS } from "./state.js";
+import { anisotropic, makesColour, nearest } from "./series.js";
+
+const form = document.getElementById("controls");
+const views = document.getElementById("views");
+const fields = form.elements;
+const TITLES = {
+  cut: "Cut", hemisphere: "Hemisphere", "half-difference": "Half–difference", spectrum: "Spectrum", albedo: "Albedo",
+  sphere: "Sphere",
+};
+
+for (const view of VIEWS) {
+  views.append(element("label", {}, element("input", { type: "radio", name: "view", value: view }), TITLES[view]));
+}
+
+/** Call `change` with what a hand changes of the state. */
+export function listen(change) {
+  views.addEventListener("change", (event) => change({ view: event.target.value }));
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.addEventListener("input", ({ target: { name, checked, value } }) => {
+    if (name === "colour") change({ nm: checked ? null : Number(fields.nm.value) });
+    else if (name === "log") change({ scale: checked ? "log" : "linear" });
+    else if (name === "compare") change({ compare: value });
+    else change({ [name]: Number(value) });
+  });
+}
+
+/** Offer materials to compare with. */
+export function offer(materials) {
+  fields.compare.replaceChildren(new Option("nothing", ""), new Option("its model", MODEL),
+    ...materials.filter((each) => !each.damaged).map((each) => new Option(each.title, each.name)));
+}
+
+/** Show a state of some series; what has no effect on the picture cannot be moved. */
+export function show(state, series) {
+  views.querySelector(`[value="${state.view}"]`).checked = true;
+  for (const name of ["theta_i", "phi_i", "theta_r", "turn"]) {
+    fields[name].value = state[name];
+    said(name, `${state[name]}°`);
+  }
+  for (const each of form.querySelectorAll("[data-view]")) each.hidden = each.dataset.view !== state.view;
+  fields.theta_i.disabled = ["albedo", "half-difference"].includes(state.view);
+  fields.phi_i.disabled = state.view === "albedo" || !(state.view === "sphere" || anisotropic(series));
+  fields.log.checked = state.scale === "log";
+  fields.log.disabled = ["albedo", "sphere"].includes(state.view);
+  fields.compare.value = state.compare;
+
+  const spectral = series.find(({ info }) => info.wavelength_nm)?.info;
+  const range = spectral?.wavelength_nm ?? [550];
+  fields.nm.min = range[0];
+  fields.nm.max = range.at(-1);
+  const one = range.length === 1 || state.view === "spectrum";
+  const coloured = spectral !== undefined && makesColour(spectral);
+  fields.nm.disabled = one || (coloured && state.nm === null);
+  if (spectral && state.nm !== null) fields.nm.value = nearest(spectral, state.nm);
+  said("nm", !spectral ? "grey: the same at all" : fields.nm.disabled && !one ? "all" : `${nearest(spectral, state.nm)} nm`);
+  if (state.view === "spectrum") said("nm", "all");
+  fields.colour.checked = coloured && state.nm === null;
+  fields.colour.disabled = !coloured || state.view === "spectrum";
+}
+
+function said(name, text) {
+  fields[name].closest("label").querySelector(".said").textContent = text;
+}

@@ -1,0 +1,79 @@
+// What is known of a material, beside the picture: parameters, stated error, what the audit found, links.
+
+import { chip, element, percent, short } from "./dom.js";
+import { nearest } from "./series.js";
+
+const aside = document.getElementById("facts");
+const FINDINGS = { energy: "energy", reciprocity: "reciprocity", smoothness: "smoothness", table_error: "stated error", sampling: "sampling" };
+
+/** Fill the side with what the service says of a material. */
+export function show(info) {
+  const { attributes, error, audit } = info;
+  aside.replaceChildren(
+    element("h3", {}, "Surface"),
+    pairs([
+      ["model", `${attributes.model_title ?? info.model}, ${attributes.model_equation ?? ""}`],
+      ["source", attributes.source],
+      ...(attributes.refractive_index ? [["n, k", attributes.refractive_index]] : []),
+      ["kind", `${info.anisotropic ? "anisotropic" : "isotropic"}, ${range(info.wavelength_nm)}`],
+      ...(attributes.note ? [["note", attributes.note]] : []),
+    ]),
+    element("h3", {}, "Parameters"),
+    pairs(info.parameters.map((each) => [each.name, value(each), each.meaning,
+      each.source === attributes.source ? "" : each.source, each.assumed ? "assumed: the paper does not print it" : ""])),
+    element("h3", {}, "Error of the table"),
+    error ? pairs([
+      ["99 of 100", `within ${percent(error.overall.p99)}`], ["median", percent(error.overall.median)],
+      ["largest", percent(error.overall.max)], ["at this θᵢ", element("span", { id: "band" })],
+    ]) : element("p", {}, "not measured"),
+    element("h3", {}, "Audit"),
+    ...(audit ? audited(audit) : [element("p", {}, "no audit of it is here; ", element("code", {}, "brdfdb audit"), " makes one")]),
+    element("h3", {}, "As data"),
+    element("p", { className: "links" }, ...links(info)),
+    element("p", { className: "quiet" }, `${info.name}, revision ${info.revision}`),
+  );
+}
+
+/** Know nothing. */
+export const forget = () => aside.replaceChildren();
+
+/** Say the error at the light that is looked at. */
+export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
+  const into = document.getElementById("band");
+  if (!into || !error) return;
+  const at = Math.max(0, error.theta_i_deg.findLastIndex((edge) => edge <= theta_i));
+  const row = error.p99[Math.min(at, error.p99.length - 1)];
+  const wanted = wavelengths && nm !== null ? nearest({ wavelength_nm: wavelengths }, nm) : null;
+  const column = wanted === null ? -1 : wavelengths.findLastIndex((each) => each <= wanted);
+  into.textContent = `within ${percent(column < 0 ? Math.max(...row) : row[column])}`;
+}
+
+function audited(audit) {
+  const found = Object.entries(FINDINGS).filter(([key]) => key in audit.findings);
+  return [
+    pairs([
+      ["verdict", chip(audit.verdict)], ...found.map(([key, words]) => [words, chip(audit.findings[key])]),
+      ["range of the model", chip(audit.validity)],
+    ]),
+    element("p", { className: "quiet" }, audit.reason),
+    ...(audit.current ? [] : [element("p", {}, `This is of revision ${audit.revision}, not of the current one.`)]),
+  ];
+}
+
+function links({ links: to, audit }) {
+  const wanted = [["material", to.self], ["albedo", to.albedo], ...(audit ? [["audit", to.audit]] : []),
+    ["table (zarr)", to["download.zarr"]], ["slice (EXR)", to["slice.exr"]]];
+  return wanted.map(([text, href]) => element("a", { href: href.replace(/^\//, "") }, text));
+}
+
+/** A list of terms; of what stands behind the first value each is a small line. */
+function pairs(rows) {
+  return element("dl", {}, ...rows.flatMap(([term, first, ...small]) => [
+    element("dt", {}, term),
+    element("dd", {}, first, ...small.filter(Boolean).map((text) => element("span", { className: "quiet" }, text))),
+  ]));
+}
+
+const value = ({ value: of, unit }) => `${typeof of === "number" ? short(of) : of}${["1", ""].includes(unit) ? "" : ` ${unit === "degree" ? "°" : unit}`}`;
+
+const range = (at) => (at === null ? "grey" : at.length === 1 ? `at ${at[0]} nm` : `${at[0]} to ${at.at(-1)} nm`);

@@ -1,0 +1,197 @@
+// Figures, as Plotly takes them, and their captions, of the answers to the requests of a view.
+
+import { short } from "./dom.js";
+import { mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
+import { nearest, number, quantityWords } from "./series.js";
+import { MODEL } from "./state.js";
+
+const NM = [450, 550, 650]; // of albedos, where none is chosen
+const BANDS = ["#4f7df0", "#2f9e6b", "#d8503f"]; // their colours
+const HEAT = "Viridis";
+const DIFFERENCE = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]];
+const RADIAN = Math.PI / 180;
+
+/** The figure of a view: `data` and `layout` of Plotly, and a caption; `stacked` where two stand on each other. */
+export function figure(view, series, answers, state, stacked) {
+  const css = getComputedStyle(document.documentElement);
+  const ink = (name) => css.getPropertyValue(`--${name}`).trim();
+  const drawn = { hemisphere, "half-difference": halfDifference, spectrum, albedo }[view](
+    series, answers, state, ink, stacked);
+  const axis = { gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false };
+  const layout = {
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink("ink"), size: 13 },
+    margin: { l: 55, r: 20, t: 30, b: 45 }, showlegend: series.length > 1 || drawn.data.length > 1,
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, uirevision: `${view} ${state.material}`,
+    ...drawn.layout,
+  };
+  for (const key of ["xaxis", "yaxis", "xaxis2", "yaxis2"]) if (layout[key]) layout[key] = { ...axis, ...layout[key] };
+  return { ...drawn, layout };
+}
+
+const line = (ink, at) => ({ color: ink(at ? "second" : "first"), dash: at ? "dash" : "solid", width: 2 });
+
+/** The part of the figure for one of some pictures, and a title above it. */
+function part(i, count, stacked, gap) {
+  const half = 0.5 - gap / 2, [low, high] = count === 1 ? [0, 1] : (i === 0) === !stacked ? [0, half] : [1 - half, 1];
+  const x = stacked ? [0, 1] : [low, high], y = stacked ? [low, high] : [0, 1];
+  const title = (text) => ({
+    text, showarrow: false, x: (x[0] + x[1]) / 2, y: y[1], xref: "paper", yref: "paper", yanchor: "bottom",
+  });
+  return { x, y, title };
+}
+
+/** Ticks of a colour bar. */
+function bars(range, state) {
+  const found = ticks(range, state);
+  return { tickvals: found.map(([at]) => at), ticktext: found.map(([, text]) => text) };
+}
+
+function hemisphere(series, answers, state, ink, stacked) {
+  const kept = answers.map((answer) => shortOfHorizon(answer.axes_deg.theta_r));
+  const values = answers.map((answer, i) => kept[i].map((k) => answer.brdf[k].map(number(answer))));
+  const range = span(values.flat(2), state), height = scaled(state, range[0]);
+  const radius = (value) => (height(value) - range[0]) / (range[1] - range[0]);
+  const towards = (theta, phi, r) => [
+    r * Math.sin(theta * RADIAN) * Math.cos(phi * RADIAN), r * Math.sin(theta * RADIAN) * Math.sin(phi * RADIAN),
+    r * Math.cos(theta * RADIAN)];
+  const turned = answers[0].phi_i;
+  const layout = { showlegend: false, margin: { l: 0, r: 0, t: 25, b: 0 }, annotations: [] };
+  const data = series.flatMap(({ label }, i) => {
+    const { theta_r, phi } = answers[i].axes_deg;
+    const points = values[i].map((row, j) => row.map((value, k) => towards(theta_r[kept[i][j]], turned + phi[k], radius(value))));
+    const scene = i ? "scene2" : "scene";
+    const { x, y, title: above } = part(i, series.length, stacked, 0.06);
+    const sides = (title, range) => ({
+      title: { text: title }, range, showticklabels: false, gridcolor: ink("grid"), backgroundcolor: "rgba(0,0,0,0)",
+      showspikes: false, zeroline: false,
+    });
+    layout[scene] = {
+      domain: { x, y }, hovermode: false, dragmode: "turntable", aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.65 },
+      xaxis: sides("x", [-1, 1]), yaxis: sides("y", [-1, 1]), zaxis: sides("normal", [0, 1]),
+      camera: { eye: { x: 0.85, y: -1.75, z: 1 }, center: { x: 0, y: 0, z: -0.15 } }, uirevision: state.material,
+    };
+    if (series.length > 1) layout.annotations.push(above(label));
+    const [lx, ly, lz] = towards(state.theta_i, turned, 1);
+    return [
+      {
+        type: "surface", scene, ...Object.fromEntries(["x", "y", "z"].map((axis, at) =>
+          [axis, points.map((row) => row.map((point) => point[at]))])),
+        surfacecolor: values[i].map((row) => row.map(height)), cmin: range[0], cmax: range[1], colorscale: HEAT,
+        showscale: i === 0, hoverinfo: "skip", lighting: { ambient: 0.75, diffuse: 0.4, specular: 0.1 },
+        colorbar: { title: { text: "1/sr" }, thickness: 12, len: 0.7, outlinewidth: 0, ...bars(range, state) },
+      },
+      {
+        type: "scatter3d", mode: "lines", scene, x: [0, lx], y: [0, ly], z: [0, lz], hoverinfo: "skip",
+        line: { color: ink("third"), width: 6 },
+      },
+    ];
+  });
+  const scale = state.scale === "log" ? `its logarithm, from ${short(10 ** range[0])}` : "it, from 0";
+  const caption = `${quantityWords(series[0], state)} over all viewers, short of the horizon: the distance from the centre is ${scale}. The line points to the light.`;
+  return { data, layout, caption: caption + mirrorWords(series, answers) };
+}
+
+function halfDifference(series, answers, state, ink, stacked) {
+  const against = state.compare === MODEL;
+  const values = answers.map((answer) => answer.brdf.map((row) => row.map(number(answer))));
+  const shown = against ? values.slice(0, 1) : values;
+  const range = span(shown.flat(2), state), height = scaled(state, range[0]);
+  const bar = { thickness: 12, outlinewidth: 0, ...(stacked && { len: 0.42 }) };
+  const title = (text) => ({ text, standoff: 6 });
+  const layout = { showlegend: false, margin: { l: 55, r: 10, t: 35, b: 50 }, annotations: [] };
+  const data = series.map(({ label }, i) => {
+    const difference = against && i === 1;
+    const { x, y, title: above } = part(i, series.length, stacked, 0.16);
+    const suffix = i ? "2" : "";
+    layout[`xaxis${suffix}`] = { domain: x, title: title("θ<sub>d</sub> [degrees]"), dtick: 30, range: [0, 90], anchor: `y${suffix}` };
+    layout[`yaxis${suffix}`] = { title: title("θ<sub>h</sub> [degrees]"), domain: y, dtick: 30, range: [90, 0], anchor: `x${suffix}` };
+    if (series.length > 1) layout.annotations.push(above(difference ? "table / model − 1" : label));
+    const { theta_d, theta_h } = answers[i].axes_deg;
+    const map = { type: "heatmap", x: theta_d, y: theta_h, xaxis: `x${suffix}`, yaxis: `y${suffix}` };
+    const where = "θ<sub>h</sub> %{y}°, θ<sub>d</sub> %{x}°";
+    if (difference) {
+      const off = values[0].map((row, j) => relative(row, values[1][j]));
+      const sizes = off.flat().filter((each) => each !== null).map(Math.abs).sort((a, b) => a - b);
+      const most = sizes[Math.floor(0.99 * sizes.length)] || 1e-9;
+      return { ...map, z: off, colorscale: DIFFERENCE, zmin: -most, zmax: most, hovertemplate: `${where}: %{z:.2%}<extra></extra>`,
+        colorbar: { ...bar, x: x[1], y: (y[0] + y[1]) / 2, tickformat: "~%" } };
+    }
+    const z = values[i].map((row) => row.map((value) => (value > 0 ? height(value) : null)));
+    return { ...map, z, customdata: values[i], colorscale: HEAT, zmin: range[0], zmax: range[1], showscale: i === 0,
+      hovertemplate: `${where}: %{customdata:.4g} /sr<extra></extra>`,
+      colorbar: { ...bar, x: x[1], y: (y[0] + y[1]) / 2, ...bars(range, state) } };
+  });
+  const caption = `${quantityWords(series[0], state)} in 1/sr over the half angle, down, and the difference angle; φ of the half vector is ${answers[0].phi_i}°, that of the difference 90°.` +
+    (against ? ` ${stacked ? "Below" : "Right"}, how far the table is off; the ends of the scale are the 99th percentile.` : "");
+  return { data, layout, caption };
+}
+
+function spectrum(series, answers, state, ink) {
+  const data = answers.flatMap((answer, i) => {
+    const grey = answer.wavelength_nm === null;
+    const x = grey ? [380, 780] : answer.wavelength_nm;
+    const all = (value) => (grey ? [value, value] : value);
+    const y = all(answer.brdf);
+    const mode = x.length === 1 ? "markers" : "lines";
+    const curve = { type: "scatter", mode, name: series[i].label, x, y, line: line(ink, i), marker: { color: line(ink, i).color, size: 9 },
+      hovertemplate: "%{x} nm: %{y:.4g} /sr<extra></extra>" };
+    if (answer.error === null) return [curve];
+    const error = all(answer.error);
+    const edge = { type: "scatter", mode: "lines", x, line: { width: 0 }, hoverinfo: "skip", showlegend: false };
+    return [
+      { ...edge, y: y.map((value, j) => Math.max(value - error[j], 0)) },
+      { ...edge, y: y.map((value, j) => value + error[j]), fill: "tonexty", fillcolor: `${line(ink, i).color}44` },
+      curve,
+    ];
+  });
+  const most = Math.max(...data.flatMap(({ y }) => y));
+  const layout = {
+    showlegend: series.length > 1,
+    xaxis: { title: { text: "wavelength [nm]" } },
+    yaxis: {
+      title: { text: "f<sub>r</sub> [1/sr]" }, type: state.scale, exponentformat: "power",
+      ...(state.scale === "linear" && { range: [0, 1.08 * most || 1] }),
+    },
+  };
+  const said = answers.map((answer, i) => answer.wavelength_nm === null && answer.brdf !== undefined ?
+    ` ${series[i].label} is grey: ${short(answer.brdf)} /sr${answer.error === null ? "" : ` ± ${short(answer.error)}`} at every wavelength.` : "");
+  const caption = `fᵣ at one pair of directions${answers.some((answer) => answer.error !== null) ? ", with the band that 99 of 100 values of the table keep to" : ""}.`;
+  return { data, layout, caption: caption + said.join("") };
+}
+
+/** Albedos of an answer of the service, or of the audit, which tells that of the model, too. */
+function albedosOf(answer, source) {
+  const found = answer.finding?.energy[source];
+  if (found) return { theta_i: found.theta_i_deg, at: found.wavelength_nm, total: found.albedo };
+  const total = answer.albedo.map((row, k) => row.map((value, i) => value + answer.specular_reflectance[k][i]));
+  return { theta_i: answer.theta_i, at: answer.wavelength_nm, total };
+}
+
+function albedo(series, answers, state, ink) {
+  const data = answers.flatMap((answer, i) => {
+    const { theta_i, at, total } = albedosOf(answer, series[i].source);
+    const asked = at === null ? [null] : state.nm === null && at.length > 1 ? NM : [nearest({ wavelength_nm: at }, state.nm)];
+    return asked.map((nm, j) => {
+      const column = nm === null ? 0 : at.reduce((best, each, k) => (Math.abs(each - nm) < Math.abs(at[best] - nm) ? k : best), 0);
+      const words = [...(answers.length > 1 || nm === null ? [series[i].label] : []), ...(nm === null ? [] : [`${at[column]} nm`])];
+      return {
+        type: "scatter", mode: "lines", name: words.join(", "), x: theta_i, y: total.map((row) => row[column]),
+        line: { ...line(ink, i), ...(asked.length > 1 && { color: BANDS[j] }) },
+        hovertemplate: "θ<sub>i</sub> %{x}°: %{y:.4f}<extra></extra>",
+      };
+    });
+  });
+  data.push({
+    type: "scatter", mode: "lines", name: "all that arrives", x: [0, 90], y: [1, 1], hoverinfo: "skip",
+    line: { color: ink("muted"), dash: "dot", width: 1.5 },
+  });
+  const most = Math.max(...data.flatMap(({ y }) => y));
+  const layout = {
+    xaxis: { title: { text: "θ<sub>i</sub> [degrees]" }, range: [0, 90], dtick: 30 },
+    yaxis: { title: { text: "albedo" }, range: [0, 1.05 * most] },
+  };
+  const audited = answers[0].finding !== undefined;
+  const caption = `The share of light from θᵢ that is reflected, Dirac part included; over φᵢ the ${audited ? "most, as the audit found it" : "mean"}.` +
+    (state.compare === MODEL && !audited ? " Nobody audited it, so that of the model is not known." : "");
+  return { data, layout, caption };
+}

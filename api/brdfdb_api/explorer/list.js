@@ -1,0 +1,102 @@
+// The list of materials: fetched page by page, searched, filtered, and walked with arrow keys.
+
+import { json } from "./api.js";
+import { chip, element } from "./dom.js";
+
+const [search, model, verdict, count, list] = ["search", "model", "verdict", "count", "list"].map((id) =>
+  document.getElementById(id));
+
+const materials = [];
+let active = null; // the option that arrow keys have reached
+let chosen = "";
+let choose = () => {};
+
+/** Fill the list; `onChoose` gets the name of what is chosen, `onPage` the materials so far, after each page. */
+export async function load(onChoose, onPage) {
+  choose = onChoose;
+  for (let path = "v1/materials"; path;) {
+    const page = await json(path);
+    materials.push(...page.materials);
+    list.append(...page.materials.map(option));
+    offer(model, page.materials.map((each) => [each.model, each.model_title]));
+    offer(verdict, page.materials.map((each) => [words(each), words(each)]));
+    filter();
+    onPage(materials);
+    path = page.next?.replace(/^\//, "");
+  }
+}
+
+/** Show which material is looked at. */
+export function mark(name) {
+  chosen = name;
+  for (const each of list.children) each.setAttribute("aria-selected", each.dataset.name === name);
+  const now = [...list.children].find((each) => each.dataset.name === name);
+  if (now) reach(now);
+}
+
+const words = (each) => (each.damaged ? "damaged" : each.verdict ?? "not audited");
+
+function option(each) {
+  const swatch = element("span", { className: "swatch" });
+  swatch.style.background = each.colour ?? "";
+  const name = element("span", { className: "name" }, each.title || each.name);
+  const made = element("li", { id: `m-${each.name}`, title: each.damaged ?? each.source }, swatch, name, chip(words(each)));
+  made.setAttribute("role", "option");
+  made.setAttribute("aria-selected", each.name === chosen);
+  Object.assign(made.dataset, {
+    name: each.name, model: each.model ?? "", verdict: words(each),
+    text: `${each.name} ${each.title} ${each.model_title} ${each.source}`.toLowerCase(),
+  });
+  return made;
+}
+
+function offer(select, pairs) {
+  const known = new Set([...select.options].map((each) => each.value));
+  for (const [value, text] of new Map(pairs.filter(([value]) => value))) {
+    if (!known.has(value)) select.add(new Option(text, value));
+  }
+}
+
+function filter() {
+  const asked = search.value.toLowerCase().split(/\s+/);
+  for (const each of list.children) {
+    const { text, model: its, verdict: found } = each.dataset;
+    each.hidden = !asked.every((word) => text.includes(word)) ||
+      ![its, ""].includes(model.value) || ![found, ""].includes(verdict.value);
+  }
+  const shown = visible();
+  count.textContent = shown.length === materials.length ? `${materials.length} materials` :
+    `${shown.length} of ${materials.length} materials`;
+  reach(shown.find((each) => each.dataset.name === chosen) ?? shown[0]);
+}
+
+const visible = () => [...list.children].filter((each) => !each.hidden);
+
+function reach(option) {
+  active?.classList.remove("active");
+  active = option ?? null;
+  active?.classList.add("active");
+  if (active) { // within the list alone: the page stays where it is
+    const { offsetTop: top, offsetHeight: height } = active;
+    list.scrollTop = Math.min(top, Math.max(list.scrollTop, top + height - list.clientHeight));
+  }
+  for (const each of [list, search]) each.setAttribute("aria-activedescendant", active?.id ?? "");
+}
+
+function walk(event) {
+  const shown = visible(), at = shown.indexOf(active);
+  const steps = { ArrowDown: at + 1, ArrowUp: at - 1, ...(event.target === list && { Home: 0, End: shown.length - 1 }) };
+  if (event.key in steps) reach(shown[Math.max(0, Math.min(steps[event.key], shown.length - 1))]);
+  else if (event.key === "Enter" && active) choose(active.dataset.name);
+  else return;
+  event.preventDefault();
+}
+
+search.addEventListener("input", filter);
+model.addEventListener("change", filter);
+verdict.addEventListener("change", filter);
+for (const each of [list, search]) each.addEventListener("keydown", walk);
+list.addEventListener("click", (event) => {
+  const option = event.target.closest("li");
+  if (option) choose(option.dataset.name);
+});

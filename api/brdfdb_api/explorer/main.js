@@ -1,0 +1,177 @@
+// The page: what changes the state, and the one loop that turns the state into a picture.
+
+import { Problem, json } from "./api.js";
+import * as controls from "./controls.js";
+import * as copy from "./copy.js";
+import { cut } from "./cut.js";
+import { element } from "./dom.js";
+import * as facts from "./facts.js";
+import { figure } from "./figures.js";
+import * as list from "./list.js";
+import { againstAudit, request, seriesOf } from "./series.js";
+import { spheres } from "./sphere.js";
+import { fromHash, toHash } from "./state.js";
+
+const [title, message, caption, picture] = ["title", "message", "caption", "picture"].map((id) => document.getElementById(id));
+const places = ["cut", "plot", "spheres"].map((id) => document.getElementById(id)); // of pictures, one shown at a time
+const DRAWN = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+const NARROW = 560; // pixels in which two pictures do not stand side by side
+const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
+
+let state = fromHash(location.hash);
+let series = []; // what is shown; emptied when it has to be found anew
+let stop = new AbortController();
+let asked = 0; // when the picture was asked for; the first one when the page was
+let wanted = false, working = false;
+let linked = 0;
+
+/** Change the state: a slider's next picture waits for the one that is being drawn, anything else stops it. */
+function change(part) {
+  const turned = Object.keys(part).every((key) => ["theta_i", "phi_i", "theta_r", "turn", "nm"].includes(key));
+  state = { ...state, ...part };
+  if ("material" in part || "compare" in part) series = [];
+  if (!turned) {
+    stop.abort();
+    stop = new AbortController();
+  }
+  if (series.length) controls.show(state, series);
+  clearTimeout(linked);
+  linked = setTimeout(() => history.replaceState(null, "", toHash(state)), LINK_MS);
+  redraw();
+}
+
+function redraw(at = performance.now()) {
+  asked = at;
+  wanted = true;
+  if (!working) work();
+}
+
+async function work() {
+  working = true;
+  while (wanted) {
+    wanted = false;
+    const now = state, start = asked, { signal } = stop;
+    try {
+      await draw(now, signal);
+      say("");
+      performance.clearMeasures("picture");
+      performance.measure("picture", { start, end: performance.now() });
+      picture.dataset.shown = toHash(now);
+    } catch (error) {
+      if (signal.aborted) continue;
+      forget(now);
+      say(error instanceof Problem ? error.message : `This cannot be drawn: ${error.message}`);
+      if (!(error instanceof Problem)) console.error(error);
+    }
+  }
+  working = false;
+}
+
+async function draw(now, signal) {
+  if (!series.length) await know(now, signal);
+  facts.band(series[0].info, now);
+  const draws = { cut: drawCut, sphere: drawSpheres }[now.view] ?? drawPlot;
+  const words = await draws(now, signal);
+  signal.throwIfAborted();
+  caption.textContent = words;
+}
+
+/** The place of a picture, shown instead of the others: what is hidden has no size to draw into. */
+function shown(id) {
+  for (const each of places) each.hidden = each.id !== id;
+  return document.getElementById(id);
+}
+
+/** Show no picture rather than one of something else. */
+function forget(now) {
+  shown(null);
+  caption.textContent = "";
+  if (series.length) return;
+  title.textContent = now.material;
+  facts.forget();
+}
+
+/** Learn what is shown. */
+async function know(now, signal) {
+  list.mark(now.material);
+  const found = await seriesOf(now, signal);
+  signal.throwIfAborted();
+  series = found;
+  title.textContent = series[0].info.title;
+  document.title = `${series[0].info.title} – brdfdb explorer`;
+  facts.show(series[0].info);
+  controls.show(now, series);
+}
+
+async function drawCut(now, signal) {
+  const answers = await answersTo(now, signal);
+  return cut(shown("cut"), series, answers, now);
+}
+
+async function drawSpheres(now, signal) {
+  const found = await spheres(series, now, signal);
+  return found.paint(shown("spheres"));
+}
+
+async function drawPlot(now, signal) {
+  const [answers, Plotly] = await Promise.all([answersTo(now, signal), loaded()]);
+  signal.throwIfAborted();
+  const plot = shown("plot");
+  const stacked = plot.clientWidth < NARROW && answers.length > 1 && ["hemisphere", "half-difference"].includes(now.view);
+  plot.classList.toggle("stacked", stacked);
+  const { data, layout, caption: words } = figure(now.view, series, answers, now, stacked);
+  await Plotly.react(plot, data, layout, DRAWN);
+  return words;
+}
+
+/** What the service answers for a view; the albedo of a model that nobody audited it does not know. */
+async function answersTo(now, signal) {
+  const known = now.view !== "albedo" ? series : series.filter((each) => each.source === "table" || againstAudit(each, now));
+  const answers = await Promise.all(known.map((each) => json(request(each, now, series), signal)));
+  signal.throwIfAborted();
+  return answers;
+}
+
+let library; // plotly.js, once it is asked for
+
+function loaded() {
+  library ??= new Promise((resolve, reject) => {
+    const script = element("script", { src: document.getElementById("plotly").href });
+    script.addEventListener("load", () => resolve(globalThis.Plotly));
+    script.addEventListener("error", () => reject(new Problem("plotly.js did not arrive: load this page again")));
+    document.head.append(script);
+  });
+  return library;
+}
+
+/** Tell people: what failed, or in another colour what worked. */
+function say(sentence, tone = "bad") {
+  message.className = tone;
+  message.textContent = sentence;
+}
+
+controls.listen(change);
+copy.listen(
+  () => new URL(toHash(state), location.href), () => (series.length ? request(series[0], state, series) : "v1/materials"), say);
+addEventListener("hashchange", () => {
+  const linked = fromHash(location.hash);
+  change({ ...linked, material: linked.material || state.material });
+});
+let width = picture.clientWidth;
+new ResizeObserver(() => {
+  if (picture.clientWidth === width) return;
+  width = picture.clientWidth;
+  if (series.length) redraw();
+}).observe(picture);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
+if (state.material) redraw(0);
+list.load((material) => change({ material, compare: state.compare === material ? "" : state.compare }), (materials) => {
+  controls.offer(materials);
+  if (series.length) controls.show(state, series);
+  list.mark(state.material);
+  const first = materials.find((each) => !each.damaged);
+  if (!state.material && first) {
+    state = { ...state, material: first.name };
+    redraw(0);
+  }
+}).catch((error) => say(error.message));

@@ -1,0 +1,64 @@
+// What a picture shows, one or two series of values: of which material, from table or model, at which wavelength.
+
+import { address, json } from "./api.js";
+import { MODEL } from "./state.js";
+
+/** The series of a state: label, material, source, and what is known of the material. */
+export async function seriesOf(state, signal) {
+  const other = ![MODEL, "", state.material].includes(state.compare);
+  const [info, second] = await Promise.all(
+    [state.material, ...(other ? [state.compare] : [])].map((name) => json(address(name), signal)));
+  const first = { label: info.title, name: info.name, source: "table", info };
+  if (other) return [first, { label: second.title, name: second.name, source: "table", info: second }];
+  if (state.compare !== MODEL) return [first];
+  return [{ ...first, label: "table" }, { ...first, label: "model", source: "model" }];
+}
+
+/** Whether any of them turns with phi_i. */
+export const anisotropic = (series) => series.some(({ info }) => info.anisotropic);
+
+/** Whether the wavelengths of a material make a colour, by the rule of the service. */
+export function makesColour({ wavelength_nm: at }) {
+  return at !== null && at[0] <= 420 && at.at(-1) >= 680 && at.every((nm, i) => i === 0 || nm - at[i - 1] <= 20);
+}
+
+/** The wavelength [nm] closest to one that is asked for, within those of a material; else its middle one. */
+export function nearest({ wavelength_nm: at }, nm) {
+  return nm === null ? at[at.length >> 1] : Math.min(Math.max(nm, at[0]), at.at(-1));
+}
+
+/** The part of a query that makes values numbers: luminance, one wavelength, or what a grey material has. */
+export function quantity({ info, source }, { nm }, colour = "xyz") {
+  const from = source === "model" ? { from: "model" } : {};
+  if (info.wavelength_nm === null) return from;
+  if (nm === null && makesColour(info)) return { ...from, output: colour };
+  return { ...from, wavelength_nm: nearest(info, nm) };
+}
+
+/** In words, what those numbers are. */
+export function quantityWords({ info }, { nm }) {
+  if (info.wavelength_nm === null) return "fᵣ";
+  return nm === null && makesColour(info) ? "Luminance of fᵣ under D65" : `fᵣ at ${nearest(info, nm)} nm`;
+}
+
+/** Whether albedos are those of the audit: it alone knows that of a model. */
+export const againstAudit = ({ info }, { compare }) => compare === MODEL && info.audit !== null;
+
+/** The address of what a view shows of one series. */
+export function request(each, state, series) {
+  const { view, theta_i } = state;
+  const phi_i = anisotropic(series) ? state.phi_i : undefined;
+  if (view === "albedo") return address(each.name, againstAudit(each, state) ? "audit" : "albedo");
+  if (view === "spectrum" || view === "sphere") {
+    const of = view === "sphere" ? quantity(each, state, "linear-srgb") :
+      each.source === "model" ? { from: "model" } : { error: true };
+    const phi_r = ((phi_i ?? 0) + state.turn) % 360;
+    return address(each.name, "lookup", { theta_i, phi_i, theta_r: state.theta_r, phi_r, ...of });
+  }
+  return address(each.name, "lobe", {
+    view, theta_i: view === "half-difference" ? undefined : theta_i, phi_i, ...quantity(each, state),
+  });
+}
+
+/** A function that makes a number of what an answer holds at a point. */
+export const number = (document) => (document.output === "xyz" ? (value) => value[1] : (value) => value);

@@ -1,0 +1,78 @@
+// A sphere of the material, lit from one direction and looked at from far away, drawn pixel by pixel.
+
+import { lookup } from "./api.js";
+import { element } from "./dom.js";
+import { quantity } from "./series.js";
+
+const SIZE = 96; // pixels across
+const DEGREE = 180 / Math.PI;
+
+const WORDS = "The viewer is far above the page; the light is as bright as makes a white matt surface white. The mirror image, a " +
+  "Dirac part, is not drawn. The x axis of the surface runs around the vertical axis of the sphere.";
+
+/** What the service says of all lit pixels of the series; `paint` draws it into an element, and gives the caption. */
+export async function spheres(series, state, signal) {
+  const scene = geometry(state.theta_i, state.phi_i);
+  const found = await Promise.all(series.map((each) =>
+    lookup(each.name, quantity(each, state, "linear-srgb"), scene.directions, signal)));
+  signal.throwIfAborted();
+  return {
+    paint(into) {
+      while (into.children.length < found.length) into.append(made());
+      while (into.children.length > found.length) into.lastChild.remove();
+      found.forEach((values, i) => {
+        const [canvas, label] = into.children[i].children;
+        paint(canvas, values, scene);
+        label.textContent = series.length > 1 ? series[i].label : "";
+      });
+      return WORDS;
+    },
+  };
+}
+
+function made() {
+  const canvas = element("canvas", { width: SIZE, height: SIZE });
+  return element("figure", {}, canvas, element("figcaption", { className: "quiet" }));
+}
+
+/** Lit pixels: directions [degrees], four numbers each, places, and cosines at the light. */
+function geometry(theta, phi) {
+  const sine = Math.sin(theta / DEGREE);
+  const light = [sine * Math.cos(phi / DEGREE), sine * Math.sin(phi / DEGREE), Math.cos(theta / DEGREE)];
+  const directions = [], pixels = [], cosines = [];
+  for (let row = 0; row < SIZE; row += 1) {
+    for (let column = 0; column < SIZE; column += 1) {
+      const x = (2 * column + 1) / SIZE - 1, y = 1 - (2 * row + 1) / SIZE;
+      const z = Math.sqrt(1 - x * x - y * y); // the normal; the viewer is at (0, 0, 1)
+      const cosine = x * light[0] + y * light[1] + z * light[2];
+      if (!(cosine > 0)) continue; // past the limb z is not a number
+      const across = Math.hypot(x, z); // the tangent runs around the vertical axis: (z, 0, -x) / across
+      const tangent = (v) => (z * v[0] - x * v[2]) / across;
+      const upward = (v) => (-x * y * v[0] + across * across * v[1] - y * z * v[2]) / across;
+      const azimuth = (v) => Math.atan2(upward(v), tangent(v)) * DEGREE;
+      directions.push(Math.acos(Math.min(cosine, 1)) * DEGREE, azimuth(light), Math.acos(z) * DEGREE, azimuth([0, 0, 1]));
+      pixels.push(row * SIZE + column);
+      cosines.push(cosine);
+    }
+  }
+  return { directions: new Float32Array(directions), pixels, cosines };
+}
+
+function paint(canvas, values, { pixels, cosines }) {
+  const context = canvas.getContext("2d"), image = context.createImageData(SIZE, SIZE);
+  const channels = values.length / pixels.length; // three, or one that is grey
+  pixels.forEach((pixel, i) => {
+    for (let channel = 0; channel < 3; channel += 1) {
+      const f_r = values[i * channels + (channels === 3 ? channel : 0)];
+      image.data[4 * pixel + channel] = encoded(Math.PI * f_r * cosines[i]);
+    }
+    image.data[4 * pixel + 3] = 255;
+  });
+  context.putImageData(image, 0, 0);
+}
+
+/** A byte of sRGB (IEC 61966-2-1). */
+function encoded(linear) {
+  const value = Math.min(Math.max(linear, 0), 1);
+  return Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
+}

@@ -1,0 +1,137 @@
+"""Chromium without a window, driven over a pipe by its DevTools protocol: real time, real keys, real requests."""
+
+from __future__ import annotations
+
+import base64
+import fcntl
+import io
+import json
+import os
+import select
+import signal
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from matplotlib.image import imread
+
+SECONDS = 60.0  # for anything, on a busy machine
+FLAGS = [
+    *("--headless", "--no-sandbox", "--no-first-run", "--hide-scrollbars", "--remote-debugging-pipe"),
+    *("--enable-unsafe-swiftshader", "--force-color-profile=srgb"),  # WebGL without a graphics card
+    *(f"--disable-{each}" for each in ("quic", "background-networking", "component-update", "sync", "dev-shm-usage")),
+]
+KEYS = {"Enter": 13, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36, "End": 35, "Tab": 9}
+
+
+class Chromium:
+    """A browser process; one page at a time.
+
+    Parameters
+    ----------
+    binary : str
+        The program.
+    profile : Path
+        A directory of its own.
+    """
+
+    def __init__(self, binary: str, profile: Path) -> None:
+        # the protocol wants descriptors 3 and 4: ends from 10 on never are in the way of those
+        (to_read, self._write), (self._read, to_write) = os.pipe(), os.pipe()
+        high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (to_read, to_write)]
+        actions: list[tuple[Any, ...]] = [(os.POSIX_SPAWN_DUP2, high[0], 3), (os.POSIX_SPAWN_DUP2, high[1], 4)]
+        actions += [(os.POSIX_SPAWN_OPEN, each, os.devnull, os.O_RDWR, 0) for each in (0, 1, 2)]
+        arguments = [binary, *FLAGS, f"--user-data-dir={profile}", "about:blank"]
+        self._pid = os.posix_spawn(binary, arguments, os.environ, file_actions=actions, setpgroup=0)
+        for end in (to_read, to_write, *high):
+            os.close(end)
+        self._buffer, self._count, self._session = b"", 0, ""
+        self.errors: list[str] = []
+        target = self.send("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self.send("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Runtime", "Log", "Page"):
+            self.send(f"{domain}.enable")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, at: TracebackType | None) -> None:
+        os.killpg(self._pid, signal.SIGKILL)
+        os.waitpid(self._pid, 0)
+        os.close(self._write)
+        os.close(self._read)
+
+    def send(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Ask for something, and wait for the answer; errors of the page on the way are kept in `errors`."""
+        self._count += 1
+        message = {"id": self._count, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._write, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._next(method)
+            if answer.get("id") == self._count:
+                assert "error" not in answer, f"{method}: {answer['error']}"
+                found: dict[str, Any] = answer["result"]
+                return found
+            self._note(answer)
+
+    def open(self, address: str, width: int = 1280, height: int = 900, scheme: str = "light") -> None:
+        """Load an address in a window of some width; `errors` begins anew."""
+        self.send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        self.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        self.send("Page.navigate", url="about:blank")  # a link to another view of the same page would not load it
+        self.errors.clear()
+        self.send("Page.navigate", url=address)
+
+    def evaluate(self, script: str) -> Any:
+        """The value of an expression, or what its promise resolves to."""
+        answer = self.send("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def until(self, script: str) -> Any:
+        """The value of an expression as soon as it is one that counts as true."""
+        deadline = time.monotonic() + SECONDS
+        while not (found := self.evaluate(script)):
+            assert time.monotonic() < deadline, f"never true: {script}; {self.errors}"
+            time.sleep(0.02)
+        return found
+
+    def press(self, *keys: str) -> None:
+        """Press keys, one after the other."""
+        for key in keys:
+            for kind in ("rawKeyDown", "keyUp"):
+                self.send("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=KEYS[key])
+
+    def type(self, text: str) -> None:
+        """Type into what has the focus."""
+        self.send("Input.insertText", text=text)
+
+    def picture(self) -> np.ndarray:
+        """The luminance of what is shown, 0 to 1."""
+        shot = base64.b64decode(self.send("Page.captureScreenshot", format="png")["data"])
+        return np.asarray(imread(io.BytesIO(shot)))[..., :3].mean(axis=-1)
+
+    def _next(self, waiting_for: str) -> dict[str, Any]:
+        deadline = time.monotonic() + SECONDS
+        while b"\0" not in self._buffer:
+            ready, _, _ = select.select([self._read], [], [], max(0.0, deadline - time.monotonic()))
+            assert ready, f"the browser does not answer {waiting_for}"
+            piece = os.read(self._read, 1 << 20)
+            assert piece, "the browser ended"
+            self._buffer += piece
+        message, _, self._buffer = self._buffer.partition(b"\0")
+        found: dict[str, Any] = json.loads(message)
+        return found
+
+    def _note(self, event: dict[str, Any]) -> None:
+        kind, of = event.get("method"), event.get("params", {})
+        if kind == "Runtime.exceptionThrown":
+            self.errors.append(str(of["exceptionDetails"]))
+        elif kind == "Runtime.consoleAPICalled" and of["type"] in ("error", "assert"):
+            self.errors.append(str(of["args"]))
+        elif kind == "Log.entryAdded" and of["entry"]["level"] == "error":
+            self.errors.append(of["entry"]["text"])
