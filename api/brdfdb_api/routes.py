@@ -111,8 +111,7 @@ def catalogue(
         if kept and paper.casefold() in f"{line.get('paper', '')} {line.get('source', '')}".casefold():
             found.append(line)
     page = [line for line in found if line["name"] > cursor][:limit]
-    for line in page:
-        shelf.colour(line["name"])
+    shelf.colour(line["name"] for line in page if line.get("colour") is None and "damaged" not in line)
     following = None
     if page and found[-1]["name"] > page[-1]["name"]:
         asked = {"model": model, "paper": paper, "q": q, "limit": limit, "cursor": page[-1]["name"]}
@@ -147,7 +146,7 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
     shelf = shelf_of(request)
     table = shelf.table(name, revision)
     verdict = shelf.verdict(name)
-    shelf.colour(name)
+    shelf.paint(name)
     audited = "" if verdict is None else verdict.when
     headers = cache_headers(f"{name}-{table.revision}-{audited}")
     if held := not_modified(request.headers.get("if-none-match"), headers):

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import os
+import queue
 import threading
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import orjson
 
 from brdfdb.store import Store, StoreError, UnknownMaterialError
+from brdfdb_api.colours import swatch
 from brdfdb_api.settings import Settings
 
 if TYPE_CHECKING:
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
 
 COLOURED_BYTES = 16 * 2**20  # a larger table is not decoded only to show its colour in a list
 
+IDLE_S = 1.0  # that the thread which finds colours waits for more
 WARMED = 100  # materials whose colours are found when a server starts
 
 
@@ -48,6 +52,8 @@ class Shelf:
         self._colours: dict[str, tuple[str, str | None]] = {}
         self._audit: tuple[tuple[int, int], dict[str, Any]] | None = None
         self._lock = threading.Lock()
+        self._waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._painter: threading.Thread | None = None
 
     @property
     def store(self) -> Store:
@@ -136,24 +142,39 @@ class Shelf:
             "href": f"/v1/materials/{name}",
         }
 
-    def colour(self, name: str) -> None:
-        """Find the colour of a material for lists: decodes its table, unless that is large or damaged."""
-        from brdfdb_api.colours import swatch
+    def colour(self, names: Iterable[str]) -> None:
+        """Have the colours of materials found, one after the other by a thread: they take a decoded table each."""
+        for name in names:
+            self._waiting.put(name)
+        with self._lock:
+            if self._painter is None or not self._painter.is_alive():
+                self._painter = threading.Thread(target=self._paint, daemon=True)
+                self._painter.start()
 
-        try:
-            digest = self.store.location(name)[1]
-            if self._colours.get(name, ("",))[0] == digest:
+    def _paint(self) -> None:
+        while True:
+            try:
+                name = self._waiting.get(timeout=IDLE_S)
+            except queue.Empty:
                 return
+            with contextlib.suppress(UnknownMaterialError, StoreError):
+                self.paint(name)
+
+    def paint(self, name: str) -> None:
+        """Find the colour of a material, unless it is known or the table is large; errors as of the store."""
+        digest = self.store.location(name)[1]
+        if self._colours.get(name, ("",))[0] != digest:
             small = (self.store.summary(name).get("bytes") or 0) <= COLOURED_BYTES
             self._colours[name] = digest, swatch(self.store[name]) if small else None
-        except (UnknownMaterialError, StoreError):
-            return
 
     def warm(self) -> None:
-        """Find the colours that the first page of a list shows, and with them decode its tables."""
+        """Load the kernels of lookups, then find the colours that the first page of a list shows."""
         with contextlib.suppress(StoreError):
-            for name in self.names()[:WARMED]:
-                self.colour(name)
+            names = self.names()
+            for name in names[:1]:
+                with contextlib.suppress(UnknownMaterialError, StoreError):
+                    self.store[name].lookup(0.0, 0.0, 0.0, 0.0)
+            self.colour(names[:WARMED])
 
     def verdict(self, name: str) -> Verdict | None:
         """What the last audit says of a material; None where there is none, or its report cannot be read."""

@@ -24,6 +24,27 @@ export async function load(onChoose, onPage) {
     onPage(materials);
     path = page.next?.replace(/^\//, "");
   }
+  await paint(REPAINTS);
+}
+
+const [REPAINTS, PAUSE_MS] = [8, 1000];
+
+/** Ask again for colours that the service has not found yet. */
+async function paint(tries) {
+  const pale = materials.filter((each) => !each.damaged && !each.colour);
+  if (!tries || !pale.length) return;
+  await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
+  for (let path = "v1/materials"; path;) {
+    const page = await json(path);
+    for (const each of page.materials) {
+      const known = materials.find((one) => one.name === each.name);
+      if (!known || !each.colour) continue;
+      known.colour = each.colour;
+      document.querySelector(`#m-${each.name} .swatch`).style.background = each.colour;
+    }
+    path = page.next?.replace(/^\//, "");
+  }
+  await paint(tries - 1);
 }
 
 /** Show which material is looked at. */
