@@ -133,7 +133,7 @@ QUERY = dict(zip(("theta_i", "phi_i", "theta_r", "phi_r"), ANGLES_DEG, strict=Tr
 
 def test_the_application_answers_as_the_library_does(name: str, built: Path, names: list[str]) -> None:
     app = create_app(Settings(store=built))
-    assert get(app, "/healthz").json() == {"status": "ok", "materials": len(names)}
+    assert get(app, "/readyz").json() == {"status": "ok", "materials": len(names)}
     catalogue = get(app, "/v1/materials").json()["materials"]
     assert [entry["name"] for entry in catalogue] == sorted(names)
     response = get(app, f"/v1/materials/{name}/lookup", **QUERY)
