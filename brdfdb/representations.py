@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel, misprints, models, tabulate
 from brdfdb.family import Family
@@ -79,7 +79,7 @@ class Representation:
 
 
 def representations(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
+    material: Material, wavelength_nm: ArrayLike | None, tolerances: Sequence[float] | None = None
 ) -> list[Representation]:
     """Every representation of a material that the project has; the first one is the truth.
 
@@ -87,7 +87,7 @@ def representations(
     ----------
     material : Material
         Of any model.
-    wavelength_nm : array of shape (L,) [nm], or None
+    wavelength_nm : array_like of shape (L,) [nm], or None
         For spectral materials, and only for them.
     tolerances : sequence of float, optional
         Of planned tables, each in [1e-4, 0.5]; by default 0.1, 0.01 and, of a grey material, 0.001.
@@ -107,8 +107,9 @@ def representations(
     """
     if tolerances is None:
         tolerances = SPECTRAL_TOLERANCES if material.spectral else TOLERANCES
-    forms = _FORMS.get(material.model, _of_itself)(material, wavelength_nm)
-    tables = _tables(material, _tabulated(material), wavelength_nm, tolerances) if tolerances else ()
+    at = None if wavelength_nm is None else np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
+    forms = _FORMS.get(material.model, _of_itself)(material, at)
+    tables = _tables(material, _tabulated(material), at, tolerances) if tolerances else ()
     return [*forms, *tables]
 
 

@@ -58,7 +58,8 @@ def _build(root: Path, name: str, layout: Layout) -> Built:
     error = accuracy.measure(layout, lambda rows: values[rows])
     before = _before(store, name)
     revision, _ = publish_dataset(root, name, table.assign_attrs(error=error.model_dump(mode="json")))
-    return Built(revision, f"{revision} {before}; its error is {terminal.error(error.overall.p99)}")
+    stated = f"{layout.material.model}, whose error (p99) is {terminal.error(error.overall.p99)}"
+    return Built(revision, f"{revision} is a table of {stated}; it {before}")
 
 
 def _before(store: Store, name: str) -> str:
@@ -69,7 +70,7 @@ def _before(store: Store, name: str) -> str:
         head = store.summary(name)
     except StoreError:
         return "replaces one that was damaged"
-    return f"replaces {head['revision']}, whose error was {terminal.error(head.get('error_p99'))}"
+    return f"replaces {head['revision']}, of {head['model']}, whose error was {terminal.error(head.get('error_p99'))}"
 
 
 def _is_there(store: Store, name: str, layout: Layout) -> bool:

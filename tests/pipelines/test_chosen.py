@@ -49,7 +49,8 @@ def test_a_chosen_table_states_its_error_and_where_it_comes_from(store: Path) ->
     table = brdfdb.open(store)[material.name]
     assert 0.0 < error_of(store, material.name) <= 0.1
     stated = terminal.error(error_of(store, material.name))
-    assert built == {material.name: Built("r000001", f"r000001 is new in the store; its error is {stated}")}
+    said = f"r000001 is a table of he_torrance, whose error (p99) is {stated}; it is new in the store"
+    assert built == {material.name: Built("r000001", said)}
     assert table_error_of(table, material, pairs_of(table, material)).verdict == "passes"
     attributes = table.attrs
     for name in ("title", "source", "note", "refractive_index"):
@@ -66,8 +67,9 @@ def test_a_table_that_replaces_another_says_so_with_both_errors(store: Path) -> 
     built = chosen.build(store, {NAME: layout(19)})
     after = error_of(store, NAME)
     assert after < before
-    errors = f"whose error was {terminal.error(before)}; its error is {terminal.error(after)}"
-    assert built[NAME] == Built("r000002", f"r000002 replaces r000001, {errors}")
+    said = f"r000002 is a table of oren_nayar, whose error (p99) is {terminal.error(after)}; "
+    said += f"it replaces r000001, of oren_nayar, whose error was {terminal.error(before)}"
+    assert built[NAME] == Built("r000002", said)
     assert brdfdb.open(store).head(NAME) == "r000002"
 
 
