@@ -49,6 +49,8 @@ class Table(Described):
         How the parts of a factored spectrum make up the wavelengths.
     uniform : array (L,) or (1,) [1/sr]
         The part of f_r that is the same in all directions, which is not in `values`.
+    digest : str
+        sha256 of the manifest of the revision; empty of a table that was not read from a store.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Table(Described):
     interpolation: Interpolation = PLAIN
     spectra: NDArray[np.float64] | None = None
     uniform: NDArray[np.float64] | None = None
+    digest: str = ""
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:

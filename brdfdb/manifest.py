@@ -54,6 +54,14 @@ def manifest_of(group: Path) -> Path:
     return group.with_name(f"{group.name}.MANIFEST.json")
 
 
+def manifest_digest(group: Path) -> str:
+    """sha256 of the manifest of a revision; StoreError if it cannot be read."""
+    try:
+        return sha256_of(manifest_of(group))
+    except OSError:
+        raise StoreError(f"{group.parent.name} {group.name} is damaged: its manifest cannot be read") from None
+
+
 def number_of(revision: str) -> int:
     """3 of ``r000003``; 0 of anything else, such as ``r000003.MANIFEST.json``."""
     return int(revision[1:]) if revision[:1] == "r" and revision[1:].isdecimal() else 0

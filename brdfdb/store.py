@@ -19,10 +19,11 @@ import re
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brdfdb.manifest import Head, StoreError, check_manifest, json_object, number_of, read_json
+from brdfdb.manifest import Head, StoreError, check_manifest, json_object, manifest_digest, number_of, read_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -162,7 +163,8 @@ class Store(Mapping[str, "Table"]):
         if group.name != revision:
             if revision not in self.revisions(name):
                 raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; the current one is {group.name}")
-            group, digest = group.with_name(revision), ""
+            group = group.with_name(revision)
+            digest = manifest_digest(group)
         return self._table(name, group, digest)
 
     def revisions(self, name: str) -> list[str]:
@@ -172,14 +174,15 @@ class Store(Mapping[str, "Table"]):
         return sorted((each for each in found if number_of(each) and (material / each).is_dir()), key=number_of)
 
     def held(self, name: str) -> Table | None:
-        """The current table of a material if it is decoded already: an answer without waiting.
+        """The current table of a material if it is decoded already: an answer without waiting; None else.
 
         Raises
         ------
-        UnknownMaterialError, StoreError
+        StoreError
             As `location` does.
         """
-        return self._decoded.get((name, self.location(name)[1]))
+        pointer = self._read_pointer(name)
+        return None if pointer is None else self._used((name, pointer.location[1]))
 
     @property
     def cached_bytes(self) -> int:
@@ -188,7 +191,7 @@ class Store(Mapping[str, "Table"]):
             return sum(table.nbytes for table in self._decoded.values())
 
     def _table(self, name: str, group: Path, digest: str) -> Table:
-        key = name, digest or group.name
+        key = name, digest
         if (held := self._used(key)) is not None:
             return held
         from brdfdb.chunks import Whole  # loads zarr
@@ -196,11 +199,11 @@ class Store(Mapping[str, "Table"]):
         with self._decoding:  # who asks for the same table meanwhile waits for it
             if (held := self._used(key)) is not None:
                 return held
-            files = check_manifest(group, digest or None, contents=False)["files"]
+            files = check_manifest(group, digest, contents=False)["files"]
             try:
-                table = _decode(name, group, Whole(group, files))
+                table = _decode(name, group, Whole(group, files), digest)
             except StoreError:
-                check_manifest(group, digest or None, contents=True)  # names the file
+                check_manifest(group, digest, contents=True)  # names the file
                 raise
             with self._lock:
                 self._decoded[key] = table
@@ -309,8 +312,15 @@ class Store(Mapping[str, "Table"]):
         check_manifest(*self.location(name), contents=True)
 
     def _pointer(self, name: str) -> _Pointer:
-        if not NAME.fullmatch(name):
+        pointer = self._read_pointer(name)
+        if pointer is None:
             raise UnknownMaterialError(name, list(self))
+        return pointer
+
+    def _read_pointer(self, name: str) -> _Pointer | None:
+        """The pointer of a material, read anew if it changed; None if there is none."""
+        if not NAME.fullmatch(name):
+            return None
         path = f"{self.root}/materials/{name}/HEAD.json"
         try:
             at = os.stat(path)
@@ -320,7 +330,7 @@ class Store(Mapping[str, "Table"]):
                 with open(path, "rb") as handle:
                     known = self._pointers[name] = _Pointer(seen, Path(path), json_object(Path(path), handle.read()))
         except (FileNotFoundError, NotADirectoryError):
-            raise UnknownMaterialError(name, list(self)) from None
+            return None
         except OSError as error:
             raise StoreError(f"cannot read {path}: {error.strerror}") from error
         return known
@@ -328,6 +338,11 @@ class Store(Mapping[str, "Table"]):
     def location(self, name: str) -> tuple[Path, str]:
         """Directory of the current revision and the digest of its manifest, both from one look at the pointer."""
         return self._pointer(name).location
+
+    def current(self, name: str) -> tuple[Path, str, dict[str, Any]]:
+        """What `location` gives, and what else the pointer says, from one look at it."""
+        pointer = self._pointer(name)
+        return *pointer.location, dict(pointer.head)
 
 
 class _Pointer:
@@ -346,7 +361,7 @@ class _Pointer:
         return self.path.with_name(revision), digest
 
 
-def _decode(name: str, path: Path, files: Whole) -> Table:
+def _decode(name: str, path: Path, files: Whole, digest: str) -> Table:
     import numpy as np
     import zarr
 
@@ -359,4 +374,4 @@ def _decode(name: str, path: Path, files: Whole) -> Table:
         raise
     except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
         raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
-    return table_from(name, path.name, arrays, dict(group.attrs))
+    return replace(table_from(name, path.name, arrays, dict(group.attrs)), digest=digest)

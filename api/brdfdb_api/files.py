@@ -10,7 +10,7 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
-from brdfdb.manifest import check_manifest, manifest_of
+from brdfdb.manifest import check_manifest, manifest_digest, manifest_of
 from brdfdb.store import StoreError, UnknownRevisionError
 from brdfdb_api.documented import answers
 from brdfdb_api.responses import RequestError, cache_headers, not_modified
@@ -29,12 +29,12 @@ files = APIRouter()
     router=files,
     tags=["files"],
     dependencies=[query_names()],
-    responses=answers(None, 304, 404, 422, 503, media={ZIP: "a zarr v3 group; xarray.open_zarr opens it as it is"}),
+    responses=answers(None, 304, 404, 422, 503, media={ZIP: "a zarr v3 group, for zarr.storage.ZipStore"}),
 )
 def download(request: Request, name: str, revision: str | None = None) -> Response:
-    """A revision as one zip file, not compressed again, which zarr and xarray open as it is."""
+    """A revision as one zip file, not compressed again: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
     group = _group(request, name, revision)
-    headers = cache_headers(f"{name}-{group.name}", "zip", immutable=revision is not None)
+    headers = cache_headers(f"{name}-{group.name}-{manifest_digest(group)[:16]}", "zip", immutable=revision is not None)
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
@@ -54,7 +54,8 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
     listed = check_manifest(group, None, contents=False)["files"]
     if file not in listed:
         raise RequestError(404, f"{name} {revision} has no such file")
-    headers = cache_headers(f"{name}-{revision}-{listed[file]['sha256'][:16]}", "file", immutable=True)
+    kind = "json" if file.endswith(".json") else "file"  # JSON may be compressed on its way
+    headers = cache_headers(f"{name}-{revision}-{listed[file]['sha256'][:16]}", kind, immutable=True)
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
     media = "application/json" if file.endswith(".json") else BYTES

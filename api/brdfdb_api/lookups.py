@@ -270,7 +270,8 @@ def refuse_unknown(name: str, allowed: tuple[str, ...]) -> None:
     """Raise the RequestError (422) of a parameter that is not one of `allowed`: a misspelt one is never ignored."""
     if name not in allowed:
         shown = shortened(name)
-        raise RequestError(422, f"{shown}: unknown parameter; allowed are {', '.join(allowed) or 'none'}", shown)
+        said = "belongs in the query" if name in OPTIONS else "unknown parameter"
+        raise RequestError(422, f"{shown}: {said}; allowed are {', '.join(allowed) or 'none'}", shown)
 
 
 def shortened(text: str) -> str:
@@ -306,7 +307,8 @@ def _number(name: str, text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise RequestError(422, f"{name}: {shortened(text)!r} is not a finite number", name)
+        hint = f"; of several, write each as {name}=NUMBER" if "," in text else ""
+        raise RequestError(422, f"{name}: {shortened(text)!r} is not a finite number{hint}", name)
     return value
 
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from http import HTTPStatus
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import orjson
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, WithJsonSchema
 from starlette.responses import Response
+
+if TYPE_CHECKING:
+    from brdfdb.lookup import Table
 
 PROBLEM_JSON = "application/problem+json"
 NPY = "application/x-npy"
@@ -237,6 +240,11 @@ def problem_response(
 def plain(array: Any) -> Any:
     """What orjson can write: a number for a 0-d array, contiguous memory for any other."""
     return np.asarray(array).item() if np.ndim(array) == 0 else np.ascontiguousarray(array)
+
+
+def tag_of(table: Table) -> str:
+    """What an ETag says of a table: name, revision, and its content, as numbers begin anew with a new store."""
+    return f"{table.name}-{table.revision}-{table.digest[:16]}"
 
 
 def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> dict[str, str]:

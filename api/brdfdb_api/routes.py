@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from urllib.parse import urlencode
@@ -30,6 +31,7 @@ from brdfdb_api.responses import (
     not_modified,
     npy_response,
     plain,
+    tag_of,
 )
 from brdfdb_api.shelf import Shelf
 
@@ -40,9 +42,11 @@ T = TypeVar("T")
 
 INLINE_VALUES = 500  # looking up more numbers happens in a thread, so that the event loop serves others meanwhile
 INLINE_BYTES = 32 * 2**10  # the same for reading a body; 500 points are about this long
-LARGE_BYTES, LARGE_AT_ONCE = 2**20, 8  # how many larger bodies, or such that do not tell, are in memory at a time
+# Larger bodies, or answers of more values, are worked on so many at a time
+LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 8
 JSON_BYTES = 8 * 2**20  # of a JSON body: numbers in lists take twenty times as much memory as text
 LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points, and numbers, in one answer, as multiples of max_points
+REVISION = "Brdfdb-Revision"  # header: which revision the numbers of a lookup are of
 PAGE, MOST = 100, 1000  # materials on a page
 SEARCHED = ("name", "title", "model", "model_title", "paper", "source")
 
@@ -72,7 +76,9 @@ async def healthz() -> Response:
 
 @router.get("/readyz", tags=["service"], dependencies=[query_names()], responses=answers(Health, 422, 503))
 def readyz(request: Request) -> Response:
-    """Whether the store can be read, and how many materials it holds."""
+    """Whether kernels are loaded and the store can be read, and how many materials it holds."""
+    if shelf_of(request).warming:
+        raise RequestError(503, "kernels are being loaded; the first time they are compiled, which takes half a minute")
     return json_response({"status": "ok", "materials": len(shelf_of(request).names())})
 
 
@@ -100,24 +106,25 @@ def catalogue(
 ) -> Response:
     """Materials of the store, sorted by name, a page at a time."""
     shelf = shelf_of(request)
-    words = q.casefold().split()
-    found = []
-    for name in shelf.names():
-        line = shelf.summary(name)
-        text = " ".join(
-            str(line.get(key, "")) for key in ("name", "title", "model_title", "paper", "source")
-        ).casefold()
-        kept = model in ("", line.get("model", "")) and all(word in text for word in words)
-        if kept and paper.casefold() in f"{line.get('paper', '')} {line.get('source', '')}".casefold():
-            found.append(line)
-    page = [line for line in found if line["name"] > cursor][:limit]
-    shelf.colour(line["name"] for line in page if line.get("colour") is None and "damaged" not in line)
+    names = shelf.names()
+    if model or paper or q:
+        words = q.casefold().split()
+        names = [name for name in names if _let_through(shelf.summary(name), model, paper.casefold(), words)]
+    page = [name for name in names if name > cursor][:limit]
+    lines = [shelf.summary(name) for name in page]
+    shelf.colour(line["name"] for line in lines if line.get("colour") is None and "damaged" not in line)
     following = None
-    if page and found[-1]["name"] > page[-1]["name"]:
-        asked = {"model": model, "paper": paper, "q": q, "limit": limit, "cursor": page[-1]["name"]}
+    if page and names[-1] > page[-1]:
+        asked = {"model": model, "paper": paper, "q": q, "limit": limit, "cursor": page[-1]}
         following = f"/v1/materials?{urlencode({key: value for key, value in asked.items() if value})}"
-    lines = [shelf.summary(line["name"]) for line in page]
-    return json_response({"materials": lines, "total": len(found), "next": following}, {"Cache-Control": "no-cache"})
+    return json_response({"materials": lines, "total": len(names), "next": following}, {"Cache-Control": "no-cache"})
+
+
+def _let_through(line: dict[str, Any], model: str, paper: str, words: list[str]) -> bool:
+    """Whether a line of the catalogue is asked for."""
+    text = " ".join(str(line.get(key, "")) for key in SEARCHED).casefold()
+    papers = f"{line.get('paper', '')} {line.get('source', '')}".casefold()
+    return model in ("", line.get("model", "")) and paper in papers and all(word in text for word in words)
 
 
 def both(
@@ -145,10 +152,10 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
     """Where the table of a material comes from, where it is sampled (axes in degrees), and how far to believe it."""
     shelf = shelf_of(request)
     table = shelf.table(name, revision)
-    verdict = shelf.verdict(name)
-    shelf.paint(name)
-    audited = "" if verdict is None else verdict.when
-    headers = cache_headers(f"{name}-{table.revision}-{audited}")
+    verdict, revisions = shelf.verdict(name), shelf.store.revisions(name)
+    # what changes beside the table
+    beside = f"{'' if verdict is None else verdict.when} {revisions}"
+    headers = cache_headers(f"{tag_of(table)}-{hashlib.sha256(beside.encode()).hexdigest()[:8]}")
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
     here = f"/v1/materials/{name}" + ("" if revision is None else f"/revisions/{revision}")
@@ -165,9 +172,9 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "specular": table.specular is not None,
         "error": attributes.get("error"),
         "audit": None if verdict is None else _verdicts(verdict.finding, verdict.when, table.revision),
-        "colour": shelf.summary(name).get("colour"),
+        "colour": shelf.swatch(table),
         "attributes": {key: value for key, value in attributes.items() if key not in ("error", "request")},
-        "revisions": shelf.store.revisions(name),
+        "revisions": revisions,
         "links": {
             "self": here,
             **{key: f"{here}/{key}" for key in ("lookup", "albedo", "lobe", "slice.exr", "audit", "download.zarr")},
@@ -237,7 +244,7 @@ async def answer_point(scope: Scope, name: str, revision: str | None) -> Respons
     settings = scope["app"].state.settings
     table = await _table(scope["app"].state.shelf, name, revision)
     kind = options.format or ("npy" if NPY in accept else "json")
-    headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
+    headers = {**cache_headers(tag_of(table), kind, immutable=revision is not None), REVISION: table.revision}
     if held and (unchanged := not_modified(held, headers)):
         return unchanged
     values = checked_size(settings.max_points, points, table, kind)
@@ -282,7 +289,7 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
     table = await _table(shelf_of(request), name, revision)
-    headers = cache_headers(f"{table.name}-{table.revision}", kind, immutable=revision is not None)
+    headers = {"Cache-Control": "no-store", REVISION: table.revision}
     max_points = request.app.state.settings.max_points
 
     def points_of(body: bytes) -> tuple[Points, int]:
@@ -292,15 +299,16 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
     def answer(body: bytes) -> Response:
         return write_answer(points_of(body)[0], options, table, kind, headers)
 
-    length = request.headers.get("content-length", "")
-    small = length.isdecimal() and int(length) <= LARGE_BYTES
-    async with contextlib.nullcontext() if small else request.app.state.large:
-        body = await request.body()
-        if not binary and len(body) > JSON_BYTES:
-            raise RequestError(413, f"a JSON body may have {JSON_BYTES} bytes; send as many points as {NPY}")
-        if len(body) > INLINE_BYTES:
+    body = await request.body()
+    if not binary and len(body) > JSON_BYTES:
+        raise RequestError(413, f"a JSON body may have {JSON_BYTES} bytes; send as many points as {NPY}")
+    large = request.app.state.large
+    if len(body) > INLINE_BYTES:
+        async with large if len(body) > LARGE_BYTES else contextlib.nullcontext():
             return await run_in_threadpool(answer, body)
-        points, values = points_of(body)
+    points, values = points_of(body)
+    # a row and a column of angles are a short body
+    async with large if values > LARGE_VALUES else contextlib.nullcontext():
         return await run(write_answer, points, options, table, kind, headers, in_thread=slow(values, options))
 
 

@@ -6,12 +6,14 @@ import contextlib
 import os
 import queue
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import orjson
 
+from brdfdb.manifest import check_manifest, read_json
 from brdfdb.store import Store, StoreError, UnknownMaterialError
 from brdfdb_api.colours import swatch
 from brdfdb_api.settings import Settings
@@ -54,6 +56,8 @@ class Shelf:
         self._lock = threading.Lock()
         self._waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._painter: threading.Thread | None = None
+        self._swatches: WeakKeyDictionary[Table, str | None] = WeakKeyDictionary()
+        self.warming = False  # kernels are being loaded, which takes half a minute where they are compiled
 
     @property
     def store(self) -> Store:
@@ -63,11 +67,11 @@ class Shelf:
         return self._store
 
     def held(self, name: str) -> Table | None:
-        """The current table of a material if it is decoded already; errors as by `table`."""
+        """The current table of a material if it is decoded already, without a wait; None else, and `table` says why."""
         try:
             return self.store.held(name)
-        except (UnknownMaterialError, StoreError) as error:
-            raise self._named(name, error) from error
+        except StoreError:
+            return None
 
     def table(self, name: str, revision: str | None = None) -> Table:
         """The table of a material, of its current revision or another.
@@ -110,10 +114,10 @@ class Shelf:
     def summary(self, name: str) -> dict[str, Any]:
         """What lists show of a material; of a damaged one its name and a sentence."""
         try:
-            group, digest = self.store.location(name)
+            group, digest, head = self.store.current(name)
             known = self._summaries.get(name)
             if known is None or known[0] != digest:
-                known = self._summaries[name] = digest, self._described(name, group.name)
+                known = self._summaries[name] = digest, _described(name, group, digest, head)
         except (UnknownMaterialError, StoreError) as error:
             return {"name": name, "damaged": str(error), "href": f"/v1/materials/{name}"}
         verdict = self.verdict(name)
@@ -122,24 +126,6 @@ class Shelf:
             **known[1],
             "verdict": verdict.finding["verdict"] if verdict and verdict.current else None,
             "colour": colour if found == digest else None,
-        }
-
-    def _described(self, name: str, revision: str) -> dict[str, Any]:
-        head, attributes = self.store.summary(name), self.store.attributes(name)
-        return {
-            "name": name,
-            "title": attributes["title"],
-            "model": attributes["model"],
-            "model_title": attributes.get("model_title", attributes["model"]),
-            "paper": attributes.get("model_reference", ""),
-            "source": attributes["source"],
-            "anisotropic": attributes["anisotropic"],
-            "wavelength_range_nm": attributes["wavelength_range_nm"] or None,
-            "error_p99": head.get("error_p99"),
-            "revision": revision,
-            "created": head.get("created"),
-            "bytes": head.get("bytes"),
-            "href": f"/v1/materials/{name}",
         }
 
     def colour(self, names: Iterable[str]) -> None:
@@ -161,20 +147,36 @@ class Shelf:
                 self.paint(name)
 
     def paint(self, name: str) -> None:
-        """Find the colour of a material, unless it is known or the table is large; errors as of the store."""
-        digest = self.store.location(name)[1]
-        if self._colours.get(name, ("",))[0] != digest:
-            small = (self.store.summary(name).get("bytes") or 0) <= COLOURED_BYTES
-            self._colours[name] = digest, swatch(self.store[name]) if small else None
+        """Find the colour of a material for lists, unless it is known or the table is large; errors as of the store."""
+        _, digest, head = self.store.current(name)
+        if self._colours.get(name, ("",))[0] == digest:
+            return
+        if (head.get("bytes") or 0) > COLOURED_BYTES:
+            self._colours[name] = digest, None
+        else:
+            table = self.store[name]
+            self._colours[name] = table.digest, self.swatch(table)
+
+    def swatch(self, table: Table) -> str | None:
+        """The colour of a table, found once; None of a model that this program does not know."""
+        if table not in self._swatches:
+            try:
+                self._swatches[table] = swatch(table)
+            except ValueError:
+                self._swatches[table] = None
+        return self._swatches[table]
 
     def warm(self) -> None:
         """Load the kernels of lookups, then find the colours that the first page of a list shows."""
-        with contextlib.suppress(StoreError):
-            names = self.names()
-            for name in names[:1]:
-                with contextlib.suppress(UnknownMaterialError, StoreError):
+        self.warming = True
+        try:
+            with contextlib.suppress(UnknownMaterialError, StoreError):
+                names = self.names()
+                for name in names[:1]:
                     self.store[name].lookup(0.0, 0.0, 0.0, 0.0)
-            self.colour(names[:WARMED])
+                self.colour(names[:WARMED])
+        finally:
+            self.warming = False
 
     def verdict(self, name: str) -> Verdict | None:
         """What the last audit says of a material; None where there is none, or its report cannot be read."""
@@ -197,10 +199,41 @@ class Shelf:
             return self._audit[1]
 
 
+def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> dict[str, Any]:
+    """A line of a list, of one revision."""
+    check_manifest(group, digest, contents=False)
+    attributes = read_json(group / "zarr.json")["attributes"]
+    return {
+        "name": name,
+        "title": attributes["title"],
+        "model": attributes["model"],
+        "model_title": attributes.get("model_title", attributes["model"]),
+        "paper": attributes.get("model_reference", ""),
+        "source": attributes["source"],
+        "anisotropic": attributes["anisotropic"],
+        "wavelength_range_nm": attributes["wavelength_range_nm"] or None,
+        "error_p99": head.get("error_p99"),
+        "revision": group.name,
+        "created": head.get("created"),
+        "bytes": head.get("bytes"),
+        "href": f"/v1/materials/{name}",
+    }
+
+
 def _read(path: Path) -> dict[str, Any]:
     """The findings of a report by material; none of a file that is no report."""
     try:
         report = orjson.loads(path.read_bytes())
-        return {"when": report["when"], "by_name": {each["material"]: each for each in report["materials"]}}
+        by_name = {each["material"]: each for each in report["materials"] if _complete(each)}
+        return {"when": str(report["when"]), "by_name": by_name}
     except (OSError, ValueError, KeyError, TypeError):
         return {"when": "", "by_name": {}}
+
+
+def _complete(finding: Any) -> bool:
+    """Whether a finding has what is shown of it."""
+    try:
+        shown = (finding["revision"], finding["verdict"], finding["energy"]["reason"], finding["validity"]["standing"])
+    except (KeyError, TypeError):
+        return False
+    return all(isinstance(each, str) for each in shown)

@@ -27,6 +27,7 @@ from brdfdb_api.responses import (
     not_modified,
     npy_response,
     plain,
+    tag_of,
 )
 from brdfdb_api.routes import both, query_names, shelf_of
 
@@ -62,7 +63,7 @@ Azimuth = Annotated[float, Query(ge=-720.0, le=720.0, description="azimuth of th
 def albedo(request: Request, name: str, revision: str | None = None) -> Response:
     """Directional and hemispherical albedo of the table: what it reflects of light from one direction, or from all."""
     table = shelf_of(request).table(name, revision)
-    headers = cache_headers(f"{name}-{table.revision}", immutable=revision is not None)
+    headers = cache_headers(tag_of(table), immutable=revision is not None)
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
     document = _ALBEDOS.get(table)
@@ -118,7 +119,7 @@ def lobe(
     options = Options.from_query(query)
     table = shelf_of(request).table(name, revision)
     kind = options.format or "json"
-    headers = cache_headers(f"{name}-{table.revision}", kind, immutable=revision is not None)
+    headers = cache_headers(tag_of(table), kind, immutable=revision is not None)
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
     axes, angles = _directions(view, theta_i, phi_i)
@@ -191,7 +192,7 @@ def slice_exr(
     from brdfdb import exr
 
     table = shelf_of(request).table(name, revision)
-    headers = cache_headers(f"{name}-{table.revision}", "exr", immutable=revision is not None)
+    headers = cache_headers(tag_of(table), "exr", immutable=revision is not None)
     headers["Content-Disposition"] = f'attachment; filename="{name}_{kind}.exr"'
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
@@ -213,9 +214,10 @@ def slice_exr(
 def audit(request: Request, name: str, revision: str | None = None) -> Response:
     """What the last `brdfdb audit` of the store found of a material: energy, reciprocity, error and more."""
     shelf = shelf_of(request)
-    current = shelf.head(name) if revision is None else shelf.table(name, revision).revision
-    verdict = shelf.verdict(name)
-    if verdict is None or (revision is not None and verdict.finding["revision"] != revision):
+    verdict, current = shelf.verdict(name), shelf.head(name)
+    if verdict is None or revision not in (None, verdict.finding["revision"]):
+        if revision not in (None, current):
+            shelf.table(name, revision)  # there is no such revision
         raise RequestError(404, f"{name}: no audit of it is here; `brdfdb audit` makes one")
     headers = cache_headers(f"{name}-{current}-{verdict.when}")
     if held := not_modified(request.headers.get("if-none-match"), headers):
@@ -223,7 +225,7 @@ def audit(request: Request, name: str, revision: str | None = None) -> Response:
     document = {
         "material": name,
         "revision": verdict.finding["revision"],
-        "current": verdict.finding["revision"] == shelf.head(name),
+        "current": verdict.finding["revision"] == current,
         "when": verdict.when,
         "finding": verdict.finding,
     }
