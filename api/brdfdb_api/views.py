@@ -28,7 +28,7 @@ from brdfdb_api.responses import (
     npy_response,
     plain,
 )
-from brdfdb_api.routes import both, query_names, shelf_of
+from brdfdb_api.routes import both, checked_size, query_names, shelf_of
 
 if TYPE_CHECKING:
     from brdfdb.lookup import Table
@@ -41,6 +41,7 @@ _OVER = np.linspace(0.0, 90.0, 31)  # theta_r of a hemisphere [degree]
 _AROUND = np.linspace(0.0, 360.0, 61)  # phi_r - phi_i
 _NEAR = np.array([-12.0, -8.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0])  # of the mirror
 _HALF = np.arange(90) + 0.5  # theta_h and theta_d
+_POINTS = _HALF.size**2  # of the largest view
 
 _LOBE = ("view", "theta_i", "phi_i", "wavelength_nm", "from", "output", "illuminant", "format")
 
@@ -99,7 +100,7 @@ def _albedo(table: Table) -> bytes:
     "/lobe",
     router=views,
     tags=["views"],
-    responses=answers(Lobe, 304, 404, 422, 503, media=NPY_ANSWER),
+    responses=answers(Lobe, 304, 404, 413, 422, 503, media=NPY_ANSWER),
     openapi_extra={"parameters": [WAVELENGTHS, *documented.OPTIONS]},
 )
 def lobe(
@@ -124,6 +125,8 @@ def lobe(
     axes, angles = _directions(view, theta_i, phi_i)
     at = Points.from_query({"theta_i": "0", "theta_r": "0"}, wavelengths).wavelength_nm
     points = Points(angles, np.broadcast_shapes(*(np.shape(angle) for angle in angles)), at)
+    # points are as many as a view has; of the client are the wavelengths
+    checked_size(max(request.app.state.settings.max_points, _POINTS), points, table, kind)
     found = evaluate(points, options, table)
     if kind == "npy":
         return npy_response(found.brdf, headers)

@@ -110,6 +110,16 @@ def test_a_bad_lobe_names_the_parameter(client: Client, query: str, parameter: s
     assert client.problem("GET", f"{FOIL}/lobe?{query}", 422)["parameter"] == parameter
 
 
+@pytest.mark.parametrize(("view", "most"), [("half-difference", 100), ("hemisphere", 150)])
+def test_a_lobe_at_more_wavelengths_than_an_answer_holds_is_refused(client: Client, view: str, most: int) -> None:
+    # 810 000 values: the 8100 points of the largest view, and 100 numbers of JSON for each
+    answers = [
+        client.get(f"{FELT}/lobe?view={view}&" + "&".join(["wavelength_nm=500"] * count)).status_code
+        for count in (most, 2 * most)
+    ]
+    assert answers == [200, 413]
+
+
 # Slices
 
 
