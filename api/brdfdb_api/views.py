@@ -14,10 +14,10 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb.geometry import radians
-from brdfdb_api import documented
-from brdfdb_api.documented import NPY_ANSWER, WAVELENGTHS, answers
+from brdfdb_api.documented import LOBE_NPY_ANSWER, LOBE_OPTIONS, WAVELENGTHS, answers
 from brdfdb_api.lookups import Options, Points, evaluate, parsed
 from brdfdb_api.responses import (
+    NPY,
     Albedo,
     Audit,
     Lobe,
@@ -100,8 +100,8 @@ def _albedo(table: Table) -> bytes:
     "/lobe",
     router=views,
     tags=["views"],
-    responses=answers(Lobe, 304, 404, 413, 422, 503, media=NPY_ANSWER),
-    openapi_extra={"parameters": [WAVELENGTHS, *documented.OPTIONS]},
+    responses=answers(Lobe, 304, 404, 413, 422, 503, media=LOBE_NPY_ANSWER),
+    openapi_extra={"parameters": [WAVELENGTHS, *LOBE_OPTIONS]},
 )
 def lobe(
     request: Request,
@@ -118,7 +118,7 @@ def lobe(
     query, wavelengths = parsed(request.scope["query_string"], _LOBE)
     options = Options.from_query(query)
     table = shelf_of(request).table(name, revision)
-    kind = options.format or "json"
+    kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
     headers = cache_headers(f"{name}-{table.revision}", kind, immutable=revision is not None)
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held

@@ -16,7 +16,7 @@ from brdfdb.albedo import directional_albedo
 from brdfdb.geometry import directions_from_half_difference
 from brdfdb.spectra import srgb_weights
 from brdfdb.store import Store
-from tests.api.a_store import VISIBLE_NM, Client, client_of, degrees, publish, read_npy
+from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, publish, read_npy
 
 FOIL, FELT, TILE, METAL = (
     f"/v1/materials/{name}" for name in ("copper-foil", "grey-felt", "white-tile", "brushed-metal")
@@ -91,6 +91,21 @@ def test_a_lobe_in_colour_at_wavelengths_and_as_npy(client: Client) -> None:
     two = client.get(f"{FOIL}/lobe?wavelength_nm=700&wavelength_nm=400").json()
     np.testing.assert_array_equal(two["brdf"], spectra[:, [-1, 0]])
     np.testing.assert_array_equal(read_npy(client.get(f"{FOIL}/lobe?format=npy").content), spectra)
+
+
+def test_a_lobe_is_npy_for_those_who_accept_it(client: Client) -> None:
+    asked = {"Accept": NPY}
+    binary, named = (client.get(f"{FOIL}/lobe{query}", headers=asked) for query in ("", "?format=json"))
+    assert [answer.headers["content-type"] for answer in (binary, named)] == [NPY, "application/json"]
+    np.testing.assert_array_equal(read_npy(binary.content), named.json()["brdf"])
+
+
+def test_of_a_lobe_nothing_is_documented_that_it_refuses(client: Client) -> None:
+    described = client.get("/openapi.json").json()["paths"]["/v1/materials/{name}/lobe"]["get"]
+    texts = [each["description"] for each in described["parameters"] if "description" in each]
+    texts.append(described["responses"]["200"]["content"][NPY]["schema"]["description"])
+    assert len(texts) >= 9
+    assert not any("error" in text for text in texts)
 
 
 @pytest.mark.parametrize(
