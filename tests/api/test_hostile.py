@@ -6,12 +6,14 @@ import contextlib
 import http.client
 import io
 import json
+import re
 import socket
 import struct
 import subprocess
 import sys
 import time
 import urllib.request
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -27,6 +29,7 @@ from brdfdb.tabulate import tabulate
 
 GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 LOOKUP = "/v1/materials/white/lookup"
+GONE = "499"
 JSON, NPY = "application/json", "application/x-npy"
 MEMORY_MB = 700.0  # of the server: 240 before, 390 after the bodies of 64 MiB that it may take
 
@@ -82,6 +85,15 @@ class Server:
         """The largest that was resident."""
         lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1e3
+
+    @property
+    def counted(self) -> Counter[str]:
+        """How many requests were answered with each status."""
+        text = self.ask("GET", "/metrics")[2].decode()
+        found: Counter[str] = Counter()
+        for status, count in re.findall(r'^brdfdb_requests_total{.*status="(\d+)"} ([\d.]+)$', text, re.MULTILINE):
+            found[status] += int(float(count))
+        return found
 
 
 @contextlib.contextmanager
@@ -282,7 +294,7 @@ def test_other_methods_are_refused(server: Server, method: str) -> None:
         b"GET / HTTP/9.9\r\n\r\n",
         b"\x00\x01\x02\x03\r\n\r\n",
         b"GET " + b"/" * 100_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n",
-        b"GET / HTTP/1.1\r\nHost: x\r\n" + b"A: " + b"b" * 200_000 + b"\r\n\r\n",
+        b"GET /no/such/address HTTP/1.1\r\nHost: x\r\n" + b"A: " + b"b" * 200_000 + b"\r\n\r\n",
         b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\n",
         b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
     ],
@@ -294,11 +306,17 @@ def test_what_is_no_http_is_answered_with_4xx_or_not_at_all(server: Server, data
 
 
 def test_a_client_that_goes_away_leaves_nothing_behind(server: Server) -> None:
+    before = server.counted[GONE]
     for _ in range(20):
         with socket.create_connection(("127.0.0.1", server.port), timeout=10) as connection:
             connection.sendall(
                 b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n" + b"x" * 10
             )
+    deadline = time.monotonic() + 10
+    while (found := server.counted)[GONE] < before + 20 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert found[GONE] == before + 20
+    assert not [status for status in found if status.startswith("5")]
 
 
 def test_a_million_points_are_answered(server: Server) -> None:
