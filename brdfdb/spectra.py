@@ -7,7 +7,7 @@ Both data sets ship with the packages they are read from: optical constants with
 from __future__ import annotations
 
 import warnings
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -136,7 +136,7 @@ def illuminant_spectrum(name: str, wavelength_nm: ArrayLike) -> NDArray[np.float
     return np.asarray(np.interp(np.asarray(wavelength_nm), at, power) / np.interp(560.0, at, power))
 
 
-@cache
+@lru_cache(maxsize=64)  # wavelengths are of clients, too
 def xyz_weights(
     wavelengths: tuple[float, ...], illuminant: str = ILLUMINANT, observer: str = OBSERVER
 ) -> NDArray[np.float64]:
@@ -154,7 +154,7 @@ def xyz_weights(
     return np.asarray(xyz / xyz[:, 1].sum(), dtype=np.float64)
 
 
-@cache
+@lru_cache(maxsize=64)
 def srgb_weights(
     wavelengths: tuple[float, ...], illuminant: str = ILLUMINANT, observer: str = OBSERVER
 ) -> NDArray[np.float64]:

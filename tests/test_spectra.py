@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from brdfdb.spectra import covers_visible, linear_srgb, refractive_index
+from brdfdb.spectra import covers_visible, linear_srgb, refractive_index, srgb_weights, xyz_weights
 
 EVERY_10_NM = np.arange(380.0, 781.0, 10.0)
 
@@ -140,6 +140,13 @@ def test_a_colour_needs_the_whole_visible():
 def test_a_colour_needs_a_value_for_each_wavelength(reflectance):
     with pytest.raises(ValueError, match=r"one value for each of the 41 wavelengths"):
         linear_srgb(EVERY_10_NM, reflectance)
+
+
+@pytest.mark.parametrize("weights", [xyz_weights, srgb_weights])
+def test_weights_are_kept_of_so_many_lists_of_wavelengths_only(weights):
+    for last_nm in range(681, 781):
+        weights((420.0, float(last_nm)))
+    assert 0 < weights.cache_info().currsize < 100
 
 
 def test_the_heavy_packages_load_when_they_are_used_and_without_a_plotting_library():

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.parameters import Floats
-from brdfdb.spectra import ILLUMINANT, check_illuminant, colour_science, covers_visible, srgb_weights, xyz_weights
+from brdfdb.spectra import check_illuminant, colour_science, covers_visible, srgb_weights, xyz_weights
 
 if TYPE_CHECKING:
     from brdfdb.lookup import Table
 
 Colour = Literal["xyz", "linear-srgb"]
 
+_WAVELENGTHS = 1000  # of a colour that is asked for: its weights take the square of their number
 _LIGHT_DEG = 45.0  # of the swatch
 _SAMPLES = 256  # of what it leaves
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
@@ -27,9 +28,14 @@ def weights(colour: Colour, wavelength_nm: NDArray[np.float64] | None, illuminan
     Raises
     ------
     ValueError
-        For an unknown illuminant, with the closest names; for wavelengths [nm] that make no colour.
+        For an unknown illuminant, with the closest names; for more than 1000 wavelengths [nm],
+        or such that make no colour.
     """
     check_illuminant(illuminant)
+    if wavelength_nm is not None and wavelength_nm.size > _WAVELENGTHS:
+        raise ValueError(
+            f"wavelength_nm: {wavelength_nm.size} wavelengths are more than the {_WAVELENGTHS} that a colour is of"
+        )
     if wavelength_nm is not None and not covers_visible(wavelength_nm):
         raise ValueError(
             "wavelength_nm: a colour needs increasing wavelengths from 420 nm or less to 680 nm or more in steps of at "
@@ -66,7 +72,7 @@ def swatch(table: Table) -> str:
     f_r = np.asarray(table.lookup_vectors(wi, drawn.wr)).reshape(_SAMPLES, -1)
     reflected = weight @ f_r + np.ravel(table.specular_reflectance(radians(_LIGHT_DEG)))
     if table.wavelength_nm is not None and covers_visible(table.wavelength_nm):
-        rgb = reflected @ weights("linear-srgb", table.wavelength_nm, ILLUMINANT)
+        rgb = reflected @ srgb_weights(tuple(table.wavelength_nm.tolist()))
     else:
         rgb = np.full(3, reflected.mean())
     encoded = colour_science().cctf_encoding(np.clip(rgb, 0.0, 1.0), function="sRGB")

@@ -39,10 +39,16 @@ BODY = {
 }
 
 NPY_ANSWER = {NPY: "brdf alone, or brdf and error on a first axis, as a .npy file"}
+LOBE_NPY_ANSWER = {NPY: "brdf as a .npy file"}
 
 
 def _parameter(name: str, schema: dict[str, Any], description: str, *, required: bool = False) -> dict[str, Any]:
     return {"name": name, "in": "query", "required": required, "description": description, "schema": schema}
+
+
+def _format(held: str) -> dict[str, Any]:
+    chosen = f"missing: npy if the Accept header names {NPY}, else json; npy holds {held}"
+    return _parameter("format", {"type": "string", "enum": ["json", "npy"]}, chosen)
 
 
 _THETA = {"type": "number", "minimum": 0, "maximum": 180}
@@ -59,7 +65,7 @@ WAVELENGTHS = _parameter(
     {"type": "array", "items": {"type": "number"}},
     "wavelength [nm], repeatable; missing: all of the table",
 )
-OPTIONS = [
+_CHOICES = [
     _parameter(
         "from",
         {"type": "string", "enum": ["table", "model"], "default": "table"},
@@ -71,13 +77,9 @@ OPTIONS = [
         "colours are in 1/sr like f_r: white is Y = 1/pi",
     ),
     _parameter("illuminant", {"type": "string"}, "of a colour: a name of colour-science, such as A or FL2; else D65"),
-    _parameter(
-        "format",
-        {"type": "string", "enum": ["json", "npy"]},
-        f"missing: npy if the Accept header names {NPY}, else json; npy holds brdf alone, with error=true brdf and "
-        "error on a first axis",
-    ),
 ]
+OPTIONS = [*_CHOICES, _format("brdf alone, with error=true brdf and error on a first axis")]
+LOBE_OPTIONS = [*_CHOICES, _format("brdf")]
 ERROR = _parameter(
     "error",
     {"type": "string", "enum": ["false", "true"], "default": "false"},

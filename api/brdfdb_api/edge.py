@@ -8,10 +8,12 @@ import os
 import re
 import sys
 import time
+import traceback
 from collections.abc import Awaitable, Callable
 
 import orjson
 from prometheus_client import REGISTRY, CollectorRegistry, Counter, Histogram, generate_latest
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from brdfdb_api.responses import RequestError
@@ -22,6 +24,7 @@ LOG = logging.getLogger("brdfdb.http")
 LOOKUP = re.compile(r"/v1/materials/([^/]+)(?:/revisions/([^/]+))?/lookup")
 LOOKUP_ROUTE = "/v1/materials/{name}/lookup"
 
+GONE = 499  # nobody is there to be answered: as nginx counts it
 _REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 # made once a process, as the registry is
@@ -78,9 +81,12 @@ class Edge:
                 await answer(scope, receive, labelled)
             else:
                 await self.app(scope, self._counted(receive), labelled)
+        except ClientDisconnect:
+            status = GONE
         except Exception as error:
             if not isinstance(error, RequestError):
-                LOG.exception(_line(scope, request_id, failed=f"{type(error).__name__}: {error}"))
+                failed = f"{type(error).__name__}: {error}"
+                LOG.error(_line(scope, request_id, failed=failed, traceback=traceback.format_exc()))
             if status:  # too late for another answer
                 raise
             await self.failed(error)(scope, receive, labelled)

@@ -39,6 +39,7 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1) -> None:
     import uvicorn
     from uvicorn.supervisors import Multiprocess
 
+    from brdfdb_api.protocol import BoundedProtocol
     from brdfdb_api.settings import Settings
 
     if not 0 <= port <= 65535:
@@ -49,6 +50,7 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1) -> None:
     config = uvicorn.Config(
         "brdfdb_api:create_app",
         factory=True,
+        http=BoundedProtocol,
         host=host,
         port=port,
         workers=workers,

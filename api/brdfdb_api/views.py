@@ -14,10 +14,10 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb.geometry import radians
-from brdfdb_api import documented
-from brdfdb_api.documented import NPY_ANSWER, WAVELENGTHS, answers
+from brdfdb_api.documented import LOBE_NPY_ANSWER, LOBE_OPTIONS, WAVELENGTHS, answers
 from brdfdb_api.lookups import Options, Points, evaluate, parsed
 from brdfdb_api.responses import (
+    NPY,
     Albedo,
     Audit,
     Lobe,
@@ -29,7 +29,7 @@ from brdfdb_api.responses import (
     plain,
     tag_of,
 )
-from brdfdb_api.routes import both, query_names, shelf_of
+from brdfdb_api.routes import both, checked_size, query_names, shelf_of
 
 if TYPE_CHECKING:
     from brdfdb.lookup import Table
@@ -42,6 +42,7 @@ _OVER = np.linspace(0.0, 90.0, 31)  # theta_r of a hemisphere [degree]
 _AROUND = np.linspace(0.0, 360.0, 61)  # phi_r - phi_i
 _NEAR = np.array([-12.0, -8.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0])  # of the mirror
 _HALF = np.arange(90) + 0.5  # theta_h and theta_d
+_POINTS = _HALF.size**2  # of the largest view
 
 _LOBE = ("view", "theta_i", "phi_i", "wavelength_nm", "from", "output", "illuminant", "format")
 
@@ -100,8 +101,8 @@ def _albedo(table: Table) -> bytes:
     "/lobe",
     router=views,
     tags=["views"],
-    responses=answers(Lobe, 304, 404, 422, 503, media=NPY_ANSWER),
-    openapi_extra={"parameters": [WAVELENGTHS, *documented.OPTIONS]},
+    responses=answers(Lobe, 304, 404, 413, 422, 503, media=LOBE_NPY_ANSWER),
+    openapi_extra={"parameters": [WAVELENGTHS, *LOBE_OPTIONS]},
 )
 def lobe(
     request: Request,
@@ -118,13 +119,15 @@ def lobe(
     query, wavelengths = parsed(request.scope["query_string"], _LOBE)
     options = Options.from_query(query)
     table = shelf_of(request).table(name, revision)
-    kind = options.format or "json"
+    kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
     headers = cache_headers(tag_of(table), kind, immutable=revision is not None)
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
     axes, angles = _directions(view, theta_i, phi_i)
     at = Points.from_query({"theta_i": "0", "theta_r": "0"}, wavelengths).wavelength_nm
     points = Points(angles, np.broadcast_shapes(*(np.shape(angle) for angle in angles)), at)
+    # points are as many as a view has; of the client are the wavelengths
+    checked_size(max(request.app.state.settings.max_points, _POINTS), points, table, kind)
     found = evaluate(points, options, table)
     if kind == "npy":
         return npy_response(found.brdf, headers)

@@ -105,6 +105,16 @@ def test_what_cannot_be_asked_for(client: Client, address: str, query: dict[str,
     assert problem["detail"].startswith(f"{parameter}: ")
 
 
+def test_a_colour_of_very_many_wavelengths_is_refused(client: Client) -> None:
+    said = []
+    for count in (1001, 1000):
+        query = {"output": "xyz", "wavelength_nm": np.linspace(400.0, 700.0, count).tolist()}
+        said.append(client.get(FOIL, params={**POINT, **query}))
+    assert [answer.status_code for answer in said] == [422, 200]
+    assert said[0].json()["parameter"] == "wavelength_nm"
+    assert said[0].json()["detail"].startswith("wavelength_nm: 1001 wavelengths are more than the 1000")
+
+
 # error=true
 
 

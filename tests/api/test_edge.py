@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 import re
@@ -96,9 +97,30 @@ def test_a_failure_is_in_the_log_and_not_in_the_answer(
 
     monkeypatch.setattr("brdfdb_api.shelf.Shelf.held", fail)
     assert "secret" not in client.problem("GET", POINT, 500, headers={"X-Request-ID": "mine"})["detail"]
-    failed, answered = (json.loads(record.message) for record in log.records if record.name == "brdfdb.http")
+    written = [logging.Formatter().format(record) for record in log.records if record.name == "brdfdb.http"]
+    failed, answered = map(json.loads, written)  # a line each, the traceback included
     assert (failed["request"], failed["failed"]) == ("mine", "RuntimeError: secret")
+    assert failed["traceback"].startswith("Traceback")
+    assert "in fail\n" in failed["traceback"]
     assert (answered["request"], answered["status"]) == ("mine", 500)
+
+
+def test_a_client_that_goes_away_is_no_failure(client: Client, log: pytest.LogCaptureFixture) -> None:
+    sent = []
+
+    async def gone() -> Any:
+        return {"type": "http.disconnect"}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    line = 'brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="499"}'
+    before = counted(client, line)
+    scope = {"type": "http", "http_version": "1.1", "method": "POST", "path": f"{FELT}/lookup", "query_string": b""}
+    asyncio.run(client.app({**scope, "headers": []}, gone, send))
+    assert sent == []
+    assert json.loads(log.records[-1].message)["status"] == 499
+    assert counted(client, line) - before == 1
 
 
 def counted(client: Client, line: str) -> float:

@@ -6,12 +6,14 @@ import contextlib
 import http.client
 import io
 import json
+import re
 import socket
 import struct
 import subprocess
 import sys
 import time
 import urllib.request
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,11 +26,15 @@ from brdfdb.layout import Layout
 from brdfdb.materials import Material
 from brdfdb.staging import publish_dataset
 from brdfdb.tabulate import tabulate
+from brdfdb_api.protocol import HEAD_BYTES
 
 GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 LOOKUP = "/v1/materials/white/lookup"
+GONE = "499"
 JSON, NPY = "application/json", "application/x-npy"
 MEMORY_MB = 700.0  # of the server: 240 before, 390 after the bodies of 64 MiB that it may take
+HEAD_MB = 2.0  # more after a head of 50 MB: 0.3 measured, 70 to 160 where it is kept
+
 
 
 class Server:
@@ -65,7 +71,7 @@ class Server:
         return sentence
 
     def raw(self, data: bytes) -> bytes:
-        """Send bytes as they are; what comes back until the server closes or is silent."""
+        """Send bytes as they are; what comes back until the server closes, resets or is silent."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=10) as connection:
             connection.settimeout(2)
             found = b""
@@ -79,8 +85,25 @@ class Server:
     @property
     def memory_mb(self) -> float:
         """The largest that was resident."""
+        return self._memory_mb("VmHWM")
+
+    @property
+    def resident_mb(self) -> float:
+        """What is resident now."""
+        return self._memory_mb("VmRSS")
+
+    def _memory_mb(self, which: str) -> float:
         lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
-        return next(float(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1e3
+        return next(float(line.split()[1]) for line in lines if line.startswith(which)) / 1e3
+
+    @property
+    def counted(self) -> Counter[str]:
+        """How many requests were answered with each status."""
+        text = self.ask("GET", "/metrics")[2].decode()
+        found: Counter[str] = Counter()
+        for status, count in re.findall(r'^brdfdb_requests_total{.*status="(\d+)"} ([\d.]+)$', text, re.MULTILINE):
+            found[status] += int(float(count))
+        return found
 
 
 @contextlib.contextmanager
@@ -281,7 +304,7 @@ def test_other_methods_are_refused(server: Server, method: str) -> None:
         b"GET / HTTP/9.9\r\n\r\n",
         b"\x00\x01\x02\x03\r\n\r\n",
         b"GET " + b"/" * 100_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n",
-        b"GET / HTTP/1.1\r\nHost: x\r\n" + b"A: " + b"b" * 200_000 + b"\r\n\r\n",
+        b"GET /no/such/address HTTP/1.1\r\nHost: x\r\n" + b"A: " + b"b" * 200_000 + b"\r\n\r\n",
         b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\n",
         b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
     ],
@@ -292,12 +315,61 @@ def test_what_is_no_http_is_answered_with_4xx_or_not_at_all(server: Server, data
     assert not found or found.split(b" ", 2)[1][:1] == b"4", found[:200]
 
 
+@pytest.mark.parametrize(
+    "start",
+    [
+        b"GET /no/such/address HTTP/1.1\r\nHost: x\r\nA: ",
+        b"GET /",
+        b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n0\r\nA: ",
+    ],
+    ids=["header", "address", "trailer"],
+)
+def test_a_head_of_50_mb_is_refused_while_it_arrives(server: Server, start: bytes) -> None:
+    before = server.resident_mb
+    taken = 0
+    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as connection:
+        connection.sendall(start)
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            while taken < 50 * 10**6:
+                taken += connection.send(b"b" * 2**16)
+    assert taken < 50 * 10**6
+    assert server.resident_mb < before + HEAD_MB
+
+
+@pytest.mark.parametrize("start", [b"GET /no/such/address HTTP/1.1\r\nHost: x\r\nA: ", b"GET /"])
+def test_a_head_longer_than_may_be_is_answered_with_400(server: Server, start: bytes) -> None:
+    # one byte too many: where more is under way, the connection may be reset before the answer is read
+    found = server.raw(start.ljust(HEAD_BYTES + 1, b"b"))
+    assert found.startswith(b"HTTP/1.1 400 ")
+    assert found.endswith(b"Address and headers are longer than 65536 bytes.")
+
+
+def test_heads_are_counted_one_by_one(server: Server) -> None:
+    # more than a head may have in all, of heads and bodies on one connection
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+    body = json.dumps({"theta_i": [10] * 20_000, "theta_r": 20})
+    for _ in range(5):
+        connection.request("GET", f"{LOOKUP}?theta_i=10&theta_r=20", headers={"A": "b" * 20_000})
+        answer = connection.getresponse()
+        assert (answer.status, len(answer.read()) > 0) == (200, True)
+        connection.request("POST", f"{LOOKUP}?format=npy", body, {"Content-Type": JSON})
+        answer = connection.getresponse()
+        assert (answer.status, len(answer.read()) > 0) == (200, True)
+    connection.close()
+
+
 def test_a_client_that_goes_away_leaves_nothing_behind(server: Server) -> None:
+    before = server.counted[GONE]
     for _ in range(20):
         with socket.create_connection(("127.0.0.1", server.port), timeout=10) as connection:
             connection.sendall(
                 b"POST " + LOOKUP.encode() + b" HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n" + b"x" * 10
             )
+    deadline = time.monotonic() + 10
+    while (found := server.counted)[GONE] < before + 20 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert found[GONE] == before + 20
+    assert not [status for status in found if status.startswith("5")]
 
 
 def test_a_million_points_are_answered(server: Server) -> None:

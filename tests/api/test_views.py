@@ -16,7 +16,7 @@ from brdfdb.albedo import directional_albedo
 from brdfdb.geometry import directions_from_half_difference
 from brdfdb.spectra import srgb_weights
 from brdfdb.store import Store
-from tests.api.a_store import VISIBLE_NM, Client, client_of, degrees, publish, read_npy
+from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, publish, read_npy
 
 FOIL, FELT, TILE, METAL = (
     f"/v1/materials/{name}" for name in ("copper-foil", "grey-felt", "white-tile", "brushed-metal")
@@ -93,6 +93,21 @@ def test_a_lobe_in_colour_at_wavelengths_and_as_npy(client: Client) -> None:
     np.testing.assert_array_equal(read_npy(client.get(f"{FOIL}/lobe?format=npy").content), spectra)
 
 
+def test_a_lobe_is_npy_for_those_who_accept_it(client: Client) -> None:
+    asked = {"Accept": NPY}
+    binary, named = (client.get(f"{FOIL}/lobe{query}", headers=asked) for query in ("", "?format=json"))
+    assert [answer.headers["content-type"] for answer in (binary, named)] == [NPY, "application/json"]
+    np.testing.assert_array_equal(read_npy(binary.content), named.json()["brdf"])
+
+
+def test_of_a_lobe_nothing_is_documented_that_it_refuses(client: Client) -> None:
+    described = client.get("/openapi.json").json()["paths"]["/v1/materials/{name}/lobe"]["get"]
+    texts = [each["description"] for each in described["parameters"] if "description" in each]
+    texts.append(described["responses"]["200"]["content"][NPY]["schema"]["description"])
+    assert len(texts) >= 9
+    assert not any("error" in text for text in texts)
+
+
 @pytest.mark.parametrize(
     ("query", "parameter"),
     [
@@ -108,6 +123,16 @@ def test_a_lobe_in_colour_at_wavelengths_and_as_npy(client: Client) -> None:
 )
 def test_a_bad_lobe_names_the_parameter(client: Client, query: str, parameter: str) -> None:
     assert client.problem("GET", f"{FOIL}/lobe?{query}", 422)["parameter"] == parameter
+
+
+@pytest.mark.parametrize(("view", "most"), [("half-difference", 100), ("hemisphere", 150)])
+def test_a_lobe_at_more_wavelengths_than_an_answer_holds_is_refused(client: Client, view: str, most: int) -> None:
+    # 810 000 values: the 8100 points of the largest view, and 100 numbers of JSON for each
+    answers = [
+        client.get(f"{FELT}/lobe?view={view}&" + "&".join(["wavelength_nm=500"] * count)).status_code
+        for count in (most, 2 * most)
+    ]
+    assert answers == [200, 413]
 
 
 # Slices

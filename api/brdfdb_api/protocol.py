@@ -1,0 +1,35 @@
+"""HTTP as uvicorn speaks it, with a limit to what is kept of a request that says nothing: its head, and trailers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+HEAD_BYTES = 64 * 2**10  # httptools reads no longer addresses
+
+
+class BoundedProtocol(HttpToolsProtocol):
+    """One connection: 400, and its end, where a head or a trailer does not end within `HEAD_BYTES`.
+
+    The parser keeps address and headers until they are whole, and names no limit. Bytes are counted as they come, since
+    the last head that was whole or the last piece of a body; what one read of the socket brings, 256 kB, may be beyond.
+    """
+
+    def __init__(self, *args: Any, **keywords: Any) -> None:
+        super().__init__(*args, **keywords)
+        self._pending = 0
+
+    def data_received(self, data: bytes) -> None:
+        self._pending += len(data)
+        super().data_received(data)  # callbacks below set it to 0
+        if self._pending > HEAD_BYTES and not self.transport.is_closing():
+            self.send_400_response(f"Address and headers are longer than {HEAD_BYTES} bytes.")
+
+    def on_headers_complete(self) -> None:
+        self._pending = 0
+        super().on_headers_complete()
+
+    def on_body(self, body: bytes) -> None:
+        self._pending = 0
+        super().on_body(body)
