@@ -14,6 +14,7 @@ from collections.abc import Awaitable, Callable
 import orjson
 from prometheus_client import REGISTRY, CollectorRegistry, Counter, Histogram, generate_latest
 from starlette.requests import ClientDisconnect
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from brdfdb_api.responses import RequestError
@@ -25,6 +26,7 @@ LOOKUP = re.compile(r"/v1/materials/([^/]+)(?:/revisions/([^/]+))?/lookup")
 LOOKUP_ROUTE = "/v1/materials/{name}/lookup"
 
 GONE = 499  # nobody is there to be answered: as nginx counts it
+BODIES = 8  # of the largest size that may be in memory together
 _REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 # made once a process, as the registry is
@@ -55,8 +57,9 @@ class Edge:
         From an exception to the answer.
     """
 
-    def __init__(self, app: ASGIApp, limit: int, lookup: Answerer, failed: Callable[[Exception], ASGIApp]) -> None:
+    def __init__(self, app: ASGIApp, limit: int, lookup: Answerer, failed: Callable[[Exception], Response]) -> None:
         self.app, self.limit, self.lookup, self.failed = app, limit, lookup, failed
+        self.waiting = 0  # bytes of bodies in memory
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -65,32 +68,39 @@ class Edge:
         start = time.perf_counter()
         request_id = _request_id(scope)
         status = 0
+        head = scope["method"] == "HEAD"
+        if head:  # answered as GET, without the body
+            scope = {**scope, "method": "GET"}
 
         async def labelled(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
                 message["headers"] = [*message["headers"], (b"x-request-id", request_id)]
+            elif head:
+                message = {**message, "body": b""}
             await send(message)
 
-        route = ""
+        route, body = "", _Body(self)
         try:
             if scope["method"] == "GET" and (match := LOOKUP.fullmatch(scope["path"])):
                 route = LOOKUP_ROUTE
                 answer = await self.lookup(scope, match[1], match[2])
                 await answer(scope, receive, labelled)
             else:
-                await self.app(scope, self._counted(receive), labelled)
+                await self.app(scope, body.counted(receive), labelled)
         except ClientDisconnect:
             status = GONE
         except Exception as error:
-            if not isinstance(error, RequestError):
+            refusal = self.failed(error)
+            if refusal.status_code == 500:
                 failed = f"{type(error).__name__}: {error}"
                 LOG.error(_line(scope, request_id, failed=failed, traceback=traceback.format_exc()))
             if status:  # too late for another answer
                 raise
-            await self.failed(error)(scope, receive, labelled)
+            await refusal(scope, receive, labelled)
         finally:
+            body.forget()
             seconds = time.perf_counter() - start
             route = route or getattr(scope.get("route"), "path", "other")
             requests, observed = _counters(route, status)
@@ -100,19 +110,29 @@ class Edge:
             if LOG.isEnabledFor(level):
                 LOG.log(level, _line(scope, request_id, status=status, ms=round(1e3 * seconds, 3)))
 
-    def _counted(self, receive: Receive) -> Receive:
-        """A body, counted while it arrives."""
-        count = 0
 
-        async def counted() -> Message:
-            nonlocal count
+class _Body:
+    """The body of a request, counted while it arrives, and with those of all others."""
+
+    def __init__(self, edge: Edge) -> None:
+        self.edge, self.size = edge, 0
+
+    def counted(self, receive: Receive) -> Receive:
+        async def more() -> Message:
             message = await receive()
-            count += len(message.get("body", b""))
-            if count > self.limit:
-                raise RequestError(413, f"the body is larger than the {self.limit} bytes that are allowed")
+            size = len(message.get("body", b""))
+            self.size += size
+            self.edge.waiting += size
+            if self.size > self.edge.limit:
+                raise RequestError(413, f"the body is larger than the {self.edge.limit} bytes that are allowed")
+            if self.edge.waiting > BODIES * self.edge.limit:
+                raise RequestError(503, "the server holds as many large bodies as it can; ask again later")
             return message
 
-        return counted
+        return more
+
+    def forget(self) -> None:
+        self.edge.waiting -= self.size
 
 
 @functools.lru_cache(maxsize=4096)

@@ -9,8 +9,11 @@ import re
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
+from brdfdb_api.app import create_app
+from brdfdb_api.settings import Settings
 from tests.api.a_store import Client, client_of, npy
 
 FELT = "/v1/materials/grey-felt"
@@ -64,6 +67,44 @@ def test_a_request_has_an_id(client: Client, address: str) -> None:
 def test_an_id_that_could_harm_a_log_is_replaced(client: Client, sent: str) -> None:
     answer = client.get(POINT, headers={"X-Request-ID": sent})
     assert re.fullmatch("[0-9a-f]{16}", answer.headers["x-request-id"])
+
+
+@pytest.mark.parametrize("address", [*ADDRESSES, "/", "/v1/materials"])
+def test_head_is_get_without_the_body(client: Client, address: str) -> None:
+    got, asked = client.get(address), client.request("HEAD", address)
+    assert (asked.status_code, asked.content) == (got.status_code, b"")
+    for name in ("content-type", "content-length", "etag", "cache-control"):
+        assert asked.headers.get(name) == got.headers.get(name)
+
+
+def test_bodies_that_wait_are_counted_together(root: Path) -> None:
+    app = create_app(Settings(store=root, max_body_bytes=1000, log_level="error"))
+
+    async def ask(count: int) -> list[int]:
+        free = asyncio.Event()
+
+        async def slow() -> Any:
+            yield b" " * 900
+            await free.wait()
+
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as http:
+            asked = [asyncio.create_task(http.post(f"{FELT}/lookup", content=slow())) for _ in range(count)]
+            await asyncio.wait(asked, timeout=0.5)
+            free.set()
+            return sorted(answer.status_code for answer in await asyncio.gather(*asked))
+
+    assert asyncio.run(ask(8)) == [422] * 8
+    assert asyncio.run(ask(10)) == [422] * 8 + [503] * 2
+    assert asyncio.run(ask(8)) == [422] * 8
+
+
+def test_a_server_is_ready_when_its_kernels_are_loaded(client: Client) -> None:
+    shelf = client.app.state.shelf
+    shelf.warming = True
+    assert "kernels are being loaded" in client.problem("GET", "/readyz", 503)["detail"]
+    assert client.get("/healthz").status_code == 200
+    shelf.warm()
+    assert client.get("/readyz").json() == {"status": "ok", "materials": 4}
 
 
 @pytest.fixture

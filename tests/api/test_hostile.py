@@ -36,7 +36,6 @@ MEMORY_MB = 700.0  # of the server: 240 before, 390 after the bodies of 64 MiB t
 HEAD_MB = 2.0  # more after a head of 50 MB: 0.3 measured, 70 to 160 where it is kept
 
 
-
 class Server:
     """A server in a process of its own."""
 
