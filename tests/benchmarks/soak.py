@@ -191,7 +191,7 @@ def main() -> int:
                 published(store, revision)
                 soak.done = revision
                 if revision % 10 == 0:
-                    collect(store, keep=3)
+                    collect(store, keep=10)  # enough for requests that name one
                 memory.append(resident(pid))
             soak.stop.set()
             for thread in threads:
