@@ -10,8 +10,10 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -247,6 +249,37 @@ def test_table_and_model_stand_side_by_side(chromium: Chromium, address: str) ->
     assert chromium.errors == []
 
 
+def test_differences_from_a_model_are_shares_of_it_or_of_the_floor(
+    chromium: Chromium, address: str, store: Path
+) -> None:
+    asked = f"{address}v1/materials/scene-copper-sphere/lobe?view=cut&theta_i=60&wavelength_nm=400"
+    chromium.open(f"{address}#material=scene-copper-sphere&theta_i=60&nm=400&compare=%3Amodel")
+    shown(chromium, "nm=400", "compare")
+    of_table, of_model = (json.loads(urlopen(asked + part).read()) for part in ("", "&from=model"))
+    kept = np.abs(of_table["axes_deg"]["theta_r"]) <= 89.0
+    table, model = (np.array(each["brdf"])[kept] for each in (of_table, of_model))
+    error = brdfdb.open(store)["scene-copper-sphere"].error
+    assert error is not None
+    floor = min(error.floor)
+    assert model.min() < floor
+    worst = 100.0 * np.max(np.abs(table - model) / np.maximum(model, floor))
+    said = chromium.evaluate("caption.textContent")
+    assert f"table / model − 1: {worst:.3g} % at most. Where the model is below" in said
+
+
+@pytest.mark.parametrize("name", ["scene-copper-sphere", "rolled-brass"])
+def test_numbers_of_the_scale_do_not_overlap_on_a_phone(chromium: Chromium, address: str, name: str) -> None:
+    chromium.open(f"{address}#material={name}", 390)
+    shown(chromium, f"material={name}")
+    boxes = chromium.evaluate(
+        "[...document.querySelectorAll('#cut text')].map(each => each.getBoundingClientRect())"
+        ".map(({ left, right, bottom }) => [bottom, left, right])"
+    )
+    line = sorted(box for box in boxes if box[0] == max(bottom for bottom, _, _ in boxes))
+    assert len(line) >= 3
+    assert all(one[2] < other[1] for one, other in pairwise(line))
+
+
 @pytest.mark.parametrize("compare", ["", "%3Amodel"])
 @pytest.mark.parametrize("view", DRAWN)
 def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: str, compare: str) -> None:
@@ -259,6 +292,18 @@ def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: s
         assert len(chromium.evaluate("caption.textContent")) > 40
         assert chromium.evaluate("message.textContent") == ""
     assert chromium.errors == []
+
+
+@pytest.mark.parametrize("view", ["hemisphere", "half-difference", "spectrum", "albedo"])
+def test_buttons_over_a_plot_save_it_and_restore_it_and_send_nothing(
+    chromium: Chromium, address: str, view: str
+) -> None:
+    chromium.open(f"{address}#material=foam&view={view}")
+    shown(chromium, f"view={view}")
+    assert chromium.evaluate("[...document.querySelectorAll('.modebar-btn')].map(each => each.dataset.title)") == [
+        "Download plot as a PNG",
+        "Reset camera to default" if view == "hemisphere" else "Reset axes",
+    ]
 
 
 @pytest.mark.parametrize("name", ["foam", "rolled-brass"])
