@@ -10,8 +10,10 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ import pytest
 import brdfdb
 from brdfdb.geometry import unit_vector
 from brdfdb_pipelines import cli
+from tests.api.a_store import serving
 from tests.api.chromium import SECONDS, Chromium
 
 RECIPE = """\
@@ -246,6 +249,37 @@ def test_table_and_model_stand_side_by_side(chromium: Chromium, address: str) ->
     assert chromium.errors == []
 
 
+def test_differences_from_a_model_are_shares_of_it_or_of_the_floor(
+    chromium: Chromium, address: str, store: Path
+) -> None:
+    asked = f"{address}v1/materials/scene-copper-sphere/lobe?view=cut&theta_i=60&wavelength_nm=400"
+    chromium.open(f"{address}#material=scene-copper-sphere&theta_i=60&nm=400&compare=%3Amodel")
+    shown(chromium, "nm=400", "compare")
+    of_table, of_model = (json.loads(urlopen(asked + part).read()) for part in ("", "&from=model"))
+    kept = np.abs(of_table["axes_deg"]["theta_r"]) <= 89.0
+    table, model = (np.array(each["brdf"])[kept] for each in (of_table, of_model))
+    error = brdfdb.open(store)["scene-copper-sphere"].error
+    assert error is not None
+    floor = min(error.floor)
+    assert model.min() < floor
+    worst = 100.0 * np.max(np.abs(table - model) / np.maximum(model, floor))
+    said = chromium.evaluate("caption.textContent")
+    assert f"table / model − 1: {worst:.3g} % at most. Where the model is below" in said
+
+
+@pytest.mark.parametrize("name", ["scene-copper-sphere", "rolled-brass"])
+def test_numbers_of_the_scale_do_not_overlap_on_a_phone(chromium: Chromium, address: str, name: str) -> None:
+    chromium.open(f"{address}#material={name}", 390)
+    shown(chromium, f"material={name}")
+    boxes = chromium.evaluate(
+        "[...document.querySelectorAll('#cut text')].map(each => each.getBoundingClientRect())"
+        ".map(({ left, right, bottom }) => [bottom, left, right])"
+    )
+    line = sorted(box for box in boxes if box[0] == max(bottom for bottom, _, _ in boxes))
+    assert len(line) >= 3
+    assert all(one[2] < other[1] for one, other in pairwise(line))
+
+
 @pytest.mark.parametrize("compare", ["", "%3Amodel"])
 @pytest.mark.parametrize("view", DRAWN)
 def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: str, compare: str) -> None:
@@ -258,6 +292,18 @@ def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: s
         assert len(chromium.evaluate("caption.textContent")) > 40
         assert chromium.evaluate("message.textContent") == ""
     assert chromium.errors == []
+
+
+@pytest.mark.parametrize("view", ["hemisphere", "half-difference", "spectrum", "albedo"])
+def test_buttons_over_a_plot_save_it_and_restore_it_and_send_nothing(
+    chromium: Chromium, address: str, view: str
+) -> None:
+    chromium.open(f"{address}#material=foam&view={view}")
+    shown(chromium, f"view={view}")
+    assert chromium.evaluate("[...document.querySelectorAll('.modebar-btn')].map(each => each.dataset.title)") == [
+        "Download plot as a PNG",
+        "Reset camera to default" if view == "hemisphere" else "Reset axes",
+    ]
 
 
 @pytest.mark.parametrize("name", ["foam", "rolled-brass"])
@@ -316,6 +362,79 @@ def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> Non
     chromium.evaluate("document.querySelector('#list li').click()")
     shown(chromium, "material=foam")
     assert chromium.evaluate("message.textContent") == ""
+
+
+@pytest.fixture
+def plain(root: Path) -> Iterator[str]:
+    """Where the store of the other tests is served: of its tables only two state an error."""
+    with serving(root) as found:
+        yield found
+
+
+@pytest.mark.parametrize("compare", ["", "%3Amodel", "grey-felt"])
+def test_the_spectrum_of_a_table_that_states_no_error_is_drawn_without_one(
+    chromium: Chromium, plain: str, compare: str
+) -> None:
+    chromium.open(f"{plain}/#material=white-tile&view=spectrum&compare={compare}")
+    assert (
+        chromium.until(
+            "document.querySelector('#picture')?.dataset.shown && 'shown' || globalThis.message?.textContent"
+        )
+        == "shown"
+    )
+    assert (
+        chromium.evaluate("plot.data.filter(each => each.mode === 'lines' && each.line.width > 0)[0].y")
+        == [
+            pytest.approx(1.0 / np.pi, rel=2**-24)  # stored as float32
+        ]
+        * 2
+    )
+    assert ("with the band" in chromium.evaluate("caption.textContent")) == (compare == "grey-felt")
+    assert chromium.errors == []
+
+
+def test_the_error_between_two_wavelengths_is_the_larger_of_theirs(
+    chromium: Chromium, address: str, store: Path
+) -> None:
+    table = brdfdb.open(store)["scene-copper-sphere"]
+    assert table.error is not None
+    p99 = np.array(table.error.p99)
+    # where the lower wavelength alone would say least
+    band, column = np.unravel_index(np.argmax(p99[:, 1:] / p99[:, :-1]), p99[:, 1:].shape)
+    lower, upper = p99[band, column : column + 2]
+    low, high = table.wavelength_nm[column : column + 2]
+    assert f"{100.0 * lower:.3g}" != f"{100.0 * upper:.3g}"
+    for nm, expected in ((low, lower), (low + 1.0, upper), (high, upper)):
+        chromium.open(f"{address}#material=scene-copper-sphere&theta_i={table.error.theta_i_deg[band]:g}&nm={nm:g}")
+        shown(chromium, f"nm={nm:g}")
+        assert chromium.evaluate("band.textContent") == f"within {100.0 * expected:.3g} %"
+
+
+PAGES = {
+    "v1/materials?limit=1000": [{"name": "a", "colour": "#010101"}],
+    "v1/materials?limit=1000&cursor=a": [{"name": "b", "colour": None}],
+}
+# a service of two pages, and without the colour on the second one when that is first asked for
+TWO_PAGES = """\
+const pages = %s, ask = fetch, asked = globalThis.asked = [];
+globalThis.fetch = (path, options) => {
+  if (!(path in pages)) return ask(path, options);
+  asked.push(path);
+  const materials = pages[path].map(each => ({ title: "", model_title: "", source: "", ...each,
+    colour: asked.filter(each => each === path).length > 1 ? "#020202" : each.colour }));
+  return Promise.resolve(Response.json({ materials, next: path.includes("cursor") ? null : `/${path}&cursor=a` }));
+};
+"""
+
+
+def test_the_list_asks_again_only_for_pages_without_all_of_their_colours(chromium: Chromium, plain: str) -> None:
+    script = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=TWO_PAGES % json.dumps(PAGES))
+    chromium.open(f"{plain}/#material=white-tile")
+    second = "document.querySelector('#m-b .swatch').style.background"
+    assert chromium.until(f"document.querySelector('#m-b') && {second}") == "rgb(2, 2, 2)"
+    assert chromium.evaluate("document.querySelector('#m-a .swatch').style.background") == "rgb(1, 1, 1)"
+    assert chromium.evaluate("asked") == [*PAGES, "v1/materials?limit=1000&cursor=a"]
+    chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
 
 
 @pytest.mark.parametrize("width", [1280, 390])

@@ -1,13 +1,13 @@
 // The polar cut in the plane of incidence, as SVG: the first picture need not wait for a library of megabytes.
 
 import { element, percent, short } from "./dom.js";
-import { mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
+import { floorOf, floorWords, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
 import { number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RADIAN = Math.PI / 180;
-const TOP = 26, STRIP = 110; // pixels: room for labels above, height of what tells the difference
+const TOP = 26, STRIP = 110, LABEL = 40; // pixels: room above, height of what tells the difference, width of a number
 
 /** Draw the cut into an element; its caption. */
 export function cut(into, series, answers, state) {
@@ -31,10 +31,10 @@ export function cut(into, series, answers, state) {
   let words = `${quantityWords(series[0], state)} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.`;
   let bottom = TOP + radius + 24;
   if (against) {
-    const off = relative(...curves);
+    const floor = floorOf(series[0]), off = relative(...curves, floor);
     const worst = Math.max(...off.map((value) => Math.abs(value ?? 0)));
     parts.push(...strip(thetas[0], off, worst || 1, bottom + 24, at, radius));
-    words += ` Below, to 89°, table / model − 1: ${percent(worst)} at most.`;
+    words += ` Below, to 89°, table / model − 1: ${percent(worst)} at most.${floorWords(curves[1], floor)}`;
     bottom += STRIP + 50;
   }
   const picture = svg("svg", { width, height: bottom }, ...parts);
@@ -53,11 +53,12 @@ export function cut(into, series, answers, state) {
 
 /** Rings of the scale and spokes of the angle. */
 function* frame(at, radius, range, state) {
-  for (const [value, label] of ticks(range, state)) {
+  const rings = ticks(range, state), every = Math.ceil((LABEL * (rings.length - 1)) / radius);
+  for (const [i, [value, label]] of rings.entries()) {
     const r = ((value - range[0]) / (range[1] - range[0])) * radius;
     const [x, y] = at(90, r);
     yield svg("path", { d: `M${at(-90, r)}A${r} ${r} 0 0 1 ${x} ${y}`, class: "grid" });
-    yield svg("text", { x, y: y + 17, class: "middle" }, label);
+    if ((rings.length - 1 - i) % every === 0) yield svg("text", { x, y: y + 17, class: "middle" }, label);
   }
   for (const theta of [-90, -60, -30, 0, 30, 60, 90]) {
     yield path([at(theta, 0), at(theta, radius)], "grid");

@@ -37,15 +37,16 @@ export function show(info) {
 /** Know nothing. */
 export const forget = () => aside.replaceChildren();
 
-/** Say the error at the light that is looked at. */
+/** Say the error at the light that is looked at: between two wavelengths the larger of theirs. */
 export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
   const into = document.getElementById("band");
   if (!into || !error) return;
   const at = Math.max(0, error.theta_i_deg.findLastIndex((edge) => edge <= theta_i));
   const row = error.p99[Math.min(at, error.p99.length - 1)];
   const wanted = wavelengths && nm !== null ? nearest({ wavelength_nm: wavelengths }, nm) : null;
-  const column = wanted === null ? -1 : wavelengths.findLastIndex((each) => each <= wanted);
-  into.textContent = `within ${percent(column < 0 ? Math.max(...row) : row[column])}`;
+  const around = wanted === null ? row : row.slice(
+    wavelengths.findLastIndex((each) => each <= wanted), wavelengths.findIndex((each) => each >= wanted) + 1);
+  into.textContent = `within ${percent(Math.max(...around))}`;
 }
 
 function audited(audit) {

@@ -1,7 +1,7 @@
 // Figures, as Plotly takes them, and their captions, of the answers to the requests of a view.
 
 import { short } from "./dom.js";
-import { mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
+import { floorOf, floorWords, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
 import { nearest, number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
@@ -17,10 +17,11 @@ export function figure(view, series, answers, state, stacked) {
   const ink = (name) => css.getPropertyValue(`--${name}`).trim();
   const drawn = { hemisphere, "half-difference": halfDifference, spectrum, albedo }[view](
     series, answers, state, ink, stacked);
-  const axis = { gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false };
+  const axis = { gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false, automargin: true };
   const layout = {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink("ink"), size: 13 },
-    margin: { l: 55, r: 20, t: 30, b: 45 }, showlegend: series.length > 1 || drawn.data.length > 1,
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: ink("muted"), activecolor: ink("ink") },
+    margin: { l: 55, r: 20, t: 55, b: 45 }, showlegend: series.length > 1 || drawn.data.length > 1,
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, uirevision: `${view} ${state.material}`,
     ...drawn.layout,
   };
@@ -92,7 +93,7 @@ function hemisphere(series, answers, state, ink, stacked) {
 }
 
 function halfDifference(series, answers, state, ink, stacked) {
-  const against = state.compare === MODEL;
+  const against = state.compare === MODEL, floor = floorOf(series[0]);
   const values = answers.map((answer) => answer.brdf.map((row) => row.map(number(answer))));
   const shown = against ? values.slice(0, 1) : values;
   const range = span(shown.flat(2), state), height = scaled(state, range[0]);
@@ -104,13 +105,13 @@ function halfDifference(series, answers, state, ink, stacked) {
     const { x, y, title: above } = part(i, series.length, stacked, 0.16);
     const suffix = i ? "2" : "";
     layout[`xaxis${suffix}`] = { domain: x, title: title("θ<sub>d</sub> [degrees]"), dtick: 30, range: [0, 90], anchor: `y${suffix}` };
-    layout[`yaxis${suffix}`] = { title: title("θ<sub>h</sub> [degrees]"), domain: y, dtick: 30, range: [90, 0], anchor: `x${suffix}` };
+    layout[`yaxis${suffix}`] = { ...((stacked || !i) && { title: title("θ<sub>h</sub> [degrees]") }), domain: y, dtick: 30, range: [90, 0], anchor: `x${suffix}` };
     if (series.length > 1) layout.annotations.push(above(difference ? "table / model − 1" : label));
     const { theta_d, theta_h } = answers[i].axes_deg;
     const map = { type: "heatmap", x: theta_d, y: theta_h, xaxis: `x${suffix}`, yaxis: `y${suffix}` };
     const where = "θ<sub>h</sub> %{y}°, θ<sub>d</sub> %{x}°";
     if (difference) {
-      const off = values[0].map((row, j) => relative(row, values[1][j]));
+      const off = values[0].map((row, j) => relative(row, values[1][j], floor));
       const sizes = off.flat().filter((each) => each !== null).map(Math.abs).sort((a, b) => a - b);
       const most = sizes[Math.floor(0.99 * sizes.length)] || 1e-9;
       return { ...map, z: off, colorscale: DIFFERENCE, zmin: -most, zmax: most, hovertemplate: `${where}: %{z:.2%}<extra></extra>`,
@@ -122,7 +123,7 @@ function halfDifference(series, answers, state, ink, stacked) {
       colorbar: { ...bar, x: x[1], y: (y[0] + y[1]) / 2, ...bars(range, state) } };
   });
   const caption = `${quantityWords(series[0], state)} in 1/sr over the half angle, down, and the difference angle; φ of the half vector is ${answers[0].phi_i}°, that of the difference 90°.` +
-    (against ? ` ${stacked ? "Below" : "Right"}, how far the table is off; the ends of the scale are the 99th percentile.` : "");
+    (against ? ` ${stacked ? "Below" : "Right"}, how far the table is off; the ends of the scale are the 99th percentile.${floorWords(values[1].flat(), floor)}` : "");
   return { data, layout, caption };
 }
 

@@ -7,6 +7,7 @@ const [search, model, verdict, count, list] = ["search", "model", "verdict", "co
   document.getElementById(id));
 
 const materials = [];
+const pages = []; // the same as they came, and from where
 let active = null; // the option that arrow keys have reached
 let chosen = "";
 let choose = () => {};
@@ -14,8 +15,9 @@ let choose = () => {};
 /** Fill the list; `onChoose` gets the name of what is chosen, `onPage` the materials so far, after each page. */
 export async function load(onChoose, onPage) {
   choose = onChoose;
-  for (let path = "v1/materials"; path;) {
+  for (let path = "v1/materials?limit=1000"; path;) {
     const page = await json(path);
+    pages.push({ path, materials: page.materials });
     materials.push(...page.materials);
     list.append(...page.materials.map(option));
     offer(model, page.materials.map((each) => [each.model, each.model_title]));
@@ -29,20 +31,17 @@ export async function load(onChoose, onPage) {
 
 const [REPAINTS, PAUSE_MS] = [8, 1000];
 
-/** Ask again for colours that the service has not found yet. */
+/** Ask again for the pages with colours that the service has not found yet. */
 async function paint(tries) {
-  const pale = materials.filter((each) => !each.damaged && !each.colour);
+  const pale = pages.filter((page) => page.materials.some((each) => !each.damaged && !each.colour));
   if (!tries || !pale.length) return;
   await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
-  for (let path = "v1/materials"; path;) {
-    const page = await json(path);
-    for (const each of page.materials) {
-      const known = materials.find((one) => one.name === each.name);
-      if (!known || !each.colour) continue;
-      known.colour = each.colour;
-      document.querySelector(`#m-${each.name} .swatch`).style.background = each.colour;
+  for (const page of pale) {
+    page.materials = (await json(page.path)).materials;
+    for (const { name, colour } of page.materials) {
+      const swatch = document.querySelector(`#m-${name} .swatch`);
+      if (swatch && colour) swatch.style.background = colour;
     }
-    path = page.next?.replace(/^\//, "");
   }
   await paint(tries - 1);
 }

@@ -14,7 +14,12 @@ import { fromHash, toHash } from "./state.js";
 
 const [title, message, caption, picture] = ["title", "message", "caption", "picture"].map((id) => document.getElementById(id));
 const places = ["cut", "plot", "spheres"].map((id) => document.getElementById(id)); // of pictures, one shown at a time
-const DRAWN = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+const DRAWN = { // of the buttons, those that save and restore: more would lie over titles and legends
+  displaylogo: false, responsive: true, showSendToCloud: false, modeBarButtonsToRemove: [
+    "lasso2d", "select2d", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "autoScale2d",
+    "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraLastSave3d",
+  ],
+};
 const NARROW = 560; // pixels in which two pictures do not stand side by side
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 

@@ -31,8 +31,18 @@ export function ticks([low, high], { scale }) {
 /** Which of some theta_r are short of the horizon, where models have poles that no scale can show. */
 export const shortOfHorizon = (theta_r) => theta_r.flatMap((theta, i) => (Math.abs(theta) <= 89 ? [i] : []));
 
-/** What a table is off, table / model - 1; null where the model is 0. */
-export const relative = (table, model) => table.map((value, i) => (model[i] > 0 ? value / model[i] - 1 : null));
+/** Below which value [1/sr] differences are shares of it, as in stated errors: the least over the wavelengths. */
+export const floorOf = ({ info: { error } }) => (error ? Math.min(...error.floor) : 0);
+
+/** What a table is off, table / model - 1, or below the floor a share of that; null where both are 0. */
+export const relative = (table, model, floor) => table.map((value, i) => {
+  const of = Math.max(model[i], floor);
+  return of > 0 ? (value - model[i]) / of : null;
+});
+
+/** A sentence on the floor where it counts. */
+export const floorWords = (model, floor) => (model.some((value) => value < floor) ?
+  ` Where the model is below ${short(floor)} /sr, it is a share of that.` : "");
 
 /** A sentence on Dirac parts. */
 export function mirrorWords(series, answers) {

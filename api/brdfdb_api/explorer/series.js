@@ -51,7 +51,7 @@ export function request(each, state, series) {
   if (view === "albedo") return address(each.name, againstAudit(each, state) ? "audit" : "albedo");
   if (view === "spectrum" || view === "sphere") {
     const of = view === "sphere" ? quantity(each, state, "linear-srgb") :
-      each.source === "model" ? { from: "model" } : { error: true };
+      each.source === "model" ? { from: "model" } : each.info.error ? { error: true } : {};
     const phi_r = ((phi_i ?? 0) + state.turn) % 360;
     return address(each.name, "lookup", { theta_i, phi_i, theta_r: state.theta_r, phi_r, ...of });
   }
