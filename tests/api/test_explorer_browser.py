@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 
@@ -238,12 +239,27 @@ def test_table_and_model_stand_side_by_side(chromium: Chromium, address: str) ->
     chromium.evaluate("controls.elements.compare.value = ':model'" + change)
     shown(chromium, "compare=%3Amodel")
     assert len(curve(chromium, "first")) == len(curve(chromium, "second")) == len(curve(chromium, "off"))
-    assert re.search(r"table / model − 1: \d.* % at most", chromium.evaluate("caption.textContent"))
+    said = r"table − model, relative to the model, or to the floor .* is larger: \d.* % at most"
+    assert re.search(said, chromium.evaluate("caption.textContent"))
     chromium.evaluate("controls.elements.compare.value = 'foam'" + change)
     shown(chromium, "compare=foam")
     assert "Foam" in chromium.evaluate("document.querySelector('.legend').textContent")
     assert chromium.evaluate("document.querySelector('#cut path.off')") is None
     assert chromium.errors == []
+
+
+def test_a_table_is_off_by_what_its_stated_error_means(chromium: Chromium, address: str, store: Path) -> None:
+    chromium.open(f"{address}#material=scene-copper-sphere&view=half-difference&compare=%3Amodel&nm=500")
+    shown(chromium, "nm=500")
+    table = brdfdb.open(store)["scene-copper-sphere"]
+    lobe = f"{address}v1/materials/scene-copper-sphere/lobe?view=half-difference&wavelength_nm=500"
+    answers = [httpx.get(lobe + of, timeout=SECONDS).json()["brdf"] for of in ("&from=table", "&from=model")]
+    tabulated, model = np.array(answers)
+    floor = table.error.floor[list(table.wavelength_nm).index(500.0)]
+    assert model.min() < floor < model.max()
+    drawn = np.array(chromium.evaluate("plot.data[1].z"))
+    np.testing.assert_allclose(drawn, (tabulated - model) / np.maximum(model, floor), rtol=1e-12, atol=0.0)
+    assert chromium.evaluate("plot.data[1].zmax") == pytest.approx(np.quantile(np.abs(drawn), 0.99), rel=1e-2)
 
 
 @pytest.mark.parametrize("compare", ["", "%3Amodel"])

@@ -1,7 +1,7 @@
 // Figures, as Plotly takes them, and their captions, of the answers to the requests of a view.
 
 import { short } from "./dom.js";
-import { mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
+import { RELATIVE, floorOf, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
 import { nearest, number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
@@ -105,12 +105,13 @@ function halfDifference(series, answers, state, ink, stacked) {
     const suffix = i ? "2" : "";
     layout[`xaxis${suffix}`] = { domain: x, title: title("θ<sub>d</sub> [degrees]"), dtick: 30, range: [0, 90], anchor: `y${suffix}` };
     layout[`yaxis${suffix}`] = { title: title("θ<sub>h</sub> [degrees]"), domain: y, dtick: 30, range: [90, 0], anchor: `x${suffix}` };
-    if (series.length > 1) layout.annotations.push(above(difference ? "table / model − 1" : label));
+    if (series.length > 1) layout.annotations.push(above(difference ? "table − model, relative" : label));
     const { theta_d, theta_h } = answers[i].axes_deg;
     const map = { type: "heatmap", x: theta_d, y: theta_h, xaxis: `x${suffix}`, yaxis: `y${suffix}` };
     const where = "θ<sub>h</sub> %{y}°, θ<sub>d</sub> %{x}°";
     if (difference) {
-      const off = values[0].map((row, j) => relative(row, values[1][j]));
+      const floor = floorOf(series[0].info, state.nm);
+      const off = values[0].map((row, j) => relative(row, values[1][j], floor));
       const sizes = off.flat().filter((each) => each !== null).map(Math.abs).sort((a, b) => a - b);
       const most = sizes[Math.floor(0.99 * sizes.length)] || 1e-9;
       return { ...map, z: off, colorscale: DIFFERENCE, zmin: -most, zmax: most, hovertemplate: `${where}: %{z:.2%}<extra></extra>`,
@@ -122,7 +123,7 @@ function halfDifference(series, answers, state, ink, stacked) {
       colorbar: { ...bar, x: x[1], y: (y[0] + y[1]) / 2, ...bars(range, state) } };
   });
   const caption = `${quantityWords(series[0], state)} in 1/sr over the half angle, down, and the difference angle; φ of the half vector is ${answers[0].phi_i}°, that of the difference 90°.` +
-    (against ? ` ${stacked ? "Below" : "Right"}, how far the table is off; the ends of the scale are the 99th percentile.` : "");
+    (against ? ` ${stacked ? "Below" : "Right"}, how far the table is off, ${RELATIVE}; the scale ends at the 99th percentile, and what is beyond has the colour of its end.` : "");
   return { data, layout, caption };
 }
 

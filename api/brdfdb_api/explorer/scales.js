@@ -1,7 +1,7 @@
 // Scales of f_r, linear or logarithmic, and the words that captions share.
 
 import { short } from "./dom.js";
-import { number } from "./series.js";
+import { makesColour, nearest, number } from "./series.js";
 
 const DECADES = 5; // of a logarithmic scale, below its largest value
 
@@ -31,8 +31,22 @@ export function ticks([low, high], { scale }) {
 /** Which of some theta_r are short of the horizon, where models have poles that no scale can show. */
 export const shortOfHorizon = (theta_r) => theta_r.flatMap((theta, i) => (Math.abs(theta) <= 89 ? [i] : []));
 
-/** What a table is off, table / model - 1; null where the model is 0. */
-export const relative = (table, model) => table.map((value, i) => (model[i] > 0 ? value / model[i] - 1 : null));
+/** The floor of the stated error [1/sr]: at a wavelength, of a luminance the largest; 0 where no error was measured. */
+export function floorOf(info, nm) {
+  const at = info.wavelength_nm, floor = info.error?.floor ?? [0];
+  if (floor.length === 1 || (nm === null && makesColour(info))) return Math.max(...floor);
+  const asked = nearest(info, nm);
+  return floor[at.reduce((best, each, i) => (Math.abs(each - asked) < Math.abs(at[best] - asked) ? i : best), 0)];
+}
+
+/** What a table is off as it states its error, (table - model) / max(model, floor); null where that is 0. */
+export const relative = (table, model, floor) => table.map((value, i) => {
+  const by = Math.max(model[i], floor);
+  return by > 0 ? (value - model[i]) / by : null;
+});
+
+/** What that is relative to, in words. */
+export const RELATIVE = "relative to the model, or to the floor of the error where that is larger";
 
 /** A sentence on Dirac parts. */
 export function mirrorWords(series, answers) {
