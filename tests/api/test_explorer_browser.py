@@ -262,6 +262,21 @@ def test_a_table_is_off_by_what_its_stated_error_means(chromium: Chromium, addre
     assert chromium.evaluate("plot.data[1].zmax") == pytest.approx(np.quantile(np.abs(drawn), 0.99), rel=1e-2)
 
 
+def test_a_picture_that_is_on_its_way_is_said_to_be(chromium: Chromium, address: str) -> None:
+    chromium.open(f"{address}#material=foam")
+    shown(chromium, "material=foam")
+    before = chromium.evaluate("caption.textContent")
+    assert chromium.evaluate("picture.ariaBusy") == "false"
+    chromium.evaluate(
+        "(was => { fetch = async (...asked) => { await new Promise(go => release = go); return was(...asked); }; })(fetch)"
+    )
+    chromium.evaluate("location.hash = 'material=foam&theta_i=20'")
+    chromium.until("caption.textContent === 'Loading …' && picture.ariaBusy === 'true'")
+    chromium.until("release(), picture.ariaBusy === 'false'")
+    assert chromium.evaluate("caption.textContent") == before
+    assert chromium.errors == []
+
+
 @pytest.mark.parametrize("compare", ["", "%3Amodel"])
 @pytest.mark.parametrize("view", DRAWN)
 def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: str, compare: str) -> None:

@@ -16,6 +16,7 @@ const [title, message, caption, picture] = ["title", "message", "caption", "pict
 const places = ["cut", "plot", "spheres"].map((id) => document.getElementById(id)); // of pictures, one shown at a time
 const DRAWN = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
 const NARROW = 560; // pixels in which two pictures do not stand side by side
+const SLOW_MS = 200; // after which people are told that a picture is on its way
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 
 let state = fromHash(location.hash);
@@ -48,9 +49,11 @@ function redraw(at = performance.now()) {
 
 async function work() {
   working = true;
+  picture.ariaBusy = "true";
   while (wanted) {
     wanted = false;
     const now = state, start = asked, { signal } = stop;
+    const slow = setTimeout(() => { caption.textContent = "Loading …"; }, SLOW_MS);
     try {
       await draw(now, signal);
       say("");
@@ -62,9 +65,12 @@ async function work() {
       forget(now);
       say(error instanceof Problem ? error.message : `This cannot be drawn: ${error.message}`);
       if (!(error instanceof Problem)) console.error(error);
+    } finally {
+      clearTimeout(slow);
     }
   }
   working = false;
+  picture.ariaBusy = "false";
 }
 
 async function draw(now, signal) {
