@@ -268,7 +268,7 @@ def test_a_picture_that_is_on_its_way_is_said_to_be(chromium: Chromium, address:
     before = chromium.evaluate("caption.textContent")
     assert chromium.evaluate("picture.ariaBusy") == "false"
     chromium.evaluate(
-        "(was => { fetch = async (...asked) => { await new Promise(go => release = go); return was(...asked); }; })(fetch)"
+        "(was => { fetch = async (...all) => { await new Promise(go => release = go); return was(...all); }; })(fetch)"
     )
     chromium.evaluate("location.hash = 'material=foam&theta_i=20'")
     chromium.until("caption.textContent === 'Loading …' && picture.ariaBusy === 'true'")
@@ -347,6 +347,35 @@ def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> Non
     chromium.evaluate("document.querySelector('#list li').click()")
     shown(chromium, "material=foam")
     assert chromium.evaluate("message.textContent") == ""
+
+
+def test_a_wrong_comparison_leaves_the_material(chromium: Chromium, address: str) -> None:
+    chromium.open(f"{address}#material=foam&compare=brsas")
+    shown(chromium, "material=foam")
+    assert "brsas" in chromium.evaluate("message.textContent")
+    assert len(curve(chromium, "first")) > 100
+    assert chromium.until("controls.elements.compare.options.length > 3 && controls.elements.compare.value === ''")
+    chromium.evaluate("controls.elements.theta_i.value = 20")
+    chromium.evaluate("controls.elements.theta_i.dispatchEvent(new Event('input', { bubbles: true }))")
+    shown(chromium, "theta_i=20")
+    assert "brsas" in chromium.evaluate("message.textContent")
+    assert chromium.until("location.hash.includes('theta_i=20') && location.hash") == "#material=foam&theta_i=20"
+
+
+def test_what_was_away_is_shown_when_it_is_back(chromium: Chromium, address: str, store: Path) -> None:
+    chromium.open(f"{address}#material=foam")
+    shown(chromium, "material=foam")
+    head = store / "materials" / "foam" / "HEAD.json"
+    kept = head.rename(head.with_suffix(".away"))
+    try:
+        chromium.evaluate("location.hash = 'material=foam&theta_i=20'")
+        assert "foam" in chromium.until("message.textContent")
+        assert chromium.evaluate("document.querySelector('#cut').hidden")
+    finally:
+        kept.rename(head)
+    shown(chromium, "theta_i=20")
+    assert chromium.evaluate("message.textContent") == ""
+    assert len(curve(chromium, "first")) > 100
 
 
 @pytest.mark.parametrize("width", [1280, 390])

@@ -17,6 +17,7 @@ const places = ["cut", "plot", "spheres"].map((id) => document.getElementById(id
 const DRAWN = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
 const NARROW = 560; // pixels in which two pictures do not stand side by side
 const SLOW_MS = 200; // after which people are told that a picture is on its way
+const AGAIN_MS = 3000; // after which is tried again what may have come back
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 
 let state = fromHash(location.hash);
@@ -24,13 +25,17 @@ let series = []; // what is shown; emptied when it has to be found anew
 let stop = new AbortController();
 let asked = 0; // when the picture was asked for; the first one when the page was
 let wanted = false, working = false;
-let linked = 0;
+let linked = 0, again = 0;
+let missing = ""; // why what is compared with is not shown
 
 /** Change the state: a slider's next picture waits for the one that is being drawn, anything else stops it. */
 function change(part) {
   const turned = Object.keys(part).every((key) => ["theta_i", "phi_i", "theta_r", "turn", "nm"].includes(key));
   state = { ...state, ...part };
-  if ("material" in part || "compare" in part) series = [];
+  if ("material" in part || "compare" in part) {
+    series = [];
+    missing = "";
+  }
   if (!turned) {
     stop.abort();
     stop = new AbortController();
@@ -44,6 +49,7 @@ function change(part) {
 function redraw(at = performance.now()) {
   asked = at;
   wanted = true;
+  clearTimeout(again);
   if (!working) work();
 }
 
@@ -56,7 +62,7 @@ async function work() {
     const slow = setTimeout(() => { caption.textContent = "Loading …"; }, SLOW_MS);
     try {
       await draw(now, signal);
-      say("");
+      say(missing);
       performance.clearMeasures("picture");
       performance.measure("picture", { start, end: performance.now() });
       picture.dataset.shown = toHash(now);
@@ -65,6 +71,7 @@ async function work() {
       forget(now);
       say(error instanceof Problem ? error.message : `This cannot be drawn: ${error.message}`);
       if (!(error instanceof Problem)) console.error(error);
+      if (error.passes) again = setTimeout(redraw, AGAIN_MS);
     } finally {
       clearTimeout(slow);
     }
@@ -100,13 +107,25 @@ function forget(now) {
 /** Learn what is shown. */
 async function know(now, signal) {
   list.mark(now.material);
-  const found = await seriesOf(now, signal);
+  const found = await seriesOf(now, signal).catch((error) => {
+    if (!(error instanceof Problem && now.compare)) throw error;
+    return alone(now, signal, error.message);
+  });
   signal.throwIfAborted();
   series = found;
   title.textContent = series[0].info.title;
   document.title = `${series[0].info.title} – brdfdb explorer`;
   facts.show(series[0].info);
-  controls.show(now, series);
+  controls.show(state, series);
+}
+
+/** The material without what it should be compared with, and why. */
+async function alone(now, signal, sentence) {
+  const found = await seriesOf({ ...now, compare: "" }, signal);
+  signal.throwIfAborted();
+  state = { ...state, compare: "" };
+  missing = sentence;
+  return found;
 }
 
 async function drawCut(now, signal) {
