@@ -291,6 +291,24 @@ def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: s
     assert chromium.errors == []
 
 
+@pytest.mark.parametrize("name", ["foam", "scene-copper-sphere"])
+def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, address: str, name: str) -> None:
+    chromium.open(f"{address}#material={name}&view=spectrum&compare=%3Amodel")
+    shown(chromium, "view=spectrum")
+    low, high = 10.0 ** np.array(chromium.evaluate("plot.layout.yaxis.range"))
+    values = np.concatenate(chromium.evaluate("plot.data.map(each => each.y)"))
+    values = values[values > 0.0]  # edges of the band at 0 are on no logarithmic axis
+    assert low < values.min() <= values.max() < high
+    assert high / low > 1.5
+
+
+def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: str) -> None:
+    for name, mirror in (("foam", False), ("scene-copper-sphere", True)):
+        chromium.open(f"{address}#material={name}&view=sphere")
+        shown(chromium, "view=sphere")
+        assert ("Dirac" in chromium.evaluate("caption.textContent")) is mirror
+
+
 @pytest.mark.parametrize("name", ["foam", "rolled-brass"])
 def test_the_sphere_has_the_radiance_of_the_table(chromium: Chromium, address: str, store: Path, name: str) -> None:
     theta, phi = 50.0, 70.0

@@ -48,6 +48,14 @@ export const relative = (table, model, floor) => table.map((value, i) => {
 /** What that is relative to, in words. */
 export const RELATIVE = "relative to the model, or to the floor of the error where that is larger";
 
+/** A sentence on what no eye sees: one wavelength out of the visible, which a sphere shows as grey. */
+export function unseenWords({ info }, { nm }) {
+  if (info.wavelength_nm === null || (nm === null && makesColour(info))) return "";
+  const at = nearest(info, nm);
+  if (at >= 380 && at <= 780) return "";
+  return ` It is grey for what no eye sees: ${at} nm is ${at > 780 ? "infrared" : "ultraviolet"}.`;
+}
+
 /** A sentence on Dirac parts. */
 export function mirrorWords(series, answers) {
   const parts = answers.map((answer) => answer.specular_reflectance && number(answer)(answer.specular_reflectance));
