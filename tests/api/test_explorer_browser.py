@@ -347,12 +347,31 @@ def test_a_link_restores_the_view_and_copies_ask_for_the_same(chromium: Chromium
     point = np.deg2rad([30.0, 20.0, 35.0, 190.0])
     ran: dict[str, Any] = {}
     exec(copied(chromium, "python"), ran)
-    assert ran["answer"]["brdf"] == pytest.approx(brdfdb.open(store)["rolled-brass"].lookup(*point), rel=1e-12)
+    assert ran["answer"].brdf == pytest.approx(brdfdb.open(store)["rolled-brass"].lookup(*point), rel=1e-12)
     assert re.fullmatch(rf"curl '{address}v1/materials/rolled-brass/lookup\?[\w=&.]+'", copied(chromium, "curl"))
     chromium.evaluate("location.hash = 'material=foam'")
     shown(chromium, "material=foam")
     assert chosen(chromium) == "foam"
     assert chromium.errors == []
+
+
+@pytest.mark.parametrize("view", ["cut", "hemisphere", "half-difference", "sphere"])
+def test_copied_python_runs_and_looks_up_the_light_of_the_sliders(
+    chromium: Chromium, address: str, store: Path, view: str
+) -> None:
+    chromium.open(f"{address}#material=rolled-brass&view={view}&theta_i=30&phi_i=20")
+    shown(chromium, f"view={view}" if view != "cut" else "theta_i=30")
+    ran: dict[str, Any] = {}
+    exec(copied(chromium, "python"), ran)
+    sixty, at = np.deg2rad(60.0), brdfdb.open(store)["rolled-brass"].lookup
+    light = np.deg2rad([30.0, 20.0])
+    found, expected = {
+        "cut": lambda of: (of[150], at(*light, sixty, np.deg2rad(200.0))),
+        "hemisphere": lambda of: (of[60, 100], at(*light, sixty, np.deg2rad(200.0))),
+        "half-difference": lambda of: (of.shape, (90, 90)),
+        "sphere": lambda of: (of, at(*light, 0.0, 0.0)),
+    }[view](ran["answer"])
+    assert found == pytest.approx(expected, rel=1e-9)
 
 
 def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> None:

@@ -175,9 +175,13 @@ function say(sentence, tone = "bad") {
   message.textContent = sentence;
 }
 
+/** What a copied request asks for: of a sphere, which is thousands of directions, its middle. */
+const copiedOf = (now) => (now.view === "sphere" ? { ...now, theta_r: 0 } : now);
+
 controls.listen(change);
 copy.listen(
-  () => new URL(toHash(state), location.href), () => (series.length ? request(series[0], state, series) : "v1/materials"), say);
+  () => new URL(toHash(state), location.href),
+  () => (series.length ? request(series[0], copiedOf(state), series) : "v1/materials"), say);
 addEventListener("hashchange", () => {
   const linked = fromHash(location.hash);
   change({ ...linked, material: linked.material || state.material });
