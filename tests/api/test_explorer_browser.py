@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
-from urllib.request import urlopen
 
+import httpx
 import numpy as np
 import pytest
 
@@ -241,30 +241,13 @@ def test_table_and_model_stand_side_by_side(chromium: Chromium, address: str) ->
     chromium.evaluate("controls.elements.compare.value = ':model'" + change)
     shown(chromium, "compare=%3Amodel")
     assert len(curve(chromium, "first")) == len(curve(chromium, "second")) == len(curve(chromium, "off"))
-    assert re.search(r"table / model − 1: \d.* % at most", chromium.evaluate("caption.textContent"))
+    said = r"table − model, relative to the model, or to the floor .* is larger: \d.* % at most"
+    assert re.search(said, chromium.evaluate("caption.textContent"))
     chromium.evaluate("controls.elements.compare.value = 'foam'" + change)
     shown(chromium, "compare=foam")
     assert "Foam" in chromium.evaluate("document.querySelector('.legend').textContent")
     assert chromium.evaluate("document.querySelector('#cut path.off')") is None
     assert chromium.errors == []
-
-
-def test_differences_from_a_model_are_shares_of_it_or_of_the_floor(
-    chromium: Chromium, address: str, store: Path
-) -> None:
-    asked = f"{address}v1/materials/scene-copper-sphere/lobe?view=cut&theta_i=60&wavelength_nm=400"
-    chromium.open(f"{address}#material=scene-copper-sphere&theta_i=60&nm=400&compare=%3Amodel")
-    shown(chromium, "nm=400", "compare")
-    of_table, of_model = (json.loads(urlopen(asked + part).read()) for part in ("", "&from=model"))
-    kept = np.abs(of_table["axes_deg"]["theta_r"]) <= 89.0
-    table, model = (np.array(each["brdf"])[kept] for each in (of_table, of_model))
-    error = brdfdb.open(store)["scene-copper-sphere"].error
-    assert error is not None
-    floor = min(error.floor)
-    assert model.min() < floor
-    worst = 100.0 * np.max(np.abs(table - model) / np.maximum(model, floor))
-    said = chromium.evaluate("caption.textContent")
-    assert f"table / model − 1: {worst:.3g} % at most. Where the model is below" in said
 
 
 @pytest.mark.parametrize("name", ["scene-copper-sphere", "rolled-brass"])
@@ -278,6 +261,35 @@ def test_numbers_of_the_scale_do_not_overlap_on_a_phone(chromium: Chromium, addr
     line = sorted(box for box in boxes if box[0] == max(bottom for bottom, _, _ in boxes))
     assert len(line) >= 3
     assert all(one[2] < other[1] for one, other in pairwise(line))
+
+
+def test_a_table_is_off_by_what_its_stated_error_means(chromium: Chromium, address: str, store: Path) -> None:
+    chromium.open(f"{address}#material=scene-copper-sphere&view=half-difference&compare=%3Amodel&nm=500")
+    shown(chromium, "nm=500")
+    table = brdfdb.open(store)["scene-copper-sphere"]
+    lobe = f"{address}v1/materials/scene-copper-sphere/lobe?view=half-difference&wavelength_nm=500"
+    answers = [httpx.get(lobe + of, timeout=SECONDS).json()["brdf"] for of in ("&from=table", "&from=model")]
+    tabulated, model = np.array(answers)
+    floor = table.error.floor[list(table.wavelength_nm).index(500.0)]
+    assert model.min() < floor < model.max()
+    drawn = np.array(chromium.evaluate("plot.data[1].z"))
+    np.testing.assert_allclose(drawn, (tabulated - model) / np.maximum(model, floor), rtol=1e-12, atol=0.0)
+    assert chromium.evaluate("plot.data[1].zmax") == pytest.approx(np.quantile(np.abs(drawn), 0.99), rel=1e-2)
+
+
+def test_a_picture_that_is_on_its_way_is_said_to_be(chromium: Chromium, address: str) -> None:
+    chromium.open(f"{address}#material=foam")
+    shown(chromium, "material=foam")
+    before = chromium.evaluate("caption.textContent")
+    assert chromium.evaluate("picture.ariaBusy") == "false"
+    chromium.evaluate(
+        "(was => { fetch = async (...all) => { await new Promise(go => release = go); return was(...all); }; })(fetch)"
+    )
+    chromium.evaluate("location.hash = 'material=foam&theta_i=20'")
+    chromium.until("caption.textContent === 'Loading …' && picture.ariaBusy === 'true'")
+    chromium.until("release(), picture.ariaBusy === 'false'")
+    assert chromium.evaluate("caption.textContent") == before
+    assert chromium.errors == []
 
 
 @pytest.mark.parametrize("compare", ["", "%3Amodel"])
@@ -304,6 +316,24 @@ def test_buttons_over_a_plot_save_it_and_restore_it_and_send_nothing(
         "Download plot as a PNG",
         "Reset camera to default" if view == "hemisphere" else "Reset axes",
     ]
+
+
+@pytest.mark.parametrize("name", ["foam", "scene-copper-sphere"])
+def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, address: str, name: str) -> None:
+    chromium.open(f"{address}#material={name}&view=spectrum&compare=%3Amodel")
+    shown(chromium, "view=spectrum")
+    low, high = 10.0 ** np.array(chromium.evaluate("plot.layout.yaxis.range"))
+    values = np.concatenate(chromium.evaluate("plot.data.map(each => each.y)"))
+    values = values[values > 0.0]  # edges of the band at 0 are on no logarithmic axis
+    assert low < values.min() <= values.max() < high
+    assert high / low > 1.5
+
+
+def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: str) -> None:
+    for name, mirror in (("foam", False), ("scene-copper-sphere", True)):
+        chromium.open(f"{address}#material={name}&view=sphere")
+        shown(chromium, "view=sphere")
+        assert ("Dirac" in chromium.evaluate("caption.textContent")) is mirror
 
 
 @pytest.mark.parametrize("name", ["foam", "rolled-brass"])
@@ -344,12 +374,31 @@ def test_a_link_restores_the_view_and_copies_ask_for_the_same(chromium: Chromium
     point = np.deg2rad([30.0, 20.0, 35.0, 190.0])
     ran: dict[str, Any] = {}
     exec(copied(chromium, "python"), ran)
-    assert ran["answer"]["brdf"] == pytest.approx(brdfdb.open(store)["rolled-brass"].lookup(*point), rel=1e-12)
+    assert ran["answer"].brdf == pytest.approx(brdfdb.open(store)["rolled-brass"].lookup(*point), rel=1e-12)
     assert re.fullmatch(rf"curl '{address}v1/materials/rolled-brass/lookup\?[\w=&.]+'", copied(chromium, "curl"))
     chromium.evaluate("location.hash = 'material=foam'")
     shown(chromium, "material=foam")
     assert chosen(chromium) == "foam"
     assert chromium.errors == []
+
+
+@pytest.mark.parametrize("view", ["cut", "hemisphere", "half-difference", "sphere"])
+def test_copied_python_runs_and_looks_up_the_light_of_the_sliders(
+    chromium: Chromium, address: str, store: Path, view: str
+) -> None:
+    chromium.open(f"{address}#material=rolled-brass&view={view}&theta_i=30&phi_i=20")
+    shown(chromium, f"view={view}" if view != "cut" else "theta_i=30")
+    ran: dict[str, Any] = {}
+    exec(copied(chromium, "python"), ran)
+    sixty, at = np.deg2rad(60.0), brdfdb.open(store)["rolled-brass"].lookup
+    light = np.deg2rad([30.0, 20.0])
+    found, expected = {
+        "cut": lambda of: (of[150], at(*light, sixty, np.deg2rad(200.0))),
+        "hemisphere": lambda of: (of[60, 100], at(*light, sixty, np.deg2rad(200.0))),
+        "half-difference": lambda of: (of.shape, (90, 90)),
+        "sphere": lambda of: (of, at(*light, 0.0, 0.0)),
+    }[view](ran["answer"])
+    assert found == pytest.approx(expected, rel=1e-9)
 
 
 def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> None:
@@ -435,6 +484,35 @@ def test_the_list_asks_again_only_for_pages_without_all_of_their_colours(chromiu
     assert chromium.evaluate("document.querySelector('#m-a .swatch').style.background") == "rgb(1, 1, 1)"
     assert chromium.evaluate("asked") == [*PAGES, "v1/materials?limit=1000&cursor=a"]
     chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+
+
+def test_a_wrong_comparison_leaves_the_material(chromium: Chromium, address: str) -> None:
+    chromium.open(f"{address}#material=foam&compare=brsas")
+    shown(chromium, "material=foam")
+    assert "brsas" in chromium.evaluate("message.textContent")
+    assert len(curve(chromium, "first")) > 100
+    assert chromium.until("controls.elements.compare.options.length > 3 && controls.elements.compare.value === ''")
+    chromium.evaluate("controls.elements.theta_i.value = 20")
+    chromium.evaluate("controls.elements.theta_i.dispatchEvent(new Event('input', { bubbles: true }))")
+    shown(chromium, "theta_i=20")
+    assert "brsas" in chromium.evaluate("message.textContent")
+    assert chromium.until("location.hash.includes('theta_i=20') && location.hash") == "#material=foam&theta_i=20"
+
+
+def test_what_was_away_is_shown_when_it_is_back(chromium: Chromium, address: str, store: Path) -> None:
+    chromium.open(f"{address}#material=foam")
+    shown(chromium, "material=foam")
+    head = store / "materials" / "foam" / "HEAD.json"
+    kept = head.rename(head.with_suffix(".away"))
+    try:
+        chromium.evaluate("location.hash = 'material=foam&theta_i=20'")
+        assert "foam" in chromium.until("message.textContent")
+        assert chromium.evaluate("document.querySelector('#cut').hidden")
+    finally:
+        kept.rename(head)
+    shown(chromium, "theta_i=20")
+    assert chromium.evaluate("message.textContent") == ""
+    assert len(curve(chromium, "first")) > 100
 
 
 @pytest.mark.parametrize("width", [1280, 390])

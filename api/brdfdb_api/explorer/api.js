@@ -2,8 +2,13 @@
 
 const NPY = "application/x-npy";
 
-/** An answer that is an error; its message is the sentence that the service gives. */
-export class Problem extends Error {}
+/** An answer that is an error; its message is the sentence that the service gives; whether it may pass by itself. */
+export class Problem extends Error {
+  constructor(sentence, passes = false) {
+    super(sentence);
+    this.passes = passes;
+  }
+}
 
 /** The address of a material, or of a view of it. */
 export function address(name, path = "", query = {}) {
@@ -30,11 +35,11 @@ async function answer(path, options) {
     response = await fetch(path, options);
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new Problem("the server does not answer");
+    throw new Problem("the server does not answer", true);
   }
   if (response.ok) return response;
   const problem = await response.json().catch(() => ({}));
-  throw new Problem(problem.detail ?? `the server answers with status ${response.status}`);
+  throw new Problem(problem.detail ?? `the server answers with status ${response.status}`, response.status === 503);
 }
 
 /** A .npy file (version 1.0) of float32 with rows of `columns` numbers. */

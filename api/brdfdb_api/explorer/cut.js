@@ -1,7 +1,7 @@
 // The polar cut in the plane of incidence, as SVG: the first picture need not wait for a library of megabytes.
 
 import { element, percent, short } from "./dom.js";
-import { floorOf, floorWords, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
+import { RELATIVE, floorOf, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
 import { number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
@@ -31,10 +31,10 @@ export function cut(into, series, answers, state) {
   let words = `${quantityWords(series[0], state)} in 1/sr over θᵣ in the plane of incidence, negative back towards the light.`;
   let bottom = TOP + radius + 24;
   if (against) {
-    const floor = floorOf(series[0]), off = relative(...curves, floor);
+    const off = relative(...curves, floorOf(series[0].info, state.nm));
     const worst = Math.max(...off.map((value) => Math.abs(value ?? 0)));
     parts.push(...strip(thetas[0], off, worst || 1, bottom + 24, at, radius));
-    words += ` Below, to 89°, table / model − 1: ${percent(worst)} at most.${floorWords(curves[1], floor)}`;
+    words += ` Below, to 89°, table − model, ${RELATIVE}: ${percent(worst)} at most.`;
     bottom += STRIP + 50;
   }
   const picture = svg("svg", { width, height: bottom }, ...parts);

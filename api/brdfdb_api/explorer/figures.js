@@ -1,7 +1,7 @@
 // Figures, as Plotly takes them, and their captions, of the answers to the requests of a view.
 
 import { short } from "./dom.js";
-import { floorOf, floorWords, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
+import { RELATIVE, floorOf, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
 import { nearest, number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
@@ -9,6 +9,7 @@ const NM = [450, 550, 650]; // of albedos, where none is chosen
 const BANDS = ["#4f7df0", "#2f9e6b", "#d8503f"]; // their colours
 const HEAT = "Viridis";
 const DIFFERENCE = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]];
+const LEAST_DECADES = 0.2; // of the logarithmic axis of a spectrum: a factor of 1.6
 const RADIAN = Math.PI / 180;
 
 /** The figure of a view: `data` and `layout` of Plotly, and a caption; `stacked` where two stand on each other. */
@@ -68,7 +69,7 @@ function hemisphere(series, answers, state, ink, stacked) {
     });
     layout[scene] = {
       domain: { x, y }, hovermode: false, dragmode: "turntable", aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.65 },
-      xaxis: sides("x", [-1, 1]), yaxis: sides("y", [-1, 1]), zaxis: sides("normal", [0, 1]),
+      xaxis: sides("", [-1, 1]), yaxis: sides("", [-1, 1]), zaxis: sides("normal", [0, 1]),
       camera: { eye: { x: 0.85, y: -1.75, z: 1 }, center: { x: 0, y: 0, z: -0.15 } }, uirevision: state.material,
     };
     if (series.length > 1) layout.annotations.push(above(label));
@@ -84,6 +85,10 @@ function hemisphere(series, answers, state, ink, stacked) {
       {
         type: "scatter3d", mode: "lines", scene, x: [0, lx], y: [0, ly], z: [0, lz], hoverinfo: "skip",
         line: { color: ink("third"), width: 6 },
+      },
+      { // where the axes point, however the picture is turned
+        type: "scatter3d", mode: "text", scene, x: [0.9, 0], y: [0, 0.9], z: [0, 0], text: ["+x", "+y"], hoverinfo: "skip",
+        textfont: { color: ink("ink") },
       },
     ];
   });
@@ -105,12 +110,13 @@ function halfDifference(series, answers, state, ink, stacked) {
     const { x, y, title: above } = part(i, series.length, stacked, 0.16);
     const suffix = i ? "2" : "";
     layout[`xaxis${suffix}`] = { domain: x, title: title("θ<sub>d</sub> [degrees]"), dtick: 30, range: [0, 90], anchor: `y${suffix}` };
-    layout[`yaxis${suffix}`] = { ...((stacked || !i) && { title: title("θ<sub>h</sub> [degrees]") }), domain: y, dtick: 30, range: [90, 0], anchor: `x${suffix}` };
-    if (series.length > 1) layout.annotations.push(above(difference ? "table / model − 1" : label));
+    layout[`yaxis${suffix}`] = { title: title(i && !stacked ? "" : "θ<sub>h</sub> [degrees]"), domain: y, dtick: 30, range: [90, 0], anchor: `x${suffix}` };
+    if (series.length > 1) layout.annotations.push(above(difference ? "table − model, relative" : label));
     const { theta_d, theta_h } = answers[i].axes_deg;
     const map = { type: "heatmap", x: theta_d, y: theta_h, xaxis: `x${suffix}`, yaxis: `y${suffix}` };
     const where = "θ<sub>h</sub> %{y}°, θ<sub>d</sub> %{x}°";
     if (difference) {
+      const floor = floorOf(series[0].info, state.nm);
       const off = values[0].map((row, j) => relative(row, values[1][j], floor));
       const sizes = off.flat().filter((each) => each !== null).map(Math.abs).sort((a, b) => a - b);
       const most = sizes[Math.floor(0.99 * sizes.length)] || 1e-9;
@@ -123,8 +129,18 @@ function halfDifference(series, answers, state, ink, stacked) {
       colorbar: { ...bar, x: x[1], y: (y[0] + y[1]) / 2, ...bars(range, state) } };
   });
   const caption = `${quantityWords(series[0], state)} in 1/sr over the half angle, down, and the difference angle; φ of the half vector is ${answers[0].phi_i}°, that of the difference 90°.` +
-    (against ? ` ${stacked ? "Below" : "Right"}, how far the table is off; the ends of the scale are the 99th percentile.${floorWords(values[1].flat(), floor)}` : "");
+    (against ? ` ${stacked ? "Below" : "Right"}, how far the table is off, ${RELATIVE}; the scale ends at the 99th percentile, and what is beyond has the colour of its end.` : "");
   return { data, layout, caption };
+}
+
+/** Ends of the axis of a spectrum, in decades of a logarithmic one, wide enough that rounding is no picture. */
+function ends(values, { scale }) {
+  const some = values.filter((value) => value > 0);
+  const most = Math.max(...some), least = Math.min(...some);
+  if (!some.length) return scale === "log" ? [-1, 0] : [0, 1];
+  if (scale === "linear") return [0, 1.08 * most];
+  const middle = Math.log10(most * least) / 2, half = Math.max(Math.log10(most / least) * 0.54, LEAST_DECADES / 2);
+  return [middle - half, middle + half];
 }
 
 function spectrum(series, answers, state, ink) {
@@ -145,13 +161,11 @@ function spectrum(series, answers, state, ink) {
       curve,
     ];
   });
-  const most = Math.max(...data.flatMap(({ y }) => y));
   const layout = {
     showlegend: series.length > 1,
     xaxis: { title: { text: "wavelength [nm]" } },
     yaxis: {
-      title: { text: "f<sub>r</sub> [1/sr]" }, type: state.scale, exponentformat: "power",
-      ...(state.scale === "linear" && { range: [0, 1.08 * most || 1] }),
+      title: { text: "f<sub>r</sub> [1/sr]" }, type: state.scale, exponentformat: "power", automargin: true, range: ends(data.flatMap(({ y }) => y), state),
     },
   };
   const said = answers.map((answer, i) => answer.wavelength_nm === null && answer.brdf !== undefined ?

@@ -21,6 +21,8 @@ const DRAWN = { // of the buttons, those that save and restore: more would lie o
   ],
 };
 const NARROW = 560; // pixels in which two pictures do not stand side by side
+const SLOW_MS = 200; // after which people are told that a picture is on its way
+const AGAIN_MS = 3000; // after which is tried again what may have come back
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 
 let state = fromHash(location.hash);
@@ -28,13 +30,17 @@ let series = []; // what is shown; emptied when it has to be found anew
 let stop = new AbortController();
 let asked = 0; // when the picture was asked for; the first one when the page was
 let wanted = false, working = false;
-let linked = 0;
+let linked = 0, again = 0;
+let missing = ""; // why what is compared with is not shown
 
 /** Change the state: a slider's next picture waits for the one that is being drawn, anything else stops it. */
 function change(part) {
   const turned = Object.keys(part).every((key) => ["theta_i", "phi_i", "theta_r", "turn", "nm"].includes(key));
   state = { ...state, ...part };
-  if ("material" in part || "compare" in part) series = [];
+  if ("material" in part || "compare" in part) {
+    series = [];
+    missing = "";
+  }
   if (!turned) {
     stop.abort();
     stop = new AbortController();
@@ -48,17 +54,20 @@ function change(part) {
 function redraw(at = performance.now()) {
   asked = at;
   wanted = true;
+  clearTimeout(again);
   if (!working) work();
 }
 
 async function work() {
   working = true;
+  picture.ariaBusy = "true";
   while (wanted) {
     wanted = false;
     const now = state, start = asked, { signal } = stop;
+    const slow = setTimeout(() => { caption.textContent = "Loading …"; }, SLOW_MS);
     try {
       await draw(now, signal);
-      say("");
+      say(missing);
       performance.clearMeasures("picture");
       performance.measure("picture", { start, end: performance.now() });
       picture.dataset.shown = toHash(now);
@@ -67,9 +76,13 @@ async function work() {
       forget(now);
       say(error instanceof Problem ? error.message : `This cannot be drawn: ${error.message}`);
       if (!(error instanceof Problem)) console.error(error);
+      if (error.passes) again = setTimeout(redraw, AGAIN_MS);
+    } finally {
+      clearTimeout(slow);
     }
   }
   working = false;
+  picture.ariaBusy = "false";
 }
 
 async function draw(now, signal) {
@@ -99,13 +112,25 @@ function forget(now) {
 /** Learn what is shown. */
 async function know(now, signal) {
   list.mark(now.material);
-  const found = await seriesOf(now, signal);
+  const found = await seriesOf(now, signal).catch((error) => {
+    if (!(error instanceof Problem && now.compare)) throw error;
+    return alone(now, signal, error.message);
+  });
   signal.throwIfAborted();
   series = found;
   title.textContent = series[0].info.title;
   document.title = `${series[0].info.title} – brdfdb explorer`;
   facts.show(series[0].info);
-  controls.show(now, series);
+  controls.show(state, series);
+}
+
+/** The material without what it should be compared with, and why. */
+async function alone(now, signal, sentence) {
+  const found = await seriesOf({ ...now, compare: "" }, signal);
+  signal.throwIfAborted();
+  state = { ...state, compare: "" };
+  missing = sentence;
+  return found;
 }
 
 async function drawCut(now, signal) {
@@ -155,9 +180,13 @@ function say(sentence, tone = "bad") {
   message.textContent = sentence;
 }
 
+/** What a copied request asks for: of a sphere, which is thousands of directions, its middle. */
+const copiedOf = (now) => (now.view === "sphere" ? { ...now, theta_r: 0 } : now);
+
 controls.listen(change);
 copy.listen(
-  () => new URL(toHash(state), location.href), () => (series.length ? request(series[0], state, series) : "v1/materials"), say);
+  () => new URL(toHash(state), location.href),
+  () => (series.length ? request(series[0], copiedOf(state), series) : "v1/materials"), say);
 addEventListener("hashchange", () => {
   const linked = fromHash(location.hash);
   change({ ...linked, material: linked.material || state.material });

@@ -1,7 +1,7 @@
 // Scales of f_r, linear or logarithmic, and the words that captions share.
 
 import { short } from "./dom.js";
-import { number } from "./series.js";
+import { makesColour, nearest, number } from "./series.js";
 
 const DECADES = 5; // of a logarithmic scale, below its largest value
 
@@ -31,18 +31,30 @@ export function ticks([low, high], { scale }) {
 /** Which of some theta_r are short of the horizon, where models have poles that no scale can show. */
 export const shortOfHorizon = (theta_r) => theta_r.flatMap((theta, i) => (Math.abs(theta) <= 89 ? [i] : []));
 
-/** Below which value [1/sr] differences are shares of it, as in stated errors: the least over the wavelengths. */
-export const floorOf = ({ info: { error } }) => (error ? Math.min(...error.floor) : 0);
+/** The floor of the stated error [1/sr]: at a wavelength, of a luminance the largest; 0 where no error was measured. */
+export function floorOf(info, nm) {
+  const at = info.wavelength_nm, floor = info.error?.floor ?? [0];
+  if (floor.length === 1 || (nm === null && makesColour(info))) return Math.max(...floor);
+  const asked = nearest(info, nm);
+  return floor[at.reduce((best, each, i) => (Math.abs(each - asked) < Math.abs(at[best] - asked) ? i : best), 0)];
+}
 
-/** What a table is off, table / model - 1, or below the floor a share of that; null where both are 0. */
+/** What a table is off as it states its error, (table - model) / max(model, floor); null where that is 0. */
 export const relative = (table, model, floor) => table.map((value, i) => {
-  const of = Math.max(model[i], floor);
-  return of > 0 ? (value - model[i]) / of : null;
+  const by = Math.max(model[i], floor);
+  return by > 0 ? (value - model[i]) / by : null;
 });
 
-/** A sentence on the floor where it counts. */
-export const floorWords = (model, floor) => (model.some((value) => value < floor) ?
-  ` Where the model is below ${short(floor)} /sr, it is a share of that.` : "");
+/** What that is relative to, in words. */
+export const RELATIVE = "relative to the model, or to the floor of the error where that is larger";
+
+/** A sentence on what no eye sees: one wavelength out of the visible, which a sphere shows as grey. */
+export function unseenWords({ info }, { nm }) {
+  if (info.wavelength_nm === null || (nm === null && makesColour(info))) return "";
+  const at = nearest(info, nm);
+  if (at >= 380 && at <= 780) return "";
+  return ` It is grey for what no eye sees: ${at} nm is ${at > 780 ? "infrared" : "ultraviolet"}.`;
+}
 
 /** A sentence on Dirac parts. */
 export function mirrorWords(series, answers) {

@@ -2,13 +2,15 @@
 
 import { lookup } from "./api.js";
 import { element } from "./dom.js";
+import { unseenWords } from "./scales.js";
 import { quantity } from "./series.js";
 
 const SIZE = 96; // pixels across
 const DEGREE = 180 / Math.PI;
 
-const WORDS = "The viewer is far above the page; the light is as bright as makes a white matt surface white. The mirror image, a " +
-  "Dirac part, is not drawn. The x axis of the surface runs around the vertical axis of the sphere.";
+const WORDS = "The viewer is far above the page; the light is as bright as makes a white matt surface white. The x axis of " +
+  "the surface runs around the vertical axis of the sphere.";
+const MIRROR = " The mirror image, a Dirac part, is not drawn.";
 
 /** What the service says of all lit pixels of the series; `paint` draws it into an element, and gives the caption. */
 export async function spheres(series, state, signal) {
@@ -25,7 +27,7 @@ export async function spheres(series, state, signal) {
         paint(canvas, values, scene);
         label.textContent = series.length > 1 ? series[i].label : "";
       });
-      return WORDS;
+      return WORDS + (series.some(({ info }) => info.specular) ? MIRROR : "") + unseenWords(series[0], state);
     },
   };
 }
