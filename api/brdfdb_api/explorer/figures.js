@@ -98,7 +98,7 @@ function hemisphere(series, answers, state, ink, stacked) {
 }
 
 function halfDifference(series, answers, state, ink, stacked) {
-  const against = state.compare === MODEL, floor = floorOf(series[0]);
+  const against = state.compare === MODEL;
   const values = answers.map((answer) => answer.brdf.map((row) => row.map(number(answer))));
   const shown = against ? values.slice(0, 1) : values;
   const range = span(shown.flat(2), state), height = scaled(state, range[0]);
