@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.scene import Scene
-from brdfdb.spectra import colour_science, illuminant_spectrum, xyz_weights
+from brdfdb.spectra import colour_science, illuminant_spectrum, srgb_weights, xyz_weights
 
 Array = NDArray[np.float64]
 
@@ -31,14 +31,8 @@ def srgb(scene: Scene, radiance: ArrayLike) -> Array:
 
 def linear_srgb(scene: Scene, radiance: ArrayLike) -> Array:
     """sRGB (..., 3) without its transfer curve, not clipped: (1, 1, 1) is white under the illuminant of the scene."""
-    colour = colour_science()
-    space = colour.RGB_COLOURSPACES["sRGB"]
-    adapt = colour.adaptation.matrix_chromatic_adaptation_VonKries(
-        _weights(scene).sum(axis=0), colour.xy_to_XYZ(space.whitepoint), transform="Bradford"
-    )
-    rgb = space.matrix_XYZ_to_RGB @ adapt
-    rgb /= (rgb @ _weights(scene).sum(axis=0))[:, np.newaxis]  # four printed decimals: white would be off by 2e-4
-    return np.asarray(xyz(scene, radiance) @ rgb.T)
+    weights = srgb_weights(tuple(scene.wavelengths_nm), scene.illuminant, scene.observer)
+    return np.asarray(scene.exposure * (np.asarray(radiance) @ weights))
 
 
 def difference(scene: Scene, radiance: ArrayLike, other: ArrayLike) -> Array:

@@ -56,31 +56,18 @@ class Reflector:
                 f"visible, {_VISIBLE_NM[0]:g} to {_VISIBLE_NM[1]:g} nm"
             )
         self._parameters = material.arguments(self.wavelength_nm)
-
-    @functools.cached_property
-    def _each(self) -> list[dict[str, float]]:
-        """The parameters at each wavelength."""
-        count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
-        return [
-            {name: value if np.ndim(value) == 0 else value[w] for name, value in self._parameters.items()}
-            for w in range(count)
-        ]
+        self._brdf = material.brdf_at(self.wavelength_nm)
 
     def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
         """f_r [1/sr] of the model: (N, L), or (N, 1) where it has no colour."""
-        # a wavelength at a time: all directions are one row of the kernel
-        return np.stack([self.material.spec.vectors(wi, wr, **one) for one in self._each], axis=-1)
+        return self._brdf(wi, wr)
 
     def mirror(self, wr: Array) -> Floats:
         """Reflectance [1] of the Dirac part towards viewers (N, 3): (N, L), (N, 1), or 0."""
-        spec = self.material.spec
-        if spec.specular is None:
+        if self.material.spec.specular is None:
             return np.zeros((len(wr), 1))
         theta = np.arccos(np.clip(wr[:, 2], -1.0, 1.0))
-        return np.stack(
-            [spec.specular(theta, **{name: one[name] for name in spec.specular_parameters}) for one in self._each],
-            axis=-1,
-        )
+        return np.reshape(self.material.specular_reflectance(theta, self.wavelength_nm), (len(wr), -1))
 
     def albedo(self, wr: Array) -> Floats:
         """Share [1] of ambient radiance that viewers (N, 3) see, without the mirror's: (N, L), or (N, 1)."""

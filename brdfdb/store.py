@@ -184,12 +184,6 @@ class Store(Mapping[str, "Table"]):
         pointer = self._read_pointer(name)
         return None if pointer is None else self._used((name, pointer.location[1]))
 
-    @property
-    def cached_bytes(self) -> int:
-        """Of the tables that are decoded now."""
-        with self._lock:
-            return sum(table.nbytes for table in self._decoded.values())
-
     def _table(self, name: str, group: Path, digest: str) -> Table:
         key = name, digest
         if (held := self._used(key)) is not None:
