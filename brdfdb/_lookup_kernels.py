@@ -387,3 +387,41 @@ def by_vectors(
             for j in range(count):
                 direction = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]
                 _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, j, low.size, f_r)
+
+
+@kernel
+def specular(
+    nodes: Array,
+    rows: NDArray[np.float32],
+    low: NDArray[np.int64],
+    weight: Array,
+    theta: Array,
+    horizon: float,
+    out: Array,
+) -> bool:
+    """The Dirac part, linear between its nodes; what `out` holds stays where there are none. As `by_angles` else."""
+    wavelengths = low.size
+    last = nodes.size - 1
+    good = True
+    for j in range(theta.size):
+        t = theta[j]
+        good = good and not (t < 0.0 or t > PI)
+        if last > 0 and t <= horizon:
+            below, above = 0, last
+            while above - below > 1:
+                middle = (below + above) // 2
+                if nodes[middle] <= t:
+                    below = middle
+                else:
+                    above = middle
+            part = (t - nodes[below]) / (nodes[above] - nodes[below])
+            part = min(max(part, 0.0), 1.0)
+            for m in range(wavelengths):
+                w = low[m]
+                value = (1.0 - part) * rows[below, w] + part * rows[above, w]
+                if weight[m] > 0.0:
+                    upper = (1.0 - part) * rows[below, w + 1] + part * rows[above, w + 1]
+                    value = (1.0 - weight[m]) * value + weight[m] * upper
+                out[j * wavelengths + m] = value
+        _outside(t, t > horizon, j, wavelengths, out)
+    return good

@@ -13,6 +13,9 @@ from brdfdb.error import Error, stated
 from brdfdb.grids import Axis
 from brdfdb.parameters import Floats
 
+_Located = tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, ...]]
+_MOST_KNOWN = 1024  # single wavelengths that are remembered
+
 
 class Stated(NamedTuple):
     """Values of f_r with the error that their table states for them.
@@ -62,17 +65,33 @@ class Described:
         return np.asarray(found if tail else found[..., 0])[()]
 
     @functools.cached_property
-    def _all_wavelengths(self) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, ...]]:
+    def _all_wavelengths(self) -> _Located:
         count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
         return np.arange(count), np.zeros(count), () if self.wavelength_nm is None else (count,)
 
-    def _wavelengths(
-        self, wavelength_nm: ArrayLike | None
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, ...]]:
+    @functools.cached_property
+    def _known_wavelengths(self) -> dict[float, _Located]:
+        return {}
+
+    def _wavelengths(self, wavelength_nm: ArrayLike | None) -> _Located:
         """Lower node and weight of the upper one for each wavelength asked for, and the shape they add."""
-        stored = self.wavelength_nm
         if wavelength_nm is None:
             return self._all_wavelengths
+        if not isinstance(wavelength_nm, float):
+            return self._located(wavelength_nm)
+        known = (
+            self._known_wavelengths
+        )  # of points one by one: checks take as long as the lookup, and few are asked for
+        found = known.get(wavelength_nm)
+        if found is None:
+            found = self._located(wavelength_nm)
+            if len(known) >= _MOST_KNOWN:
+                known.clear()
+            known[wavelength_nm] = found
+        return found
+
+    def _located(self, wavelength_nm: ArrayLike) -> _Located:
+        stored = self.wavelength_nm
         given = np.asarray(wavelength_nm)
         if given.size and given.dtype.kind not in "iuf":
             raise ValueError(f"wavelength_nm: {wavelength_nm!r} is not a number of nanometres")

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from brdfdb import _lookup_kernels
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.described import Described, Stated
-from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, finished, radians
+from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians
 from brdfdb.grids import Axis, Grid, axes_among
 from brdfdb.interpolation import Axes, prepared
 from brdfdb.layout import PLAIN, Interpolation, Layout
@@ -263,38 +263,25 @@ class Table(Described):
             If theta_i or a wavelength is outside its range.
         """
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
-        angles = checked_angles(theta_i, 0.0, 0.0, 0.0)
-        values = np.zeros((*angles.theta_i.shape, weight.size))
-        if self.specular is not None:
-            position = np.interp(angles.theta_i, self._specular_theta, np.arange(len(self.specular)))  # nan stays nan
-            at = np.minimum(np.nan_to_num(position).astype(np.int64), len(self.specular) - 2)
-            values = self._specular_at(position[..., np.newaxis], at[..., np.newaxis], low, weight)
-        return finished(values, angles, trailing=1).reshape(angles.theta_i.shape + wavelength_shape)[()]
-
-    def specular_reflectance_of_one(self, theta_i: float, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """`specular_reflectance` for one light that is above the horizon: theta_i [rad] in [0, pi/2], not checked."""
-        low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
-        if self.specular is None:
-            return np.zeros(wavelength_shape)[()]
-        position = float(np.interp(theta_i, self._specular_theta, np.arange(len(self.specular))))
-        at = min(int(position), len(self.specular) - 2)
-        return self._specular_at(position, at, low, weight).reshape(wavelength_shape)[()]
-
-    def _specular_at(
-        self, position: Any, at: Any, low: NDArray[np.int64], weight: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """The Dirac part between two nodes of theta_i and two wavelengths each."""
-        assert self.specular is not None
-        table = self.specular.reshape(len(self.specular), -1)
-        upper = np.minimum(low + 1, table.shape[1] - 1)
-        first, second = ((1.0 - weight) * table[row, low] + weight * table[row, upper] for row in (at, at + 1))
-        return np.asarray((1.0 - (position - at)) * first + (position - at) * second)
+        given = np.asarray(theta_i)
+        dtype = asked_for(theta_i)
+        if given.dtype.kind not in "iuf":
+            checked_angles(theta_i, 0.0, 0.0, 0.0)
+        values = np.zeros(given.size * weight.size, dtype)
+        horizon = float(dtype.type(HALF_PI))
+        nodes, rows = self._specular_rows
+        if not _lookup_kernels.specular(nodes, rows, low, weight, _flat(given, given.shape, dtype), horizon, values):
+            checked_angles(theta_i, 0.0, 0.0, 0.0)
+        return values.reshape(given.shape + wavelength_shape)[()]
 
     @functools.cached_property
-    def _specular_theta(self) -> NDArray[np.float64]:
-        """Nodes [rad] of the Dirac part."""
+    def _specular_rows(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+        """Nodes [rad] of the Dirac part, and its values there, a row a node; none of either where there is none."""
+        if self.specular is None:
+            return np.empty(0), np.empty((0, 0), np.float32)
         at_deg = self.specular_theta_deg
-        return radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
+        nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
+        return nodes, np.ascontiguousarray(self.specular.reshape(len(self.specular), -1))
 
 
 def rebuilt(
@@ -317,7 +304,8 @@ def rebuilt(
 
 def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     """One number after the other, and never writable: kernels are compiled anew for arrays that are, 10 s a time."""
-    flat = np.ascontiguousarray(np.broadcast_to(array, shape), dtype=dtype).reshape(-1)
+    whole = array if array.shape == shape else np.broadcast_to(array, shape)
+    flat = np.ascontiguousarray(whole, dtype=dtype).reshape(-1)
     flat.flags.writeable = False
     return flat
 

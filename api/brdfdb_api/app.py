@@ -16,9 +16,10 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from brdfdb.store import StoreError, UnknownMaterialError, UnknownRevisionError
-from brdfdb_api.edge import Edge, log_to_stderr
+from brdfdb_api.edge import Edge
 from brdfdb_api.files import files
 from brdfdb_api.pages import pages
 from brdfdb_api.responses import PROBLEM_JSON, RequestError, problem_response
@@ -43,7 +44,17 @@ UNCOMPRESSED = (*("application/x-npy", "application/octet-stream", "application/
 
 
 class Application(FastAPI):
-    """FastAPI whose OpenAPI document gives problems the media type that they are sent with."""
+    """FastAPI behind an edge, whose OpenAPI document gives problems the media type that they are sent with."""
+
+    outermost: ASGIApp
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        scope["app"] = self
+        await self.outermost(scope, receive, send)
+
+    async def routed(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """What lies behind the edge."""
+        await super().__call__(scope, receive, send)
 
     def openapi(self) -> dict[str, Any]:
         document = super().openapi()
@@ -89,15 +100,15 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     app.include_router(pages)
     for kind in (
         *(RequestError, RequestValidationError, UnknownMaterialError, UnknownRevisionError, StoreError),
-        HTTPException,
+        *(HTTPException, Exception),
     ):
         app.add_exception_handler(kind, problem)
-    # the last one added is the first to see a request
     app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=5, exclude_content_types=UNCOMPRESSED)
-    app.add_middleware(Edge, limit=app.state.settings.max_body_bytes, lookup=answer_point, failed=problem_of)
+    limit, level = app.state.settings.max_body_bytes, app.state.settings.log_level
+    app.outermost = Edge(app.routed, limit=limit, lookup=answer_point, failed=problem_of, log_level=level)
     if app.state.settings.cors_origins:
-        app.add_middleware(
-            CORSMiddleware,
+        app.outermost = CORSMiddleware(
+            app.outermost,
             allow_origins=app.state.settings.cors_origins,
             allow_methods=["GET", "POST"],
             allow_headers=["*"],
@@ -108,8 +119,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
 
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
-    """While the application runs: the log, and a thread that decodes what lists show first."""
-    log_to_stderr(app.state.settings.log_level)
+    """While the application runs: a thread that decodes what lists show first."""
     threading.Thread(target=app.state.shelf.warm, daemon=True).start()
     yield
 

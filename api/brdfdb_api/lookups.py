@@ -5,21 +5,21 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, Self, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, cast, get_args
 from urllib.parse import parse_qsl
 
 import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from brdfdb.geometry import HALF_PI, radians
+from brdfdb.geometry import radians
 from brdfdb_api.responses import RequestError
 
 if TYPE_CHECKING:
     from brdfdb.lookup import Table
+    from brdfdb.materials import Material
 
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 REQUIRED = ("theta_i", "theta_r")
@@ -61,7 +61,7 @@ class Options:
     @classmethod
     def from_query(cls, query: Mapping[str, str]) -> Self:
         """Read what a query names of `OPTIONS`; a RequestError (422) for a value that is not allowed."""
-        if not any(name in query for name in OPTIONS):
+        if query.keys().isdisjoint(OPTIONS):
             return cls()
         error = _one_of(query, "error", ("false", "true"), "false") == "true"
         source = cast(Source, _one_of(query, "from", get_args(Source), "table"))
@@ -102,10 +102,11 @@ class Points:
         """One point, of numbers in a query; errors as by `from_fields`."""
         angles = []
         for name in ANGLES:
-            if name not in query and name in REQUIRED:
+            text = query.get(name)
+            if text is None and name in REQUIRED:
                 raise RequestError(422, f"{name}: missing", name)
-            degrees = _number(name, query.get(name, "0"))
-            if name.startswith("theta") and not 0.0 <= degrees <= 180.0:
+            degrees = 0.0 if text is None else _number(name, text)
+            if name in REQUIRED and not 0.0 <= degrees <= 180.0:
                 raise RequestError(422, f"{name}: {degrees} is outside [0, 180] degrees", name)
             angles.append(math.radians(math.fmod(degrees, _TURN)))
         at = [_number("wavelength_nm", text) for text in wavelengths]
@@ -185,45 +186,46 @@ class Points:
     def values(self, table: Table) -> int:
         """How many numbers are looked up: points times wavelengths."""
         wavelengths = self.wavelengths(table)
-        return self.count * (1 if wavelengths is None else np.size(wavelengths))
+        return self.count * (wavelengths.size if isinstance(wavelengths, np.ndarray) else 1)
 
 
-@dataclass(frozen=True)
-class Values:
-    """What a lookup found: f_r, its error or None, the Dirac part; colours on the last axis if they were asked for."""
+class Values(NamedTuple):
+    """What a lookup found: f_r, its error or None, the Dirac part or None; colours on the last axis if asked for."""
 
     brdf: Any
     error: Any
     specular_reflectance: Any
 
 
-def evaluate(points: Points, options: Options, table: Table) -> Values:
-    """Look points up; a RequestError (422) where the table does not reach, or makes no colour."""
-    with _refused():
+def evaluate(points: Points, options: Options, table: Table, *, specular: bool = True) -> Values:
+    """Look points up, and if `specular` the Dirac part at their theta_i.
+
+    A RequestError (422) where the table does not reach, or makes no colour.
+    """
+    try:
         if options.output != "spectrum":
-            return _coloured(points, options, table)
+            return _coloured(points, options, table, specular=specular)
+        theta_i, at = points.angles[0], points.wavelength_nm
+        source: Table | Material = table
         if options.source == "model":
             from brdfdb.albedo import material_of
 
             at = points.wavelengths(table)
             table.specular_reflectance(0.0, at)  # no further than the table reaches
-            material = material_of(table)
-            return Values(
-                material.lookup(*points.angles, at), None, material.specular_reflectance(points.angles[0], at)
-            )
-        at = points.wavelength_nm
-        brdf, error = (
-            table.lookup(*points.angles, at, with_error=True)
-            if options.error
-            else (table.lookup(*points.angles, at), None)
-        )
-        theta_i = points.angles[0]
-        if isinstance(theta_i, float) and theta_i <= HALF_PI:  # checks of arrays take longer than the lookup of a point
-            return Values(brdf, error, table.specular_reflectance_of_one(theta_i, at))
-        return Values(brdf, error, table.specular_reflectance(theta_i, at))
+            source = material_of(table)
+        if options.error:
+            brdf, error = table.lookup(*points.angles, at, with_error=True)
+        else:
+            brdf, error = source.lookup(*points.angles, at), None
+        return Values(brdf, error, source.specular_reflectance(theta_i, at) if specular else None)
+    except ValueError as error:
+        refusal = _refusal(error)
+        if refusal is None:
+            raise
+        raise refusal from error
 
 
-def _coloured(points: Points, options: Options, table: Table) -> Values:
+def _coloured(points: Points, options: Options, table: Table, *, specular: bool) -> Values:
     from brdfdb_api.colours import coloured, weights
 
     assert options.output != "spectrum"
@@ -232,12 +234,20 @@ def _coloured(points: Points, options: Options, table: Table) -> Values:
     if grey and points.wavelength_nm is not None:
         raise RequestError(422, "wavelength_nm: a colour of a grey material has no wavelengths", "wavelength_nm")
     of = weights(options.output, None if grey else np.atleast_1d(cast(Any, wavelengths)), options.illuminant)
-    spectra = evaluate(points, replace(options, output="spectrum"), table)
+    spectra = evaluate(points, replace(options, output="spectrum"), table, specular=specular)
     return Values(
         coloured(spectra.brdf, of, grey=grey),
         None if spectra.error is None else coloured(spectra.error, np.abs(of), grey=grey),
-        coloured(spectra.specular_reflectance, of, grey=grey),
+        coloured(spectra.specular_reflectance, of, grey=grey) if specular else None,
     )
+
+
+def _refusal(error: ValueError) -> RequestError | None:
+    """The answer (422) to a ValueError of the library that starts with the name of a parameter; None to any other."""
+    name = str(error).partition(":")[0]
+    if name == "with_error":
+        return RequestError(422, f"error{str(error)[len(name) :]}", "error")
+    return RequestError(422, str(error), name) if name in (*FIELDS, "illuminant") else None
 
 
 def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list[str]]:
@@ -277,20 +287,6 @@ def refuse_unknown(name: str, allowed: tuple[str, ...]) -> None:
 def shortened(text: str) -> str:
     """What a client wrote, to be repeated to it: 40 characters at most, none of which is special."""
     return text.encode("ascii", "backslashreplace").decode()[:40]
-
-
-@contextmanager
-def _refused() -> Iterator[None]:
-    """Turn a ValueError of the library that starts with the name of a parameter into a RequestError (422)."""
-    try:
-        yield
-    except ValueError as error:
-        name = str(error).partition(":")[0]
-        if name == "with_error":
-            raise RequestError(422, f"error{str(error)[len(name) :]}", "error") from error
-        if name not in (*FIELDS, "illuminant"):
-            raise
-        raise RequestError(422, str(error), name) from error
 
 
 def _one_of(query: Mapping[str, str], name: str, allowed: tuple[str, ...], default: str) -> str:
@@ -343,24 +339,27 @@ def _npy(body: bytes) -> NDArray[Any]:
 def _numbers(name: str, value: Any) -> NDArray[np.float64]:
     """A JSON number or nested lists of them as a float64 array: not empty, all finite."""
     try:
-        array = np.asarray(value)
-    except ValueError:
+        types = _types(value)
+        array = np.array(value, np.float64) if types <= {int, float} else None  # numpy alone would read true as 1
+    except (ValueError, RecursionError):
         raise RequestError(422, f"{name}: the lists have unequal lengths or are nested too deep", name) from None
+    except OverflowError:
+        array = None
+    if array is None:
+        raise RequestError(422, f"{name}: not a number or a list of numbers", name)
     if array.size == 0:
         raise RequestError(422, f"{name}: an empty list", name)
-    if array.dtype.kind not in "iuf" or bool in _types(value):
-        raise RequestError(422, f"{name}: not a number or a list of numbers", name)
     if not np.all(finite := np.isfinite(array)):
         raise RequestError(422, f"{name}: {array[~finite][0]} is not a finite number", name)
-    return array.astype(np.float64)
+    return array
 
 
 def _types(value: Any) -> set[type]:
-    """The types of the leaves of nested lists. numpy alone would read true as 1."""
-    if not isinstance(value, list):
+    """The types of the leaves of nested lists."""
+    if type(value) is not list:
         return {type(value)}
     types = set(map(type, value))
-    return types.union(*map(_types, value)) if list in types else types
+    return types.union(*map(_types, value)) - {list} if list in types else types
 
 
 def _wavelengths(value: Any) -> float | NDArray[np.float64] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 from collections.abc import Sequence
 from http import HTTPStatus
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 PROBLEM_JSON = "application/problem+json"
 NPY = "application/x-npy"
+JSON = "application/json"
+REVISION = "Brdfdb-Revision"  # header: which revision the numbers of a lookup are of
 
 # The phrases of RFC 9110; those of http.HTTPStatus change from one Python to the next.
 TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
@@ -203,17 +206,45 @@ class Audit(BaseModel):
     )
 
 
+def json_bytes(document: dict[str, Any]) -> bytes:
+    """JSON; numpy arrays may stand anywhere in `document` except as 0-d arrays."""
+    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
 def json_response(document: dict[str, Any], headers: dict[str, str] | None = None) -> Response:
-    """A JSON answer; numpy arrays may stand anywhere in `document` except as 0-d arrays."""
-    content = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
-    return Response(content, media_type="application/json", headers=headers)
+    """A JSON answer, of what `json_bytes` takes."""
+    return Response(json_bytes(document), media_type=JSON, headers=headers)
 
 
-def npy_response(array: NDArray[Any], headers: dict[str, str] | None = None) -> Response:
-    """An array as the bytes of a .npy file."""
+def npy_bytes(array: NDArray[Any]) -> bytes:
+    """An array as a .npy file."""
     buffer = io.BytesIO()
     np.save(buffer, array, allow_pickle=False)
-    return Response(buffer.getvalue(), media_type=NPY, headers=headers)
+    return buffer.getvalue()
+
+
+class Encoded(dict[str, str]):
+    """Headers that many answers have in common, encoded once: it takes as long as the lookup of a point."""
+
+    @functools.cached_property
+    def raw(self) -> list[tuple[bytes, bytes]]:
+        """As they are sent."""
+        return [(name.lower().encode("latin-1"), value.encode("latin-1")) for name, value in self.items()]
+
+
+class EncodedResponse(Response):
+    """An answer with such headers, which name its media type, too."""
+
+    def __init__(self, content: bytes, headers: Encoded) -> None:
+        self.status_code, self.background, self.body = 200, None, content
+        self.raw_headers = [*headers.raw, (b"content-length", str(len(content)).encode())]
+
+
+@functools.lru_cache(maxsize=1024)
+def lookup_headers(tag: str | None, revision: str, kind: str, *, immutable: bool = False) -> Encoded:
+    """Of the answer to a lookup: by its tag, or None of what is not to be kept; which revision the numbers are of."""
+    cached = {"Cache-Control": "no-store"} if tag is None else cache_headers(tag, kind, immutable=immutable)
+    return Encoded({**cached, REVISION: revision, "Content-Type": NPY if kind == "npy" else JSON})
 
 
 def problem_response(
@@ -239,7 +270,9 @@ def problem_response(
 
 def plain(array: Any) -> Any:
     """What orjson can write: a number for a 0-d array, contiguous memory for any other."""
-    return np.asarray(array).item() if np.ndim(array) == 0 else np.ascontiguousarray(array)
+    if isinstance(array, np.ndarray):
+        return np.ascontiguousarray(array) if array.ndim else array.item()
+    return array
 
 
 def tag_of(table: Table) -> str:

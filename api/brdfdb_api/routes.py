@@ -22,14 +22,18 @@ from brdfdb_api.responses import (
     NPY,
     Alive,
     Catalogue,
+    Encoded,
+    EncodedResponse,
     Health,
     Lookup,
     Material,
     RequestError,
     cache_headers,
+    json_bytes,
     json_response,
+    lookup_headers,
     not_modified,
-    npy_response,
+    npy_bytes,
     plain,
     tag_of,
 )
@@ -40,14 +44,14 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-INLINE_VALUES = 500  # looking up more numbers happens in a thread, so that the event loop serves others meanwhile
-INLINE_BYTES = 32 * 2**10  # the same for reading a body; 500 points are about this long
+INLINE_VALUES = 1000  # looking up more numbers happens in a thread, so that the event loop serves others meanwhile
+INLINE_BYTES = 96 * 2**10  # the same for reading a body; 1000 points are at most about this long
 # Larger bodies, or answers of more values, are worked on so many at a time
 LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 8
 JSON_BYTES = 8 * 2**20  # of a JSON body: numbers in lists take twenty times as much memory as text
 LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points, and numbers, in one answer, as multiples of max_points
-REVISION = "Brdfdb-Revision"  # header: which revision the numbers of a lookup are of
 PAGE, MOST = 100, 1000  # materials on a page
+_ALLOWED = (*FIELDS, *OPTIONS)  # in the query of a lookup
 SEARCHED = ("name", "title", "model", "model_title", "paper", "source")
 
 router = APIRouter()
@@ -238,16 +242,16 @@ async def lookup_point(request: Request, name: str, revision: str | None = None)
 
 async def answer_point(scope: Scope, name: str, revision: str | None) -> Response:
     """Answer GET of a lookup, from the query as it came."""
-    query, wavelengths = parsed(scope["query_string"], (*FIELDS, *OPTIONS))
+    query, wavelengths = parsed(scope["query_string"], _ALLOWED)
     options, points = Options.from_query(query), Points.from_query(query, wavelengths)
     accept, held = _headers(scope)
-    settings = scope["app"].state.settings
-    table = await _table(scope["app"].state.shelf, name, revision)
+    state = scope["app"].state
+    table = await _table(state.shelf, name, revision)
     kind = options.format or ("npy" if NPY in accept else "json")
-    headers = {**cache_headers(tag_of(table), kind, immutable=revision is not None), REVISION: table.revision}
+    headers = lookup_headers(tag_of(table), table.revision, kind, immutable=revision is not None)
     if held and (unchanged := not_modified(held, headers)):
         return unchanged
-    values = checked_size(settings.max_points, points, table, kind)
+    values = checked_size(state.settings.max_points, points, table, kind)
     in_thread = slow(values, options)
     return await run(write_answer, points, options, table, kind, headers, in_thread=in_thread)
 
@@ -289,7 +293,7 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
     kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
     table = await _table(shelf_of(request), name, revision)
-    headers = {"Cache-Control": "no-store", REVISION: table.revision}
+    headers = lookup_headers(None, table.revision, kind)
     max_points = request.app.state.settings.max_points
 
     def points_of(body: bytes) -> tuple[Points, int]:
@@ -313,7 +317,7 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
 
 
 async def run(function: Callable[..., T], *args: Any, in_thread: bool) -> T:
-    """Call `function`, in a thread where that pays: it costs about as long as 500 values do."""
+    """Call `function`, in a thread where that pays: it costs about as long as 1000 values do."""
     return await run_in_threadpool(function, *args) if in_thread else function(*args)
 
 
@@ -324,7 +328,8 @@ def slow(values: int, options: Options) -> bool:
 
 def checked_size(max_points: int, points: Points, table: Table, kind: str) -> int:
     """How many numbers are looked up; a RequestError (413) where they are too many for one answer."""
-    most_points, most_values = (factor * max_points for factor in LIMITS[kind])
+    most_points, most_values = LIMITS[kind]
+    most_points, most_values = most_points * max_points, most_values * max_points
     if points.count > most_points:
         raise RequestError(
             413, f"{points.count} points are more than the {most_points} that one {kind} answer may hold"
@@ -335,12 +340,13 @@ def checked_size(max_points: int, points: Points, table: Table, kind: str) -> in
     return values
 
 
-def write_answer(points: Points, options: Options, table: Table, kind: str, headers: dict[str, str]) -> Response:
+def write_answer(points: Points, options: Options, table: Table, kind: str, headers: Encoded) -> Response:
     """Look the points up and write them as `kind`."""
-    edge.POINTS.labels(options.source).inc(points.count)
-    found = evaluate(points, options, table)
+    edge.points_counted(options.source, points.count)
+    found = evaluate(points, options, table, specular=kind == "json")
     if kind == "npy":
-        return npy_response(found.brdf if found.error is None else np.stack([found.brdf, found.error]), headers)
+        content = npy_bytes(found.brdf if found.error is None else np.stack([found.brdf, found.error]))
+        return EncodedResponse(content, headers)
     document = {
         "material": table.name,
         "revision": table.revision,
@@ -353,4 +359,4 @@ def write_answer(points: Points, options: Options, table: Table, kind: str, head
         "error": None if found.error is None else plain(found.error),
         "specular_reflectance": plain(found.specular_reflectance),
     }
-    return json_response(document, headers)
+    return EncodedResponse(json_bytes(document), headers)

@@ -17,15 +17,17 @@ from brdfdb.geometry import radians
 from brdfdb_api.documented import LOBE_NPY_ANSWER, LOBE_OPTIONS, WAVELENGTHS, answers
 from brdfdb_api.lookups import Options, Points, evaluate, parsed
 from brdfdb_api.responses import (
+    JSON,
     NPY,
     Albedo,
     Audit,
     Lobe,
     RequestError,
     cache_headers,
+    json_bytes,
     json_response,
     not_modified,
-    npy_response,
+    npy_bytes,
     plain,
     tag_of,
 )
@@ -70,7 +72,7 @@ def albedo(request: Request, name: str, revision: str | None = None) -> Response
     document = _ALBEDOS.get(table)
     if document is None:
         document = _ALBEDOS[table] = _albedo(table)
-    return Response(document, media_type="application/json", headers=headers)
+    return Response(document, media_type=JSON, headers=headers)
 
 
 def _albedo(table: Table) -> bytes:
@@ -81,19 +83,17 @@ def _albedo(table: Table) -> bytes:
     diffuse = found.mean
     specular = np.asarray(table.specular_reflectance(radians(found.theta_i_deg))).reshape(diffuse.shape[0], -1)
     specular = np.broadcast_to(specular, diffuse.shape)
-    return bytes(
-        json_response(
-            {
-                "material": table.name,
-                "revision": table.revision,
-                "wavelength_nm": table.wavelength_nm,
-                "theta_i": np.ascontiguousarray(found.theta_i_deg),
-                "albedo": np.ascontiguousarray(diffuse),
-                "specular_reflectance": np.ascontiguousarray(specular),
-                "hemispherical": hemispherical_albedo(found.theta_i_deg, diffuse + specular),
-                "error": float(found.error.max()),
-            }
-        ).body
+    return json_bytes(
+        {
+            "material": table.name,
+            "revision": table.revision,
+            "wavelength_nm": table.wavelength_nm,
+            "theta_i": np.ascontiguousarray(found.theta_i_deg),
+            "albedo": np.ascontiguousarray(diffuse),
+            "specular_reflectance": np.ascontiguousarray(specular),
+            "hemispherical": hemispherical_albedo(found.theta_i_deg, diffuse + specular),
+            "error": float(found.error.max()),
+        }
     )
 
 
@@ -130,7 +130,7 @@ def lobe(
     checked_size(max(request.app.state.settings.max_points, _POINTS), points, table, kind)
     found = evaluate(points, options, table)
     if kind == "npy":
-        return npy_response(found.brdf, headers)
+        return Response(npy_bytes(found.brdf), media_type=NPY, headers=headers)
     document = {
         "material": table.name,
         "revision": table.revision,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-import logging
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -107,46 +107,54 @@ def test_a_server_is_ready_when_its_kernels_are_loaded(client: Client) -> None:
     assert client.get("/readyz").json() == {"status": "ok", "materials": 4}
 
 
+Log = Callable[[], list[dict[str, Any]]]
+
+
 @pytest.fixture
-def log(caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
-    caplog.set_level(logging.INFO, "brdfdb.http")
-    return caplog
+def log(capfd: pytest.CaptureFixture[str]) -> Log:
+    """The lines of the log since it was read last."""
+    return lambda: [json.loads(line) for line in capfd.readouterr().err.splitlines()]
 
 
-@pytest.mark.parametrize(
-    ("address", "status", "level"),
-    [(POINT, 200, "INFO"), (FELT, 200, "INFO"), ("/nothing", 404, "WARNING"), (f"{FELT}/lookup", 422, "WARNING")],
-)
-def test_the_log_has_a_line_of_json_for_each_request(
-    client: Client, log: pytest.LogCaptureFixture, address: str, status: int, level: str
-) -> None:
+REQUESTS = [(POINT, 200), (FELT, 200), ("/nothing", 404), (f"{FELT}/lookup", 422)]
+
+
+@pytest.mark.parametrize(("address", "status"), REQUESTS)
+def test_the_log_has_a_line_of_json_for_each_request(client: Client, log: Log, address: str, status: int) -> None:
     client.get(address, headers={"X-Request-ID": "mine"})
-    (record,) = [record for record in log.records if record.name == "brdfdb.http"]
-    assert record.levelname == level
-    line = json.loads(record.message)
+    (line,) = log()
     path, _, query = address.partition("?")
     told = {"request": "mine", "method": "GET", "path": path, "query": query, "status": status}
     assert {key: line[key] for key in told} == told
     assert line["ms"] > 0.0
 
 
+@pytest.mark.parametrize(("level", "logged"), [("info", [200, 200, 404, 422]), ("warning", [404, 422]), ("error", [])])
+def test_the_log_may_be_of_refusals_or_failures_alone(root: Path, log: Log, level: str, logged: list[int]) -> None:
+    client = client_of(root, log_level=level)
+    for address, _ in REQUESTS:
+        client.get(address)
+    assert [line["status"] for line in log()] == logged
+
+
+@pytest.mark.parametrize("address", [POINT, FELT])
 def test_a_failure_is_in_the_log_and_not_in_the_answer(
-    client: Client, log: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    client: Client, log: Log, monkeypatch: pytest.MonkeyPatch, address: str
 ) -> None:
     def fail(*_: Any) -> Any:
         raise RuntimeError("secret")
 
     monkeypatch.setattr("brdfdb_api.shelf.Shelf.held", fail)
-    assert "secret" not in client.problem("GET", POINT, 500, headers={"X-Request-ID": "mine"})["detail"]
-    written = [logging.Formatter().format(record) for record in log.records if record.name == "brdfdb.http"]
-    failed, answered = map(json.loads, written)  # a line each, the traceback included
+    monkeypatch.setattr("brdfdb_api.shelf.Shelf.table", fail)
+    assert "secret" not in client.problem("GET", address, 500, headers={"X-Request-ID": "mine"})["detail"]
+    failed, answered = log()  # a line each, the traceback included
     assert (failed["request"], failed["failed"]) == ("mine", "RuntimeError: secret")
     assert failed["traceback"].startswith("Traceback")
     assert "in fail\n" in failed["traceback"]
     assert (answered["request"], answered["status"]) == ("mine", 500)
 
 
-def test_a_client_that_goes_away_is_no_failure(client: Client, log: pytest.LogCaptureFixture) -> None:
+def test_a_client_that_goes_away_is_no_failure(client: Client, log: Log) -> None:
     sent = []
 
     async def gone() -> Any:
@@ -157,10 +165,11 @@ def test_a_client_that_goes_away_is_no_failure(client: Client, log: pytest.LogCa
 
     line = 'brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="499"}'
     before = counted(client, line)
+    log()
     scope = {"type": "http", "http_version": "1.1", "method": "POST", "path": f"{FELT}/lookup", "query_string": b""}
     asyncio.run(client.app({**scope, "headers": []}, gone, send))
     assert sent == []
-    assert json.loads(log.records[-1].message)["status"] == 499
+    assert [each["status"] for each in log()] == [499]
     assert counted(client, line) - before == 1
 
 

@@ -6,6 +6,7 @@ import json
 import math
 import threading
 from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from brdfdb.lookup import Table
 from brdfdb.store import Store
 from brdfdb_api.app import create_app
 from brdfdb_api.settings import Settings
-from tests.api.a_store import VISIBLE_NM, Client, degrees, read_npy
+from tests.api.a_store import VISIBLE_NM, Client, client_of, degrees, read_npy
 
 FOIL = "/v1/materials/copper-foil/lookup"
 FELT = "/v1/materials/grey-felt/lookup"
@@ -135,9 +136,9 @@ def test_format_wins_over_accept(client: Client) -> None:
     assert answer.headers["content-type"] == "application/json"
 
 
-@pytest.mark.parametrize(("points", "in_main_thread"), [(500, True), (501, False)])
+@pytest.mark.parametrize(("points", "in_main_thread"), [(1000, True), (1001, False)])
 def test_many_values_are_looked_up_in_a_thread(
-    client: Client, points: int, in_main_thread: bool, monkeypatch: pytest.MonkeyPatch
+    root: Path, points: int, in_main_thread: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     threads = []
     lookup = Table.lookup
@@ -147,15 +148,15 @@ def test_many_values_are_looked_up_in_a_thread(
         return lookup(*args, **keywords)
 
     monkeypatch.setattr(Table, "lookup", watched)
-    assert client.post(FELT, json={"theta_i": [1] * points, "theta_r": 2}).status_code == 200
+    assert client_of(root).post(FELT, json={"theta_i": [1] * points, "theta_r": 2}).status_code == 200
     assert [thread is threading.main_thread() for thread in threads] == [in_main_thread]
 
 
-def test_a_long_body(client: Client, store: Store) -> None:
-    angles = np.linspace(0, 90, 1000)
+def test_a_long_body(root: Path, store: Store) -> None:
+    angles = np.linspace(0, 90, 2000)
     fields = dict.fromkeys(("theta_i", "phi_i", "theta_r", "phi_r"), angles.tolist())
     expected = degrees(store, "grey-felt", angles, angles, angles, angles)
-    np.testing.assert_allclose(client.post(FELT, json=fields).json()["brdf"], expected, **EXACT)
+    np.testing.assert_allclose(client_of(root).post(FELT, json=fields).json()["brdf"], expected, **EXACT)
 
 
 # Wrong questions
