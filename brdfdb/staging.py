@@ -127,7 +127,7 @@ class Lock:
             self.path.parent.mkdir(exist_ok=True)
             handle = self.path.open("ab")
         except (FileNotFoundError, FileExistsError):  # its holder took the directory away, maybe between two calls
-            if self.path.parent.exists() and not self.path.parent.is_dir():
+            if self.path.parent.is_file():  # one look: between two the directory may go
                 raise
             return None
         try:
