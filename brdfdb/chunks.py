@@ -1,12 +1,10 @@
-"""The zarr side of the store: which codecs, a block as the bytes of its chunk, and chunks that went missing."""
+"""The zarr side of the store: which codecs, and a block as the bytes of its chunk."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
 from functools import lru_cache
-from pathlib import Path
-from typing import Any
 
 import google_crc32c
 import numpy as np
@@ -16,10 +14,10 @@ from numcodecs import Blosc
 from numpy.typing import NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.core.buffer import Buffer
-from zarr.storage import LocalStore, MemoryStore
+from zarr.storage import MemoryStore
 
 from brdfdb.layout import Layout
-from brdfdb.manifest import StoreError, manifest_of
+from brdfdb.manifest import StoreError
 from brdfdb.tabulate import VARIABLES
 
 _CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset that comes as a whole, 4 MB
@@ -27,32 +25,6 @@ _CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset that comes as a whole,
 # crc32c last: without it nearly every flipped bit reads back as a plausible number
 COMPRESSORS = (BloscCodec(cname="zstd", clevel=1, shuffle="shuffle"), Crc32cCodec())
 _BLOSC = Blosc(cname="zstd", clevel=1, shuffle=Blosc.SHUFFLE)
-
-
-class Whole(LocalStore):
-    """A revision as zarr reads it, but that a file of it that goes missing is an error and not nan.
-
-    Parameters
-    ----------
-    group : Path
-        Directory of the revision.
-    files : mapping
-        By the path of each file that belongs there.
-    """
-
-    def __init__(self, group: Path, files: Mapping[str, Any]) -> None:
-        super().__init__(group, read_only=True)
-        self._files = frozenset(files)
-
-    async def get(self, key: str, *arguments: Any, **keywords: Any) -> Buffer | None:
-        """As `LocalStore.get`; StoreError for a file that should be there."""
-        value = await super().get(key, *arguments, **keywords)
-        if value is None and key in self._files:
-            where = f"{self.root.parent.name} {self.root.name}"
-            if not manifest_of(self.root).is_file():
-                raise StoreError(f"{where} was removed while it was read; open the material anew")
-            raise StoreError(f"{where} is damaged: {key} is missing")
-        return value
 
 
 def chunk_name(layout: Layout, number: int) -> str:

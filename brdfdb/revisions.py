@@ -152,7 +152,7 @@ def verify(root: Path, name: str) -> int:
     """
     import zarr
 
-    from brdfdb.chunks import Whole
+    from brdfdb.whole import Whole
 
     group, manifest_sha256 = Store(root).location(name)
     where = f"{name} {group.name}"

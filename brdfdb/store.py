@@ -28,9 +28,9 @@ from brdfdb.manifest import Head, StoreError, check_manifest, json_object, manif
 if TYPE_CHECKING:
     import xarray as xr
 
-    from brdfdb.chunks import Whole
     from brdfdb.family import Family
     from brdfdb.lookup import Table
+    from brdfdb.whole import Whole
 
 __all__ = [
     "FORMAT",
@@ -188,7 +188,7 @@ class Store(Mapping[str, "Table"]):
         key = name, digest
         if (held := self._used(key)) is not None:
             return held
-        from brdfdb.chunks import Whole  # loads zarr
+        from brdfdb.whole import Whole  # loads zarr
 
         with self._decoding:  # who asks for the same table meanwhile waits for it
             if (held := self._used(key)) is not None:
@@ -288,8 +288,8 @@ class Store(Mapping[str, "Table"]):
         """
         import xarray as xr
 
-        from brdfdb.chunks import Whole
         from brdfdb.rebuilt import with_brdf
+        from brdfdb.whole import Whole
 
         group, digest = self.location(name)
         files = check_manifest(group, digest, contents=False)["files"]
