@@ -6,13 +6,15 @@ import http.client
 import io
 import json
 import os
+import re
 import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, cast, overload
-from urllib.parse import quote, urlencode, urlsplit
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, overload
+from urllib.parse import quote, urlencode, urlsplit, urlunsplit
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,14 +32,14 @@ TIMEOUT_S = 60.0  # for each step of an exchange: to connect, to send, to receiv
 NPY = "application/x-npy"
 JSON = "application/json"
 
-# Of one request, within what a service takes unless it was told otherwise: 413 halves them
-_NPY_POINTS, _NPY_VALUES = 250_000, 2_000_000
+# Of one request, within what services and proxies take unless they were told otherwise: 413 halves them
+_NPY_POINTS, _NPY_VALUES = 32_000, 2_000_000  # bodies of 1.02 MB, of which nginx takes 1.05; larger ones are no faster
 _JSON_POINTS, _JSON_VALUES = 10_000, 200_000
-_WAVELENGTHS = 1000  # stand in the address, which servers cut at 64 kB
+_WAVELENGTHS = 200  # stand in the address, 33 bytes each; nginx cuts it at 8 kB
 
 
-class _TooLargeError(Exception):
-    """More than the service takes at once; str() is its sentence."""
+class _TooLargeError(StoreError):
+    """More than the service, or a proxy before it, takes at once."""
 
 
 class Service:
@@ -53,19 +55,25 @@ class Service:
     Raises
     ------
     ValueError
-        If `url` is not such an address.
+        If `url` is not such an address, or `timeout_s` out of range.
     """
 
     def __init__(self, url: str, timeout_s: float = TIMEOUT_S) -> None:
         try:
             split = urlsplit(url)
-            host, self._port = split.hostname, split.port
+            host, port = split.hostname, split.port
         except ValueError as error:
             raise ValueError(f"url: {url!r} is not an address: {error}") from None
-        if split.scheme not in ("http", "https") or not host or split.query or split.fragment:
+        if split.scheme not in ("http", "https") or not host or "@" in split.netloc or split.query or split.fragment:
             raise ValueError(f"url: {url!r} is not an address such as http://127.0.0.1:8000")
-        self.url, self.timeout_s = url.rstrip("/"), timeout_s
-        self._host, self._secure, self._path = host, split.scheme == "https", split.path.rstrip("/")
+        if not re.fullmatch("[!-~]+", url):
+            raise ValueError(f"url: {url!r} is not an address: it has characters other than those of ASCII, or spaces")
+        if not 0.0 < timeout_s <= threading.TIMEOUT_MAX:
+            raise ValueError(f"timeout_s: {timeout_s:g} is outside (0, {threading.TIMEOUT_MAX:g}] s")
+        self._path, self.timeout_s = split.path.rstrip("/"), timeout_s
+        self.url = urlunsplit((split.scheme, split.netloc, self._path, "", ""))
+        self._kind = http.client.HTTPSConnection if split.scheme == "https" else http.client.HTTPConnection
+        self._host, self._port = host, port or self._kind.default_port  # without one, ::1 is read as port 1
         self._local = threading.local()
 
     def __reduce__(self) -> tuple[type[Service], tuple[str, float]]:
@@ -73,21 +81,32 @@ class Service:
 
     def document(self, path: str, body: Any = None) -> dict[str, Any]:
         """The JSON object at a path below the service, or its answer to a JSON body; errors as by `content`."""
+        answer = self.content(path, None if body is None else json.dumps(body).encode(), JSON)
         try:
-            found = json.loads(self.content(path, None if body is None else json.dumps(body).encode(), JSON))
-        except json.JSONDecodeError:
+            found = json.loads(answer)
+        except ValueError:
             found = None
         if not isinstance(found, dict):
-            raise StoreError(f"{self.url} is no service of brdfdb")
+            raise self.stranger()
         return found
 
-    def array(self, path: str, array: NDArray[Any] | None = None) -> NDArray[Any]:
-        """The array at a path, or what it answers to an array; errors as by `content`."""
+    def array(self, path: str, shape: tuple[int, ...], points: NDArray[Any] | None = None) -> NDArray[np.float64]:
+        """An array of `shape`: what is at a path, or its answer to an array of points; errors as by `content`."""
         buffer = io.BytesIO()
-        if array is not None:
-            np.save(buffer, array, allow_pickle=False)
-        answer = self.content(path, None if array is None else buffer.getvalue(), NPY)
-        return cast(NDArray[Any], np.load(io.BytesIO(answer), allow_pickle=False))
+        if points is not None:
+            np.save(buffer, points, allow_pickle=False)
+        answer = self.content(path, None if points is None else buffer.getvalue(), NPY)
+        try:
+            found = np.lib.format.read_array(io.BytesIO(answer), allow_pickle=False)
+        except Exception:  # a header is Python text: what reading it raises is of many kinds
+            raise self.stranger() from None
+        if found.shape != shape or found.dtype != np.float64:
+            raise self.stranger()
+        return found
+
+    def stranger(self) -> StoreError:
+        """What to raise where something else answers, such as the page of a network that wants one to log in."""
+        return StoreError(f"{self.url} is no service of brdfdb")
 
     def content(self, path: str, body: bytes | None, media: str) -> bytes:
         """The bytes of an answer.
@@ -99,50 +118,56 @@ class Service:
         UnknownMaterialError, UnknownRevisionError, ValueError
             As the store itself raises them.
         """
-        status, answer = self._answer(path, body, media)
+        response, answer = self._answer(path, body, media)
+        status, location = response.status, response.getheader("Location")
         if status == 200:
             return answer
+        if 300 <= status < 400 and location is not None:
+            asked, there = (address.partition("?")[0] for address in (path, location))
+            raise StoreError(f"{self.url} redirects {asked} to {there}; open the address that the service itself has")
         try:
             problem = json.loads(answer)
             detail = str(problem["detail"])
-        except (ValueError, TypeError, KeyError):
-            raise StoreError(f"{self.url} answered {status}, and does not say why") from None
+        except (ValueError, TypeError, KeyError):  # the page of a proxy
+            problem, detail = {}, ""
         if status == 404 and "closest" in problem:
             raise UnknownMaterialError(path.split("/")[3], problem["closest"])
         if status == 404 and problem.get("parameter") == "revision":
             raise UnknownRevisionError(detail)
-        if status == 413:
-            raise _TooLargeError(detail)
-        if status == 422:
+        if status == 422 and detail:
             raise ValueError(detail)
-        raise StoreError(detail if status == 503 else f"{self.url} answered {status}: {detail}")
+        if status == 503 and detail:
+            raise StoreError(detail)
+        why = f": {detail}" if detail else ", and does not say why"
+        said = f"{self.url} answered {status} {response.reason}".rstrip() + why
+        raise _TooLargeError(said) if status == 413 else StoreError(said)
 
-    def _answer(self, path: str, body: bytes | None, media: str) -> tuple[int, bytes]:
+    def _answer(self, path: str, body: bytes | None, media: str) -> tuple[http.client.HTTPResponse, bytes]:
+        """An answer that is whole, and its bytes."""
         headers = {"Accept": media} if body is None else {"Accept": media, "Content-Type": media}
-        connection, kept = self._connection()
-        while True:
-            try:
-                connection.request("GET" if body is None else "POST", self._path + path, body, headers)
-                response = connection.getresponse()
-                return response.status, response.read()
-            except (OSError, http.client.HTTPException) as error:
-                connection.close()
-                if kept and isinstance(error, ConnectionError):
-                    kept = False  # the server closed it in between: once more, on a new one
-                    continue
-                why = getattr(error, "strerror", None) or str(error) or type(error).__name__
-                raise StoreError(f"no answer from {self.url}: {why}") from error
-            except BaseException:
-                connection.close()  # what is left of this answer is not that of the next request
-                raise
+        request = ("GET" if body is None else "POST", self._path + path, body, headers)
+        connection = self._connection()
+        try:
+            if connection.sock is not None:
+                with suppress(ConnectionError):
+                    return _exchange(connection, *request)
+                connection.close()  # the server had closed it in between: once more, on a new one
+            connection.connect()
+            return _exchange(connection, *request)
+        except (OSError, UnicodeError, http.client.HTTPException) as error:
+            connection.close()
+            why = getattr(error, "strerror", None) or str(error).strip() or type(error).__name__
+            raise StoreError(f"no answer from {self.url}: {why}") from error
+        except BaseException:
+            connection.close()  # what is left of this answer is not that of the next request
+            raise
 
-    def _connection(self) -> tuple[http.client.HTTPConnection, bool]:
-        """The connection of this thread, and whether it is open; a forked process does not share that of its parent."""
+    def _connection(self) -> http.client.HTTPConnection:
+        """The connection of this thread, open or not; a forked process does not share that of its parent."""
         held: _Held | None = getattr(self._local, "held", None)
         if held is None or held.process != os.getpid():
-            kind = http.client.HTTPSConnection if self._secure else http.client.HTTPConnection
-            held = self._local.held = _Held(kind(self._host, self._port, timeout=self.timeout_s))
-        return held.connection, held.connection.sock is not None
+            held = self._local.held = _Held(self._kind(self._host, self._port, timeout=self.timeout_s))
+        return held.connection
 
 
 class _Held:
@@ -152,6 +177,21 @@ class _Held:
         self.connection, self.process = connection, os.getpid()
         # not __del__: in a cycle the socket may be collected first, and warn
         weakref.finalize(self, connection.close)
+
+
+def _exchange(
+    connection: http.client.HTTPConnection, method: str, address: str, body: bytes | None, headers: Mapping[str, str]
+) -> tuple[http.client.HTTPResponse, bytes]:
+    """Send a request on an open connection, and read all of its answer."""
+    sent = False
+    with suppress(OSError):  # who refuses a body may answer, and close, before all of it is sent
+        connection.request(method, address, body, headers)
+        sent = True
+    response = connection.getresponse()
+    answer = response.read()
+    if not sent:
+        connection.close()  # the rest of this body is not the next request
+    return response, answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,14 +328,15 @@ class RemoteTable(Described):
         if values.size:
             at = [] if wavelength_nm is None else np.ravel(np.asarray(wavelength_nm, dtype=np.float64)).tolist()
             query = [("format", "npy"), *(("wavelength_nm", one) for one in at)]
+            axes = () if len(at) == 1 else tail  # an address cannot tell a list of one from a number
 
             def ask(part: slice) -> Any:
                 points = np.stack([angle[part] for angle in flat], axis=-1)
                 if len(points) > 1:
-                    return self._service.array(f"{self._path}?{urlencode(query)}", points)
+                    return self._service.array(f"{self._path}?{urlencode(query)}", (len(points), *axes), points)
                 # a service answers one point fastest if it stands in the address
                 point = zip(("theta_i", "phi_i", "theta_r", "phi_r"), points[0].tolist(), strict=True)
-                return self._service.array(f"{self._path}?{urlencode([*query, *point])}")
+                return self._service.array(f"{self._path}?{urlencode([*query, *point])}", axes)
 
             _in_parts(ask, values, min(_NPY_POINTS, max(1, _NPY_VALUES // count)))
         return finished(values.reshape(shape + tail), given, trailing=len(tail))
@@ -314,7 +355,7 @@ class RemoteStore(Mapping[str, RemoteTable]):
     Raises
     ------
     ValueError
-        If `url` is not an address.
+        If `url` is not an address, or `timeout_s` out of range.
     StoreError
         If no service answers there, or it cannot read its store; later the same.
     """
@@ -328,10 +369,15 @@ class RemoteStore(Mapping[str, RemoteTable]):
         return iter([line["name"] for line in self._lines()])
 
     def __len__(self) -> int:
-        return int(self._service.document("/readyz")["materials"])
+        count = self._service.document("/readyz").get("materials")
+        if not isinstance(count, int):
+            raise self._service.stranger()
+        return count
 
     def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and any(line["name"] == name for line in self._lines(name))
+        if not isinstance(name, str) or not NAME.fullmatch(name):
+            return False
+        return any(line["name"] == name for line in self._lines(name))
 
     def __getitem__(self, name: str) -> RemoteTable:
         return self._table(self._material(name))
@@ -364,7 +410,7 @@ class RemoteStore(Mapping[str, RemoteTable]):
         UnknownMaterialError
             If the store has no such material.
         """
-        for line in self._lines(name):
+        for line in self._lines(name) if NAME.fullmatch(name) else ():
             if line["name"] == name:
                 return line
         raise UnknownMaterialError(name, list(self))
@@ -438,12 +484,12 @@ def _in_parts(ask: Callable[[slice], Any], values: NDArray[np.float64], step: in
     """Fill the rows of `values` with what `ask` answers, `step` rows at a time, or fewer if the service wants it."""
     start = 0
     while start < len(values):
-        part = slice(start, start + step)
+        rows = values[start : start + step]
         try:
-            values[part] = np.reshape(ask(part), values[part].shape)
-        except _TooLargeError as error:
-            if step == 1:
-                raise ValueError(f"wavelength_nm: too many for the service: {error}") from error
-            step = max(1, min(step, len(values)) // 2)
+            rows[:] = np.reshape(ask(slice(start, start + step)), rows.shape)
+        except _TooLargeError:
+            if len(rows) == 1:
+                raise
+            step = len(rows) // 2
         else:
             start += step
