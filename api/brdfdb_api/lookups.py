@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, cast, get_args
 from urllib.parse import parse_qsl
 
@@ -29,8 +29,10 @@ OPTIONS = ("from", "error", "output", "illuminant", "format")
 Source = Literal["table", "model"]
 Output = Literal["spectrum", "xyz", "linear-srgb"]
 Format = Literal["json", "npy"]
+Angles = tuple[Any, Any, Any, Any]  # theta_i, phi_i, theta_r, phi_r [rad]
 
 _TURN = 360.0  # degrees; fmod is exact, and radians have no digits left at 1e15
+_AT_ONCE = 25_000  # points whose spectra are in memory while colours are made of them
 _HEADER_BYTES = 4096  # of a .npy file: dtype and shape take a hundred
 
 
@@ -88,7 +90,7 @@ class Points:
         None is every wavelength of the table.
     """
 
-    angles: tuple[Any, Any, Any, Any]
+    angles: Angles
     shape: tuple[int, ...]
     wavelength_nm: float | NDArray[np.float64] | None
 
@@ -203,21 +205,23 @@ def evaluate(points: Points, options: Options, table: Table, *, specular: bool =
     A RequestError (422) where the table does not reach, or makes no colour.
     """
     try:
-        if options.output != "spectrum":
-            return _coloured(points, options, table, specular=specular)
-        theta_i, at = points.angles[0], points.wavelength_nm
         source: Table | Material = table
+        at = points.wavelength_nm
         if options.source == "model":
             from brdfdb.albedo import material_of
 
             at = points.wavelengths(table)
             table.specular_reflectance(0.0, at)  # no further than the table reaches
             source = material_of(table)
-        if options.error:
-            brdf, error = table.lookup(*points.angles, at, with_error=True)
-        else:
-            brdf, error = source.lookup(*points.angles, at), None
-        return Values(brdf, error, source.specular_reflectance(theta_i, at) if specular else None)
+
+        def spectra(angles: Angles) -> tuple[Any, Any]:
+            if options.error:
+                return table.lookup(*angles, at, with_error=True)
+            return source.lookup(*angles, at), None
+
+        if options.output != "spectrum":
+            return _coloured(points, options, table, source if specular else None, spectra)
+        return Values(*spectra(points.angles), source.specular_reflectance(points.angles[0], at) if specular else None)
     except ValueError as error:
         refusal = _refusal(error)
         if refusal is None:
@@ -225,7 +229,14 @@ def evaluate(points: Points, options: Options, table: Table, *, specular: bool =
         raise refusal from error
 
 
-def _coloured(points: Points, options: Options, table: Table, *, specular: bool) -> Values:
+def _coloured(
+    points: Points,
+    options: Options,
+    table: Table,
+    specular: Table | Material | None,
+    spectra: Callable[[Angles], tuple[Any, Any]],
+) -> Values:
+    """Colours of spectra, some points at a time: 41 numbers of each of a million would be 300 MB."""
     from brdfdb_api.colours import coloured, weights
 
     assert options.output != "spectrum"
@@ -234,11 +245,21 @@ def _coloured(points: Points, options: Options, table: Table, *, specular: bool)
     if grey and points.wavelength_nm is not None:
         raise RequestError(422, "wavelength_nm: a colour of a grey material has no wavelengths", "wavelength_nm")
     of = weights(options.output, None if grey else np.atleast_1d(cast(Any, wavelengths)), options.illuminant)
-    spectra = evaluate(points, replace(options, output="spectrum"), table, specular=specular)
+    flat = [np.broadcast_to(angle, points.shape).reshape(-1) for angle in points.angles]
+    brdf, error = np.empty((points.count, 3)), np.empty((points.count, 3)) if options.error else None
+    for start in range(0, points.count, _AT_ONCE):
+        rows = slice(start, start + _AT_ONCE)
+        t_i, p_i, t_r, p_r = (angle[rows] for angle in flat)
+        found, stated = spectra((t_i, p_i, t_r, p_r))
+        brdf[rows] = coloured(found, of, grey=grey)
+        if error is not None:
+            error[rows] = coloured(stated, np.abs(of), grey=grey)
+    shape = (*points.shape, 3)
+    dirac = None if specular is None else specular.specular_reflectance(points.angles[0], wavelengths)
     return Values(
-        coloured(spectra.brdf, of, grey=grey),
-        None if spectra.error is None else coloured(spectra.error, np.abs(of), grey=grey),
-        coloured(spectra.specular_reflectance, of, grey=grey) if specular else None,
+        brdf.reshape(shape),
+        None if error is None else error.reshape(shape),
+        None if dirac is None else coloured(dirac, of, grey=grey),
     )
 
 

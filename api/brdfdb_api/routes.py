@@ -49,7 +49,8 @@ INLINE_BYTES = 96 * 2**10  # the same for reading a body; 1000 points are at mos
 # Larger bodies, or answers of more values, are worked on so many at a time
 LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 8
 JSON_BYTES = 8 * 2**20  # of a JSON body: numbers in lists take twenty times as much memory as text
-LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points, and numbers, in one answer, as multiples of max_points
+LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points, and values, of one answer, as multiples of max_points
+SPECTRA_OF_COLOURS = 10  # times as many values where colours are made of them: they are not kept
 PAGE, MOST = 100, 1000  # materials on a page
 _ALLOWED = (*FIELDS, *OPTIONS)  # in the query of a lookup
 SEARCHED = ("name", "title", "model", "model_title", "paper", "source")
@@ -251,7 +252,7 @@ async def answer_point(scope: Scope, name: str, revision: str | None) -> Respons
     headers = lookup_headers(tag_of(table), table.revision, kind, immutable=revision is not None)
     if held and (unchanged := not_modified(held, headers)):
         return unchanged
-    values = checked_size(state.settings.max_points, points, table, kind)
+    values = checked_size(state.settings.max_points, points, options, table, kind)
     in_thread = slow(values, options)
     return await run(write_answer, points, options, table, kind, headers, in_thread=in_thread)
 
@@ -298,7 +299,7 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
 
     def points_of(body: bytes) -> tuple[Points, int]:
         points = Points.from_npy(body, wavelengths) if binary else Points.from_json(body)
-        return points, checked_size(max_points, points, table, kind)
+        return points, checked_size(max_points, points, options, table, kind)
 
     def answer(body: bytes) -> Response:
         return write_answer(points_of(body)[0], options, table, kind, headers)
@@ -326,7 +327,7 @@ def slow(values: int, options: Options) -> bool:
     return values > INLINE_VALUES or options.source == "model" or options.output != "spectrum"
 
 
-def checked_size(max_points: int, points: Points, table: Table, kind: str) -> int:
+def checked_size(max_points: int, points: Points, options: Options, table: Table, kind: str) -> int:
     """How many numbers are looked up; a RequestError (413) where they are too many for one answer."""
     most_points, most_values = LIMITS[kind]
     most_points, most_values = most_points * max_points, most_values * max_points
@@ -335,8 +336,10 @@ def checked_size(max_points: int, points: Points, table: Table, kind: str) -> in
             413, f"{points.count} points are more than the {most_points} that one {kind} answer may hold"
         )
     values = points.values(table)
+    if options.output != "spectrum" and options.source == "table":
+        most_values *= SPECTRA_OF_COLOURS
     if values > most_values:
-        raise RequestError(413, f"{values} values are more than the {most_values} that one {kind} answer may hold")
+        raise RequestError(413, f"{values} values are more than the {most_values} that one {kind} answer may be of")
     return values
 
 

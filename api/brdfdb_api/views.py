@@ -127,7 +127,7 @@ def lobe(
     at = Points.from_query({"theta_i": "0", "theta_r": "0"}, wavelengths).wavelength_nm
     points = Points(angles, np.broadcast_shapes(*(np.shape(angle) for angle in angles)), at)
     # points are as many as a view has; of the client are the wavelengths
-    checked_size(max(request.app.state.settings.max_points, _POINTS), points, table, kind)
+    checked_size(max(request.app.state.settings.max_points, _POINTS), points, options, table, kind)
     found = evaluate(points, options, table)
     if kind == "npy":
         return Response(npy_bytes(found.brdf), media_type=NPY, headers=headers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from brdfdb.albedo import material_of
 from brdfdb.spectra import srgb_weights, xyz_weights
 from brdfdb.store import Store
-from tests.api.a_store import NPY, VISIBLE_NM, Client, degrees, npy, read_npy
+from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, npy, read_npy
 
 FOIL, FELT, TILE, METAL = (
     f"/v1/materials/{name}/lookup" for name in ("copper-foil", "grey-felt", "white-tile", "brushed-metal")
@@ -83,6 +84,31 @@ def test_colours_of_many_points(client: Client, store: Store) -> None:
     answer = client.post(FOIL, json=body, params={"output": "xyz", "format": "npy"})
     spectra = degrees(store, "copper-foil", body["theta_i"], 0, body["theta_r"], 170)
     np.testing.assert_allclose(read_npy(answer.content), spectra @ xyz_weights(tuple(VISIBLE_NM.tolist())), **EXACT)
+
+
+def test_colours_of_more_points_than_are_worked_on_at_once(root: Path, store: Store) -> None:
+    points = np.random.default_rng(41).random((60_001, 4)) * [90.0, 360.0, 90.0, 360.0]
+    answer = client_of(root).post(
+        FOIL,
+        content=npy(points),
+        headers=BINARY,
+        params={"output": "linear-srgb", "format": "npy", "error": "true"},
+    )
+    spectra = store["copper-foil"].lookup(*np.radians(points.T), with_error=True)
+    of = srgb_weights(tuple(VISIBLE_NM.tolist()))
+    expected = np.stack([spectra.brdf @ of, spectra.error @ np.abs(of)])
+    np.testing.assert_allclose(read_npy(answer.content), expected, rtol=1e-12, atol=1e-15)
+
+
+def test_colours_may_be_of_more_spectra_than_an_answer_holds(client: Client) -> None:
+    body = {"theta_i": [1] * 500, "theta_r": 2, "wavelength_nm": np.linspace(400.0, 700.0, 201).tolist()}
+    assert "100500 values" in client.problem("POST", FOIL, 413, json=body)["detail"]
+    assert client.post(FOIL, json=body, params={"output": "xyz"}).status_code == 200
+    client.problem("POST", FOIL, 413, json=body, params={"output": "xyz", "from": "model"})
+    much = {**body, "theta_i": [1] * 1000, "wavelength_nm": np.linspace(400.0, 700.0, 1000).tolist()}
+    assert client.post(FOIL, json=much, params={"output": "xyz"}).status_code == 200
+    more = {**much, "wavelength_nm": np.linspace(400.0, 700.0, 1001).tolist()}
+    client.problem("POST", FOIL, 413, json=more, params={"output": "xyz"})
 
 
 @pytest.mark.parametrize(
