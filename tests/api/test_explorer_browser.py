@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,17 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb_api.shelf import COLOURED_BYTES
 from tests.api.chromium import Chromium, chosen, copied, curve, milliseconds, shown
+
+# what there is to see when the script of plotly is put into the page
+BEFORE_PLOTLY = """\
+new MutationObserver(() => {
+  const find = selector => document.querySelector(selector);
+  if (globalThis.before || !find("script[src*=plotly]")) return;
+  globalThis.before = [find("#facts").innerText, find("#caption").innerText, find("#plot").clientHeight];
+}).observe(document, { childList: true, subtree: true });
+"""
 
 
 def test_the_first_view_is_a_list_a_cut_and_what_is_known(chromium: Chromium, address: str) -> None:
@@ -67,6 +78,39 @@ def test_the_filters_leave_what_they_name(chromium: Chromium, address: str) -> N
     assert chromium.evaluate(visible) == []
     chromium.evaluate("model.value = ''; model.dispatchEvent(new Event('change'))")
     assert chromium.evaluate(visible) == ["foam", "scene-copper-sphere"]
+    papers = ["", "Oren and Nayar 1994", "Ward 1992", "He et al. 1991"]
+    assert chromium.evaluate("[...paper.options].map(each => each.value)") == papers
+    chromium.evaluate("paper.value = 'He et al. 1991'; paper.dispatchEvent(new Event('change'))")
+    assert chromium.evaluate(visible) == ["scene-copper-sphere"]
+    assert chromium.evaluate("document.querySelector('#count').textContent") == "1 of 3 materials"
+
+
+def test_a_slider_has_one_request_on_its_way_and_ends_where_it_rests(chromium: Chromium, address: str) -> None:
+    chromium.open(f"{address}#material=scene-copper-sphere&view=hemisphere")
+    shown(chromium, "view=hemisphere")
+    chromium.evaluate(
+        "asked = [], (was => { fetch = (...all) => { asked.push(all[0]); return was(...all); }; })(fetch);"
+        "for (let theta = 20; theta <= 40; theta += 1) {"
+        "  controls.elements.theta_i.value = theta;"
+        "  controls.elements.theta_i.dispatchEvent(new Event('input', { bubbles: true }));"
+        "}"
+    )
+    shown(chromium, "theta_i=40")
+    assert [re.findall(r"theta_i=(\d+)", each) for each in chromium.evaluate("asked")] == [["20"], ["40"]]
+    chromium.until("picture.ariaBusy === 'false'")
+    assert "theta_i=40" in chromium.evaluate("picture.dataset.shown")
+
+
+@pytest.mark.parametrize("view", ["half-difference", "spectrum", "albedo"])
+def test_what_is_known_is_there_before_the_library_that_draws(chromium: Chromium, address: str, view: str) -> None:
+    script = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=BEFORE_PLOTLY)
+    chromium.open(f"{address}#material=foam&view={view}")
+    shown(chromium, "material=foam")
+    facts, caption, tall = chromium.evaluate("before")
+    assert "Oren and Nayar 1994" in facts
+    assert caption == "Loading …"
+    assert tall > 100
+    chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
 
 
 def test_verdicts_are_words_in_colours_beside_the_picture(chromium: Chromium, address: str) -> None:
@@ -101,11 +145,14 @@ def test_a_picture_that_is_on_its_way_is_said_to_be(chromium: Chromium, address:
 
 
 def test_a_link_restores_the_view_and_copies_ask_for_the_same(chromium: Chromium, address: str, explored: Path) -> None:
-    link = "#material=rolled-brass&view=spectrum&theta_i=30&phi_i=20&theta_r=35&turn=170&scale=linear&compare=foam"
+    link = (
+        "#material=rolled-brass&view=spectrum&theta_i=30&phi_i=20&theta_r=35&turn=170&scale=linear&compare=foam"
+        "&illuminant=A"
+    )
     chromium.open(address + link)
     shown(chromium, "material=rolled-brass", "turn=170")
-    fields = "['theta_i', 'phi_i', 'theta_r', 'turn', 'compare'].map(name => controls.elements[name].value)"
-    assert chromium.evaluate(fields) == ["30", "20", "35", "170", "foam"]
+    fields = "[...controls.elements].filter(({ name }) => /theta|phi|turn|comp|ill/.test(name)).map(of => of.value)"
+    assert chromium.evaluate(fields) == ["30", "20", "35", "170", "A", "foam"]
     assert chromium.evaluate("controls.elements.log.checked") is False
     assert copied(chromium, "link") == address + link
     point = np.deg2rad([30.0, 20.0, 35.0, 190.0])
@@ -119,7 +166,32 @@ def test_a_link_restores_the_view_and_copies_ask_for_the_same(chromium: Chromium
     assert chromium.errors == []
 
 
-@pytest.mark.parametrize("view", ["cut", "hemisphere", "half-difference", "sphere"])
+@pytest.mark.parametrize("view", ["cut", "hemisphere", "half-difference", "spectrum", "albedo", "sphere"])
+def test_a_copied_curl_runs_in_a_shell_and_answers_with_the_picture(
+    chromium: Chromium, address: str, explored: Path, view: str
+) -> None:
+    chromium.open(f"{address}#material=rolled-brass&view={view}&theta_i=30&phi_i=20")
+    shown(chromium, "theta_i=30")
+    ran = subprocess.run(["sh", "-c", copied(chromium, "curl")], capture_output=True, check=True)
+    answer = json.loads(ran.stdout)
+    light, at = np.deg2rad([30.0, 20.0]), brdfdb.open(explored)["rolled-brass"].lookup
+    axes, f_r = answer.get("axes_deg", {}), answer.get("brdf")
+    found, expected = {
+        "cut": lambda: (f_r[axes["theta_r"].index(60.0)], at(*light, *np.deg2rad([60.0, 200.0]))),
+        "hemisphere": lambda: (
+            f_r[axes["theta_r"].index(60.0)][axes["phi"].index(180.0)],
+            at(*light, *np.deg2rad([60.0, 200.0])),
+        ),
+        "half-difference": lambda: (np.shape(f_r), (90, 90)),
+        "spectrum": lambda: (f_r, at(*light, *np.deg2rad([45.0, 200.0]))),
+        "albedo": lambda: (answer["theta_i"][0], 0.0),
+        "sphere": lambda: (f_r, at(*light, 0.0, 0.0)),
+    }[view]()
+    assert answer["material"] == "rolled-brass"
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("view", ["cut", "hemisphere", "half-difference", "albedo", "sphere"])
 def test_copied_python_runs_and_looks_up_the_light_of_the_sliders(
     chromium: Chromium, address: str, explored: Path, view: str
 ) -> None:
@@ -133,6 +205,7 @@ def test_copied_python_runs_and_looks_up_the_light_of_the_sliders(
         "cut": lambda of: (of[150], at(*light, sixty, np.deg2rad(200.0))),
         "hemisphere": lambda of: (of[60, 100], at(*light, sixty, np.deg2rad(200.0))),
         "half-difference": lambda of: (of.shape, (90, 90)),
+        "albedo": lambda of: (of["theta_i"][0], 0.0),
         "sphere": lambda of: (of, at(*light, 0.0, 0.0)),
     }[view](ran["answer"])
     assert found == pytest.approx(expected, rel=1e-9)
@@ -141,13 +214,16 @@ def test_copied_python_runs_and_looks_up_the_light_of_the_sliders(
 def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> None:
     chromium.open(f"{address}#material=fome")
     said = chromium.until("document.querySelector('#message')?.textContent")
-    assert "fome" in said
+    assert said == "no material 'fome' in the store; closest: foam"
+    resting = "['views', 'controls', 'copies'].map(id => document.getElementById(id).inert)"
+    assert chromium.evaluate(resting) == [True, True, True]
     assert chromium.evaluate("message.getAttribute('role')") == "status"
     assert chromium.evaluate("[title.textContent, facts.textContent, picture.innerText.trim()]") == ["fome", "", ""]
     chromium.until("document.querySelectorAll('#list li').length === 3")
     chromium.evaluate("document.querySelector('#list li').click()")
     shown(chromium, "material=foam")
     assert chromium.evaluate("message.textContent") == ""
+    assert chromium.evaluate(resting) == [False, False, False]
 
 
 def test_the_error_between_two_wavelengths_is_the_larger_of_theirs(
@@ -168,10 +244,13 @@ def test_the_error_between_two_wavelengths_is_the_larger_of_theirs(
 
 
 PAGES = {
-    "v1/materials?limit=1000": [{"name": "a", "colour": "#010101"}],
-    "v1/materials?limit=1000&cursor=a": [{"name": "b", "colour": None}],
+    "v1/materials?limit=1000": [
+        {"name": "a", "colour": "#010101"},
+        {"name": "large", "colour": None, "bytes": COLOURED_BYTES + 1},
+    ],
+    "v1/materials?limit=1000&cursor=a": [{"name": "b", "colour": None, "bytes": COLOURED_BYTES}],
 }
-# a service of two pages, and without the colour on the second one when that is first asked for
+# a service of two pages: a colour of the second is not there when that is first asked for, that of a large table never
 TWO_PAGES = """\
 const pages = %s, ask = fetch, asked = globalThis.asked = [];
 globalThis.fetch = (path, options) => {
@@ -184,7 +263,7 @@ globalThis.fetch = (path, options) => {
 """
 
 
-def test_the_list_asks_again_only_for_pages_without_all_of_their_colours(chromium: Chromium, plain: str) -> None:
+def test_the_list_asks_again_only_for_pages_with_colours_that_will_come(chromium: Chromium, plain: str) -> None:
     script = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=TWO_PAGES % json.dumps(PAGES))
     chromium.open(f"{plain}/#material=white-tile")
     second = "document.querySelector('#m-b .swatch').style.background"
@@ -252,5 +331,5 @@ def test_every_control_has_a_name_and_can_be_reached_by_keys(chromium: Chromium,
     for _ in range(14):
         chromium.press("Tab")
         reached.append(chromium.evaluate("document.activeElement.id || document.activeElement.name"))
-    assert {"search", "model", "verdict", "list", "view", "theta_i", "log", "compare"} <= set(reached)
+    assert {"search", "model", "verdict", "paper", "list", "view", "theta_i", "log", "compare"} <= set(reached)
     assert chromium.evaluate("getComputedStyle(document.activeElement).outlineStyle") != "none"

@@ -12,6 +12,7 @@ import pytest
 
 import brdfdb
 from brdfdb.geometry import unit_vector
+from brdfdb.spectra import srgb_weights
 from tests.api.chromium import SECONDS, Chromium, curve, shown
 
 # What a view has drawn once it is there
@@ -23,6 +24,9 @@ DRAWN = {
     "albedo": "#plot .scatterlayer path.js-line",
     "sphere": "#spheres canvas",
 }
+COLOURFUL = 60  # of 255: between the largest and the smallest channel
+LAST = 87.0  # degrees: of the viewers of a hemisphere, those next to the horizon
+PIXELS = 0.5  # edges are soft: measured 0.33
 PIXEL = 0.1  # paths are written to a tenth of a pixel
 LEVELS = 0.51  # of 255: levels are whole numbers, and angles travel as float32
 SIZE = 96  # pixels across a sphere
@@ -136,6 +140,41 @@ def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, addre
     assert high / low > 1.5
 
 
+def painted(browser: Chromium) -> np.ndarray:
+    """Which pixels of the hemisphere are of its surface, or of the line to the light: all else is grey."""
+    width, height, data = browser.evaluate(
+        "(({ width, height }, context) => [width, height, [...context.getImageData(0, 0, width, height).data]])"
+        "(...[document.querySelector('#hemisphere canvas')].flatMap(each => [each, each.getContext('2d')]))"
+    )
+    pixels = np.reshape(data, (height, width, 4)).astype(float)
+    return (np.ptp(pixels[..., :3], axis=-1) > COLOURFUL) & (pixels[..., 3] == 255.0)
+
+
+def test_the_hemisphere_of_a_white_tile_is_half_a_ball_that_keys_turn(chromium: Chromium, plain: str) -> None:
+    chromium.open(f"{plain}/#material=white-tile&view=hemisphere&scale=linear")
+    shown(chromium, "view=hemisphere")
+    chromium.evaluate("document.querySelector('#hemisphere').focus()")
+    for keys, elevation in (((), 27.0), (("ArrowDown", "ArrowLeft"), 32.0), (("Home",), 27.0)):
+        chromium.press(*keys)
+        rows, columns = np.nonzero(painted(chromium))
+        ratio = np.ptp(rows) / np.ptp(columns)
+        front = -np.cos(np.deg2rad(elevation + LAST))  # of its edge, below the centre; its top is the radius above
+        assert ratio == pytest.approx((1.0 + front) / 2.0, abs=PIXELS / np.ptp(columns))
+    assert f"to θᵣ = {LAST:g}°" in chromium.evaluate("caption.textContent")
+    assert chromium.errors == []
+
+
+def test_the_lobe_of_the_hemisphere_is_across_from_the_light(chromium: Chromium, address: str) -> None:
+    middles = []
+    for phi in (0, 180):  # the light is at the left, then at the right
+        chromium.open(f"{address}#material=rolled-brass&view=hemisphere&theta_i=60&phi_i={phi}")
+        shown(chromium, "view=hemisphere")
+        surface = painted(chromium)
+        middles.append(np.nonzero(surface)[1].mean() / surface.shape[1])
+    assert middles[0] > 0.55
+    assert middles[1] < 0.45
+
+
 def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: str) -> None:
     for name, mirror in (("foam", False), ("scene-copper-sphere", True)):
         chromium.open(f"{address}#material={name}&view=sphere")
@@ -143,15 +182,20 @@ def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: s
         assert ("Dirac" in chromium.evaluate("caption.textContent")) is mirror
 
 
-@pytest.mark.parametrize("name", ["foam", "rolled-brass"])
-def test_the_sphere_has_the_radiance_of_the_table(chromium: Chromium, address: str, explored: Path, name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "illuminant"),
+    [("foam", "D65"), ("rolled-brass", "D65"), ("scene-copper-sphere", "D65"), ("scene-copper-sphere", "A")],
+)
+def test_the_sphere_has_the_radiance_of_the_table(
+    chromium: Chromium, address: str, explored: Path, name: str, illuminant: str
+) -> None:
     theta, phi = 50.0, 70.0
-    chromium.open(f"{address}#material={name}&view=sphere&theta_i={theta}&phi_i={phi}")
+    chromium.open(f"{address}#material={name}&view=sphere&theta_i={theta}&phi_i={phi}&illuminant={illuminant}")
     shown(chromium, "view=sphere")
     drawn = chromium.evaluate(
-        f"[...document.querySelector('canvas').getContext('2d').getImageData(0, 0, {SIZE}, {SIZE}).data]"
+        f"[...document.querySelector('#spheres canvas').getContext('2d').getImageData(0, 0, {SIZE}, {SIZE}).data]"
     )
-    levels = np.reshape(drawn, (SIZE, SIZE, 4))[..., 0]
+    levels = np.reshape(drawn, (SIZE, SIZE, 4))[..., :3]
     # the same scene with vectors: x to the right, y up, z to the viewer; the tangent is up x normal
     x, y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE * 2.0 - 1.0, 1.0 - (np.arange(SIZE) + 0.5) / SIZE * 2.0)
     normal = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], axis=-1)
@@ -162,8 +206,9 @@ def test_the_sphere_has_the_radiance_of_the_table(chromium: Chromium, address: s
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
     frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=-2)
     table = brdfdb.open(explored)[name]
-    radiance = np.pi * table.lookup_vectors(frame @ light, frame @ [0.0, 0.0, 1.0]) * (normal @ light)
-    linear = np.clip(radiance, 0.0, 1.0)
+    f_r = table.lookup_vectors(frame @ light, frame @ [0.0, 0.0, 1.0]).reshape(len(normal), -1)
+    colours = np.ones((1, 3)) if table.wavelength_nm is None else srgb_weights(tuple(table.wavelength_nm), illuminant)
+    linear = np.clip(np.pi * (f_r @ colours) * (normal @ light)[:, np.newaxis], 0.0, 1.0)
     expected = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
     assert np.ptp(levels[lit]) > 50
     np.testing.assert_allclose(levels[lit], 255.0 * expected, atol=LEVELS)

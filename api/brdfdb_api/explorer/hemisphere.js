@@ -23,7 +23,7 @@ export function hemisphere(into, series, answers, state) {
   const range = span(values.flat(2), state), height = scaled(state, range[0]);
   const share = (value) => (height(value) - range[0]) / (range[1] - range[0]);
   const marks = ticks(range, state).map(([at, text]) => [(at - range[0]) / (range[1] - range[0]), text]);
-  const { phi_i: turned } = answers[0];
+  const { phi_i: turned } = answers[0], end = answers[0].axes_deg.theta_r[kept[0].at(-1)];
   const scenes = answers.map((answer, i) => {
     const { theta_r, phi } = answer.axes_deg;
     const scene = { points: [], pieces: [] };
@@ -40,7 +40,7 @@ export function hemisphere(into, series, answers, state) {
   repaint = () => canvases.forEach((canvas, i) => paint(canvas, scenes[i], marks));
   repaint();
   const scale = state.scale === "log" ? `its logarithm, from ${short(10 ** range[0])}` : "it, from 0";
-  return `${quantityWords(series[0], state)} in 1/sr over all viewers, to 89°: the distance from the centre is ${scale}. ` +
+  return `${quantityWords(series[0], state)} in 1/sr over all viewers to θᵣ = ${end}°: the distance from the centre is ${scale}. ` +
     `The thick line points to the light, the thin one to its mirror direction. Drag it or use arrow keys to turn it.` +
     mirrorWords(series, answers);
 }
