@@ -140,6 +140,16 @@ def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, addre
     assert high / low > 1.5
 
 
+def test_a_spectrum_over_decades_has_numbers_at_1_2_and_5(chromium: Chromium, address: str) -> None:
+    chromium.open(f"{address}#material=foam&view=spectrum&compare=rolled-brass")
+    shown(chromium, "view=spectrum")
+    low, high = 10.0 ** np.array(chromium.evaluate("plot.layout.yaxis.range"))
+    assert high / low > 10.0
+    texts = chromium.evaluate("[...document.querySelectorAll('.ytick text')].map(each => each.textContent)")
+    expected = [mantissa * 10.0**power for power in range(-3, 3) for mantissa in (1, 2, 5)]
+    assert [float(each) for each in texts] == [pytest.approx(each) for each in expected if low <= each <= high]
+
+
 def painted(browser: Chromium) -> np.ndarray:
     """Which pixels of the hemisphere are of its surface, or of the line to the light: all else is grey."""
     width, height, data = browser.evaluate(

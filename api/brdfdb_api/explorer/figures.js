@@ -93,6 +93,14 @@ function ends(values, { scale }) {
   return [middle - half, middle + half];
 }
 
+/** Ticks at 1, 2 and 5 of each decade of a logarithmic axis, where it is long enough for three of them. */
+function decades([low, high], { scale }) {
+  if (scale !== "log" || high - low < 1) return {};
+  const powers = Array.from({ length: Math.ceil(high) - Math.floor(low) }, (_, i) => 10 ** (Math.floor(low) + i));
+  const tickvals = powers.flatMap((power) => [power, 2 * power, 5 * power]);
+  return { tickvals, ticktext: tickvals.map(short) };
+}
+
 function spectrum(series, answers, state, ink) {
   const data = answers.flatMap((answer, i) => {
     const grey = answer.wavelength_nm === null;
@@ -111,11 +119,13 @@ function spectrum(series, answers, state, ink) {
       curve,
     ];
   });
+  const range = ends(data.flatMap(({ y }) => y), state);
   const layout = {
     showlegend: series.length > 1,
     xaxis: { title: { text: "wavelength [nm]" } },
     yaxis: {
-      title: { text: "f<sub>r</sub> [1/sr]" }, type: state.scale, exponentformat: "power", automargin: true, range: ends(data.flatMap(({ y }) => y), state),
+      title: { text: "f<sub>r</sub> [1/sr]" }, type: state.scale, exponentformat: "power", automargin: true, range,
+      ...decades(range, state),
     },
   };
   const said = answers.map((answer, i) => answer.wavelength_nm === null && answer.brdf !== undefined ?

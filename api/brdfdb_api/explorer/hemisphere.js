@@ -39,7 +39,7 @@ export function hemisphere(into, series, answers, state) {
   const canvases = [...stands.querySelectorAll("canvas")];
   repaint = () => canvases.forEach((canvas, i) => paint(canvas, scenes[i], marks));
   repaint();
-  const scale = state.scale === "log" ? `its logarithm, from ${short(10 ** range[0])}` : "it, from 0";
+  const scale = state.scale === "log" ? `its logarithm, from ${short(10 ** range[0])}` : "the value itself, from 0";
   return `${quantityWords(series[0], state)} in 1/sr over all viewers to θᵣ = ${end}°: the distance from the centre is ${scale}. ` +
     `The thick line points to the light, the thin one to its mirror direction. Drag it or use arrow keys to turn it.` +
     mirrorWords(series, answers);
