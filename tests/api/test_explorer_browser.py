@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 
 import brdfdb
 from brdfdb_api.shelf import COLOURED_BYTES
+from tests.api.a_store import serving
 from tests.api.chromium import Chromium, chosen, copied, curve, milliseconds, shown
 
 # what there is to see when the script of plotly is put into the page
@@ -224,6 +226,18 @@ def test_what_fails_is_said_in_the_page(chromium: Chromium, address: str) -> Non
     shown(chromium, "material=foam")
     assert chromium.evaluate("message.textContent") == ""
     assert chromium.evaluate(resting) == [False, False, False]
+
+
+def test_an_empty_store_is_said_to_be_one(chromium: Chromium, own: Path) -> None:
+    for material in (own / "materials").iterdir():
+        shutil.rmtree(material)
+    with serving(own) as empty:
+        chromium.open(empty)
+        said = chromium.until("document.querySelector('#message')?.textContent")
+        assert said == "There is nothing to look at in the store."
+        assert chromium.evaluate("[count.textContent, picture.innerText.trim()]") == ["0 materials", ""]
+        assert chromium.evaluate("controls.inert")
+        assert chromium.errors == []
 
 
 def test_the_error_between_two_wavelengths_is_the_larger_of_theirs(

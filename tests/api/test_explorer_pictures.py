@@ -174,6 +174,21 @@ def test_the_hemisphere_of_a_white_tile_is_half_a_ball_that_keys_turn(chromium: 
     assert chromium.errors == []
 
 
+def test_a_hand_turns_the_hemisphere(chromium: Chromium, address: str) -> None:
+    chromium.open(f"{address}#material=rolled-brass&view=hemisphere&theta_i=60")
+    shown(chromium, "view=hemisphere")
+    before = painted(chromium)
+    left, top = chromium.evaluate("(({ left, top }) => [left, top])(hemisphere.getBoundingClientRect())")
+    half_a_turn = 360  # pixels
+    for kind, x in (("mousePressed", 50), ("mouseMoved", 50 + half_a_turn), ("mouseReleased", 50 + half_a_turn)):
+        chromium.send(
+            "Input.dispatchMouseEvent", type=kind, x=left + x, y=top + 50, button="left", buttons=1, clickCount=1
+        )
+    middles = [np.nonzero(each)[1].mean() / each.shape[1] for each in (before, painted(chromium))]
+    assert middles[0] > 0.55
+    assert middles[1] < 0.45
+
+
 def test_the_lobe_of_the_hemisphere_is_across_from_the_light(chromium: Chromium, address: str) -> None:
     middles = []
     for phi in (0, 180):  # the light is at the left, then at the right
