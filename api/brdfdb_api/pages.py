@@ -21,7 +21,7 @@ MEDIA = {
     **dict.fromkeys(
         (
             *("main.js", "state.js", "series.js", "api.js", "list.js", "controls.js"),
-            *("facts.js", "figures.js", "sphere.js", "copy.js", "dom.js", "cut.js", "scales.js"),
+            *("facts.js", "figures.js", "hemisphere.js", "sphere.js", "copy.js", "dom.js", "cut.js", "scales.js"),
         ),
         SCRIPT,
     ),

@@ -1,4 +1,4 @@
-"""Chromium without a window, driven over a pipe by its DevTools protocol: real time, real keys, real requests."""
+"""Chromium without a window, driven over a pipe by its DevTools protocol, and what tests read of the explorer in it."""
 
 from __future__ import annotations
 
@@ -135,3 +135,30 @@ class Chromium:
             self.errors.append(str(of["args"]))
         elif kind == "Log.entryAdded" and of["entry"]["level"] == "error":
             self.errors.append(of["entry"]["text"])
+
+
+def shown(browser: Chromium, *parts: str) -> None:
+    """Wait for a picture of the state whose link has these parts."""
+    of = "(document.querySelector('#picture')?.dataset.shown ?? '')"
+    browser.until(" && ".join([f"{of} !== ''", *(f"{of}.includes('{part}')" for part in parts)]))
+
+
+def chosen(browser: Chromium) -> str:
+    return str(browser.evaluate("document.querySelector('[aria-selected=true]').dataset.name"))
+
+
+def milliseconds(browser: Chromium) -> float:
+    """From what asked for a picture, a hand or the page, to the picture."""
+    return float(browser.evaluate("performance.getEntriesByName('picture')[0].duration"))
+
+
+def curve(browser: Chromium, kind: str) -> np.ndarray:
+    """The points of a curve [pixel]."""
+    path = browser.evaluate(f"document.querySelector('#cut path.{kind}').getAttribute('d')")
+    return np.array([point.split() for point in path[1:].split("L")], dtype=float)
+
+
+def copied(browser: Chromium, kind: str) -> str:
+    browser.evaluate(f"document.querySelector('[data-copy={kind}]').click()")
+    browser.until("/Copied|Selected/.test(document.querySelector('#message').textContent)")
+    return str(browser.evaluate("document.querySelector('#copied textarea').value"))

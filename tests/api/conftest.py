@@ -1,14 +1,24 @@
-"""A small store of tabulated materials for all tests of the HTTP layer, made once."""
+"""Stores for all tests of the HTTP layer, made once: a small one, and one to explore, its server and a browser."""
 
 from __future__ import annotations
 
+import json
+import os
+import re
 import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from brdfdb.store import Store
-from tests.api.a_store import TURNED, Client, client_of, publish
+from brdfdb_pipelines import cli
+from tests.api.a_store import TURNED, Client, client_of, publish, serving
+from tests.api.chromium import SECONDS, Chromium
+from tests.api.explored import AUDIT, RECIPE
 
 
 @pytest.fixture(scope="session")
@@ -44,3 +54,50 @@ def own(root: Path, tmp_path: Path) -> Path:
 @pytest.fixture
 def client(root: Path) -> Client:
     return client_of(root, max_points=1000, max_body_bytes=100_000)
+
+
+@pytest.fixture(scope="session")
+def explored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Directory of the store that the explorer shows."""
+    root = tmp_path_factory.mktemp("explored")
+    (root / "recipe.toml").write_text(RECIPE, encoding="utf-8")
+    assert cli.main(["build", str(root / "recipe.toml"), "--store", str(root / "store"), "--jobs", "2"]) == 0
+    (root / "store" / "audit.json").write_text(json.dumps(AUDIT), encoding="utf-8")
+    return root / "store"
+
+
+@pytest.fixture(scope="session")
+def address(explored: Path) -> Iterator[str]:
+    """Where `brdfdb serve` serves it."""
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(explored), "--port", "0"]
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("BRDFDB_")}
+    server = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment, text=True, encoding="utf-8"
+    )
+    assert server.stdout is not None
+    said = server.stdout.readline()
+    found = re.search(r"http://\S+", said)
+    assert found, said
+    yield found[0]
+    server.send_signal(signal.SIGINT)
+    server.communicate(timeout=SECONDS)
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
+    """A Chromium; without one these tests are skipped, or fail where it is known to be there."""
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        if binary := shutil.which(name):
+            with Chromium(binary, tmp_path_factory.mktemp("profile")) as browser:
+                yield browser
+            return
+    if os.environ.get("BRDFDB_NEEDS_BROWSER"):
+        pytest.fail("BRDFDB_NEEDS_BROWSER is set, and no chromium, chromium-browser or google-chrome is on PATH")
+    pytest.skip("no chromium, chromium-browser or google-chrome on PATH")
+
+
+@pytest.fixture
+def plain(root: Path) -> Iterator[str]:
+    """Where the store of the other tests is served: of its tables only two state an error."""
+    with serving(root) as found:
+        yield found

@@ -1,7 +1,7 @@
 // Sliders, switches and the choice of a view: they show the state, and tell what a hand changes of it.
 
 import { element } from "./dom.js";
-import { MODEL, VIEWS } from "./state.js";
+import { ILLUMINANTS, MODEL, VIEWS } from "./state.js";
 import { anisotropic, makesColour, nearest } from "./series.js";
 
 const form = document.getElementById("controls");
@@ -16,6 +16,8 @@ for (const view of VIEWS) {
   views.append(element("label", {}, element("input", { type: "radio", name: "view", value: view }), TITLES[view]));
 }
 
+fields.illuminant.append(...ILLUMINANTS.map((name) => new Option(name)));
+
 /** Call `change` with what a hand changes of the state. */
 export function listen(change) {
   views.addEventListener("change", (event) => change({ view: event.target.value }));
@@ -23,7 +25,7 @@ export function listen(change) {
   form.addEventListener("input", ({ target: { name, checked, value } }) => {
     if (name === "colour") change({ nm: checked ? null : Number(fields.nm.value) });
     else if (name === "log") change({ scale: checked ? "log" : "linear" });
-    else if (name === "compare") change({ compare: value });
+    else if (["compare", "illuminant"].includes(name)) change({ [name]: value });
     else change({ [name]: Number(value) });
   });
 }
@@ -34,8 +36,16 @@ export function offer(materials) {
     ...materials.filter((each) => !each.damaged).map((each) => new Option(each.title, each.name)));
 }
 
+const all = [views, form, document.getElementById("copies")];
+
+/** Nothing can be moved while there is nothing to look at. */
+export function forget() {
+  for (const each of all) each.inert = true;
+}
+
 /** Show a state of some series; what has no effect on the picture cannot be moved. */
 export function show(state, series) {
+  for (const each of all) each.inert = false;
   views.querySelector(`[value="${state.view}"]`).checked = true;
   for (const name of ["theta_i", "phi_i", "theta_r", "turn"]) {
     fields[name].value = state[name];
@@ -60,6 +70,8 @@ export function show(state, series) {
   if (state.view === "spectrum") said("nm", "all");
   fields.colour.checked = coloured && state.nm === null;
   fields.colour.disabled = !coloured || state.view === "spectrum";
+  fields.illuminant.value = state.illuminant;
+  fields.illuminant.closest("label").hidden = !fields.colour.checked || ["spectrum", "albedo"].includes(state.view);
 }
 
 function said(name, text) {

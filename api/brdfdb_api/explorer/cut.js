@@ -75,7 +75,7 @@ function* strip(theta, off, worst, top, at, radius) {
   for (const share of [-worst, 0, worst]) {
     const [x, y] = place(-90, share);
     yield path([[x, y], place(90, share)], "grid");
-    yield svg("text", { x: x + 2, y: y - 4 }, `${share > 0 ? "+" : ""}${percent(share).replace("-", "−")}`);
+    if (share !== 0) yield svg("text", { x: x + 2, y: y - 4 }, `${share > 0 ? "+" : ""}${percent(share).replace("-", "−")}`);
   }
   for (let each = -90; each <= 90; each += 30) {
     const [x, y] = place(each, -worst);

@@ -1,7 +1,7 @@
 // Figures, as Plotly takes them, and their captions, of the answers to the requests of a view.
 
 import { short } from "./dom.js";
-import { RELATIVE, floorOf, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
+import { RELATIVE, floorOf, relative, scaled, span, ticks } from "./scales.js";
 import { nearest, number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
@@ -10,20 +10,19 @@ const BANDS = ["#4f7df0", "#2f9e6b", "#d8503f"]; // their colours
 const HEAT = "Viridis";
 const DIFFERENCE = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]];
 const LEAST_DECADES = 0.2; // of the logarithmic axis of a spectrum: a factor of 1.6
-const RADIAN = Math.PI / 180;
 
 /** The figure of a view: `data` and `layout` of Plotly, and a caption; `stacked` where two stand on each other. */
 export function figure(view, series, answers, state, stacked) {
   const css = getComputedStyle(document.documentElement);
   const ink = (name) => css.getPropertyValue(`--${name}`).trim();
-  const drawn = { hemisphere, "half-difference": halfDifference, spectrum, albedo }[view](
+  const drawn = { "half-difference": halfDifference, spectrum, albedo }[view](
     series, answers, state, ink, stacked);
   const axis = { gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false, automargin: true };
   const layout = {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink("ink"), size: 13 },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: ink("muted"), activecolor: ink("ink") },
     margin: { l: 55, r: 20, t: 55, b: 45 }, showlegend: series.length > 1 || drawn.data.length > 1,
-    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, uirevision: `${view} ${state.material}`,
+    legend: { orientation: "h", traceorder: "normal", y: 1.02, yanchor: "bottom", x: 0 }, uirevision: `${view} ${state.material}`,
     ...drawn.layout,
   };
   for (const key of ["xaxis", "yaxis", "xaxis2", "yaxis2"]) if (layout[key]) layout[key] = { ...axis, ...layout[key] };
@@ -46,55 +45,6 @@ function part(i, count, stacked, gap) {
 function bars(range, state) {
   const found = ticks(range, state);
   return { tickvals: found.map(([at]) => at), ticktext: found.map(([, text]) => text) };
-}
-
-function hemisphere(series, answers, state, ink, stacked) {
-  const kept = answers.map((answer) => shortOfHorizon(answer.axes_deg.theta_r));
-  const values = answers.map((answer, i) => kept[i].map((k) => answer.brdf[k].map(number(answer))));
-  const range = span(values.flat(2), state), height = scaled(state, range[0]);
-  const radius = (value) => (height(value) - range[0]) / (range[1] - range[0]);
-  const towards = (theta, phi, r) => [
-    r * Math.sin(theta * RADIAN) * Math.cos(phi * RADIAN), r * Math.sin(theta * RADIAN) * Math.sin(phi * RADIAN),
-    r * Math.cos(theta * RADIAN)];
-  const turned = answers[0].phi_i;
-  const layout = { showlegend: false, margin: { l: 0, r: 0, t: 25, b: 0 }, annotations: [] };
-  const data = series.flatMap(({ label }, i) => {
-    const { theta_r, phi } = answers[i].axes_deg;
-    const points = values[i].map((row, j) => row.map((value, k) => towards(theta_r[kept[i][j]], turned + phi[k], radius(value))));
-    const scene = i ? "scene2" : "scene";
-    const { x, y, title: above } = part(i, series.length, stacked, 0.06);
-    const sides = (title, range) => ({
-      title: { text: title }, range, showticklabels: false, gridcolor: ink("grid"), backgroundcolor: "rgba(0,0,0,0)",
-      showspikes: false, zeroline: false,
-    });
-    layout[scene] = {
-      domain: { x, y }, hovermode: false, dragmode: "turntable", aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.65 },
-      xaxis: sides("", [-1, 1]), yaxis: sides("", [-1, 1]), zaxis: sides("normal", [0, 1]),
-      camera: { eye: { x: 0.85, y: -1.75, z: 1 }, center: { x: 0, y: 0, z: -0.15 } }, uirevision: state.material,
-    };
-    if (series.length > 1) layout.annotations.push(above(label));
-    const [lx, ly, lz] = towards(state.theta_i, turned, 1);
-    return [
-      {
-        type: "surface", scene, ...Object.fromEntries(["x", "y", "z"].map((axis, at) =>
-          [axis, points.map((row) => row.map((point) => point[at]))])),
-        surfacecolor: values[i].map((row) => row.map(height)), cmin: range[0], cmax: range[1], colorscale: HEAT,
-        showscale: i === 0, hoverinfo: "skip", lighting: { ambient: 0.75, diffuse: 0.4, specular: 0.1 },
-        colorbar: { title: { text: "1/sr" }, thickness: 12, len: 0.7, outlinewidth: 0, ...bars(range, state) },
-      },
-      {
-        type: "scatter3d", mode: "lines", scene, x: [0, lx], y: [0, ly], z: [0, lz], hoverinfo: "skip",
-        line: { color: ink("third"), width: 6 },
-      },
-      { // where the axes point, however the picture is turned
-        type: "scatter3d", mode: "text", scene, x: [0.9, 0], y: [0, 0.9], z: [0, 0], text: ["+x", "+y"], hoverinfo: "skip",
-        textfont: { color: ink("ink") },
-      },
-    ];
-  });
-  const scale = state.scale === "log" ? `its logarithm, from ${short(10 ** range[0])}` : "it, from 0";
-  const caption = `${quantityWords(series[0], state)} over all viewers, short of the horizon: the distance from the centre is ${scale}. The line points to the light.`;
-  return { data, layout, caption: caption + mirrorWords(series, answers) };
 }
 
 function halfDifference(series, answers, state, ink, stacked) {
@@ -143,6 +93,14 @@ function ends(values, { scale }) {
   return [middle - half, middle + half];
 }
 
+/** Ticks at 1, 2 and 5 of each decade of a logarithmic axis, where it is long enough for three of them. */
+function decades([low, high], { scale }) {
+  if (scale !== "log" || high - low < 1) return {};
+  const powers = Array.from({ length: Math.ceil(high) - Math.floor(low) }, (_, i) => 10 ** (Math.floor(low) + i));
+  const tickvals = powers.flatMap((power) => [power, 2 * power, 5 * power]);
+  return { tickvals, ticktext: tickvals.map(short) };
+}
+
 function spectrum(series, answers, state, ink) {
   const data = answers.flatMap((answer, i) => {
     const grey = answer.wavelength_nm === null;
@@ -161,11 +119,13 @@ function spectrum(series, answers, state, ink) {
       curve,
     ];
   });
+  const range = ends(data.flatMap(({ y }) => y), state);
   const layout = {
     showlegend: series.length > 1,
     xaxis: { title: { text: "wavelength [nm]" } },
     yaxis: {
-      title: { text: "f<sub>r</sub> [1/sr]" }, type: state.scale, exponentformat: "power", automargin: true, range: ends(data.flatMap(({ y }) => y), state),
+      title: { text: "f<sub>r</sub> [1/sr]" }, type: state.scale, exponentformat: "power", automargin: true, range,
+      ...decades(range, state),
     },
   };
   const said = answers.map((answer, i) => answer.wavelength_nm === null && answer.brdf !== undefined ?

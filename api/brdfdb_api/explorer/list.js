@@ -3,7 +3,7 @@
 import { json } from "./api.js";
 import { chip, element } from "./dom.js";
 
-const [search, model, verdict, count, list] = ["search", "model", "verdict", "count", "list"].map((id) =>
+const [search, model, paper, verdict, count, list] = ["search", "model", "paper", "verdict", "count", "list"].map((id) =>
   document.getElementById(id));
 
 const materials = [];
@@ -21,6 +21,7 @@ export async function load(onChoose, onPage) {
     materials.push(...page.materials);
     list.append(...page.materials.map(option));
     offer(model, page.materials.map((each) => [each.model, each.model_title]));
+    offer(paper, page.materials.map((each) => [paperOf(each), paperOf(each)]));
     offer(verdict, page.materials.map((each) => [words(each), words(each)]));
     filter();
     onPage(materials);
@@ -30,20 +31,25 @@ export async function load(onChoose, onPage) {
 }
 
 const [REPAINTS, PAUSE_MS] = [8, 1000];
+const COLOURED_BYTES = 16 * 2 ** 20; // the service finds the colour of a larger table only where that is looked at
 
-/** Ask again for the pages with colours that the service has not found yet. */
+/** Ask again for the pages with colours that the service has not found yet; some tables get none. */
 async function paint(tries) {
-  const pale = pages.filter((page) => page.materials.some((each) => !each.damaged && !each.colour));
+  const waits = (each) => !each.damaged && !each.colour && (each.bytes ?? 0) <= COLOURED_BYTES;
+  const pale = pages.filter((page) => page.materials.some(waits));
   if (!tries || !pale.length) return;
   await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
   for (const page of pale) {
     page.materials = (await json(page.path)).materials;
-    for (const { name, colour } of page.materials) {
-      const swatch = document.querySelector(`#m-${name} .swatch`);
-      if (swatch && colour) swatch.style.background = colour;
-    }
+    page.materials.forEach(colour);
   }
   await paint(tries - 1);
+}
+
+/** Show the colour of a material, where it has one. */
+export function colour({ name, colour: found }) {
+  const swatch = document.querySelector(`#m-${name} .swatch`);
+  if (swatch && found) swatch.style.background = found;
 }
 
 /** Show which material is looked at. */
@@ -53,6 +59,9 @@ export function mark(name) {
   const now = [...list.children].find((each) => each.dataset.name === name);
   if (now) reach(now);
 }
+
+/** The paper in a source such as "Ward 1992, section 6". */
+const paperOf = (each) => each.source?.split(",")[0];
 
 const words = (each) => (each.damaged ? "damaged" : each.verdict ?? "not audited");
 
@@ -64,7 +73,7 @@ function option(each) {
   made.setAttribute("role", "option");
   made.setAttribute("aria-selected", each.name === chosen);
   Object.assign(made.dataset, {
-    name: each.name, model: each.model ?? "", verdict: words(each),
+    name: each.name, model: each.model ?? "", paper: paperOf(each) ?? "", verdict: words(each),
     text: `${each.name} ${each.title} ${each.model_title} ${each.source}`.toLowerCase(),
   });
   return made;
@@ -80,9 +89,9 @@ function offer(select, pairs) {
 function filter() {
   const asked = search.value.toLowerCase().split(/\s+/);
   for (const each of list.children) {
-    const { text, model: its, verdict: found } = each.dataset;
-    each.hidden = !asked.every((word) => text.includes(word)) ||
-      ![its, ""].includes(model.value) || ![found, ""].includes(verdict.value);
+    const filters = [[model, "model"], [paper, "paper"], [verdict, "verdict"]];
+    each.hidden = !asked.every((word) => each.dataset.text.includes(word)) ||
+      filters.some(([select, key]) => !["", each.dataset[key]].includes(select.value));
   }
   const shown = visible();
   count.textContent = shown.length === materials.length ? `${materials.length} materials` :
@@ -113,8 +122,7 @@ function walk(event) {
 }
 
 search.addEventListener("input", filter);
-model.addEventListener("change", filter);
-verdict.addEventListener("change", filter);
+for (const each of [model, paper, verdict]) each.addEventListener("change", filter);
 for (const each of [list, search]) each.addEventListener("keydown", walk);
 list.addEventListener("click", (event) => {
   const option = event.target.closest("li");

@@ -7,17 +7,18 @@ import { cut } from "./cut.js";
 import { element } from "./dom.js";
 import * as facts from "./facts.js";
 import { figure } from "./figures.js";
+import { hemisphere, turns } from "./hemisphere.js";
 import * as list from "./list.js";
 import { againstAudit, request, seriesOf } from "./series.js";
 import { spheres } from "./sphere.js";
 import { fromHash, toHash } from "./state.js";
 
 const [title, message, caption, picture] = ["title", "message", "caption", "picture"].map((id) => document.getElementById(id));
-const places = ["cut", "plot", "spheres"].map((id) => document.getElementById(id)); // of pictures, one shown at a time
+const PLACES = { cut: "cut", hemisphere: "hemisphere", sphere: "spheres" }; // where a view is drawn, one shown at a time
+const placeOf = ({ view }) => PLACES[view] ?? "plot";
 const DRAWN = { // of the buttons, those that save and restore: more would lie over titles and legends
   displaylogo: false, responsive: true, showSendToCloud: false, modeBarButtonsToRemove: [
     "lasso2d", "select2d", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "autoScale2d",
-    "zoom3d", "pan3d", "orbitRotation", "tableRotation", "resetCameraLastSave3d",
   ],
 };
 const NARROW = 560; // pixels in which two pictures do not stand side by side
@@ -88,7 +89,7 @@ async function work() {
 async function draw(now, signal) {
   if (!series.length) await know(now, signal);
   facts.band(series[0].info, now);
-  const draws = { cut: drawCut, sphere: drawSpheres }[now.view] ?? drawPlot;
+  const draws = { cut: drawOwn, hemisphere: drawOwn, sphere: drawSpheres }[now.view] ?? drawPlot;
   const words = await draws(now, signal);
   signal.throwIfAborted();
   caption.textContent = words;
@@ -96,7 +97,7 @@ async function draw(now, signal) {
 
 /** The place of a picture, shown instead of the others: what is hidden has no size to draw into. */
 function shown(id) {
-  for (const each of places) each.hidden = each.id !== id;
+  for (const each of picture.querySelectorAll(":scope > div")) each.hidden = each.id !== id;
   return document.getElementById(id);
 }
 
@@ -107,6 +108,7 @@ function forget(now) {
   if (series.length) return;
   title.textContent = now.material;
   facts.forget();
+  controls.forget();
 }
 
 /** Learn what is shown. */
@@ -121,6 +123,7 @@ async function know(now, signal) {
   title.textContent = series[0].info.title;
   document.title = `${series[0].info.title} – brdfdb explorer`;
   facts.show(series[0].info);
+  list.colour(series[0].info);
   controls.show(state, series);
 }
 
@@ -133,21 +136,21 @@ async function alone(now, signal, sentence) {
   return found;
 }
 
-async function drawCut(now, signal) {
+async function drawOwn(now, signal) {
   const answers = await answersTo(now, signal);
-  return cut(shown("cut"), series, answers, now);
+  return { cut, hemisphere }[now.view](shown(placeOf(now)), series, answers, now);
 }
 
 async function drawSpheres(now, signal) {
   const found = await spheres(series, now, signal);
-  return found.paint(shown("spheres"));
+  return found.paint(shown(placeOf(now)));
 }
 
 async function drawPlot(now, signal) {
   const [answers, Plotly] = await Promise.all([answersTo(now, signal), loaded()]);
   signal.throwIfAborted();
-  const plot = shown("plot");
-  const stacked = plot.clientWidth < NARROW && answers.length > 1 && ["hemisphere", "half-difference"].includes(now.view);
+  const plot = shown(placeOf(now));
+  const stacked = plot.clientWidth < NARROW && answers.length > 1 && now.view === "half-difference";
   plot.classList.toggle("stacked", stacked);
   const { data, layout, caption: words } = figure(now.view, series, answers, now, stacked);
   await Plotly.react(plot, data, layout, DRAWN);
@@ -164,13 +167,14 @@ async function answersTo(now, signal) {
 
 let library; // plotly.js, once it is asked for
 
+/** plotly.js, which takes a second to run: what is known already is shown before. */
 function loaded() {
-  library ??= new Promise((resolve, reject) => {
+  library ??= new Promise((go) => requestAnimationFrame(() => setTimeout(go))).then(() => new Promise((resolve, reject) => {
     const script = element("script", { src: document.getElementById("plotly").href });
     script.addEventListener("load", () => resolve(globalThis.Plotly));
     script.addEventListener("error", () => reject(new Problem("plotly.js did not arrive: load this page again")));
     document.head.append(script);
-  });
+  }));
   return library;
 }
 
@@ -184,6 +188,7 @@ function say(sentence, tone = "bad") {
 const copiedOf = (now) => (now.view === "sphere" ? { ...now, theta_r: 0 } : now);
 
 controls.listen(change);
+turns(document.getElementById("hemisphere"));
 copy.listen(
   () => new URL(toHash(state), location.href),
   () => (series.length ? request(series[0], copiedOf(state), series) : "v1/materials"), say);
@@ -198,14 +203,19 @@ new ResizeObserver(() => {
   if (series.length) redraw();
 }).observe(picture);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
+shown(placeOf(state)); // an empty frame
 if (state.material) redraw(0);
 list.load((material) => change({ material, compare: state.compare === material ? "" : state.compare }), (materials) => {
   controls.offer(materials);
   if (series.length) controls.show(state, series);
+  for (const { info } of series) list.colour(info);
   list.mark(state.material);
   const first = materials.find((each) => !each.damaged);
   if (!state.material && first) {
     state = { ...state, material: first.name };
     redraw(0);
+  } else if (!state.material) {
+    forget(state);
+    say("There is nothing to look at in the store.");
   }
 }).catch((error) => say(error.message));

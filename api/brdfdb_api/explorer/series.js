@@ -28,17 +28,17 @@ export function nearest({ wavelength_nm: at }, nm) {
 }
 
 /** The part of a query that makes values numbers: luminance, one wavelength, or what a grey material has. */
-export function quantity({ info, source }, { nm }, colour = "xyz") {
+export function quantity({ info, source }, { nm, illuminant }, colour = "xyz") {
   const from = source === "model" ? { from: "model" } : {};
-  if (info.wavelength_nm === null) return from;
-  if (nm === null && makesColour(info)) return { ...from, output: colour };
+  if (info.wavelength_nm === null) return from; // white under any illuminant
+  if (nm === null && makesColour(info)) return { ...from, output: colour, illuminant };
   return { ...from, wavelength_nm: nearest(info, nm) };
 }
 
 /** In words, what those numbers are. */
-export function quantityWords({ info }, { nm }) {
+export function quantityWords({ info }, { nm, illuminant }) {
   if (info.wavelength_nm === null) return "fᵣ";
-  return nm === null && makesColour(info) ? "Luminance of fᵣ under D65" : `fᵣ at ${nearest(info, nm)} nm`;
+  return nm === null && makesColour(info) ? `Luminance of fᵣ under ${illuminant}` : `fᵣ at ${nearest(info, nm)} nm`;
 }
 
 /** Whether albedos are those of the audit: it alone knows that of a model. */

@@ -5,11 +5,15 @@ export const VIEWS = ["cut", "hemisphere", "half-difference", "spectrum", "albed
 // compare: nothing, the model of the material itself, or the name of another one
 export const MODEL = ":model";
 
-// nm: a wavelength, or null for luminance and colours under D65; turn is phi_r - phi_i
+// Of colours; D65 first, as in the list
+export const ILLUMINANTS = ["D65", "D50", "A", "FL2"];
+
+// nm: a wavelength, or null for luminance and colours under an illuminant; turn is phi_r - phi_i
 const DEFAULTS = {
   material: "", view: "cut", theta_i: 45, phi_i: 0, theta_r: 45, turn: 180, nm: null, scale: "log", compare: "",
+  illuminant: "D65",
 };
-const CHOICES = { view: VIEWS, scale: ["log", "linear"] };
+const CHOICES = { view: VIEWS, scale: ["log", "linear"], illuminant: ILLUMINANTS };
 const RANGES = { theta_i: [0, 89.5], phi_i: [0, 360], theta_r: [0, 89.5], turn: [0, 360], nm: [1, 1e6] };
 
 /** The state that a link holds; what it does not hold, or holds wrongly, is as at the start. */

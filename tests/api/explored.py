@@ -1,0 +1,35 @@
+"""The store that tests of the explorer look at: its recipe, and what an audit says of it."""
+
+from __future__ import annotations
+
+RECIPE = """\
+title = "one grey, one anisotropic, one spectral"
+materials = ["foam", "rolled-brass", "scene-copper-sphere"]
+wavelengths_nm = [{ start = 400, stop = 700, step = 20 }]
+[grids.isotropic]
+theta_i_deg = [{ start = 0, stop = 80, step = 10 }, 85, 89.5]
+theta_r_deg = [{ start = 0, stop = 80, step = 10 }, 85, 89.5]
+delta_phi_deg = [{ start = 0, stop = 180, step = 15 }]
+[grids.spectral]
+theta_i_deg = [{ start = 0, stop = 80, step = 10 }, 89.5]
+theta_r_deg = [{ start = 0, stop = 80, step = 10 }, 89.5]
+delta_phi_deg = [{ start = 0, stop = 180, step = 30 }]
+[grids.anisotropic]
+theta_i_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
+phi_i_deg = [{ start = 0, stop = 360, step = 30 }]
+theta_r_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
+phi_r_deg = [{ start = 0, stop = 360, step = 30 }]
+"""
+ALBEDO = {"theta_i_deg": [0.0, 90.0], "wavelength_nm": None, "albedo": [[0.5], [1.2]]}
+FOUND = {each: {"verdict": "passes"} for each in ("reciprocity", "smoothness", "table_error", "sampling")} | {
+    "material": "rolled-brass",
+    "revision": "r000001",
+    "energy": {"verdict": "violates", "reason": "reflects 1.2 at 90 degrees", "model": ALBEDO, "table": ALBEDO},
+    "validity": {"standing": "at the edge"},
+    "verdict": "violates",
+}
+# Of three materials one is audited, one was at another revision
+AUDIT = {
+    "when": "2026-11-21T12:00:00Z",
+    "materials": [FOUND, FOUND | {"material": "scene-copper-sphere", "revision": "r000009"}],
+}
