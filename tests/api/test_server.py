@@ -13,14 +13,17 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from brdfdb_api.protocol import HEAD_BYTES
 from tests.api.a_store import publish
 
+README = Path(__file__).parents[2] / "README.md"
 LOOKUP = "/v1/materials/grey/lookup?theta_i=10&theta_r=20"
 BODY = b'{"theta_i": 10, "theta_r": 20}'
 COUNTED = re.compile(r'^brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"} (\d+)', re.MULTILINE)
@@ -226,6 +229,18 @@ def test_told_to_stop_all_that_connect_are_answered_or_refused(
     assert not any(Path(f"/proc/{child}").exists() for child in children)
 
 
+def test_a_worker_that_fails_ends_the_server_with_a_sentence(store: Path, tmp_path: Path) -> None:
+    (tmp_path / "fastapi.py").write_text("raise RuntimeError('no such luck')\n")  # workers alone import it
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(store), "--port", "0"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    ended = subprocess.run(
+        [*command, "--workers", "2"], env=environment, capture_output=True, text=True, timeout=WAIT_S, check=False
+    )
+    said = ended.stderr.splitlines()
+    assert (ended.returncode, said[-1]) == (2, "brdfdb: a worker ended with status 1; its log says why")
+    assert "RuntimeError: no such luck" in said
+
+
 def test_workers_end_with_the_command_that_started_them_even_while_they_start(store: Path, tmp_path: Path) -> None:
     with serving(store, tmp_path / "log", 2, ready=False) as server:
         workers = server.workers
@@ -233,6 +248,28 @@ def test_workers_end_with_the_command_that_started_them_even_while_they_start(st
         wait_until(lambda: not any(map(_runs, workers)))
     assert len(workers) == 2
     assert server.logged() == []
+
+
+def test_uvicorn_as_the_readme_starts_it_logs_once_and_bounds_heads(store: Path, tmp_path: Path) -> None:
+    (words,) = re.findall(r"`uvicorn (--factory [^`]*)`", README.read_text())
+    command = [sys.executable, "-m", "uvicorn", *words.split(), "--port", "0"]
+    log = tmp_path / "log"
+    with (
+        log.open("w") as errors,
+        subprocess.Popen(
+            command, env={**os.environ, "BRDFDB_STORE": str(store)}, stdout=errors, stderr=errors
+        ) as process,
+    ):
+        try:
+            wait_until(lambda: "running on" in log.read_text())
+            port = int(re.findall(r"http://127.0.0.1:(\d+)", log.read_text())[0])
+            urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=WAIT_S).close()
+            with socket.create_connection(("127.0.0.1", port), timeout=WAIT_S) as connection:
+                connection.sendall(b"GET /".ljust(HEAD_BYTES + 1, b"x"))
+                assert connection.recv(65536).startswith(b"HTTP/1.1 400 ")
+        finally:
+            process.terminate()
+    assert len([line for line in log.read_text().splitlines() if "/healthz" in line]) == 1
 
 
 def _runs(pid: int) -> bool:
