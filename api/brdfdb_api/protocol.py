@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import ctypes
 import socket
+import struct
+import sys
 from typing import Any
 
 import uvicorn
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 HEAD_BYTES = 64 * 2**10  # httptools reads no longer addresses
+QUEUE_S = 0.1  # for the event loop to accept what waits in a socket
+SO_ATTACH_FILTER = 26  # of Linux, without a name in Python
 LAST_S = 0.5  # from the word to stop to the last byte of a request that is answered still
 
 
@@ -54,18 +59,25 @@ class BoundedProtocol(HttpToolsProtocol):
 class PatientServer(uvicorn.Server):
     """A server that answers, when it stops, the connections that the kernel took for it until then."""
 
+    shared = False  # whether the sockets are those of other workers, too
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        loop, taken = asyncio.get_running_loop(), []
-        for listener in sockets or []:
-            with contextlib.suppress(OSError):  # there are no more
-                while True:
-                    taken.append(listener.accept()[0])
-        for server in self.servers:
-            server.close()
-        for connection in taken:
-            connection.setblocking(False)
-            await loop.connect_accepted_socket(self._protocol, connection)
+        for listener in [] if self.shared else sockets or []:
+            keep_out(listener)
+        await asyncio.sleep(QUEUE_S)
         await super().shutdown(sockets)
 
-    def _protocol(self) -> BoundedProtocol:
-        return BoundedProtocol(config=self.config, server_state=self.server_state, app_state=self.lifespan.state)
+
+def keep_out(listener: socket.socket) -> None:
+    """Let no new connection into a socket that listens, while those that wait in it can still be accepted.
+
+    What waits when a socket is closed is reset. Linux drops here what begins a connection; it is sent again a second
+    later, and refused if the socket is closed by then. Where there is no such filter, all goes on.
+    """
+    if sys.platform == "linux":
+        # BPF: the byte of flags, SYN or not, dropped or let through
+        steps = ((0x30, 0, 0, 13), (0x45, 0, 1, 2), (0x06, 0, 0, 0), (0x06, 0, 0, 0xFFFFFFFF))
+        program = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *step) for step in steps))
+        attached = struct.pack("HP", len(steps), ctypes.addressof(program))
+        with contextlib.suppress(OSError):
+            listener.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, attached)

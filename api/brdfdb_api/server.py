@@ -18,12 +18,13 @@ import orjson
 import uvicorn
 
 import brdfdb
-from brdfdb_api.protocol import BoundedProtocol, PatientServer
+from brdfdb_api.protocol import BoundedProtocol, PatientServer, keep_out
 from brdfdb_api.settings import Settings
 
 GRACE_S = 10  # for requests that are being answered when the server is told to stop
 
 LOG = logging.getLogger("brdfdb.server")
+OTHERS = ("uvicorn", LOG.name, "py.warnings")  # loggers beside that of requests
 
 
 def serve(store_dir: Path, host: str, port: int, workers: int = 1) -> None:
@@ -75,7 +76,9 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
     environment = {**os.environ, "PROMETHEUS_MULTIPROC_DIR": counts}
 
     def stop() -> None:
-        listener.close()  # before the workers close theirs: what the kernel takes after that, nobody would answer
+        if not stopping.is_set():
+            keep_out(listener)
+            listener.close()  # before the workers close theirs: it would let in what nobody answers
         stopping.set()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.remove_signal_handler(number)  # told again, this process does not wait
@@ -111,6 +114,7 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
 def _work(descriptor: int) -> None:
     """Be a worker, of the socket that the parent listens on."""
     server = PatientServer(_config())
+    server.shared = True
 
     def wait() -> None:
         os.read(sys.stdin.fileno(), 1)
@@ -122,6 +126,7 @@ def _work(descriptor: int) -> None:
 
 
 def _config() -> uvicorn.Config:
+    logging.captureWarnings(True)
     return uvicorn.Config(
         "brdfdb_api:create_app",
         factory=True,
@@ -132,7 +137,7 @@ def _config() -> uvicorn.Config:
             "disable_existing_loggers": False,
             "formatters": {"lines": {"()": _Lines}},
             "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "lines"}},
-            "loggers": {name: {"handlers": ["stderr"], "propagate": False} for name in ("uvicorn", LOG.name)},
+            "loggers": {name: {"handlers": ["stderr"], "propagate": False} for name in OTHERS},
         },
         log_level="warning",
         timeout_graceful_shutdown=GRACE_S,
@@ -143,7 +148,7 @@ class _Lines(logging.Formatter):
     """What the server says beside its requests: lines of JSON, too."""
 
     def format(self, record: logging.LogRecord) -> str:
-        line = {"time": round(record.created, 3), "failed": record.getMessage()}
+        line = {"time": round(record.created, 3), "failed": record.getMessage().strip()}
         if record.exc_info:
             line["traceback"] = self.formatException(record.exc_info)
         return orjson.dumps(line).decode()

@@ -201,7 +201,9 @@ def test_told_to_stop_all_that_connect_are_answered_or_refused(
         request = f"GET {LOOKUP} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
         idle, used, half = server.connect(), server.connect(), server.connect()
         used.sendall(request)
-        assert used.recv(65536).startswith(b"HTTP/1.1 200 ")
+        first = b""
+        while not first.endswith(b"}"):
+            first += used.recv(65536)
         head = f"POST {LOOKUP.partition('?')[0]} HTTP/1.1\r\nHost: x\r\nContent-Length: {len(BODY)}\r\n\r\n".encode()
         half.sendall(head + BODY[:10])
         threads = [threading.Thread(target=ask) for _ in range(4)]
@@ -230,7 +232,9 @@ def test_told_to_stop_all_that_connect_are_answered_or_refused(
 
 
 def test_a_worker_that_fails_ends_the_server_with_a_sentence(store: Path, tmp_path: Path) -> None:
-    (tmp_path / "fastapi.py").write_text("raise RuntimeError('no such luck')\n")  # workers alone import it
+    (tmp_path / "fastapi.py").write_text(  # workers alone import it
+        "import warnings\nwarnings.warn('beware')\nraise RuntimeError('no such luck')\n"
+    )
     command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(store), "--port", "0"]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     ended = subprocess.run(
@@ -239,6 +243,9 @@ def test_a_worker_that_fails_ends_the_server_with_a_sentence(store: Path, tmp_pa
     said = ended.stderr.splitlines()
     assert (ended.returncode, said[-1]) == (2, "brdfdb: a worker ended with status 1; its log says why")
     assert "RuntimeError: no such luck" in said
+    warned = [json.loads(line)["failed"] for line in said if "UserWarning" in line]
+    assert warned
+    assert all("UserWarning: beware" in line for line in warned)
 
 
 def test_workers_end_with_the_command_that_started_them_even_while_they_start(store: Path, tmp_path: Path) -> None:
