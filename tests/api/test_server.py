@@ -83,7 +83,11 @@ def serving(store: Path, log: Path, workers: int, *, ready: bool = True) -> Iter
     with (
         log.open("w") as errors,
         subprocess.Popen(
-            [*command, "--workers", str(workers)], stdout=subprocess.PIPE, stderr=errors, text=True
+            [*command, "--workers", str(workers)],
+            env={**os.environ, "TMPDIR": str(log.parent)},  # where one that is killed leaves its counts
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
         ) as process,
     ):
         found = Serving(process, log)
