@@ -9,7 +9,8 @@ from brdfdb_api.responses import NPY, Problem
 ANGLE_SCHEMA = {"anyOf": [{"type": "number"}, {"type": "array", "items": {}}]}
 BODY = {
     "description": "Angles in degrees, numbers or nested lists of numbers that broadcast as numpy arrays do; or a .npy "
-    "array of shape (..., 4), float32 or float64, with the wavelengths in the query.",
+    "array of shape (..., 4), float32 or float64, with the wavelengths in the query. A body of any other media type is "
+    "read as JSON.",
     "required": True,
     "content": {
         "application/json": {
@@ -93,7 +94,6 @@ def answers(model: type | None, *statuses: int, media: dict[str, str] | None = N
         304: {"description": "The ETag in If-None-Match still holds"},
         404: {"description": "No such material or revision; the closest names are listed", "model": Problem},
         413: {"description": "Too large a body, or too many points for one answer", "model": Problem},
-        415: {"description": "A body of another media type", "model": Problem},
         422: {"description": "A parameter is missing, unknown or out of range; it is named", "model": Problem},
         503: {"description": "The store, or the files of this material, cannot be read", "model": Problem},
     }

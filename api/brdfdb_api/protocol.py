@@ -1,4 +1,4 @@
-"""HTTP as uvicorn speaks it, with a limit to what is kept of a request that says nothing: its head, and trailers."""
+"""HTTP as uvicorn speaks it, with a limit to heads and trailers, and an end that lets requests finish."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 HEAD_BYTES = 64 * 2**10  # httptools reads no longer addresses
+LAST_S = 0.5  # from the word to stop to the last byte of a request that is answered still
 
 
 class BoundedProtocol(HttpToolsProtocol):
@@ -19,6 +20,7 @@ class BoundedProtocol(HttpToolsProtocol):
     def __init__(self, *args: Any, **keywords: Any) -> None:
         super().__init__(*args, **keywords)
         self._pending = 0
+        self._stopping = False
 
     def data_received(self, data: bytes) -> None:
         self._pending += len(data)
@@ -29,7 +31,17 @@ class BoundedProtocol(HttpToolsProtocol):
     def on_headers_complete(self) -> None:
         self._pending = 0
         super().on_headers_complete()
+        if self._stopping:
+            self.cycle.keep_alive = False
 
     def on_body(self, body: bytes) -> None:
         self._pending = 0
         super().on_body(body)
+
+    def shutdown(self) -> None:
+        """Close when what is asked is answered; a request may be under way on a connection that looks idle."""
+        self._stopping = True
+        if self.cycle is None or self.cycle.response_complete:
+            self.loop.call_later(LAST_S, super().shutdown)
+        else:
+            super().shutdown()

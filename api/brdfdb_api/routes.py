@@ -99,7 +99,7 @@ def metrics() -> Response:
     "/v1/materials",
     tags=["materials"],
     dependencies=[query_names("cursor", "limit", "model", "paper", "q")],
-    responses=answers(Catalogue, 422, 503),
+    responses=answers(Catalogue, 304, 422, 503),
 )
 def catalogue(
     request: Request,
@@ -122,7 +122,12 @@ def catalogue(
     if page and names[-1] > page[-1]:
         asked = {"model": model, "paper": paper, "q": q, "limit": limit, "cursor": page[-1]}
         following = f"/v1/materials?{urlencode({key: value for key, value in asked.items() if value})}"
-    return json_response({"materials": lines, "total": len(names), "next": following}, {"Cache-Control": "no-cache"})
+    answer = json_response({"materials": lines, "total": len(names), "next": following})
+    headers = cache_headers(f"materials-{hashlib.sha256(answer.body).hexdigest()[:16]}")
+    if held := not_modified(request.headers.get("if-none-match"), headers):
+        return held
+    answer.headers.update(headers)
+    return answer
 
 
 def _let_through(line: dict[str, Any], model: str, paper: str, words: list[str]) -> bool:

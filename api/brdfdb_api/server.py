@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import logging
 import os
+import signal
 import socket
+import sys
 import tempfile
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
+import orjson
+import uvicorn
+
 import brdfdb
+from brdfdb_api.protocol import BoundedProtocol
+from brdfdb_api.settings import Settings
 
 GRACE_S = 10  # for requests that are being answered when the server is told to stop
+
+LOG = logging.getLogger("brdfdb.server")
+OTHERS = ("uvicorn", LOG.name, "py.warnings")  # loggers beside that of requests
 
 
 def serve(store_dir: Path, host: str, port: int, workers: int = 1) -> None:
@@ -34,42 +48,118 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1) -> None:
     ValueError
         If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.
     OSError
-        If `host` is not an address of this machine or the port is taken.
+        If `host` is not an address of this machine or the port is taken; or if a worker fails.
     """
-    import uvicorn
-    from uvicorn.supervisors import Multiprocess
-
-    from brdfdb_api.protocol import BoundedProtocol
-    from brdfdb_api.settings import Settings
-
     if not 0 <= port <= 65535:
         raise ValueError(f"port: {port} is outside [0, 65535]")
     os.environ["BRDFDB_STORE"] = str(store_dir)  # workers read it
     Settings.from_environment()
     brdfdb.open(store_dir)
-    config = uvicorn.Config(
-        "brdfdb_api:create_app",
-        factory=True,
-        http=BoundedProtocol,
-        host=host,
-        port=port,
-        workers=workers,
-        access_log=False,
-        log_level="warning",
-        timeout_graceful_shutdown=GRACE_S,
-    )
+    config = _config()
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(_listening(host, port))
         port = listener.getsockname()[1]
         print(f"serving {store_dir} at http://{f'[{host}]' if ':' in host else host}:{port}/", flush=True)
-        stack.enter_context(contextlib.suppress(KeyboardInterrupt))
+        stack.enter_context(_ended_by_signals())
         if workers == 1:
             uvicorn.Server(config).run(sockets=[listener])
         else:
             # where workers count, so that any of them can tell what all did
             counts = stack.enter_context(tempfile.TemporaryDirectory(prefix="brdfdb-metrics-"))
-            os.environ["PROMETHEUS_MULTIPROC_DIR"] = counts
-            Multiprocess(config, sockets=[listener]).run()
+            asyncio.run(_keep(workers, listener, counts))
+
+
+async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
+    """Keep so many workers until told to stop; ChildProcessError where one ends by an error of its own."""
+    loop, stopping = asyncio.get_running_loop(), asyncio.Event()
+    command = (sys.executable, "-P", "-m", "brdfdb_api.server", str(listener.fileno()))
+    environment = {**os.environ, "PROMETHEUS_MULTIPROC_DIR": counts}
+
+    def stop() -> None:
+        listener.close()  # before the workers close theirs: it would let in what nobody answers
+        stopping.set()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.remove_signal_handler(number)  # told again, this process does not wait
+
+    async def worker() -> int:
+        # In a group of its own: Ctrl-C is for this process. Its stdin ends when it is to stop, or this process is gone.
+        process = await asyncio.create_subprocess_exec(
+            *command, stdin=asyncio.subprocess.PIPE, pass_fds=[listener.fileno()], process_group=0, env=environment
+        )
+        ends = asyncio.create_task(process.wait()), asyncio.create_task(stopping.wait())
+        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        if not stopping.is_set():
+            LOG.error("worker %d ended with status %d", process.pid, await process.wait())
+        assert process.stdin is not None
+        process.stdin.close()
+        return await process.wait()
+
+    async def place() -> int:
+        status = 0
+        while not stopping.is_set():
+            status = await worker()
+            if status > 0 and not stopping.is_set():  # it would fail again; one that was killed, would not
+                stop()
+        return status
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop)
+    status = max(await asyncio.gather(*(place() for _ in range(workers))))
+    if status > 0:
+        raise ChildProcessError(f"a worker ended with status {status}; its log says why")
+
+
+def _work(descriptor: int) -> None:
+    """Be a worker, of the socket that the parent listens on."""
+    server = uvicorn.Server(_config())
+
+    def wait() -> None:
+        os.read(sys.stdin.fileno(), 1)
+        server.should_exit = True
+
+    threading.Thread(target=wait, daemon=True).start()
+    with _ended_by_signals():
+        server.run(sockets=[socket.socket(fileno=descriptor)])
+
+
+def _config() -> uvicorn.Config:
+    logging.captureWarnings(True)
+    return uvicorn.Config(
+        "brdfdb_api:create_app",
+        factory=True,
+        http=BoundedProtocol,
+        access_log=False,
+        log_config={
+            "version": 1,
+            "disable_existing_loggers": False,
+            "formatters": {"lines": {"()": _Lines}},
+            "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "lines"}},
+            "loggers": {name: {"handlers": ["stderr"], "propagate": False} for name in OTHERS},
+        },
+        log_level="warning",
+        timeout_graceful_shutdown=GRACE_S,
+    )
+
+
+class _Lines(logging.Formatter):
+    """What the server says beside its requests: lines of JSON, too."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        line = {"time": round(record.created, 3), "failed": record.getMessage().strip()}
+        if record.exc_info:
+            line["traceback"] = self.formatException(record.exc_info)
+        return orjson.dumps(line).decode()
+
+
+@contextlib.contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """SIGTERM is as Ctrl-C, and neither an error: uvicorn raises them again when all is answered."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _listening(host: str, port: int) -> socket.socket:
@@ -85,3 +175,7 @@ def _listening(host: str, port: int) -> socket.socket:
         listener.close()
         raise OSError(f"cannot listen on {host}, port {port}: {error.strerror}") from error
     return listener
+
+
+if __name__ == "__main__":
+    _work(int(sys.argv[1]))

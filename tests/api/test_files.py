@@ -6,6 +6,8 @@ import io
 import zipfile
 from pathlib import Path
 
+import fsspec
+import httpx
 import pytest
 import xarray as xr
 from zarr.storage import ZipStore
@@ -110,9 +112,19 @@ def test_a_zip_of_a_revision_is_kept_for_good(own: Path) -> None:
 
 def test_xarray_reads_over_http(root: Path, store: Store) -> None:
     pytest.importorskip("aiohttp")
-    with (
-        serving(root) as url,
-        xr.open_zarr(f"{url}{STORED}") as found,
-        xr.open_zarr(store.path("copper-foil")) as expected,
-    ):
-        assert found.load().identical(expected.load())
+    with serving(root) as url:
+        stored = httpx.get(f"{url}{FOIL}").json()["links"]["store"]
+        assert stored == STORED
+        with xr.open_zarr(f"{url}{stored}") as found, xr.open_zarr(store.path("copper-foil")) as expected:
+            assert found.load().identical(expected.load())
+
+
+def test_fsspec_finds_sizes_and_reads_parts(root: Path, store: Store) -> None:
+    pytest.importorskip("aiohttp")
+    content = (store.path("copper-foil") / CHUNK).read_bytes()
+    with serving(root) as url:
+        files = fsspec.filesystem("http", skip_instance_cache=True)
+        assert files.size(f"{url}{STORED}/{CHUNK}") == len(content)
+        assert files.cat_file(f"{url}{STORED}/{CHUNK}", 4, 12) == content[4:12]
+        assert files.cat_file(f"{url}{STORED}/{CHUNK}", start=-8) == content[-8:]
+        assert not files.exists(f"{url}{STORED}/nothing")

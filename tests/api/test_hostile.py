@@ -208,6 +208,13 @@ def test_hostile_arrays_are_refused_in_a_sentence(server: Server, body: bytes) -
     server.refused(422, "POST", LOOKUP, body, Content_Type=NPY)
 
 
+@pytest.mark.parametrize("media", ["text/plain", "application/x-www-form-urlencoded", "application/xml", "", "/;="])
+def test_a_body_that_is_not_said_to_be_an_array_is_json(server: Server, media: str) -> None:
+    body = b'{"theta_i": 10, "theta_r": 20}'
+    assert server.ask("POST", LOOKUP, body, Content_Type=media)[:2] == (200, JSON)
+    assert "JSON" in server.refused(422, "POST", LOOKUP, npy("(1, 4)", bytes(32)), Content_Type=media)
+
+
 @pytest.mark.parametrize("media", [JSON, NPY, "text/plain"])
 def test_a_body_of_100_mb_is_refused_while_it_arrives(server: Server, media: str) -> None:
     said = server.refused(413, "POST", LOOKUP, bytes(100 * 10**6), Content_Type=media)

@@ -175,6 +175,22 @@ def test_etag_follows_the_revision(own: Path, address: str) -> None:
     assert answer.headers["etag"].startswith('W/"copper-foil-r000002-')
 
 
+def test_etag_of_the_catalogue_follows_what_it_shows(own: Path) -> None:
+    client = client_of(own)
+    colourless = client.get("/v1/materials").headers["etag"]
+    for name in client.app.state.shelf.names():
+        client.app.state.shelf.paint(name)
+    first = client.get("/v1/materials", headers={"If-None-Match": colourless})
+    assert (first.status_code, first.headers["cache-control"]) == (200, "no-cache")
+    held = {"If-None-Match": first.headers["etag"]}
+    again = client.get("/v1/materials", headers=held)
+    assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", first.headers["etag"])
+    assert client.get("/v1/materials?q=foil", headers=held).status_code == 200
+    assert client.get("/v1/materials?limit=3", headers=held).status_code == 200
+    publish(own, "copper-foil", "lambert", rho=0.5)
+    assert client.get("/v1/materials", headers=held).status_code == 200
+
+
 def test_etag_of_npy_is_another(client: Client) -> None:
     tag = client.get(FOIL_POINT).headers["etag"]
     answer = client.get(FOIL_POINT, headers={"If-None-Match": tag, "Accept": "application/x-npy"})

@@ -1,8 +1,8 @@
 """The service under mixed load while new revisions are published: python tests/benchmarks/soak.py --minutes 5
 
-Of a Lambertian material whose albedo is its revision's number / 1000, so that every answer tells which revision its
-numbers are of. Exits with 1 after an answer that is an error, mixes revisions or is of one that was not current, or if
-memory goes on growing.
+Of a Lambertian material whose albedo tells in every answer which revision its numbers are of: 0.001 of the first, 0.002
+of the second, and 0.001 again after a thousand. Exits with 1 after an answer that is an error, mixes revisions or is of
+one that was not current, or if memory goes on growing.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import zipfile
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -34,54 +35,66 @@ from brdfdb.tabulate import tabulate
 
 GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 NAME = "changing"
+STEPS = 1000  # of albedo, from one revision to the next; far more than are current while a request is answered
 OFF = 1e-7  # of float32 tables, albedos up to 1: 3e-9 measured up to 0.06, neighbours are 1e-3 apart
 LEVELS = 0.51  # of 255: levels are whole numbers
 GROWTH = 1.1  # of memory, from the middle of the time to its end
 MANY = points(2000)
 
 Get = Callable[..., bytes]
-Told = Sequence[float] | np.ndarray  # numbers of revisions; none where there is nothing to tell yet
+Told = Sequence[float] | np.ndarray  # steps of albedo; none where there is nothing to tell yet
+
+
+def step(revision: int) -> int:
+    """The step of albedo that a revision has, 1 to `STEPS`."""
+    return 1 + (revision - 1) % STEPS
 
 
 def published(store: Path, revision: int) -> None:
     """A revision whose albedo says which it is."""
-    table = {"title": "Changing", "model": "lambert", "source": "no paper", "parameters": {"rho": revision / 1000}}
+    table = {
+        "title": "Changing",
+        "model": "lambert",
+        "source": "no paper",
+        "parameters": {"rho": step(revision) / STEPS},
+    }
     found, _ = publish_dataset(store, NAME, tabulate(Layout(Material.from_table(NAME, table), GRID)))
     assert found == f"r{revision:06d}", found
 
 
-def number(revision: str) -> int:
-    return int(revision[1:])
+def step_of(answer: dict[str, Any]) -> int:
+    """The step of the revision that an answer names."""
+    return step(int(answer["revision"][1:]))
 
 
 def one(get: Get) -> Told:
     """One point: its value and the revision that it names."""
     answer = json.loads(get(f"/v1/materials/{NAME}/lookup?theta_i=10&theta_r=40"))
-    return [answer["brdf"] * np.pi * 1000, number(answer["revision"])]
+    return [answer["brdf"] * np.pi * STEPS, step_of(answer)]
 
 
 def bound(get: Get) -> Told:
     """One point of the revision that is current, by its own address."""
-    revision = json.loads(get(f"/v1/materials/{NAME}"))["revision"]
-    answer = json.loads(get(f"/v1/materials/{NAME}/revisions/{revision}/lookup?theta_i=10&theta_r=40"))
-    return [answer["brdf"] * np.pi * 1000, number(answer["revision"]), number(revision)]
+    current = json.loads(get(f"/v1/materials/{NAME}"))
+    answer = json.loads(get(f"/v1/materials/{NAME}/revisions/{current['revision']}/lookup?theta_i=10&theta_r=40"))
+    return [answer["brdf"] * np.pi * STEPS, step_of(answer), step_of(current)]
 
 
 def many(get: Get) -> Told:
     """Thousands of points as .npy, which name no revision."""
-    return np.load(io.BytesIO(get(f"/v1/materials/{NAME}/lookup?format=npy", as_npy(MANY)))) * np.pi * 1000
+    return np.load(io.BytesIO(get(f"/v1/materials/{NAME}/lookup?format=npy", as_npy(MANY)))) * np.pi * STEPS
 
 
 def described(get: Get) -> Told:
     """A description: its parameter and its revision."""
     answer = json.loads(get(f"/v1/materials/{NAME}"))
-    return [answer["parameters"][0]["value"] * 1000, number(answer["revision"])]
+    return [answer["parameters"][0]["value"] * STEPS, step_of(answer)]
 
 
 def albedo(get: Get) -> Told:
     """Integrals, one for each theta_i."""
     answer = json.loads(get(f"/v1/materials/{NAME}/albedo"))
-    return [*np.ravel(answer["albedo"]) * 1000, number(answer["revision"])]
+    return [*np.ravel(answer["albedo"]) * STEPS, step_of(answer)]
 
 
 def downloaded(get: Get) -> Told:
@@ -89,27 +102,27 @@ def downloaded(get: Get) -> Told:
     archive = zipfile.ZipFile(io.BytesIO(get(f"/v1/materials/{NAME}/download.zarr")))
     if broken := archive.testzip():
         raise RuntimeError(f"{broken} is damaged")
-    return [json.loads(archive.read("zarr.json"))["attributes"]["parameters"]["rho"] * 1000]
+    return [json.loads(archive.read("zarr.json"))["attributes"]["parameters"]["rho"] * STEPS]
 
 
 def listed(get: Get) -> Told:
     """A list that shows it."""
     (line,) = json.loads(get("/v1/materials"))["materials"]
-    return [number(line["revision"])]
+    return [step_of(line)]
 
 
 def coloured(get: Get) -> Told:
     """The colour in a list, once it is found: eight bits of sRGB, so that neighbours may look alike."""
     (line,) = json.loads(get("/v1/materials"))["materials"]
-    revision = number(line["revision"])
+    found = step_of(line)
     if line["colour"] is None:
         return []
-    linear = revision / 1000
+    linear = found / STEPS
     level = 255.0 * (12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055)
-    found = [int(line["colour"][at : at + 2], 16) for at in (1, 3, 5)]
-    if max(abs(each - level) for each in found) > LEVELS:
+    levels = [int(line["colour"][at : at + 2], 16) for at in (1, 3, 5)]
+    if max(abs(each - level) for each in levels) > LEVELS:
         raise RuntimeError(f"{line['colour']} is not the colour of {line['revision']}")
-    return [revision]
+    return [found]
 
 
 ASKED = {
@@ -153,10 +166,10 @@ class Soak:
                 told = np.asarray(ASKED[what](get), dtype=float)
                 if told.size == 0:
                     continue
-                revision = round(told[0])
-                if np.abs(told - revision).max() > OFF * 1000:
+                found = round(told[0])
+                if np.abs(told - found).max() > OFF * STEPS:
                     self.wrong.append(f"{what}: revisions are mixed")
-                elif not oldest <= revision <= self.begun:
+                elif found not in map(step, range(oldest, self.begun + 1)):
                     self.wrong.append(f"{what}: of a revision that was not current")
                 else:
                     self.right[what] += 1

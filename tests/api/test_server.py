@@ -1,0 +1,293 @@
+"""`brdfdb serve` as a command: several workers that answer as one, and ends at which requests are answered."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from brdfdb_api.protocol import HEAD_BYTES
+from tests.api.a_store import publish
+
+README = Path(__file__).parents[2] / "README.md"
+LOOKUP = "/v1/materials/grey/lookup?theta_i=10&theta_r=20"
+BODY = b'{"theta_i": 10, "theta_r": 20}'
+COUNTED = re.compile(r'^brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"} (\d+)', re.MULTILINE)
+DROPPED = 2  # of 4 that connect while a socket is closed; one in some stops. uvicorn's own end dropped most
+WAIT_S = 60  # for what takes a second or two where the machine has nothing else to do
+
+
+class Serving:
+    """A command that serves, its port and its log."""
+
+    def __init__(self, process: subprocess.Popen[str], log: Path) -> None:
+        assert process.stdout is not None
+        self.process, self.log = process, log
+        self.port = int(process.stdout.readline().rsplit(":", 1)[1].strip(" /\n"))
+
+    def get(self, path: str = LOOKUP) -> tuple[int, bytes]:
+        """Status and body of an answer over a new connection."""
+        with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=WAIT_S)) as connection:
+            connection.request("GET", path)
+            answer = connection.getresponse()
+            return answer.status, answer.read()
+
+    def connect(self) -> socket.socket:
+        return socket.create_connection(("127.0.0.1", self.port), timeout=WAIT_S)
+
+    @property
+    def workers(self) -> set[int]:
+        """Processes that the command started."""
+        return {
+            int(pid) for pid in Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        }
+
+    @contextlib.contextmanager
+    def alone(self, worker: int) -> Iterator[None]:
+        """While all other workers are halted."""
+        others = self.workers - {worker}
+        for other in others:
+            os.kill(other, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            for other in others:
+                os.kill(other, signal.SIGCONT)
+
+    def count(self) -> int:
+        """Lookups of one point that were answered, as /metrics says."""
+        return sum(map(int, COUNTED.findall(self.get("/metrics")[1].decode())))
+
+    def logged(self) -> list[dict[str, object]]:
+        """The whole lines of the log; an error where one is no JSON."""
+        return [json.loads(line) for line in self.log.read_text().splitlines(keepends=True) if line.endswith("\n")]
+
+
+@contextlib.contextmanager
+def serving(store: Path, log: Path, workers: int, *, ready: bool = True) -> Iterator[Serving]:
+    """A command that serves a store; if `ready`, with the kernels of all workers loaded."""
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(store), "--port", "0"]
+    with (
+        log.open("w") as errors,
+        subprocess.Popen(
+            [*command, "--workers", str(workers)],
+            env={**os.environ, "TMPDIR": str(log.parent)},  # where one that is killed leaves its counts
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+        ) as process,
+    ):
+        found = Serving(process, log)
+        try:
+            wait_until(lambda: len(found.workers) == workers * (workers > 1))
+            if ready:
+                wait_until(lambda: found.get("/readyz")[0] == 200)
+                for worker in found.workers:
+                    with found.alone(worker):
+                        wait_until(lambda: found.get("/readyz")[0] == 200)
+            yield found
+        finally:
+            process.terminate()
+
+
+def wait_until(true: Callable[[], bool]) -> None:
+    """Wait for what will be; an error where it does not come."""
+    deadline = time.monotonic() + WAIT_S
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("server") / "store"
+    publish(root, "grey", "lambert", rho=0.25)
+    return root
+
+
+@pytest.fixture(scope="module")
+def pair(store: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    """Two workers."""
+    with serving(store, tmp_path_factory.mktemp("pair") / "log", 2) as found:
+        yield found
+        found.process.terminate()
+        assert found.process.wait(WAIT_S) == 0
+
+
+def test_all_workers_answer_the_same_revision_after_a_publication(store: Path, pair: Serving) -> None:
+    for rho in (0.5, 0.75):
+        revision = publish(store, "grey", "lambert", rho=rho)
+        answers = []
+        for worker in pair.workers:
+            with pair.alone(worker):
+                answers.append(json.loads(pair.get()[1]))
+        assert [answer["revision"] for answer in answers] == [revision] * 2
+        assert answers[0] == answers[1]
+
+
+def test_any_worker_counts_the_requests_of_all(pair: Serving) -> None:
+    before = pair.count()
+    for asked, worker in enumerate(pair.workers, 3):
+        with pair.alone(worker):
+            for _ in range(asked):
+                pair.get()
+    wait_until(lambda: pair.count() == before + 3 + 4)  # a request is counted once its answer is sent
+    for worker in pair.workers:
+        with pair.alone(worker):
+            assert pair.count() == before + 3 + 4
+
+
+def test_a_worker_that_is_killed_is_replaced_and_what_it_counted_stays(pair: Serving) -> None:
+    before, count = pair.workers, pair.count()
+    killed = min(before)
+    os.kill(killed, signal.SIGKILL)
+    while not pair.workers - before:
+        assert pair.get()[0] == 200
+        count += 1
+    wait_until(lambda: pair.count() == count)
+    (new,) = pair.workers - before
+    with pair.alone(new):
+        assert pair.get()[0] == 200
+        wait_until(lambda: pair.count() == count + 1)
+    assert [line for line in pair.logged() if "failed" in line and str(killed) in str(line["failed"])]
+
+
+def test_lines_of_the_log_are_whole_under_load(pair: Serving) -> None:
+    queries = [f"theta_i=10&theta_r=20&phi_r={number}{'0' * 300}" for number in range(100)]
+
+    def load() -> None:
+        for query in queries:
+            pair.get(f"{LOOKUP.partition('?')[0]}?{query}")
+
+    def found() -> Counter[object]:
+        return Counter(line.get("query", line.get("failed")) for line in pair.logged())
+
+    threads = [threading.Thread(target=load) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    with pair.connect() as connection:
+        connection.sendall(b"no HTTP\r\n\r\n")
+        assert connection.recv(65536).startswith(b"HTTP/1.1 400 ")
+    expected = {**dict.fromkeys(queries, 4), "Invalid HTTP request received.": 1}
+    wait_until(lambda: expected.items() <= found().items())  # a line is written once its answer is sent
+
+
+@pytest.mark.parametrize(("workers", "word"), [(1, signal.SIGTERM), (2, signal.SIGINT)])
+def test_told_to_stop_all_that_connect_are_answered_or_refused(
+    store: Path, tmp_path: Path, workers: int, word: signal.Signals
+) -> None:
+    with serving(store, tmp_path / "log", workers) as server:
+        statuses: Counter[int] = Counter()
+        refused: list[ConnectionError] = []
+
+        def ask() -> None:
+            try:
+                while True:
+                    statuses[server.get()[0]] += 1
+            except (ConnectionRefusedError, ConnectionResetError) as error:  # pytest makes any other ours
+                refused.append(error)
+
+        request = f"GET {LOOKUP} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
+        idle, used, half = server.connect(), server.connect(), server.connect()
+        used.sendall(request)
+        first = b""
+        while not first.endswith(b"}"):
+            first += used.recv(65536)
+        head = f"POST {LOOKUP.partition('?')[0]} HTTP/1.1\r\nHost: x\r\nContent-Length: {len(BODY)}\r\n\r\n".encode()
+        half.sendall(head + BODY[:10])
+        threads = [threading.Thread(target=ask) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        time.sleep(0.1)
+        children = server.workers
+        server.process.send_signal(word)
+        idle.sendall(request)
+        used.sendall(request)
+        for thread in threads:
+            thread.join()
+        half.sendall(BODY[10:])  # when nobody is let in any more
+        for connection in (idle, used, half):
+            answer = b""
+            while part := connection.recv(65536):
+                answer += part
+            assert answer.startswith(b"HTTP/1.1 200 ")
+            assert b'"specular_reflectance"' in answer
+            connection.close()
+        assert server.process.wait(WAIT_S) == 0
+    assert len(refused) == 4
+    dropped = [error for error in refused if isinstance(error, ConnectionResetError)]
+    assert len(dropped) <= DROPPED
+    assert set(statuses) == {200}
+    assert {line["status"] for line in server.logged()} <= {200, 503}  # 503: before kernels were loaded
+    assert not any(Path(f"/proc/{child}").exists() for child in children)
+
+
+def test_a_worker_that_fails_ends_the_server_with_a_sentence(store: Path, tmp_path: Path) -> None:
+    (tmp_path / "fastapi.py").write_text(  # workers alone import it
+        "import warnings\nwarnings.warn('beware')\nraise RuntimeError('no such luck')\n"
+    )
+    command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", str(store), "--port", "0"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    ended = subprocess.run(
+        [*command, "--workers", "2"], env=environment, capture_output=True, text=True, timeout=WAIT_S, check=False
+    )
+    said = ended.stderr.splitlines()
+    assert (ended.returncode, said[-1]) == (2, "brdfdb: a worker ended with status 1; its log says why")
+    assert "RuntimeError: no such luck" in said
+    warned = [json.loads(line)["failed"] for line in said if "UserWarning" in line]
+    assert warned
+    assert all("UserWarning: beware" in line for line in warned)
+
+
+def test_workers_end_with_the_command_that_started_them_even_while_they_start(store: Path, tmp_path: Path) -> None:
+    with serving(store, tmp_path / "log", 2, ready=False) as server:
+        workers = server.workers
+        server.process.kill()
+        wait_until(lambda: not any(map(_runs, workers)))
+    assert len(workers) == 2
+    assert server.logged() == []
+
+
+def test_uvicorn_as_the_readme_starts_it_logs_once_and_bounds_heads(store: Path, tmp_path: Path) -> None:
+    (words,) = re.findall(r"`uvicorn (--factory [^`]*)`", README.read_text())
+    command = [sys.executable, "-m", "uvicorn", *words.split(), "--port", "0"]
+    log = tmp_path / "log"
+    with (
+        log.open("w") as errors,
+        subprocess.Popen(
+            command, env={**os.environ, "BRDFDB_STORE": str(store)}, stdout=errors, stderr=errors
+        ) as process,
+    ):
+        try:
+            wait_until(lambda: "running on" in log.read_text())
+            port = int(re.findall(r"http://127.0.0.1:(\d+)", log.read_text())[0])
+            urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=WAIT_S).close()
+            with socket.create_connection(("127.0.0.1", port), timeout=WAIT_S) as connection:
+                connection.sendall(b"GET /".ljust(HEAD_BYTES + 1, b"x"))
+                assert connection.recv(65536).startswith(b"HTTP/1.1 400 ")
+        finally:
+            process.terminate()
+    assert len([line for line in log.read_text().splitlines() if "/healthz" in line]) == 1
+
+
+def _runs(pid: int) -> bool:
+    """Whether a process is there and not only its exit status."""
+    with contextlib.suppress(FileNotFoundError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
