@@ -176,7 +176,7 @@ class Table(Described):
         low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
         given: Sequence[ArrayLike] = (theta_i, phi_i, theta_r, phi_r)
         shape: tuple[int, ...] = ()
-        if all(type(angle) is float for angle in given):  # broadcasting takes longer than the lookup of one point
+        if all(isinstance(angle, float) for angle in given):  # broadcasting takes longer than the lookup of one point
             numbers = np.array(given).reshape(4, 1)
             numbers.flags.writeable = False  # as by `_flat`
             dtype, flat = numbers.dtype, list(numbers)

@@ -313,13 +313,13 @@ class Store(Mapping[str, "Table"]):
 
     def _read_pointer(self, name: str) -> _Pointer | None:
         """The pointer of a material, read anew if it changed; None if there is none."""
-        if not NAME.fullmatch(name):
+        known = self._pointers.get(name)
+        if known is None and not NAME.fullmatch(name):
             return None
         path = f"{self.root}/materials/{name}/HEAD.json"
         try:
             at = os.stat(path)
             seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
-            known = self._pointers.get(name)
             if known is None or known.seen != seen:
                 with open(path, "rb") as handle:
                     known = self._pointers[name] = _Pointer(seen, Path(path), json_object(Path(path), handle.read()))

@@ -122,6 +122,7 @@ async def _warmed(app: FastAPI) -> AsyncIterator[None]:
     """While the application runs: a thread that decodes what lists show first."""
     threading.Thread(target=app.state.shelf.warm, daemon=True).start()
     yield
+    app.state.shelf.close()
 
 
 async def problem(_: Request, error: Exception) -> Response:

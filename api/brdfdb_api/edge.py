@@ -37,6 +37,7 @@ SECONDS = Histogram(
 POINTS = Counter("brdfdb_points", "Pairs of directions looked up", ["source"])
 
 LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # the lowest status
+LOGGED = 1000  # characters of a path, and of a query: pipes mix what several workers write beyond 4096 bytes a line
 _STDERR = 2
 
 Answerer = Callable[[Scope, str, str | None], Awaitable[ASGIApp]]
@@ -188,8 +189,8 @@ def _log(scope: Scope, request_id: bytes, **more: object) -> None:
         "request": request_id.decode(),
         "client": client[0] if client else "",
         "method": scope["method"],
-        "path": scope["path"],
-        "query": scope["query_string"].decode("latin-1"),
+        "path": scope["path"][:LOGGED],
+        "query": scope["query_string"][:LOGGED].decode("latin-1"),
         **more,
     }
     with contextlib.suppress(OSError):  # nobody reads it any more

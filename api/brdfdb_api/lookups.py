@@ -149,7 +149,8 @@ class Points:
             422, naming the parameter.
         """
         for name in fields:
-            refuse_unknown(name, FIELDS)
+            if name not in FIELDS:
+                raise unknown(name, FIELDS)
         angles = []
         for name in ANGLES:
             if name not in fields and name in REQUIRED:
@@ -287,7 +288,8 @@ def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list
     single: dict[str, str] = {}
     wavelengths = []
     for name, value in pairs:
-        refuse_unknown(name, allowed)
+        if name not in allowed:
+            raise unknown(name, allowed)
         if name == "wavelength_nm":
             wavelengths.append(value)
         elif name in single:
@@ -297,12 +299,11 @@ def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list
     return single, wavelengths
 
 
-def refuse_unknown(name: str, allowed: tuple[str, ...]) -> None:
-    """Raise the RequestError (422) of a parameter that is not one of `allowed`: a misspelt one is never ignored."""
-    if name not in allowed:
-        shown = shortened(name)
-        said = "belongs in the query" if name in OPTIONS else "unknown parameter"
-        raise RequestError(422, f"{shown}: {said}; allowed are {', '.join(allowed) or 'none'}", shown)
+def unknown(name: str, allowed: tuple[str, ...]) -> RequestError:
+    """The refusal (422) of a parameter that is not one of `allowed`: a misspelt one is never ignored."""
+    shown = shortened(name)
+    said = "belongs in the query" if name in OPTIONS else "unknown parameter"
+    return RequestError(422, f"{shown}: {said}; allowed are {', '.join(allowed) or 'none'}", shown)
 
 
 def shortened(text: str) -> str:

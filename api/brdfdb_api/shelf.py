@@ -57,6 +57,7 @@ class Shelf:
         self._waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._painter: threading.Thread | None = None
         self._swatches: WeakKeyDictionary[Table, str | None] = WeakKeyDictionary()
+        self._closed = False
         self.warming = False  # kernels are being loaded, which takes half a minute where they are compiled
 
     @property
@@ -133,18 +134,27 @@ class Shelf:
         for name in names:
             self._waiting.put(name)
         with self._lock:
-            if self._painter is None or not self._painter.is_alive():
+            if not self._closed and (self._painter is None or not self._painter.is_alive()):
                 self._painter = threading.Thread(target=self._paint, daemon=True)
                 self._painter.start()
 
     def _paint(self) -> None:
-        while True:
+        while not self._closed:
             try:
                 name = self._waiting.get(timeout=IDLE_S)
             except queue.Empty:
                 return
             with contextlib.suppress(UnknownMaterialError, StoreError):
                 self.paint(name)
+
+    def close(self) -> None:
+        """End the thread that finds colours: decoding while the interpreter ends leaves a warning."""
+        with self._lock:
+            self._closed = True
+            painter = self._painter
+        if painter is not None:
+            self._waiting.put("")  # it may wait for a name
+            painter.join()
 
     def paint(self, name: str) -> None:
         """Find the colour of a material for lists, unless it is known or the table is large; errors as of the store."""

@@ -137,6 +137,12 @@ def test_the_log_may_be_of_refusals_or_failures_alone(root: Path, log: Log, leve
     assert [line["status"] for line in log()] == logged
 
 
+def test_a_long_address_is_cut_in_the_log(client: Client, log: Log) -> None:
+    client.get(f"/{'a' * 5000}?{'b' * 5000}")
+    (line,) = log()
+    assert (line["path"], line["query"]) == ("/" + "a" * 999, "b" * 1000)
+
+
 @pytest.mark.parametrize("address", [POINT, FELT])
 def test_a_failure_is_in_the_log_and_not_in_the_answer(
     client: Client, log: Log, monkeypatch: pytest.MonkeyPatch, address: str
