@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -136,6 +138,12 @@ def test_a_table_is_what_was_published(root: Path) -> None:
     }
     assert list(table.axes_deg) == list(GRID.axes)
     assert dict(table.attrs) == dataset.attrs
+
+
+def test_decoding_a_table_loads_neither_xarray_nor_pandas(root: Path) -> None:
+    program = "import sys, brdfdb; brdfdb.open(sys.argv[1])['white']; print({'xarray', 'pandas'} & set(sys.modules))"
+    ended = subprocess.run([sys.executable, "-c", program, str(root)], capture_output=True, text=True, check=True)
+    assert ended.stdout == "set()\n"  # half a second of a server's start
 
 
 def test_an_open_store_serves_the_new_head_and_the_old_table_stays_whole(root: Path) -> None:
