@@ -1,0 +1,314 @@
+"""A store behind a service that is not there, is another, does not answer, or stands behind a proxy."""
+
+from __future__ import annotations
+
+import http.client
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb import remote
+from brdfdb.store import StoreError
+from tests.api.a_store import angles, npy, same, serving
+
+
+@pytest.fixture(scope="module")
+def address(root: Path) -> Iterator[str]:
+    with serving(root) as url:
+        yield url
+
+
+def test_a_server_that_is_not_there(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    with pytest.raises(StoreError, match=rf"^no answer from http://127.0.0.1:{port}: Connection refused$"):
+        brdfdb.open(f"http://127.0.0.1:{port}")
+    with serving(tmp_path) as url, pytest.raises(StoreError, match=r"^no store at "):
+        brdfdb.open(url)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        *("http://", "http://host:port", "ftp://host", "http://host/?a=1", "host:8000"),
+        *("http://me:secret@host", "http://my host", "http://host/\u00e4", "http://host/\n"),
+    ],
+)
+def test_an_address_that_is_none(url: str) -> None:
+    with pytest.raises(ValueError, match=r"^url: '.*' is not an address"):
+        remote.RemoteStore(url)
+
+
+def test_an_address_that_no_name_service_takes() -> None:
+    with pytest.raises(StoreError, match=r"^no answer from http://a\.\.b: "):
+        remote.RemoteStore("http://a..b")
+
+
+@pytest.mark.parametrize(("scheme", "port"), [("http", 80), ("https", 443)])
+def test_an_address_of_ipv6_without_a_port(scheme: str, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def refuse(address: tuple[str, int], *_: Any) -> socket.socket:
+        asked.append(address)
+        raise ConnectionRefusedError("nobody")
+
+    monkeypatch.setattr(socket, "create_connection", refuse)
+    with pytest.raises(StoreError, match=r"nobody$"):
+        remote.RemoteStore(f"{scheme}://[::1]/brdf/")
+    assert asked == [("::1", port)]
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, -1.0, np.inf, np.nan])
+def test_a_time_that_no_socket_waits(timeout_s: float) -> None:
+    with pytest.raises(ValueError, match=r"^timeout_s: \S+ is outside \(0, 9\.\d+e\+09\] s$"):
+        remote.RemoteStore("http://127.0.0.1:1", timeout_s)
+
+
+def test_a_service_that_does_not_answer_in_time() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(StoreError, match=f"^no answer from {url}: timed out$"):
+            remote.RemoteStore(url, timeout_s=0.05)
+
+
+@contextmanager
+def answering(*answers: bytes, close: bool = True) -> Iterator[tuple[str, list[bytes]]]:
+    """A server that sends each of its answers to the beginning of one request, on a connection of its own."""
+    asked: list[bytes] = []
+    with socket.create_server(("127.0.0.1", 0)) as listener, ExitStack() as held:
+        listener.settimeout(5.0)  # a client that asks less often fails the test, and does not hang it
+
+        def work() -> None:
+            for answer in answers:
+                connection, _ = listener.accept()
+                held.enter_context(connection)
+                asked.append(connection.recv(65536))
+                connection.sendall(answer)
+                if close:
+                    connection.close()
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}", asked
+        finally:
+            thread.join()
+
+
+def answer(content: bytes, status: str = "200 OK", *lines: str) -> bytes:
+    """An answer of a server that says how long it is."""
+    head = "\r\n".join([f"HTTP/1.1 {status}", f"Content-Length: {len(content)}", *lines])
+    return head.encode() + b"\r\n\r\n" + content
+
+
+PAGE = b"<html>\r\n<head><title>nginx</title></head></html>\r\n"
+READY = answer(b'{"materials":3}')
+TOO_LARGE = answer(PAGE, "413 Request Entity Too Large", "Content-Type: text/html", "Connection: close")
+FAR_TOO_LARGE = bytes(16_000_000)  # more than sockets keep: it cannot be sent to whom does not read it
+
+
+def test_a_connection_that_was_closed_in_between_is_made_anew() -> None:
+    with answering(READY, READY) as (url, asked):
+        assert len(remote.RemoteStore(url)) == 3
+    assert len(asked) == 2
+    assert all(b"Accept-Encoding: identity" in request for request in asked)
+
+
+def test_it_is_made_anew_once() -> None:
+    with answering(READY, b"") as (url, asked):
+        there = remote.RemoteStore(url)
+        with pytest.raises(StoreError, match=f"^no answer from {url}: "):
+            len(there)
+    assert len(asked) == 2
+
+
+def test_a_new_connection_that_breaks_is_not_tried_again() -> None:
+    with answering(b"") as (url, asked), pytest.raises(StoreError, match=f"^no answer from {url}: "):
+        remote.RemoteStore(url)
+    assert len(asked) == 1
+
+
+def test_an_answer_in_chunks() -> None:
+    chunks = b'4\r\n{"ma\r\nb\r\nterials":3}\r\n0\r\n\r\n'
+    with answering(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n" + chunks) as (url, _):
+        assert remote.Service(url).document("/readyz") == {"materials": 3}
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (answer(PAGE, "502 Bad Gateway"), "^http://[^ ]+ answered 502 Bad Gateway, and does not say why$"),
+        (answer(PAGE, "504 Gateway Time-out"), "^http://[^ ]+ answered 504 Gateway Time-out, and does not say why$"),
+        (
+            answer(PAGE, "503 Service Unavailable"),
+            "^http://[^ ]+ answered 503 Service Unavailable, and does not say why$",
+        ),
+        (answer(b"\xff\xfe", "422 "), "^http://[^ ]+ answered 422, and does not say why$"),
+        (answer(b'{"detail": "Not Found"}', "404 Not Found"), "^http://[^ ]+ answered 404 Not Found: Not Found$"),
+        (answer(b"", "304 Not Modified"), "^http://[^ ]+ answered 304 Not Modified, and does not say why$"),
+        (TOO_LARGE, "^http://[^ ]+ answered 413 Request Entity Too Large, and does not say why$"),
+        (answer(PAGE), "^http://[^ ]+ is no service of brdfdb$"),
+        (answer(b"[]"), "^http://[^ ]+ is no service of brdfdb$"),
+        (answer(b""), "^http://[^ ]+ is no service of brdfdb$"),
+        (answer(b'{"title": "\xe4"}'), "^http://[^ ]+ is no service of brdfdb$"),
+        (answer(b'{"status": "ready"}'), "^http://[^ ]+ is no service of brdfdb$"),
+        (answer(b'{"materials": "3"}'), "^http://[^ ]+ is no service of brdfdb$"),
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 99\r\n\r\n{}", "^no answer from http://[^ ]+: IncompleteRead"),
+        (b"SSH-2.0\r\n", "^no answer from http://[^ ]+: SSH-2.0$"),
+    ],
+)
+def test_something_else_at_the_address(found: bytes, said: str) -> None:
+    with answering(found) as (url, _), pytest.raises(StoreError, match=said):
+        remote.RemoteStore(url)
+
+
+NUMBERS = npy(np.zeros((3, 2)))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        *(PAGE, b"", b"PK\x03\x04", NUMBERS[:-1], NUMBERS[:20], NUMBERS.replace(b"(3, 2), ", b"(3, 2 , ")),
+        *(npy(np.zeros(shape)) for shape in [(2, 3), 6, (3, 2, 1), ()]),
+        *(npy(np.zeros((3, 2), dtype)) for dtype in ("f4", "i8", ">f8", "c16", "S8", "O")),
+    ],
+)
+def test_something_else_than_the_array_asked_for(content: bytes) -> None:
+    said = "^http://[^ ]+ is no service of brdfdb$"
+    with answering(answer(content)) as (url, _), pytest.raises(StoreError, match=said):
+        remote.Service(url).array("/v1", (3, 2))
+
+
+@pytest.mark.parametrize("status", ["301 Moved Permanently", "302 Found", "307 Temporary Redirect", "308 Permanent"])
+def test_a_redirect_is_told_and_not_followed(status: str) -> None:
+    moved = answer(PAGE, status, "Location: https://there.example/brdf/v1?a=1")
+    for body in (None, {"theta_i": 0}):
+        with answering(moved) as (url, _), pytest.raises(StoreError) as raised:
+            remote.Service(f"{url}/brdf/").document("/v1?a=1", body)
+        where = "https://there.example/brdf/v1; open the address that the service itself has"
+        assert str(raised.value) == f"{url}/brdf redirects /v1 to {where}"
+
+
+# Behind a proxy
+
+
+def test_a_body_that_is_refused_before_it_was_read() -> None:
+    with answering(TOO_LARGE, READY, TOO_LARGE, READY) as (url, asked):
+        there = remote.Service(url)
+        for _ in range(2):  # the second time, the connection is one that was closed in between
+            with pytest.raises(
+                StoreError, match=f"^{url} answered 413 Request Entity Too Large, and does not say why$"
+            ):
+                there.content("/v1", FAR_TOO_LARGE, remote.NPY)
+            assert there.document("/readyz") == {"materials": 3}
+    assert [request[:4] for request in asked] == [b"POST", b"GET ", b"POST", b"GET "]
+
+
+def test_a_connection_on_which_a_body_was_not_sent_whole_is_not_used_again() -> None:
+    with answering(answer(PAGE, "413"), READY, close=False) as (url, asked):
+        there = remote.Service(url, timeout_s=1.0)
+        with pytest.raises(StoreError, match=f"^{url} answered 413, and does not say why$"):
+            there.content("/v1", FAR_TOO_LARGE, remote.NPY)
+        assert there.document("/readyz") == {"materials": 3}
+    assert len(asked) == 2
+
+
+class Proxy(ThreadingHTTPServer):
+    """What nginx is before a service: too large a body is refused unread, with a page, and answers come in chunks.
+
+    `asked` are the sizes of request line and body; lines above 8 kB are refused as well.
+    """
+
+    def __init__(self, service: str) -> None:
+        super().__init__(("127.0.0.1", 0), Passing)
+        self.service, self.url = service.removeprefix("http://"), f"http://127.0.0.1:{self.server_port}"
+        self.most_bytes = 2**20
+        self.asked: list[tuple[int, int]] = []
+
+    def refused(self) -> list[int]:
+        """The sizes of the bodies that were too large."""
+        return [size for _, size in self.asked if size > self.most_bytes]
+
+
+class Passing(BaseHTTPRequestHandler):
+    """One connection of a `Proxy`."""
+
+    protocol_version = "HTTP/1.1"
+    server: Proxy
+
+    def do_GET(self) -> None:
+        line, size = len(self.raw_requestline), int(self.headers.get("Content-Length", 0))
+        self.server.asked.append((line, size))
+        if size > self.server.most_bytes or line > 8192:
+            self.wfile.write(TOO_LARGE if line <= 8192 else answer(PAGE, "414 Request-URI Too Large"))
+            self.close_connection = True
+            return
+        behind = http.client.HTTPConnection(self.server.service)
+        behind.request(self.command, self.path, self.rfile.read(size) or None, dict(self.headers))
+        response = behind.getresponse()
+        self.send_response(response.status)
+        self.send_header("Transfer-Encoding", "chunked")
+        self.end_headers()
+        while part := response.read(5000):
+            self.wfile.write(b"%x\r\n%b\r\n" % (len(part), part))
+        self.wfile.write(b"0\r\n\r\n")
+        behind.close()
+
+    def do_POST(self) -> None:
+        self.do_GET()
+
+    def log_message(self, *_: Any) -> None: ...
+
+
+@pytest.fixture
+def proxy(address: str) -> Iterator[Proxy]:
+    with Proxy(address) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def test_a_proxy_passes_as_much_as_is_sent_at_once(proxy: Proxy, root: Path) -> None:
+    there, here = brdfdb.open(proxy.url)["copper-foil"], brdfdb.open(root)["copper-foil"]
+    given = [np.tile(angle, 100) for angle in angles()]
+    same(there.lookup(*given, 500.5), here.lookup(*given, 500.5))
+    many = np.linspace(400, 700, 1003)
+    same(there.lookup(0.1, 0.2, 0.3, 0.4, many), here.lookup(0.1, 0.2, 0.3, 0.4, many))
+    assert proxy.refused() == []
+    assert max(size for _, size in proxy.asked) > 0.9 * proxy.most_bytes
+    assert 0.7 * 8192 < max(line for line, _ in proxy.asked) < 8192
+
+
+def test_what_is_too_large_for_a_proxy_is_halved(proxy: Proxy, root: Path) -> None:
+    there, here = brdfdb.open(proxy.url)["copper-foil"], brdfdb.open(root)["copper-foil"]
+    proxy.most_bytes = 4000
+    given = angles()
+    same(there.lookup(*given), here.lookup(*given))
+    head = len(npy(np.zeros((1, 4)))) - 32
+    assert proxy.refused() == [head + 32 * points for points in (400, 200)]
+    same(there.specular_reflectance(given[0]), here.specular_reflectance(given[0]))
+    assert len(proxy.refused()) == 3
+
+
+@pytest.mark.parametrize(("points", "requests"), [(8, 4), (3, 2), (1, 1)])
+def test_one_point_that_is_too_large_for_a_proxy_is_an_error(proxy: Proxy, points: int, requests: int) -> None:
+    there = brdfdb.open(proxy.url)["copper-foil"]
+    proxy.most_bytes = -1
+    theta = np.full(points, 0.3)
+    for ask in (lambda: there.lookup(0.1, 0.2, theta, 0.4), lambda: there.specular_reflectance(theta)):
+        proxy.asked.clear()
+        with pytest.raises(StoreError, match=f"^{proxy.url} answered 413 Request Entity Too Large, and does not say"):
+            ask()
+        assert len(proxy.asked) == requests
