@@ -406,7 +406,7 @@ def specular(
     for j in range(theta.size):
         t = theta[j]
         good = good and not (t < 0.0 or t > PI)
-        if last > 0 and t <= horizon:
+        if last > 0:
             below, above = 0, last
             while above - below > 1:
                 middle = (below + above) // 2

@@ -14,7 +14,7 @@ from brdfdb.grids import Axis
 from brdfdb.parameters import Floats
 
 _Located = tuple[NDArray[np.int64], NDArray[np.float64], tuple[int, ...]]
-_MOST_KNOWN = 1024  # single wavelengths that are remembered
+_MOST_KNOWN = 64  # single wavelengths that are remembered
 
 
 class Stated(NamedTuple):

@@ -281,7 +281,12 @@ class Table(Described):
             return np.empty(0), np.empty((0, 0), np.float32)
         at_deg = self.specular_theta_deg
         nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
-        return nodes, np.ascontiguousarray(self.specular.reshape(len(self.specular), -1))
+        expected = (nodes.size,) if self.wavelength_nm is None else (nodes.size, self.wavelength_nm.size)
+        if self.specular.shape != expected or nodes.size < 2:  # kernels do not look
+            raise ValueError(
+                f"specular: shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
+            )
+        return nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1))
 
 
 def rebuilt(

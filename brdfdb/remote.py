@@ -184,7 +184,7 @@ def _exchange(
 ) -> tuple[http.client.HTTPResponse, bytes]:
     """Send a request on an open connection, and read all of its answer."""
     sent = False
-    with suppress(OSError):  # who refuses a body may answer, and close, before all of it is sent
+    with suppress(OSError):  # who refuses a body may answer, and close or read no more, before all of it is sent
         connection.request(method, address, body, headers)
         sent = True
     response = connection.getresponse()

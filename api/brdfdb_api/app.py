@@ -22,7 +22,7 @@ from brdfdb.store import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb_api.edge import Edge
 from brdfdb_api.files import files
 from brdfdb_api.pages import pages
-from brdfdb_api.responses import PROBLEM_JSON, RequestError, problem_response
+from brdfdb_api.responses import PROBLEM_JSON, REVISION, RequestError, problem_response
 from brdfdb_api.routes import LARGE_AT_ONCE, answer_point, router
 from brdfdb_api.settings import Settings
 from brdfdb_api.shelf import Shelf
@@ -112,7 +112,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
             allow_origins=app.state.settings.cors_origins,
             allow_methods=["GET", "POST"],
             allow_headers=["*"],
-            expose_headers=["ETag", "X-Request-ID"],
+            expose_headers=["ETag", "X-Request-ID", REVISION],
         )
     return app
 

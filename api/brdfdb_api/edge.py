@@ -37,7 +37,9 @@ SECONDS = Histogram(
 POINTS = Counter("brdfdb_points", "Pairs of directions looked up", ["source"])
 
 LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # the lowest status
-LOGGED = 1000  # characters of a path, and of a query: pipes mix what several workers write beyond 4096 bytes a line
+LINE = 4096  # bytes: beyond, pipes mix what several workers write
+SHOWN = 100  # characters of a path, and of a query, in a line that would be longer
+KEPT = {"failed": slice(SHOWN), "traceback": slice(-1000, None)}
 _STDERR = 2
 
 Answerer = Callable[[Scope, str, str | None], Awaitable[ASGIApp]]
@@ -77,7 +79,7 @@ class Edge:
             await self.app(scope, receive, send)
             return
         start = time.perf_counter()
-        exchange = _Exchange(self, scope, receive, send)
+        exchange, asked = _Exchange(self, scope, receive, send), scope
         if scope["method"] == "HEAD":  # answered as GET, without the body
             scope = {**scope, "method": "GET"}
         route = ""
@@ -92,20 +94,21 @@ class Edge:
             refusal = self.failed(error)
             if refusal.status_code == 500 and not exchange.gone:
                 failed = f"{type(error).__name__}: {error}"
-                _log(scope, exchange.id, failed=failed, traceback=traceback.format_exc())
+                _log(asked, exchange.id, failed=_ascii(failed), traceback=_ascii(traceback.format_exc()))
             if exchange.status == 0:
                 await refusal(scope, receive, exchange.send)
             elif not exchange.ended:  # too late for another answer
+                exchange.status = 500
                 raise
         finally:
             self.waiting -= exchange.size
             seconds = time.perf_counter() - start
-            status = exchange.status
+            status = exchange.status or GONE  # nobody waits for a request that is cancelled
             requests, observed = _counters(route or getattr(scope.get("route"), "path", "other"), status)
             requests.inc()
             observed.observe(seconds)
             if status >= self.logged_from:
-                _log(scope, exchange.id, status=status, ms=round(1e3 * seconds, 3))
+                _log(asked, exchange.id, status=status, ms=round(1e3 * seconds, 3))
 
 
 class _Exchange:
@@ -122,7 +125,8 @@ class _Exchange:
     async def receive(self) -> Message:
         message = await self._receive()
         if message["type"] == "http.disconnect":
-            self.gone, self.status, self.ended = True, GONE, True
+            if not self.ended:
+                self.gone, self.status, self.ended = True, GONE, True
             return message
         size = len(message.get("body", b""))
         self.size += size
@@ -189,9 +193,19 @@ def _log(scope: Scope, request_id: bytes, **more: object) -> None:
         "request": request_id.decode(),
         "client": client[0] if client else "",
         "method": scope["method"],
-        "path": scope["path"][:LOGGED],
-        "query": scope["query_string"][:LOGGED].decode("latin-1"),
+        "path": _ascii(scope["path"]),
+        "query": scope["query_string"].decode("ascii", "backslashreplace"),
         **more,
     }
+    line = orjson.dumps(record, option=orjson.OPT_APPEND_NEWLINE)
+    if len(line) > LINE:  # a character is six at most
+        shown = {"path": record["path"][:SHOWN], "query": record["query"][:SHOWN]}
+        shown |= {key: str(more[key])[part] for key, part in KEPT.items() if key in more}
+        line = orjson.dumps(record | shown, option=orjson.OPT_APPEND_NEWLINE)
     with contextlib.suppress(OSError):  # nobody reads it any more
-        os.write(_STDERR, orjson.dumps(record, option=orjson.OPT_APPEND_NEWLINE))
+        os.write(_STDERR, line)
+
+
+def _ascii(text: str) -> str:
+    """What orjson can write, lone surrogates too, and terminals show as it is."""
+    return text.encode("ascii", "backslashreplace").decode()

@@ -33,6 +33,7 @@ Angles = tuple[Any, Any, Any, Any]  # theta_i, phi_i, theta_r, phi_r [rad]
 
 _TURN = 360.0  # degrees; fmod is exact, and radians have no digits left at 1e15
 _AT_ONCE = 25_000  # points whose spectra are in memory while colours are made of them
+_MOST_AXES = 32  # that numpy broadcasts
 _HEADER_BYTES = 4096  # of a .npy file: dtype and shape take a hundred
 
 
@@ -175,6 +176,8 @@ class Points:
         degrees = _npy(body)
         if degrees.ndim == 0 or degrees.shape[-1] != 4:
             raise RequestError(422, f"the body: its shape {degrees.shape} is not (..., 4): {', '.join(ANGLES)}")
+        if degrees.ndim > _MOST_AXES + 1:
+            raise RequestError(422, f"the body: {degrees.ndim} axes; at most {_MOST_AXES + 1} are allowed")
         if degrees.size == 0:
             raise RequestError(422, "the body: an empty array")
         angles = [_in_radians(name, degrees[..., column]) for column, name in enumerate(ANGLES)]
@@ -369,6 +372,8 @@ def _numbers(name: str, value: Any) -> NDArray[np.float64]:
         array = None
     if array is None:
         raise RequestError(422, f"{name}: not a number or a list of numbers", name)
+    if array.ndim > _MOST_AXES:
+        raise RequestError(422, f"{name}: lists in {array.ndim} levels; at most {_MOST_AXES} are allowed", name)
     if array.size == 0:
         raise RequestError(422, f"{name}: an empty list", name)
     if not np.all(finite := np.isfinite(array)):

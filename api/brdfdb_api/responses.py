@@ -259,7 +259,7 @@ def problem_response(
         "type": "about:blank",
         "title": TITLES.get(status) or HTTPStatus(status).phrase,
         "status": status,
-        "detail": detail,
+        "detail": detail.encode(errors="backslashreplace").decode(),  # paths may have what is no text
     }
     if parameter is not None:
         problem["parameter"] = parameter

@@ -267,7 +267,7 @@ def _headers(scope: Scope) -> tuple[str, str]:
     accept = held = b""
     for key, value in scope["headers"]:
         if key == b"accept":
-            accept = value
+            accept += value  # of several lines
         elif key == b"if-none-match":
             held = value
     return accept.decode("latin-1"), held.decode("latin-1")
@@ -275,8 +275,10 @@ def _headers(scope: Scope) -> tuple[str, str]:
 
 async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
     """A table at once if it is decoded, else from a thread."""
-    table = shelf.held(name) if revision is None else None
-    return await run_in_threadpool(shelf.table, name, revision) if table is None else table
+    table = shelf.held(name)
+    if table is not None and revision in (None, table.revision):
+        return table
+    return await run_in_threadpool(shelf.table, name, revision)
 
 
 @both(

@@ -21,6 +21,7 @@ import brdfdb
 from brdfdb_api.protocol import BoundedProtocol
 from brdfdb_api.settings import Settings
 
+PAUSE_S = 1.0  # before a worker is replaced
 GRACE_S = 10  # for requests that are being answered when the server is told to stop
 
 LOG = logging.getLogger("brdfdb.server")
@@ -98,8 +99,10 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
         status = 0
         while not stopping.is_set():
             status = await worker()
-            if status > 0 and not stopping.is_set():  # it would fail again; one that was killed, would not
+            if status > 0 and not stopping.is_set():  # it would fail again; one that was killed, may not
                 stop()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(stopping.wait(), PAUSE_S)
         return status
 
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -350,6 +350,16 @@ def test_a_head_longer_than_may_be_is_answered_with_400(server: Server, start: b
     assert found.endswith(b"Address and headers are longer than 65536 bytes.")
 
 
+def test_an_offer_of_http_2_is_ignored(server: Server) -> None:
+    headers = {"Connection": "Upgrade, HTTP2-Settings", "Upgrade": "h2c", "HTTP2-Settings": "AAMAAABkAAQAAP__"}
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+    for _ in range(2):
+        connection.request("POST", LOOKUP, b'{"theta_i": 10, "theta_r": 20}', headers)
+        answer = connection.getresponse()
+        assert (answer.status, json.loads(answer.read())["material"]) == (200, "white")
+    connection.close()
+
+
 def test_heads_are_counted_one_by_one(server: Server) -> None:
     # more than a head may have in all, of heads and bodies on one connection
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)

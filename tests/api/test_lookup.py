@@ -18,7 +18,7 @@ from brdfdb.lookup import Table
 from brdfdb.store import Store
 from brdfdb_api.app import create_app
 from brdfdb_api.settings import Settings
-from tests.api.a_store import VISIBLE_NM, Client, client_of, degrees, read_npy
+from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, npy, read_npy
 
 FOIL = "/v1/materials/copper-foil/lookup"
 FELT = "/v1/materials/grey-felt/lookup"
@@ -157,6 +157,18 @@ def test_a_long_body(root: Path, store: Store) -> None:
     fields = dict.fromkeys(("theta_i", "phi_i", "theta_r", "phi_r"), angles.tolist())
     expected = degrees(store, "grey-felt", angles, angles, angles, angles)
     np.testing.assert_allclose(client_of(root).post(FELT, json=fields).json()["brdf"], expected, **EXACT)
+
+
+@pytest.mark.parametrize(("levels", "status"), [(32, 200), (33, 422), (64, 422), (65, 422)])
+def test_lists_in_lists(client: Client, levels: int, status: int) -> None:
+    body = '{"theta_i": 10, "theta_r": ' + "[" * levels + "20" + "]" * levels + "}"
+    answer = client.post(FELT, content=body)
+    assert answer.status_code == status
+    if status == 422:
+        assert answer.json()["parameter"] == "theta_r"
+    if levels < 64:
+        degrees = np.full((1,) * levels + (4,), 10.0)
+        assert client.post(FELT, content=npy(degrees), headers={"Content-Type": NPY}).status_code == status
 
 
 # Wrong questions
