@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -55,15 +55,15 @@ class Table(Described):
 
     name: str
     revision: str
-    attrs: Mapping[str, Any]
-    grid: Grid
-    wavelength_nm: Axis | None
-    values: NDArray[np.float32]
-    specular: NDArray[np.float32] | None
-    specular_theta_deg: Axis | None = None
+    attrs: Mapping[str, Any] = field(repr=False)
+    grid: Grid = field(repr=False)
+    wavelength_nm: Axis | None = field(repr=False)
+    values: NDArray[np.float32] = field(repr=False)
+    specular: NDArray[np.float32] | None = field(repr=False)
+    specular_theta_deg: Axis | None = field(default=None, repr=False)
     interpolation: Interpolation = PLAIN
-    spectra: NDArray[np.float64] | None = None
-    uniform: NDArray[np.float64] | None = None
+    spectra: NDArray[np.float64] | None = field(default=None, repr=False)
+    uniform: NDArray[np.float64] | None = field(default=None, repr=False)
     digest: str = ""
 
     @classmethod

@@ -217,9 +217,9 @@ class RemoteTable(Described):
 
     name: str
     revision: str
-    attrs: Mapping[str, Any]
-    axes_deg: Mapping[str, Axis]
-    wavelength_nm: Axis | None
+    attrs: Mapping[str, Any] = field(repr=False)
+    axes_deg: Mapping[str, Axis] = field(repr=False)
+    wavelength_nm: Axis | None = field(repr=False)
     anisotropic: bool
     _specular: bool = field(repr=False)
     _service: Service = field(repr=False)

@@ -48,7 +48,7 @@ def _parameter(name: str, schema: dict[str, Any], description: str, *, required:
 
 
 def _format(held: str) -> dict[str, Any]:
-    chosen = f"missing: npy if the Accept header names {NPY}, else json; npy holds {held}"
+    chosen = f"missing: npy if the Accept header names {NPY}, or of a .npy body does not name JSON; npy holds {held}"
     return _parameter("format", {"type": "string", "enum": ["json", "npy"]}, chosen)
 
 

@@ -10,7 +10,7 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
-from brdfdb.manifest import check_manifest, manifest_digest, manifest_of
+from brdfdb.manifest import check_manifest, manifest_digest, manifest_of, sha256_of
 from brdfdb.store import StoreError, UnknownRevisionError
 from brdfdb_api.documented import answers
 from brdfdb_api.responses import RequestError, cache_headers, not_modified
@@ -38,7 +38,7 @@ def download(request: Request, name: str, revision: str | None = None) -> Respon
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
-    listed = sorted(check_manifest(group, None, contents=False)["files"])
+    listed = sorted(check_manifest(group, None, contents=True)["files"])
     return StreamingResponse(_zipped(group, listed), media_type=ZIP, headers=headers)
 
 
@@ -58,6 +58,8 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
     headers = cache_headers(f"{name}-{revision}-{listed[file]['sha256'][:16]}", kind, immutable=True)
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
+    if sha256_of(group / file) != listed[file]["sha256"]:  # it would be kept for good
+        raise StoreError(f"{name} {revision} is damaged: the content of {file} changed")
     media = "application/json" if file.endswith(".json") else BYTES
     return FileResponse(group / file, media_type=media, headers=headers)
 

@@ -305,7 +305,7 @@ def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list
 def unknown(name: str, allowed: tuple[str, ...]) -> RequestError:
     """The refusal (422) of a parameter that is not one of `allowed`: a misspelt one is never ignored."""
     shown = shortened(name)
-    said = "belongs in the query" if name in OPTIONS else "unknown parameter"
+    said = "belongs in the query" if allowed == FIELDS and name in OPTIONS else "unknown parameter"
     return RequestError(422, f"{shown}: {said}; allowed are {', '.join(allowed) or 'none'}", shown)
 
 

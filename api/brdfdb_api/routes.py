@@ -19,6 +19,7 @@ from brdfdb_api import documented, edge
 from brdfdb_api.documented import BODY, ERROR, NPY_ANSWER, POINT, WAVELENGTHS, answers
 from brdfdb_api.lookups import FIELDS, OPTIONS, Options, Points, evaluate, parsed
 from brdfdb_api.responses import (
+    JSON,
     NPY,
     Alive,
     Catalogue,
@@ -299,7 +300,8 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
     binary = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NPY
     if wavelengths and not binary:
         raise RequestError(422, "wavelength_nm: a JSON body holds it, not the query", "wavelength_nm")
-    kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
+    accept = request.headers.get("accept", "")
+    kind = options.format or ("npy" if NPY in accept or (binary and JSON not in accept) else "json")
     table = await _table(shelf_of(request), name, revision)
     headers = lookup_headers(None, table.revision, kind)
     max_points = request.app.state.settings.max_points
@@ -339,8 +341,9 @@ def checked_size(max_points: int, points: Points, options: Options, table: Table
     most_points, most_values = LIMITS[kind]
     most_points, most_values = most_points * max_points, most_values * max_points
     if points.count > most_points:
+        hint = "; format=npy may hold more" if kind == "json" else ""
         raise RequestError(
-            413, f"{points.count} points are more than the {most_points} that one {kind} answer may hold"
+            413, f"{points.count} points are more than the {most_points} that one {kind} answer may hold{hint}"
         )
     values = points.values(table)
     if options.output != "spectrum" and options.source == "table":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,12 +55,18 @@ class Settings:
         Raises
         ------
         ValueError
-            If a limit is not a positive whole number, or the level of the log none; the sentence names the variable.
+            If a limit is not a positive whole number, the level of the log none, or an origin none; the sentence names
+            the variable.
         """
         level = environ.get("BRDFDB_LOG_LEVEL", cls.log_level)
         if level not in get_args(LogLevel):
             raise ValueError(f"BRDFDB_LOG_LEVEL: {level!r} is not one of {', '.join(get_args(LogLevel))}")
-        origins = (origin.strip() for origin in environ.get("BRDFDB_CORS_ORIGINS", "").split(","))
+        origins = [origin.strip() for origin in environ.get("BRDFDB_CORS_ORIGINS", "").split(",")]
+        for origin in origins:
+            if origin not in ("", "*") and not re.fullmatch("https?://[^/]+", origin):
+                raise ValueError(
+                    f"BRDFDB_CORS_ORIGINS: {origin!r} is neither * nor an origin such as https://example.org"
+                )
         return cls(
             store=Path(environ.get("BRDFDB_STORE", cls.store)),
             audit=Path(environ["BRDFDB_AUDIT"]) if "BRDFDB_AUDIT" in environ else None,

@@ -63,6 +63,12 @@ def test_an_unknown_level_of_the_log_is_named() -> None:
         Settings.from_environment({"BRDFDB_LOG_LEVEL": "loud"})
 
 
+@pytest.mark.parametrize("origin", ["a.example", "https://", "https://a.example/", "ftp://a.example"])
+def test_an_origin_that_no_page_has_is_refused(origin: str) -> None:
+    with pytest.raises(ValueError, match=r"^BRDFDB_CORS_ORIGINS: '.*' is neither"):
+        Settings.from_environment({"BRDFDB_CORS_ORIGINS": f"https://b.example, {origin}"})
+
+
 def test_openapi_document_is_the_reviewed_one() -> None:
     assert json.loads(openapi_json()) == json.loads(OPENAPI.read_text()), (
         "the HTTP interface changed; review it, then: python -m brdfdb_api.app > api/openapi.json"

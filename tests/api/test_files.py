@@ -85,6 +85,19 @@ def test_a_file_that_is_missing_is_an_error_not_nan(own: Path) -> None:
     assert said.startswith("white-tile")
 
 
+def test_a_file_that_changed_in_place_is_not_sent_to_be_kept_for_good(own: Path) -> None:
+    chunk = own / "materials" / "copper-foil" / "r000001" / CHUNK
+    sound = chunk.read_bytes()
+    chunk.write_bytes(bytes([sound[0] ^ 1]) + sound[1:])
+    client = client_of(own)
+    addresses = (f"{STORED}/{CHUNK}", f"{FOIL}/download.zarr", f"{FOIL}/revisions/r000001/download.zarr")
+    for address in addresses:
+        said = client.problem("GET", address, 503)["detail"]
+        assert said == f"copper-foil r000001 is damaged: the content of {CHUNK} changed"
+    chunk.write_bytes(sound)
+    assert [client.get(address).status_code for address in addresses] == [200] * 3
+
+
 def test_a_zip_that_xarray_opens(client: Client, store: Store, tmp_path: Path) -> None:
     answer = client.get(f"{FOIL}/download.zarr")
     assert answer.headers["content-type"] == "application/zip"
