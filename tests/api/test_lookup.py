@@ -305,8 +305,8 @@ def outer(n: int, m: int) -> dict[str, Any]:
 
 def test_points_in_one_answer(client: Client) -> None:
     assert client.post(FELT, json=outer(20, 50)).status_code == 200
-    problem = client.problem("POST", FELT, 413, json=outer(7, 143))
-    assert problem["detail"] == "1001 points are more than the 1000 that one json answer may hold; format=npy may hold more"
+    said = client.problem("POST", FELT, 413, json=outer(7, 143))["detail"]
+    assert said == "1001 points are more than the 1000 that one json answer may hold; format=npy may hold more"
     assert client.post(FELT, json=outer(7, 143), params={"format": "npy"}).status_code == 200
     assert client.post(FELT, json=outer(200, 500), params={"format": "npy"}).status_code == 200
     client.problem("POST", FELT, 413, json=outer(201, 500), params={"format": "npy"})
