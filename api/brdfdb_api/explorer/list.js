@@ -41,15 +41,19 @@ async function paint(tries) {
   await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
   for (const page of pale) {
     page.materials = (await json(page.path)).materials;
-    page.materials.forEach(colour);
+    page.materials.forEach(update);
   }
   await paint(tries - 1);
 }
 
-/** Show the colour of a material, where it has one. */
-export function colour({ name, colour: found }) {
-  const swatch = document.querySelector(`#m-${name} .swatch`);
-  if (swatch && found) swatch.style.background = found;
+/** Show what was learnt of a material since its line was made: its verdict, and its colour, where it has one. */
+export function update(each) {
+  const made = document.getElementById(`m-${each.name}`);
+  if (!made) return;
+  if (each.colour) made.querySelector(".swatch").style.background = each.colour;
+  made.dataset.verdict = words(each);
+  made.querySelector(".chip").replaceWith(chip(words(each)));
+  offer(verdict, [[words(each), words(each)]]);
 }
 
 /** Show which material is looked at. */
@@ -63,7 +67,9 @@ export function mark(name) {
 /** The paper in a source such as "Ward 1992, section 6". */
 const paperOf = (each) => each.source?.split(",")[0];
 
-const words = (each) => (each.damaged ? "damaged" : each.verdict ?? "not audited");
+/** The verdict on the current revision, by a line of the catalogue or by all that is known of a material. */
+const words = ({ damaged, verdict, audit }) =>
+  damaged ? "damaged" : verdict ?? (audit?.current ? audit.verdict : "not audited");
 
 function option(each) {
   const swatch = element("span", { className: "swatch" });

@@ -10,7 +10,7 @@ import { figure } from "./figures.js";
 import { hemisphere, turns } from "./hemisphere.js";
 import * as list from "./list.js";
 import { againstAudit, request, seriesOf } from "./series.js";
-import { spheres } from "./sphere.js";
+import { lit, spheres } from "./sphere.js";
 import { fromHash, toHash } from "./state.js";
 
 const [title, message, caption, picture] = ["title", "message", "caption", "picture"].map((id) => document.getElementById(id));
@@ -87,10 +87,9 @@ async function work() {
 }
 
 async function draw(now, signal) {
-  if (!series.length) await know(now, signal);
-  facts.band(series[0].info, now);
-  const draws = { cut: drawOwn, hemisphere: drawOwn, sphere: drawSpheres }[now.view] ?? drawPlot;
-  const words = await draws(now, signal);
+  if (series.length) facts.band(series[0].info, now);
+  else await know(now, signal);
+  const words = await (now.view in PLACES ? drawOwn : drawPlot)(now, signal);
   signal.throwIfAborted();
   caption.textContent = words;
 }
@@ -123,7 +122,8 @@ async function know(now, signal) {
   title.textContent = series[0].info.title;
   document.title = `${series[0].info.title} – brdfdb explorer`;
   facts.show(series[0].info);
-  list.colour(series[0].info);
+  facts.band(series[0].info, now);
+  for (const { info } of series) list.update(info);
   controls.show(state, series);
 }
 
@@ -138,12 +138,7 @@ async function alone(now, signal, sentence) {
 
 async function drawOwn(now, signal) {
   const answers = await answersTo(now, signal);
-  return { cut, hemisphere }[now.view](shown(placeOf(now)), series, answers, now);
-}
-
-async function drawSpheres(now, signal) {
-  const found = await spheres(series, now, signal);
-  return found.paint(shown(placeOf(now)));
+  return { cut, hemisphere, sphere: spheres }[now.view](shown(placeOf(now)), series, answers, now);
 }
 
 async function drawPlot(now, signal) {
@@ -158,12 +153,19 @@ async function drawPlot(now, signal) {
 }
 
 /** What the service answers for a view; the albedo of a model that nobody audited it does not know. */
-async function answersTo(now, signal) {
+async function answersTo(now, signal, lastTry = false) {
   const known = now.view !== "albedo" ? series : series.filter((each) => each.source === "table" || againstAudit(each, now));
-  const answers = await Promise.all(known.map((each) => json(request(each, now, series), signal)));
+  const answers = await Promise.all(known.map((each) =>
+    (now.view === "sphere" ? lit(each, now, signal) : json(request(each, now, series), signal))));
   signal.throwIfAborted();
-  return answers;
+  if (lastTry || !answers.some((answer, i) => outdates(answer, known[i].info))) return answers;
+  await know(now, signal);
+  return answersTo(now, signal, true);
 }
+
+/** Whether an answer is of another revision than what is known; what an audit found may be of an old one. */
+const outdates = ({ revision, current, finding }, info) => (finding ?
+  revision !== info.audit.revision || current !== info.audit.current : revision !== info.revision);
 
 let library; // plotly.js, once it is asked for
 
@@ -208,7 +210,7 @@ if (state.material) redraw(0);
 list.load((material) => change({ material, compare: state.compare === material ? "" : state.compare }), (materials) => {
   controls.offer(materials);
   if (series.length) controls.show(state, series);
-  for (const { info } of series) list.colour(info);
+  for (const { info } of series) list.update(info);
   list.mark(state.material);
   const first = materials.find((each) => !each.damaged);
   if (!state.material && first) {

@@ -1,0 +1,50 @@
+"""The explorer as time goes by: new revisions, a store that is away, and the way back in the history of the browser."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import brdfdb
+from tests.api.a_store import publish, serving
+from tests.api.chromium import Chromium, shown
+from tests.api.explored import AUDIT, FOUND
+
+LINE = "document.querySelector('#m-grey-felt .chip').textContent"
+
+
+def move(browser: Chromium, name: str, value: float) -> None:
+    """Move a slider, as a hand does."""
+    browser.evaluate(
+        f"controls.elements.{name}.value = {value};"
+        f"controls.elements.{name}.dispatchEvent(new Event('input', {{ bubbles: true }}))"
+    )
+
+
+@pytest.mark.parametrize(
+    ("view", "compare"), [("cut", ""), ("sphere", "white-tile"), ("albedo", "%3Amodel"), ("spectrum", "")]
+)
+def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
+    chromium: Chromium, own: Path, view: str, compare: str
+) -> None:
+    found = FOUND | {"material": "grey-felt"}
+    (own / "audit.json").write_text(json.dumps(AUDIT | {"materials": [found]}), encoding="utf-8")
+    with serving(own) as address:
+        chromium.open(f"{address}/#material=grey-felt&view={view}&compare={compare}")
+        shown(chromium, "material=grey-felt")
+        assert chromium.until(f"document.querySelector('#m-grey-felt') && {LINE}") == "violates"
+        assert "revision r000001" in chromium.evaluate("facts.innerText")
+        publish(own, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=40.0, error=True)
+        move(chromium, "theta_i", 20)
+        shown(chromium, "theta_i=20")
+        known = chromium.evaluate("facts.innerText")
+        assert "revision r000002" in known
+        assert "This is of revision r000001, not of the current one." in known
+        error = brdfdb.open(own)["grey-felt"].error
+        assert error is not None
+        assert f"within {100.0 * error.overall.p99:.3g} %" in known
+        assert chromium.evaluate(LINE) == "not audited"
+        assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
+        assert chromium.errors == []
