@@ -48,3 +48,23 @@ def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
         assert chromium.evaluate(LINE) == "not audited"
         assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
         assert chromium.errors == []
+
+
+@pytest.mark.parametrize("link", ["", "#material=grey-felt&compare=white-tile"])
+def test_a_page_that_was_opened_while_the_store_was_away_is_there_when_it_is_back(
+    chromium: Chromium, own: Path, link: str
+) -> None:
+    away = own.rename(own.with_name("away"))
+    with serving(own) as address:
+        chromium.open(f"{address}/{link}")
+        said = chromium.until("globalThis.count?.textContent")
+        assert "store" in said
+        assert chromium.until("message.textContent || caption.textContent === ''")
+        assert chromium.evaluate("[list.children.length, caption.textContent]") == [0, ""]
+        away.rename(own)
+        shown(chromium, "compare=white-tile" if link else "material=brushed-metal")
+        chromium.until("list.children.length")
+        names = ["brushed-metal", "copper-foil", "grey-felt", "white-tile"]
+        assert chromium.evaluate("[...list.children].map(each => each.dataset.name)") == names
+        assert chromium.evaluate("[count.textContent, message.textContent]") == ["4 materials", ""]
+        assert chromium.evaluate("[controls.inert, controls.elements.compare.options.length]") == [False, 6]

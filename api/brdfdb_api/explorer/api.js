@@ -2,6 +2,8 @@
 
 const NPY = "application/x-npy";
 
+export const AGAIN_MS = 3000; // after which is asked again for what may have come back
+
 /** An answer that is an error; its message is the sentence that the service gives; whether it may pass by itself. */
 export class Problem extends Error {
   constructor(sentence, passes = false) {

@@ -1,6 +1,6 @@
 // The page: what changes the state, and the one loop that turns the state into a picture.
 
-import { Problem, json } from "./api.js";
+import { AGAIN_MS, Problem, json } from "./api.js";
 import * as controls from "./controls.js";
 import * as copy from "./copy.js";
 import { cut } from "./cut.js";
@@ -23,7 +23,6 @@ const DRAWN = { // of the buttons, those that save and restore: more would lie o
 };
 const NARROW = 560; // pixels in which two pictures do not stand side by side
 const SLOW_MS = 200; // after which people are told that a picture is on its way
-const AGAIN_MS = 3000; // after which is tried again what may have come back
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 
 let state = fromHash(location.hash);
@@ -220,4 +219,4 @@ list.load((material) => change({ material, compare: state.compare === material ?
     forget(state);
     say("There is nothing to look at in the store.");
   }
-}).catch((error) => say(error.message));
+}, () => state.material || forget(state)).catch((error) => say(error.message));
