@@ -117,6 +117,41 @@ def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: s
     assert chromium.errors == []
 
 
+# gives every material the longest title of the presets
+LONG_TITLES = """\
+const ask = fetch, title = "Vase, cylindrical block and cube of the rendered scene, smooth";
+globalThis.fetch = async (...all) => {
+  const answer = await ask(...all);
+  return /^v1.materials.[a-z-]+$/.test(all[0]) ? Response.json({ ...(await answer.json()), title }) : answer;
+};
+"""
+
+
+@pytest.mark.parametrize("width", [1280, 390, 320])
+def test_titles_of_two_maps_stand_apart_and_whole_over_their_maps(
+    chromium: Chromium, address: str, width: int
+) -> None:
+    script = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=LONG_TITLES)
+    chromium.open(f"{address}#material=foam&view=half-difference&compare=rolled-brass", width)
+    chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+    shown(chromium, "view=half-difference")
+    boxes = (
+        "[...document.querySelectorAll('#plot %s')].map(each => each.getBoundingClientRect())"
+        ".map(({ left, right, top, bottom }) => [left, right, top, bottom])"
+    )
+    (page,), titles, maps = (
+        chromium.evaluate(boxes % of) for of in (".main-svg:first-child", ".annotation-text", ".nsewdrag")
+    )
+    for (left, right, top, bottom), (begin, end, upper, _) in zip(titles, maps, strict=True):
+        assert page[0] <= left < right <= page[1]
+        assert page[2] <= top < bottom <= upper
+        assert abs((left + right) / 2 - (begin + end) / 2) < 1.0
+    (_, end, *_), (begin, *_) = titles
+    assert end < begin or width < 560
+    words = "[...document.querySelectorAll('#plot .annotation-text')].map(each => each.textContent)"
+    assert all(text.endswith("smooth") for text in chromium.evaluate(words))
+
+
 @pytest.mark.parametrize("view", ["half-difference", "spectrum", "albedo"])
 def test_buttons_over_a_plot_save_it_and_restore_it_and_send_nothing(
     chromium: Chromium, address: str, view: str

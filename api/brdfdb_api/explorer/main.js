@@ -144,9 +144,9 @@ async function drawPlot(now, signal) {
   const [answers, Plotly] = await Promise.all([answersTo(now, signal), loaded()]);
   signal.throwIfAborted();
   const plot = shown(placeOf(now));
-  const stacked = plot.clientWidth < NARROW && answers.length > 1 && now.view === "half-difference";
+  const width = plot.clientWidth, stacked = width < NARROW && answers.length > 1 && now.view === "half-difference";
   plot.classList.toggle("stacked", stacked);
-  const { data, layout, caption: words } = figure(now.view, series, answers, now, stacked);
+  const { data, layout, caption: words } = figure(now.view, series, answers, now, { width, stacked });
   await Plotly.react(plot, data, layout, DRAWN);
   return words;
 }
