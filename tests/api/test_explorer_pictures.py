@@ -164,6 +164,22 @@ def test_buttons_over_a_plot_save_it_and_restore_it_and_send_nothing(
     ]
 
 
+@pytest.mark.parametrize("view", ["half-difference", "spectrum", "albedo"])
+def test_a_finger_on_a_plot_scrolls_the_page_and_leaves_the_plot(chromium: Chromium, address: str, view: str) -> None:
+    chromium.open(f"{address}#material=foam&view={view}", 390, 844, touch=True)
+    shown(chromium, f"view={view}")
+    chromium.evaluate("plot.scrollIntoView({ block: 'center' })")
+    read = "[scrollY, plot.layout.xaxis.range, plot.layout.yaxis.range]"
+    before, *axes = chromium.evaluate(read)
+    x, y = chromium.evaluate(
+        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])"
+        "(document.querySelector('#plot .nsewdrag').getBoundingClientRect())"
+    )
+    chromium.swipe(x, y, 100.0)
+    _, *found = chromium.until(f"scrollY > {before + 50} && {read}")
+    assert found == axes
+
+
 @pytest.mark.parametrize("name", ["foam", "scene-copper-sphere"])
 def test_the_axis_of_a_spectrum_is_wider_than_rounding(chromium: Chromium, address: str, name: str) -> None:
     chromium.open(f"{address}#material={name}&view=spectrum&compare=%3Amodel")

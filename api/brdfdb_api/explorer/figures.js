@@ -19,12 +19,14 @@ export function figure(view, series, answers, state, place) {
   const ink = (name) => css.getPropertyValue(`--${name}`).trim();
   const drawn = { "half-difference": halfDifference, spectrum, albedo }[view](
     series, answers, state, ink, place);
-  const axis = { gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false, automargin: true };
+  const touched = matchMedia("(pointer: coarse)").matches; // where a finger scrolls the page, and zooms no picture
+  const axis = { fixedrange: touched, gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false, automargin: true };
   const layout = {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink("ink"), size: 13 },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: ink("muted"), activecolor: ink("ink") },
     margin: { l: 55, r: 20, t: 55, b: 45 }, showlegend: series.length > 1 || drawn.data.length > 1,
     legend: { orientation: "h", traceorder: "normal", y: 1.02, yanchor: "bottom", x: 0 }, uirevision: `${view} ${state.material}`,
+    ...(touched && { dragmode: false }),
     ...drawn.layout,
   };
   for (const key of ["xaxis", "yaxis", "xaxis2", "yaxis2"]) if (layout[key]) layout[key] = { ...axis, ...layout[key] };
