@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 import brdfdb
 from tests.api.a_store import publish, serving
-from tests.api.chromium import Chromium, shown
+from tests.api.chromium import Chromium, chosen, shown
 from tests.api.explored import AUDIT, FOUND
 
 LINE = "document.querySelector('#m-grey-felt .chip').textContent"
@@ -68,3 +69,36 @@ def test_a_page_that_was_opened_while_the_store_was_away_is_there_when_it_is_bac
         assert chromium.evaluate("[...list.children].map(each => each.dataset.name)") == names
         assert chromium.evaluate("[count.textContent, message.textContent]") == ["4 materials", ""]
         assert chromium.evaluate("[controls.inert, controls.elements.compare.options.length]") == [False, 6]
+
+
+def test_the_way_back_is_over_materials_and_views_as_they_were_left(chromium: Chromium, address: str) -> None:
+    chromium.open(address)
+    shown(chromium, "material=foam")
+    start = chromium.evaluate("history.length")
+    move(chromium, "theta_i", 20)  # not yet in the link when the next material is chosen
+    chromium.evaluate("document.querySelector('#m-rolled-brass').click()")
+    shown(chromium, "material=rolled-brass", "theta_i=20")
+    for theta_i in (30, 40):
+        move(chromium, "theta_i", theta_i)
+        shown(chromium, f"theta_i={theta_i}")
+    chromium.until("location.hash.includes('theta_i=40')")
+    chromium.evaluate("document.querySelector('[value=sphere]').click()")
+    shown(chromium, "view=sphere")
+    chromium.evaluate("document.querySelector('#m-rolled-brass').click()")  # which is shown already
+    assert chromium.evaluate("history.length") == start + 2
+    sphere, cut, foam = (
+        "#material=rolled-brass&view=sphere&theta_i=40",
+        "#material=rolled-brass&theta_i=40",
+        "#material=foam&theta_i=20",
+    )
+    for way, link in (("back", cut), ("back", foam), ("forward", cut), ("forward", sphere)):
+        chromium.evaluate(f"history.{way}()")
+        chromium.until(f"picture.ariaBusy === 'false' && picture.dataset.shown === '{link}'")
+        name = re.findall(r"material=([\w-]+)", link)[0]
+        assert chosen(chromium) == name
+        assert f"{name}, revision" in chromium.evaluate("facts.innerText")
+        assert chromium.evaluate("[controls.elements.theta_i.value, spheres.hidden, location.hash]") == [
+            *(re.findall(r"theta_i=(\d+)", link)[0], "view=sphere" not in link, link)
+        ]
+    assert chromium.evaluate("history.length") == start + 2
+    assert chromium.errors == []

@@ -33,6 +33,20 @@ let wanted = false, working = false;
 let linked = 0, again = 0;
 let missing = ""; // why what is compared with is not shown
 
+/** Change the state by hand: another material or view can be gone back from, anything else is written over its link. */
+function choose(part) {
+  const before = toHash(state);
+  change(part);
+  clearTimeout(linked);
+  const go = ("material" in part || "view" in part) && toHash(state) !== before;
+  if (go) {
+    history.replaceState(null, "", before); // which may wait to be written
+    history.pushState(null, "", toHash(state));
+  } else {
+    linked = setTimeout(() => history.replaceState(null, "", toHash(state)), LINK_MS);
+  }
+}
+
 /** Change the state: a slider's next picture waits for the one that is being drawn, anything else stops it. */
 function change(part) {
   const turned = Object.keys(part).every((key) => ["theta_i", "phi_i", "theta_r", "turn", "nm"].includes(key));
@@ -46,8 +60,6 @@ function change(part) {
     stop = new AbortController();
   }
   if (series.length) controls.show(state, series);
-  clearTimeout(linked);
-  linked = setTimeout(() => history.replaceState(null, "", toHash(state)), LINK_MS);
   redraw();
 }
 
@@ -188,14 +200,15 @@ function say(sentence, tone = "bad") {
 /** What a copied request asks for: of a sphere, which is thousands of directions, its middle. */
 const copiedOf = (now) => (now.view === "sphere" ? { ...now, theta_r: 0 } : now);
 
-controls.listen(change);
+controls.listen(choose);
 turns(document.getElementById("hemisphere"));
 copy.listen(
   () => new URL(toHash(state), location.href),
   () => (series.length ? request(series[0], copiedOf(state), series) : "v1/materials"), say);
-addEventListener("hashchange", () => {
-  const linked = fromHash(location.hash);
-  change({ ...linked, material: linked.material || state.material });
+addEventListener("hashchange", () => { // a link, or the way back
+  clearTimeout(linked);
+  const held = fromHash(location.hash);
+  change({ ...held, material: held.material || state.material });
 });
 let width = picture.clientWidth;
 new ResizeObserver(() => {
@@ -206,7 +219,7 @@ new ResizeObserver(() => {
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
 shown(placeOf(state)); // an empty frame
 if (state.material) redraw(0);
-list.load((material) => change({ material, compare: state.compare === material ? "" : state.compare }), (materials) => {
+list.load((material) => choose({ material, compare: state.compare === material ? "" : state.compare }), (materials) => {
   controls.offer(materials);
   if (series.length) controls.show(state, series);
   for (const { info } of series) list.update(info);
