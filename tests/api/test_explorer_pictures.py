@@ -128,9 +128,7 @@ globalThis.fetch = async (...all) => {
 
 
 @pytest.mark.parametrize("width", [1280, 390, 320])
-def test_titles_of_two_maps_stand_apart_and_whole_over_their_maps(
-    chromium: Chromium, address: str, width: int
-) -> None:
+def test_titles_of_two_maps_stand_apart_and_whole_over_their_maps(chromium: Chromium, address: str, width: int) -> None:
     script = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=LONG_TITLES)
     chromium.open(f"{address}#material=foam&view=half-difference&compare=rolled-brass", width)
     chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
@@ -249,6 +247,21 @@ def test_the_lobe_of_the_hemisphere_is_across_from_the_light(chromium: Chromium,
         middles.append(np.nonzero(surface)[1].mean() / surface.shape[1])
     assert middles[0] > 0.55
     assert middles[1] < 0.45
+
+
+@pytest.mark.parametrize(("phi_i", "axis", "side", "words"), [(0, 1, 1, "right (+x)"), (90, 0, -1, "top (+y)")])
+def test_the_light_of_a_sphere_is_where_its_caption_says(
+    chromium: Chromium, address: str, phi_i: int, axis: int, side: int, words: str
+) -> None:
+    chromium.open(f"{address}#material=foam&view=sphere&theta_i=60&phi_i={phi_i}")
+    shown(chromium, "view=sphere")
+    drawn = chromium.evaluate(
+        f"[...document.querySelector('#spheres canvas').getContext('2d').getImageData(0, 0, {SIZE}, {SIZE}).data]"
+    )
+    bright = np.reshape(drawn, (SIZE, SIZE, 4))[..., 0]  # rows from the top
+    middle = np.sum(np.nonzero(bright)[axis] * bright[bright > 0]) / np.sum(bright)
+    assert side * (middle / SIZE - 0.5) > 0.1
+    assert words in chromium.evaluate("caption.textContent")
 
 
 def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: str) -> None:

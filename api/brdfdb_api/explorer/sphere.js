@@ -8,8 +8,9 @@ import { quantity } from "./series.js";
 const SIZE = 96; // pixels across
 const DEGREE = 180 / Math.PI;
 
-const WORDS = "The viewer is far above the page; the light is as bright as makes a white matt surface white. The x axis of " +
-  "the surface runs around the vertical axis of the sphere.";
+const WORDS = "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
+  "top (+y) at 90°, and as bright as makes a white matt surface white. The x axis of the surface runs around the vertical " +
+  "axis of the sphere.";
 const MIRROR = " The mirror image, a Dirac part, is not drawn.";
 
 /** What the service says of all lit pixels of a series. */
