@@ -137,12 +137,13 @@ def test_titles_of_two_maps_stand_apart_and_whole_over_their_maps(chromium: Chro
         "[...document.querySelectorAll('#plot %s')].map(each => each.getBoundingClientRect())"
         ".map(({ left, right, top, bottom }) => [left, right, top, bottom])"
     )
-    (page,), titles, maps = (
-        chromium.evaluate(boxes % of) for of in (".main-svg:first-child", ".annotation-text", ".nsewdrag")
+    (page,), (buttons,), titles, maps = (
+        chromium.evaluate(boxes % of)
+        for of in (".main-svg:first-child", ".modebar-group:last-child", ".annotation-text", ".nsewdrag")
     )
     for (left, right, top, bottom), (begin, end, upper, _) in zip(titles, maps, strict=True):
         assert page[0] <= left < right <= page[1]
-        assert page[2] <= top < bottom <= upper
+        assert page[2] < buttons[3] <= top < bottom <= upper
         assert abs((left + right) / 2 - (begin + end) / 2) < 1.0
     (_, end, *_), (begin, *_) = titles
     assert end < begin or width < 560

@@ -9,7 +9,7 @@ const NM = [450, 550, 650]; // of albedos, where none is chosen
 const BANDS = ["#4f7df0", "#2f9e6b", "#d8503f"]; // their colours
 const HEAT = "Viridis";
 const DIFFERENCE = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]];
-const [CHARACTER, LINE] = [7.4, 17]; // pixels of titles: width of a wide one, height
+const [CHARACTER, LINE, BUTTONS] = [7.4, 17, 30]; // pixels: a wide character and a line of titles, the buttons above them
 const LEAST_DECADES = 0.2; // of the logarithmic axis of a spectrum: a factor of 1.6
 
 /** The figure of a view: `data` and `layout` of Plotly, and a caption; in a place of some `width` [pixel], `stacked` where
@@ -64,8 +64,8 @@ function halfDifference(series, answers, state, ink, { width, stacked }) {
   const title = (text) => ({ text, standoff: 6 });
   const titles = series.length === 1 ? [] : series.map(({ label }, i) =>
     wrapped(against && i ? "table − model, relative" : label, Math.floor((width * (stacked ? 0.85 : 0.42)) / CHARACTER)));
-  const lines = Math.max(1, ...titles.map((each) => each.length));
-  const layout = { showlegend: false, margin: { l: 55, r: 10, t: 18 + LINE * lines, b: 50 }, annotations: [] };
+  const top = titles.length ? LINE * Math.max(...titles.map((each) => each.length)) : 0;
+  const layout = { showlegend: false, margin: { l: 55, r: 10, t: BUTTONS + top, b: 50 }, annotations: [] };
   const data = series.map((_, i) => {
     const difference = against && i === 1;
     const { x, y, title: above } = part(i, series.length, stacked, 0.16);
