@@ -188,7 +188,7 @@ class Lobe(BaseModel):
     wavelength_nm: float | list[float] | None
     axes_deg: dict[str, list[float]] = Field(
         description="of the axes of brdf, in order; in a cut theta_r is negative back towards the light; in a "
-        "hemisphere phi is phi_r - phi_i"
+        "hemisphere delta_phi is phi_r - phi_i"
     )
     brdf: list[Any]
     specular_reflectance: float | list[float] | None

@@ -41,7 +41,7 @@ View = Literal["cut", "hemisphere", "half-difference"]
 
 _CUT = np.arange(-90.0, 91.0)  # theta_r [degree], negative back towards the light
 _OVER = np.linspace(0.0, 90.0, 31)  # theta_r of a hemisphere [degree]
-_AROUND = np.linspace(0.0, 360.0, 61)  # phi_r - phi_i
+_AROUND = np.linspace(0.0, 360.0, 61)  # delta_phi
 _NEAR = np.array([-12.0, -8.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0])  # of the mirror
 _HALF = np.arange(90) + 0.5  # theta_h and theta_d
 _POINTS = _HALF.size**2  # of the largest view
@@ -168,8 +168,9 @@ def _directions(view: View, theta_i: float, phi_i: float) -> tuple[dict[str, NDA
         )
     theta_r = np.unique(np.clip(np.concatenate([_OVER, theta_i + _NEAR]), 0.0, 90.0))
     spread = _NEAR / max(np.sin(light), 0.1)
-    phi = np.unique(np.clip(np.concatenate([_AROUND, 180.0 + spread]), 0.0, 360.0))
-    return {"theta_r": theta_r, "phi": phi}, (light, turned, radians(theta_r)[:, np.newaxis], turned + radians(phi))
+    delta_phi = np.unique(np.clip(np.concatenate([_AROUND, 180.0 + spread]), 0.0, 360.0))
+    axes = {"theta_r": theta_r, "delta_phi": delta_phi}
+    return axes, (light, turned, radians(theta_r)[:, np.newaxis], turned + radians(delta_phi))
 
 
 @both(

@@ -78,9 +78,12 @@ class Chromium:
                 return found
             self._note(answer)
 
-    def open(self, address: str, width: int = 1280, height: int = 900, scheme: str = "light") -> None:
-        """Load an address in a window of some width; `errors` begins anew."""
-        self.send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+    def open(
+        self, address: str, width: int = 1280, height: int = 900, scheme: str = "light", touch: bool = False
+    ) -> None:
+        """Load an address in a window of some width, or on a phone that is touched; `errors` begins anew."""
+        self.send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=touch)
+        self.send("Emulation.setTouchEmulationEnabled", enabled=touch)
         self.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
         self.send("Page.navigate", url="about:blank")  # a link to another view of the same page would not load it
         self.errors.clear()
@@ -109,6 +112,13 @@ class Chromium:
     def type(self, text: str) -> None:
         """Type into what has the focus."""
         self.send("Input.insertText", text=text)
+
+    def swipe(self, x: float, y: float, by: float) -> None:
+        """Move a finger up from a point by some pixels."""
+        for step in range(11):
+            at = [{"x": x, "y": y - by * step / 10}]
+            self.send("Input.dispatchTouchEvent", type="touchMove" if step else "touchStart", touchPoints=at)
+        self.send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
     def picture(self) -> np.ndarray:
         """The luminance of what is shown, 0 to 1."""

@@ -181,7 +181,7 @@ def test_a_copied_curl_runs_in_a_shell_and_answers_with_the_picture(
     found, expected = {
         "cut": lambda: (f_r[axes["theta_r"].index(60.0)], at(*light, *np.deg2rad([60.0, 200.0]))),
         "hemisphere": lambda: (
-            f_r[axes["theta_r"].index(60.0)][axes["phi"].index(180.0)],
+            f_r[axes["theta_r"].index(60.0)][axes["delta_phi"].index(180.0)],
             at(*light, *np.deg2rad([60.0, 200.0])),
         ),
         "half-difference": lambda: (np.shape(f_r), (90, 90)),

@@ -117,6 +117,40 @@ def test_every_view_draws_at_any_width(chromium: Chromium, address: str, view: s
     assert chromium.errors == []
 
 
+# gives every material the longest title of the presets
+LONG_TITLES = """\
+const ask = fetch, title = "Vase, cylindrical block and cube of the rendered scene, smooth";
+globalThis.fetch = async (...all) => {
+  const answer = await ask(...all);
+  return /^v1.materials.[a-z-]+$/.test(all[0]) ? Response.json({ ...(await answer.json()), title }) : answer;
+};
+"""
+
+
+@pytest.mark.parametrize("width", [1280, 390, 320])
+def test_titles_of_two_maps_stand_apart_and_whole_over_their_maps(chromium: Chromium, address: str, width: int) -> None:
+    script = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=LONG_TITLES)
+    chromium.open(f"{address}#material=foam&view=half-difference&compare=rolled-brass", width)
+    chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+    shown(chromium, "view=half-difference")
+    boxes = (
+        "[...document.querySelectorAll('#plot %s')].map(each => each.getBoundingClientRect())"
+        ".map(({ left, right, top, bottom }) => [left, right, top, bottom])"
+    )
+    (page,), (buttons,), titles, maps = (
+        chromium.evaluate(boxes % of)
+        for of in (".main-svg:first-child", ".modebar-group:last-child", ".annotation-text", ".nsewdrag")
+    )
+    for (left, right, top, bottom), (begin, end, upper, _) in zip(titles, maps, strict=True):
+        assert page[0] <= left < right <= page[1]
+        assert page[2] < buttons[3] <= top < bottom <= upper
+        assert abs((left + right) / 2 - (begin + end) / 2) < 1.0
+    (_, end, *_), (begin, *_) = titles
+    assert end < begin or width < 560
+    words = "[...document.querySelectorAll('#plot .annotation-text')].map(each => each.textContent)"
+    assert all(text.endswith("smooth") for text in chromium.evaluate(words))
+
+
 @pytest.mark.parametrize("view", ["half-difference", "spectrum", "albedo"])
 def test_buttons_over_a_plot_save_it_and_restore_it_and_send_nothing(
     chromium: Chromium, address: str, view: str
@@ -127,6 +161,22 @@ def test_buttons_over_a_plot_save_it_and_restore_it_and_send_nothing(
         "Download plot as a PNG",
         "Reset axes",
     ]
+
+
+@pytest.mark.parametrize("view", ["half-difference", "spectrum", "albedo"])
+def test_a_finger_on_a_plot_scrolls_the_page_and_leaves_the_plot(chromium: Chromium, address: str, view: str) -> None:
+    chromium.open(f"{address}#material=foam&view={view}", 390, 844, touch=True)
+    shown(chromium, f"view={view}")
+    chromium.evaluate("plot.scrollIntoView({ block: 'center' })")
+    read = "[scrollY, plot.layout.xaxis.range, plot.layout.yaxis.range]"
+    before, *axes = chromium.evaluate(read)
+    x, y = chromium.evaluate(
+        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])"
+        "(document.querySelector('#plot .nsewdrag').getBoundingClientRect())"
+    )
+    chromium.swipe(x, y, 100.0)
+    _, *found = chromium.until(f"scrollY > {before + 50} && {read}")
+    assert found == axes
 
 
 @pytest.mark.parametrize("name", ["foam", "scene-copper-sphere"])
@@ -198,6 +248,21 @@ def test_the_lobe_of_the_hemisphere_is_across_from_the_light(chromium: Chromium,
         middles.append(np.nonzero(surface)[1].mean() / surface.shape[1])
     assert middles[0] > 0.55
     assert middles[1] < 0.45
+
+
+@pytest.mark.parametrize(("phi_i", "axis", "side", "words"), [(0, 1, 1, "right (+x)"), (90, 0, -1, "top (+y)")])
+def test_the_light_of_a_sphere_is_where_its_caption_says(
+    chromium: Chromium, address: str, phi_i: int, axis: int, side: int, words: str
+) -> None:
+    chromium.open(f"{address}#material=foam&view=sphere&theta_i=60&phi_i={phi_i}")
+    shown(chromium, "view=sphere")
+    drawn = chromium.evaluate(
+        f"[...document.querySelector('#spheres canvas').getContext('2d').getImageData(0, 0, {SIZE}, {SIZE}).data]"
+    )
+    bright = np.reshape(drawn, (SIZE, SIZE, 4))[..., 0]  # rows from the top
+    middle = np.sum(np.nonzero(bright)[axis] * bright[bright > 0]) / np.sum(bright)
+    assert side * (middle / SIZE - 0.5) > 0.1
+    assert words in chromium.evaluate("caption.textContent")
 
 
 def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: str) -> None:

@@ -66,9 +66,9 @@ def test_a_cut_is_lookups_at_its_axis(client: Client, store: Store, name: str) -
 
 def test_a_hemisphere_is_lookups_at_its_axes(client: Client, store: Store) -> None:
     lobe = client.get(f"{METAL}/lobe?view=hemisphere&theta_i=40&phi_i=20").json()
-    theta_r, phi = (np.array(lobe["axes_deg"][axis]) for axis in ("theta_r", "phi"))
-    assert (theta_r[0], theta_r[-1], phi[0], phi[-1]) == (0.0, 90.0, 0.0, 360.0)
-    expected = degrees(store, "brushed-metal", 40, 20, theta_r[:, None], 20 + phi)
+    theta_r, delta_phi = (np.array(lobe["axes_deg"][axis]) for axis in ("theta_r", "delta_phi"))
+    assert (theta_r[0], theta_r[-1], delta_phi[0], delta_phi[-1]) == (0.0, 90.0, 0.0, 360.0)
+    expected = degrees(store, "brushed-metal", 40, 20, theta_r[:, None], 20 + delta_phi)
     np.testing.assert_allclose(lobe["brdf"], expected, **EXACT)
 
 

@@ -2,6 +2,8 @@
 
 const NPY = "application/x-npy";
 
+export const AGAIN_MS = 3000; // after which is asked again for what may have come back
+
 /** An answer that is an error; its message is the sentence that the service gives; whether it may pass by itself. */
 export class Problem extends Error {
   constructor(sentence, passes = false) {
@@ -21,12 +23,12 @@ export async function json(path, signal) {
   return (await answer(path, { signal })).json();
 }
 
-/** Values at directions [degrees], four numbers each: theta_i, phi_i, theta_r, phi_r. */
+/** Values at directions [degrees], four numbers each: theta_i, phi_i, theta_r, phi_r; and of which revision they are. */
 export async function lookup(name, query, directions, signal) {
   const response = await answer(address(name, "lookup", query), {
     signal, method: "POST", body: toNpy(directions, 4), headers: { "Content-Type": NPY, Accept: NPY },
   });
-  return fromNpy(await response.arrayBuffer());
+  return { revision: response.headers.get("Brdfdb-Revision"), values: fromNpy(await response.arrayBuffer()) };
 }
 
 async function answer(path, options) {

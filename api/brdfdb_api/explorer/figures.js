@@ -9,20 +9,24 @@ const NM = [450, 550, 650]; // of albedos, where none is chosen
 const BANDS = ["#4f7df0", "#2f9e6b", "#d8503f"]; // their colours
 const HEAT = "Viridis";
 const DIFFERENCE = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]];
+const [CHARACTER, LINE, BUTTONS] = [7.4, 17, 30]; // pixels: a wide character and a line of titles, the buttons above them
 const LEAST_DECADES = 0.2; // of the logarithmic axis of a spectrum: a factor of 1.6
 
-/** The figure of a view: `data` and `layout` of Plotly, and a caption; `stacked` where two stand on each other. */
-export function figure(view, series, answers, state, stacked) {
+/** The figure of a view: `data` and `layout` of Plotly, and a caption; in a place of some `width` [pixel], `stacked` where
+ * two stand on each other. */
+export function figure(view, series, answers, state, place) {
   const css = getComputedStyle(document.documentElement);
   const ink = (name) => css.getPropertyValue(`--${name}`).trim();
   const drawn = { "half-difference": halfDifference, spectrum, albedo }[view](
-    series, answers, state, ink, stacked);
-  const axis = { gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false, automargin: true };
+    series, answers, state, ink, place);
+  const touched = matchMedia("(pointer: coarse)").matches; // where a finger scrolls the page, and zooms no picture
+  const axis = { fixedrange: touched, gridcolor: ink("grid"), linecolor: ink("grid"), zeroline: false, automargin: true };
   const layout = {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink("ink"), size: 13 },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: ink("muted"), activecolor: ink("ink") },
     margin: { l: 55, r: 20, t: 55, b: 45 }, showlegend: series.length > 1 || drawn.data.length > 1,
     legend: { orientation: "h", traceorder: "normal", y: 1.02, yanchor: "bottom", x: 0 }, uirevision: `${view} ${state.material}`,
+    ...(touched && { dragmode: false }),
     ...drawn.layout,
   };
   for (const key of ["xaxis", "yaxis", "xaxis2", "yaxis2"]) if (layout[key]) layout[key] = { ...axis, ...layout[key] };
@@ -31,12 +35,16 @@ export function figure(view, series, answers, state, stacked) {
 
 const line = (ink, at) => ({ color: ink(at ? "second" : "first"), dash: at ? "dash" : "solid", width: 2 });
 
+/** Text in lines of at most so many characters, where its words are not longer. */
+const wrapped = (text, most) => text.match(new RegExp(`\\S.{0,${most - 1}}(?=\\s|$)|\\S+`, "g"));
+
 /** The part of the figure for one of some pictures, and a title above it. */
 function part(i, count, stacked, gap) {
   const half = 0.5 - gap / 2, [low, high] = count === 1 ? [0, 1] : (i === 0) === !stacked ? [0, half] : [1 - half, 1];
   const x = stacked ? [0, 1] : [low, high], y = stacked ? [low, high] : [0, 1];
-  const title = (text) => ({
-    text, showarrow: false, x: (x[0] + x[1]) / 2, y: y[1], xref: "paper", yref: "paper", yanchor: "bottom",
+  const title = (lines) => ({
+    text: lines.join("<br>"), showarrow: false, xref: "paper", yref: "paper",
+    x: (x[0] + x[1]) / 2, y: y[1], xanchor: "center", yanchor: "bottom",
   });
   return { x, y, title };
 }
@@ -47,21 +55,24 @@ function bars(range, state) {
   return { tickvals: found.map(([at]) => at), ticktext: found.map(([, text]) => text) };
 }
 
-function halfDifference(series, answers, state, ink, stacked) {
+function halfDifference(series, answers, state, ink, { width, stacked }) {
   const against = state.compare === MODEL;
   const values = answers.map((answer) => answer.brdf.map((row) => row.map(number(answer))));
   const shown = against ? values.slice(0, 1) : values;
   const range = span(shown.flat(2), state), height = scaled(state, range[0]);
   const bar = { thickness: 12, outlinewidth: 0, ...(stacked && { len: 0.42 }) };
   const title = (text) => ({ text, standoff: 6 });
-  const layout = { showlegend: false, margin: { l: 55, r: 10, t: 35, b: 50 }, annotations: [] };
-  const data = series.map(({ label }, i) => {
+  const titles = series.length === 1 ? [] : series.map(({ label }, i) =>
+    wrapped(against && i ? "table − model, relative" : label, Math.floor((width * (stacked ? 0.85 : 0.42)) / CHARACTER)));
+  const top = titles.length ? LINE * Math.max(...titles.map((each) => each.length)) : 0;
+  const layout = { showlegend: false, margin: { l: 55, r: 10, t: BUTTONS + top, b: 50 }, annotations: [] };
+  const data = series.map((_, i) => {
     const difference = against && i === 1;
     const { x, y, title: above } = part(i, series.length, stacked, 0.16);
     const suffix = i ? "2" : "";
     layout[`xaxis${suffix}`] = { domain: x, title: title("θ<sub>d</sub> [degrees]"), dtick: 30, range: [0, 90], anchor: `y${suffix}` };
     layout[`yaxis${suffix}`] = { title: title(i && !stacked ? "" : "θ<sub>h</sub> [degrees]"), domain: y, dtick: 30, range: [90, 0], anchor: `x${suffix}` };
-    if (series.length > 1) layout.annotations.push(above(difference ? "table − model, relative" : label));
+    if (titles.length) layout.annotations.push(above(titles[i]));
     const { theta_d, theta_h } = answers[i].axes_deg;
     const map = { type: "heatmap", x: theta_d, y: theta_h, xaxis: `x${suffix}`, yaxis: `y${suffix}` };
     const where = "θ<sub>h</sub> %{y}°, θ<sub>d</sub> %{x}°";

@@ -25,9 +25,9 @@ export function hemisphere(into, series, answers, state) {
   const marks = ticks(range, state).map(([at, text]) => [(at - range[0]) / (range[1] - range[0]), text]);
   const { phi_i: turned } = answers[0], end = answers[0].axes_deg.theta_r[kept[0].at(-1)];
   const scenes = answers.map((answer, i) => {
-    const { theta_r, phi } = answer.axes_deg;
+    const { theta_r, delta_phi } = answer.axes_deg;
     const scene = { points: [], pieces: [] };
-    surface(scene, kept[i].map((k) => theta_r[k]), phi.map((each) => turned + each), values[i].map((row) => row.map(share)));
+    surface(scene, kept[i].map((k) => theta_r[k]), delta_phi.map((each) => turned + each), values[i].map((row) => row.map(share)));
     line(scene, towards(0, 0, 1), "grid", 1);
     line(scene, towards(state.theta_i, turned, 1), "third", 3);
     line(scene, towards(state.theta_i, turned + 180, 1), "muted", 1.5);

@@ -1,6 +1,6 @@
 // The list of materials: fetched page by page, searched, filtered, and walked with arrow keys.
 
-import { json } from "./api.js";
+import { AGAIN_MS, json } from "./api.js";
 import { chip, element } from "./dom.js";
 
 const [search, model, paper, verdict, count, list] = ["search", "model", "paper", "verdict", "count", "list"].map((id) =>
@@ -12,11 +12,12 @@ let active = null; // the option that arrow keys have reached
 let chosen = "";
 let choose = () => {};
 
-/** Fill the list; `onChoose` gets the name of what is chosen, `onPage` the materials so far, after each page. */
-export async function load(onChoose, onPage) {
+/** Fill the list; `onChoose` gets the name of what is chosen, `onPage` the materials so far, after each page;
+ * `onFail` is called when a page does not come, which is asked for again where that may pass by itself. */
+export async function load(onChoose, onPage, onFail) {
   choose = onChoose;
   for (let path = "v1/materials?limit=1000"; path;) {
-    const page = await json(path);
+    const page = await arrived(path, onFail);
     pages.push({ path, materials: page.materials });
     materials.push(...page.materials);
     list.append(...page.materials.map(option));
@@ -30,6 +31,22 @@ export async function load(onChoose, onPage) {
   await paint(REPAINTS);
 }
 
+/** A page, once it is there; until then the list says why it is not. */
+async function arrived(path, onFail) {
+  for (;;) {
+    try {
+      return await json(path);
+    } catch (error) {
+      count.textContent = error.message;
+      onFail();
+      if (!error.passes) throw error;
+      await pause(AGAIN_MS);
+    }
+  }
+}
+
+const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
 const [REPAINTS, PAUSE_MS] = [8, 1000];
 const COLOURED_BYTES = 16 * 2 ** 20; // the service finds the colour of a larger table only where that is looked at
 
@@ -38,18 +55,22 @@ async function paint(tries) {
   const waits = (each) => !each.damaged && !each.colour && (each.bytes ?? 0) <= COLOURED_BYTES;
   const pale = pages.filter((page) => page.materials.some(waits));
   if (!tries || !pale.length) return;
-  await new Promise((resolve) => setTimeout(resolve, PAUSE_MS));
+  await pause(PAUSE_MS);
   for (const page of pale) {
-    page.materials = (await json(page.path)).materials;
-    page.materials.forEach(colour);
+    page.materials = (await json(page.path).catch(() => page)).materials;
+    page.materials.forEach(update);
   }
   await paint(tries - 1);
 }
 
-/** Show the colour of a material, where it has one. */
-export function colour({ name, colour: found }) {
-  const swatch = document.querySelector(`#m-${name} .swatch`);
-  if (swatch && found) swatch.style.background = found;
+/** Show what was learnt of a material since its line was made: its verdict, and its colour, where it has one. */
+export function update(each) {
+  const made = document.getElementById(`m-${each.name}`);
+  if (!made) return;
+  if (each.colour) made.querySelector(".swatch").style.background = each.colour;
+  made.dataset.verdict = words(each);
+  made.querySelector(".chip").replaceWith(chip(words(each)));
+  offer(verdict, [[words(each), words(each)]]);
 }
 
 /** Show which material is looked at. */
@@ -63,7 +84,9 @@ export function mark(name) {
 /** The paper in a source such as "Ward 1992, section 6". */
 const paperOf = (each) => each.source?.split(",")[0];
 
-const words = (each) => (each.damaged ? "damaged" : each.verdict ?? "not audited");
+/** The verdict on the current revision, by a line of the catalogue or by all that is known of a material. */
+const words = ({ damaged, verdict, audit }) =>
+  damaged ? "damaged" : verdict ?? (audit?.current ? audit.verdict : "not audited");
 
 function option(each) {
   const swatch = element("span", { className: "swatch" });

@@ -1,6 +1,6 @@
 // The page: what changes the state, and the one loop that turns the state into a picture.
 
-import { Problem, json } from "./api.js";
+import { AGAIN_MS, Problem, json } from "./api.js";
 import * as controls from "./controls.js";
 import * as copy from "./copy.js";
 import { cut } from "./cut.js";
@@ -10,7 +10,7 @@ import { figure } from "./figures.js";
 import { hemisphere, turns } from "./hemisphere.js";
 import * as list from "./list.js";
 import { againstAudit, request, seriesOf } from "./series.js";
-import { spheres } from "./sphere.js";
+import { lit, spheres } from "./sphere.js";
 import { fromHash, toHash } from "./state.js";
 
 const [title, message, caption, picture] = ["title", "message", "caption", "picture"].map((id) => document.getElementById(id));
@@ -23,7 +23,6 @@ const DRAWN = { // of the buttons, those that save and restore: more would lie o
 };
 const NARROW = 560; // pixels in which two pictures do not stand side by side
 const SLOW_MS = 200; // after which people are told that a picture is on its way
-const AGAIN_MS = 3000; // after which is tried again what may have come back
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 
 let state = fromHash(location.hash);
@@ -33,6 +32,20 @@ let asked = 0; // when the picture was asked for; the first one when the page wa
 let wanted = false, working = false;
 let linked = 0, again = 0;
 let missing = ""; // why what is compared with is not shown
+
+/** Change the state by hand: another material or view can be gone back from, anything else is written over its link. */
+function choose(part) {
+  const before = toHash(state);
+  change(part);
+  clearTimeout(linked);
+  const go = ("material" in part || "view" in part) && toHash(state) !== before;
+  if (go) {
+    history.replaceState(null, "", before); // which may wait to be written
+    history.pushState(null, "", toHash(state));
+  } else {
+    linked = setTimeout(() => history.replaceState(null, "", toHash(state)), LINK_MS);
+  }
+}
 
 /** Change the state: a slider's next picture waits for the one that is being drawn, anything else stops it. */
 function change(part) {
@@ -47,8 +60,6 @@ function change(part) {
     stop = new AbortController();
   }
   if (series.length) controls.show(state, series);
-  clearTimeout(linked);
-  linked = setTimeout(() => history.replaceState(null, "", toHash(state)), LINK_MS);
   redraw();
 }
 
@@ -87,10 +98,9 @@ async function work() {
 }
 
 async function draw(now, signal) {
-  if (!series.length) await know(now, signal);
-  facts.band(series[0].info, now);
-  const draws = { cut: drawOwn, hemisphere: drawOwn, sphere: drawSpheres }[now.view] ?? drawPlot;
-  const words = await draws(now, signal);
+  if (series.length) facts.band(series[0].info, now);
+  else await know(now, signal);
+  const words = await (now.view in PLACES ? drawOwn : drawPlot)(now, signal);
   signal.throwIfAborted();
   caption.textContent = words;
 }
@@ -123,7 +133,8 @@ async function know(now, signal) {
   title.textContent = series[0].info.title;
   document.title = `${series[0].info.title} – brdfdb explorer`;
   facts.show(series[0].info);
-  list.colour(series[0].info);
+  facts.band(series[0].info, now);
+  for (const { info } of series) list.update(info);
   controls.show(state, series);
 }
 
@@ -138,32 +149,34 @@ async function alone(now, signal, sentence) {
 
 async function drawOwn(now, signal) {
   const answers = await answersTo(now, signal);
-  return { cut, hemisphere }[now.view](shown(placeOf(now)), series, answers, now);
-}
-
-async function drawSpheres(now, signal) {
-  const found = await spheres(series, now, signal);
-  return found.paint(shown(placeOf(now)));
+  return { cut, hemisphere, sphere: spheres }[now.view](shown(placeOf(now)), series, answers, now);
 }
 
 async function drawPlot(now, signal) {
   const [answers, Plotly] = await Promise.all([answersTo(now, signal), loaded()]);
   signal.throwIfAborted();
   const plot = shown(placeOf(now));
-  const stacked = plot.clientWidth < NARROW && answers.length > 1 && now.view === "half-difference";
+  const width = plot.clientWidth, stacked = width < NARROW && answers.length > 1 && now.view === "half-difference";
   plot.classList.toggle("stacked", stacked);
-  const { data, layout, caption: words } = figure(now.view, series, answers, now, stacked);
+  const { data, layout, caption: words } = figure(now.view, series, answers, now, { width, stacked });
   await Plotly.react(plot, data, layout, DRAWN);
   return words;
 }
 
 /** What the service answers for a view; the albedo of a model that nobody audited it does not know. */
-async function answersTo(now, signal) {
+async function answersTo(now, signal, lastTry = false) {
   const known = now.view !== "albedo" ? series : series.filter((each) => each.source === "table" || againstAudit(each, now));
-  const answers = await Promise.all(known.map((each) => json(request(each, now, series), signal)));
+  const answers = await Promise.all(known.map((each) =>
+    (now.view === "sphere" ? lit(each, now, signal) : json(request(each, now, series), signal))));
   signal.throwIfAborted();
-  return answers;
+  if (lastTry || !answers.some((answer, i) => outdates(answer, known[i].info))) return answers;
+  await know(now, signal);
+  return answersTo(now, signal, true);
 }
+
+/** Whether an answer is of another revision than what is known; what an audit found may be of an old one. */
+const outdates = ({ revision, current, finding }, info) => (finding ?
+  revision !== info.audit.revision || current !== info.audit.current : revision !== info.revision);
 
 let library; // plotly.js, once it is asked for
 
@@ -187,14 +200,15 @@ function say(sentence, tone = "bad") {
 /** What a copied request asks for: of a sphere, which is thousands of directions, its middle. */
 const copiedOf = (now) => (now.view === "sphere" ? { ...now, theta_r: 0 } : now);
 
-controls.listen(change);
+controls.listen(choose);
 turns(document.getElementById("hemisphere"));
 copy.listen(
   () => new URL(toHash(state), location.href),
   () => (series.length ? request(series[0], copiedOf(state), series) : "v1/materials"), say);
-addEventListener("hashchange", () => {
-  const linked = fromHash(location.hash);
-  change({ ...linked, material: linked.material || state.material });
+addEventListener("hashchange", () => { // a link, or the way back
+  clearTimeout(linked);
+  const held = fromHash(location.hash);
+  change({ ...held, material: held.material || state.material });
 });
 let width = picture.clientWidth;
 new ResizeObserver(() => {
@@ -205,10 +219,10 @@ new ResizeObserver(() => {
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
 shown(placeOf(state)); // an empty frame
 if (state.material) redraw(0);
-list.load((material) => change({ material, compare: state.compare === material ? "" : state.compare }), (materials) => {
+list.load((material) => choose({ material, compare: state.compare === material ? "" : state.compare }), (materials) => {
   controls.offer(materials);
   if (series.length) controls.show(state, series);
-  for (const { info } of series) list.colour(info);
+  for (const { info } of series) list.update(info);
   list.mark(state.material);
   const first = materials.find((each) => !each.damaged);
   if (!state.material && first) {
@@ -218,4 +232,4 @@ list.load((material) => change({ material, compare: state.compare === material ?
     forget(state);
     say("There is nothing to look at in the store.");
   }
-}).catch((error) => say(error.message));
+}, () => state.material || forget(state)).catch((error) => say(error.message));

@@ -8,28 +8,26 @@ import { quantity } from "./series.js";
 const SIZE = 96; // pixels across
 const DEGREE = 180 / Math.PI;
 
-const WORDS = "The viewer is far above the page; the light is as bright as makes a white matt surface white. The x axis of " +
-  "the surface runs around the vertical axis of the sphere.";
+const WORDS = "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
+  "top (+y) at 90°, and as bright as makes a white matt surface white. The x axis of the surface runs around the vertical " +
+  "axis of the sphere.";
 const MIRROR = " The mirror image, a Dirac part, is not drawn.";
 
-/** What the service says of all lit pixels of the series; `paint` draws it into an element, and gives the caption. */
-export async function spheres(series, state, signal) {
-  const scene = geometry(state.theta_i, state.phi_i);
-  const found = await Promise.all(series.map((each) =>
-    lookup(each.name, quantity(each, state, "linear-srgb"), scene.directions, signal)));
-  signal.throwIfAborted();
-  return {
-    paint(into) {
-      while (into.children.length < found.length) into.append(made());
-      while (into.children.length > found.length) into.lastChild.remove();
-      found.forEach((values, i) => {
-        const [canvas, label] = into.children[i].children;
-        paint(canvas, values, scene);
-        label.textContent = series.length > 1 ? series[i].label : "";
-      });
-      return WORDS + (series.some(({ info }) => info.specular) ? MIRROR : "") + unseenWords(series[0], state);
-    },
-  };
+/** What the service says of all lit pixels of a series. */
+export const lit = (each, state, signal) =>
+  lookup(each.name, quantity(each, state, "linear-srgb"), geometry(state).directions, signal);
+
+/** Draw the sphere of each series into an element; the caption. */
+export function spheres(into, series, answers, state) {
+  const scene = geometry(state);
+  while (into.children.length < answers.length) into.append(made());
+  while (into.children.length > answers.length) into.lastChild.remove();
+  answers.forEach(({ values }, i) => {
+    const [canvas, label] = into.children[i].children;
+    paint(canvas, values, scene);
+    label.textContent = series.length > 1 ? series[i].label : "";
+  });
+  return WORDS + (series.some(({ info }) => info.specular) ? MIRROR : "") + unseenWords(series[0], state);
 }
 
 function made() {
@@ -38,7 +36,7 @@ function made() {
 }
 
 /** Lit pixels: directions [degrees], four numbers each, places, and cosines at the light. */
-function geometry(theta, phi) {
+function geometry({ theta_i: theta, phi_i: phi }) {
   const sine = Math.sin(theta / DEGREE);
   const light = [sine * Math.cos(phi / DEGREE), sine * Math.sin(phi / DEGREE), Math.cos(theta / DEGREE)];
   const directions = [], pixels = [], cosines = [];

@@ -1,0 +1,104 @@
+"""The explorer as time goes by: new revisions, a store that is away, and the way back in the history of the browser."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import brdfdb
+from tests.api.a_store import publish, serving
+from tests.api.chromium import Chromium, chosen, shown
+from tests.api.explored import AUDIT, FOUND
+
+LINE = "document.querySelector('#m-grey-felt .chip').textContent"
+
+
+def move(browser: Chromium, name: str, value: float) -> None:
+    """Move a slider, as a hand does."""
+    browser.evaluate(
+        f"controls.elements.{name}.value = {value};"
+        f"controls.elements.{name}.dispatchEvent(new Event('input', {{ bubbles: true }}))"
+    )
+
+
+@pytest.mark.parametrize(
+    ("view", "compare"), [("cut", ""), ("sphere", "white-tile"), ("albedo", "%3Amodel"), ("spectrum", "")]
+)
+def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
+    chromium: Chromium, own: Path, view: str, compare: str
+) -> None:
+    found = FOUND | {"material": "grey-felt"}
+    (own / "audit.json").write_text(json.dumps(AUDIT | {"materials": [found]}), encoding="utf-8")
+    with serving(own) as address:
+        chromium.open(f"{address}/#material=grey-felt&view={view}&compare={compare}")
+        shown(chromium, "material=grey-felt")
+        assert chromium.until(f"document.querySelector('#m-grey-felt') && {LINE}") == "violates"
+        assert "revision r000001" in chromium.evaluate("facts.innerText")
+        publish(own, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=40.0, error=True)
+        move(chromium, "theta_i", 20)
+        shown(chromium, "theta_i=20")
+        known = chromium.evaluate("facts.innerText")
+        assert "revision r000002" in known
+        assert "This is of revision r000001, not of the current one." in known
+        error = brdfdb.open(own)["grey-felt"].error
+        assert error is not None
+        assert f"within {100.0 * error.overall.p99:.3g} %" in known
+        assert chromium.evaluate(LINE) == "not audited"
+        assert chromium.evaluate("[...verdict.options].map(each => each.value)") == ["", "not audited", "violates"]
+        assert chromium.errors == []
+
+
+@pytest.mark.parametrize("link", ["", "#material=grey-felt&compare=white-tile"])
+def test_a_page_that_was_opened_while_the_store_was_away_is_there_when_it_is_back(
+    chromium: Chromium, own: Path, link: str
+) -> None:
+    away = own.rename(own.with_name("away"))
+    with serving(own) as address:
+        chromium.open(f"{address}/{link}")
+        said = chromium.until("globalThis.count?.textContent")
+        assert "store" in said
+        assert chromium.until("message.textContent || caption.textContent === ''")
+        assert chromium.evaluate("[list.children.length, caption.textContent]") == [0, ""]
+        away.rename(own)
+        shown(chromium, "compare=white-tile" if link else "material=brushed-metal")
+        chromium.until("list.children.length")
+        names = ["brushed-metal", "copper-foil", "grey-felt", "white-tile"]
+        assert chromium.evaluate("[...list.children].map(each => each.dataset.name)") == names
+        assert chromium.evaluate("[count.textContent, message.textContent]") == ["4 materials", ""]
+        assert chromium.evaluate("[controls.inert, controls.elements.compare.options.length]") == [False, 6]
+
+
+def test_the_way_back_is_over_materials_and_views_as_they_were_left(chromium: Chromium, address: str) -> None:
+    chromium.open(address)
+    shown(chromium, "material=foam")
+    start = chromium.evaluate("history.length")
+    move(chromium, "theta_i", 20)  # not yet in the link when the next material is chosen
+    chromium.evaluate("document.querySelector('#m-rolled-brass').click()")
+    shown(chromium, "material=rolled-brass", "theta_i=20")
+    for theta_i in (30, 40):
+        move(chromium, "theta_i", theta_i)
+        shown(chromium, f"theta_i={theta_i}")
+    chromium.until("location.hash.includes('theta_i=40')")
+    chromium.evaluate("document.querySelector('[value=sphere]').click()")
+    shown(chromium, "view=sphere")
+    chromium.evaluate("document.querySelector('#m-rolled-brass').click()")  # which is shown already
+    assert chromium.evaluate("history.length") == start + 2
+    sphere, cut, foam = (
+        "#material=rolled-brass&view=sphere&theta_i=40",
+        "#material=rolled-brass&theta_i=40",
+        "#material=foam&theta_i=20",
+    )
+    for way, link in (("back", cut), ("back", foam), ("forward", cut), ("forward", sphere)):
+        chromium.evaluate(f"history.{way}()")
+        chromium.until(f"picture.ariaBusy === 'false' && picture.dataset.shown === '{link}'")
+        name = re.findall(r"material=([\w-]+)", link)[0]
+        assert chosen(chromium) == name
+        assert f"{name}, revision" in chromium.evaluate("facts.innerText")
+        assert chromium.evaluate("[controls.elements.theta_i.value, spheres.hidden, location.hash]") == [
+            *(re.findall(r"theta_i=(\d+)", link)[0], "view=sphere" not in link, link)
+        ]
+    assert chromium.evaluate("history.length") == start + 2
+    assert chromium.errors == []
