@@ -175,13 +175,10 @@ def test_an_answer_that_breaks_in_the_middle_is_a_failure(log: Log) -> None:
         await send({"type": "http.response.body", "body": b"first", "more_body": True})
         raise OSError("the disk \udcff")
 
-    async def whole(*_: Any) -> Any:
-        raise NotImplementedError
-
-    edge = Edge(breaks, limit=1, lookup=whole, failed=problem_of, log_level="error")
+    edge = Edge(breaks, limit=1, lookup=AsyncMock(), failed=problem_of, log_level="error")
     scope = {"type": "http", "method": "GET", "path": "/", "query_string": b"", "headers": []}
     with pytest.raises(OSError, match="the disk"):
-        asyncio.run(edge(scope, whole, AsyncMock()))
+        asyncio.run(edge(scope, AsyncMock(), AsyncMock()))
     failed, answered = log()
     assert failed["failed"] == "OSError: the disk \\udcff"
     assert answered["status"] == 500

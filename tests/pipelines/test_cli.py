@@ -7,36 +7,22 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
-import xarray as xr
 
 import brdfdb
-from brdfdb.grids import Grid
-from brdfdb.layout import Layout
-from brdfdb.materials import Material, presets
-from brdfdb.staging import publish_dataset
-from brdfdb.tabulate import tabulate
+from brdfdb.materials import presets
 from brdfdb_pipelines import cli, terminal
+from tests.pipelines.command import Captured, run
 
 COMMANDS = [
     *("build", "audit", "export exr", "lookup", "list", "show"),
     *("chart", "history", "rollback", "verify", "gc", "serve"),
 ]
 HEAVY = ["numpy", "numba", "xarray", "zarr", "pydantic", "rich", "fastapi", "uvicorn", "OpenEXR", "brdfdb.store"]
-SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "audit.schema.json"
-
-Captured = pytest.CaptureFixture[str]
-
-
-def run(*arguments: object) -> int:
-    here = ["--jobs", "1"] if arguments[:1] == ("audit",) else []  # no processes for what takes a second
-    return cli.main([*map(str, arguments), *here])
 
 
 def fails(capsys: Captured, *arguments: object) -> str:
@@ -441,126 +427,6 @@ def test_export_takes_names_or_all_and_its_options_anywhere(
     assert run("export", "exr", "--all", "--half", "--out", tmp_path / "all", "--store", built) == 0
     assert capsys.readouterr().out.startswith("15 EXR files, ")
     assert {path.name.rsplit("_")[0] for path in (tmp_path / "all").iterdir()} == set(names)
-
-
-# Audit
-
-
-def test_audit_of_some_materials_reports_those(built: Path, tmp_path: Path, capsys: Captured) -> None:
-    report = tmp_path / "report.json"
-    code = run("audit", "mirror", "foam", "mirror", "--store", built, "--report", report)
-    out, err = capsys.readouterr()
-    assert code == 0
-    assert "auditing" in err
-    assert "auditing" not in out
-    lines = out.splitlines()
-    assert lines[0].startswith(f"Audit of {built}")
-    assert [line.split()[:2] for line in lines[2:4]] == [["mirror", "passes"], ["foam", "passes"]]
-    written = report.with_suffix(".html")
-    assert lines[-1] == (
-        "2 audited: 2 pass, 0 exceed 1 as their published parameters are known to, 0 violate; "
-        f"page {written}, data {report}"
-    )
-    assert written.read_text(encoding="utf-8").startswith("<!doctype html>")
-    document = json.loads(report.read_bytes())
-    jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
-    assert [entry["material"] for entry in document["materials"]] == ["mirror", "foam"]
-    assert document["violations"] == []
-
-
-def spoil(dataset: xr.Dataset, index: tuple[int, ...], value: float) -> xr.Dataset:
-    dataset["brdf"].values[index] = value
-    return dataset
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda d: spoil(d, (1, 2, 1), -0.1), "1 negative values"),
-        (lambda d: spoil(d, (1, 2, 1), np.nan), "1 values are not finite"),
-        (lambda d: spoil(d, (1, 2, 1), np.inf), "1 values are not finite"),
-        (lambda d: spoil(d, (1, 2, 1), 0.1), "not reciprocal"),
-        (lambda d: d.assign(brdf=d["brdf"] * np.float32(2.5)), "the table reflects 1.25 of what arrives at 0 degrees"),
-    ],
-    ids=["negative", "nan", "inf", "asymmetric", "bright"],
-)
-def test_a_violation_is_exit_code_1_and_stands_in_the_report(
-    change: Callable[[xr.Dataset], xr.Dataset], said: str, tmp_path: Path, capsys: Captured
-) -> None:
-    grey = {"title": "Grey", "model": "lambert", "source": "no paper", "parameters": {"rho": 0.5}}
-    theta = [0, 30, 60, 80]
-    grid = Grid({"theta_i": theta, "theta_r": theta, "delta_phi": [0, 90, 180]})
-    publish_dataset(tmp_path, "good", tabulate(Layout(Material.from_table("good", grey), grid)))
-    publish_dataset(tmp_path, "bad", change(tabulate(Layout(Material.from_table("bad", grey), grid))))
-    assert run("audit", "--no-figures", "--store", tmp_path) == 1
-    out, err = capsys.readouterr()
-    assert f"bad: {said}\n" in out
-    assert "good: " not in out
-    assert "2 audited: 1 pass, 0 exceed 1 as their published parameters are known to, 1 violate" in out
-    assert "Traceback" not in err
-    document = json.loads((tmp_path / "audit.json").read_text(encoding="utf-8"))
-    jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
-    assert document["violations"] == ["bad"]
-    assert run("audit", "good", "--store", tmp_path) == 0
-
-
-def test_audit_notices_a_file_that_was_exchanged_for_a_sound_one(tmp_path: Path, capsys: Captured) -> None:
-    grid = Grid({"theta_i": [0, 80], "theta_r": [0, 80], "delta_phi": [0, 90, 180]})
-    for name, rho in (("grey", 0.25), ("white", 0.75)):
-        table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-        publish_dataset(tmp_path, name, tabulate(Layout(Material.from_table(name, table), grid)))
-    grey, white = (brdfdb.open(tmp_path).path(name) / "brdf" / "c" / "0" / "0" / "0" for name in ("grey", "white"))
-    assert (grey.stat().st_size, grey.read_bytes() != white.read_bytes()) == (white.stat().st_size, True)
-    shutil.copyfile(white, grey)
-    assert run("audit", "--no-figures", "--store", tmp_path) == 2
-    out, err = capsys.readouterr()
-    assert err.splitlines()[-1] == "brdfdb: grey r000001 is damaged: the content of brdf/c/0/0/0 changed"
-    assert "1 audited: 1 pass" in out  # the other one
-    document = json.loads((tmp_path / "audit.json").read_text(encoding="utf-8"))
-    assert [entry["material"] for entry in document["materials"]] == ["white"]
-
-
-WHITE = """
-[define.white]
-title = "White, rough"
-model = "oren_nayar"
-source = "no paper"
-[define.white.parameters]
-rho = 1
-sigma_deg = 20
-"""
-KNOWN = """
-[define.white.known_excess]
-max_albedo = 1.05
-from_theta_i_deg = 75
-citation = "Erratum of eqs 27 and 28: Größe"
-"""
-GRID = "[{ start = 0, stop = 88, step = 2 }, 89, 89.5]"
-
-
-@pytest.mark.parametrize(
-    ("known", "said"),
-    [("", "Oren and Nayar 1994, eqs 27, 28 and 30: "), (KNOWN, "Erratum of eqs 27 and 28: Größe\n")],
-    ids=["of the model", "of the material"],
-)
-def test_white_oren_nayar_is_a_known_excess(
-    known: str, said: str, recipe_text: str, tmp_path: Path, capsys: Captured
-) -> None:
-    before, grids = recipe_text.split("[grids.isotropic]")
-    _, rest = grids.split("delta_phi_deg", 1)
-    text = before + f"[grids.isotropic]\ntheta_i_deg = {GRID}\ntheta_r_deg = {GRID}\ndelta_phi_deg" + rest
-    text = text.replace('"mirror"]', '"mirror", "white"]') + WHITE + known
-    recipe = tmp_path / "recipe.toml"
-    recipe.write_text(text, encoding="utf-8")
-    assert run("build", recipe, "--store", tmp_path / "store") == 0
-    capsys.readouterr()
-    assert run("audit", "white", "--store", tmp_path / "store") == 0
-    out, _ = capsys.readouterr()
-    document = json.loads((tmp_path / "store" / "audit-part.json").read_text(encoding="utf-8"))
-    (entry,) = document["materials"]
-    assert entry["verdict"] == "known published excess"
-    assert entry["energy"]["table"]["max_albedo"] == pytest.approx(1.046, abs=0.003)
-    assert any(line.startswith("white: reflects 1.0") and f": {said}" in f"{line}\n" for line in out.splitlines())
 
 
 # Terminals and locales
