@@ -74,6 +74,7 @@ def test_a_page_that_was_opened_while_the_store_was_away_is_there_when_it_is_bac
 def test_the_way_back_is_over_materials_and_views_as_they_were_left(chromium: Chromium, address: str) -> None:
     chromium.open(address)
     shown(chromium, "material=foam")
+    chromium.send("Page.resetNavigationHistory")  # full at fifty addresses, those of the tests before counted
     start = chromium.evaluate("history.length")
     move(chromium, "theta_i", 20)  # not yet in the link when the next material is chosen
     chromium.evaluate("document.querySelector('#m-rolled-brass').click()")
