@@ -147,7 +147,7 @@ def _as(material: Material, model: str, **parameters: Number) -> Material:
     """A material of another model, from the same sources; what is said of parameters that it lacks is left out."""
     stated = {
         "sources": {name: source for name, source in material.sources.items() if name in parameters},
-        "assumed": tuple(name for name in material.assumed if name in parameters),
+        "assumed": {name: each for name, each in material.assumed.items() if name in parameters},
         "known_excess": None,  # of the other model
     }
     return material.model_copy(update={"model": model, "parameters": parameters, **stated})
@@ -166,7 +166,7 @@ def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[R
             f_r = body(wi, wr, **own, **more)
             if "k_s" in values:  # Eq. (32)
                 surface = models.torrance_sparrow_vectors(wi, wr, sigma=own["sigma"])
-                f_r = values["k_b"] * f_r + values["k_s"] * surface
+                f_r = values["k_b"] * f_r + values["k_s"] / values["e_0"] * surface
             return f_r[:, np.newaxis]
 
         return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more)))

@@ -250,7 +250,7 @@ def _attributes(material: Material) -> dict[str, Any]:
         "parameters": material.file_parameters(),
         "parameter_sources": {written[name]: material.sources.get(name, material.source) for name in written},
         "source": material.source,
-        "assumed": [written.get(name, name) for name in material.assumed],
+        "assumed": {written.get(name, name): each.model_dump(mode="json") for name, each in material.assumed.items()},
         "note": material.note,
         "refractive_index": material.refractive_index or "",
         "known_excess": material.known_excess.model_dump() if material.known_excess else {},

@@ -9,8 +9,10 @@ import pytest
 from pydantic import ValidationError
 
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import Material, presets
+from brdfdb.materials import Material, Number, presets
 from brdfdb.models import MODELS
+from brdfdb.quadrature import directional_albedo
+from brdfdb.reference import oren_nayar_1994
 
 TOGETHER = 3e-13  # relative, of copper in one call or in a call each, through the table of eq. 78: 1.9e-13
 
@@ -88,7 +90,7 @@ HE_IDEAL_DIFFUSE = "aluminum-cylinder-13c"
 ASSUMED = {
     **{name: {"interreflection"} for name in OREN_NAYAR},
     **{name: {"rho", "interreflection"} for name in OREN_NAYAR if name.startswith(("rendered-", "scene-"))},
-    **{name: {"k_b"} for name in SURFACE_TERM_RATIOS},
+    **{name: {"k_b", "e_0"} for name in SURFACE_TERM_RATIOS},
     "sandpaper-220-grit": {"sigma_0_um", "tau_um", "refractive_index"},
     "blue-plastic": {"tau_um", "refractive_index"},
     "aluminum-cylinder-13b": {"tau_um"},
@@ -129,7 +131,7 @@ def test_oren_nayar(name):
     rho, sigma_deg = OREN_NAYAR[name]
     if name in SURFACE_TERM_RATIOS:
         assert material.model == "oren_nayar_body_surface"
-        surface = {"k_s": SURFACE_TERM_RATIOS[name], "k_b": 1.0, "interreflection": False}
+        surface = {"k_s": SURFACE_TERM_RATIOS[name], "k_b": 1.0, "e_0": np.pi, "interreflection": False}
         assert material.file_parameters() == {"rho": rho, "sigma_deg": sigma_deg, **surface}
     else:
         assert material.model == "oren_nayar"
@@ -172,6 +174,7 @@ def test_every_value_has_a_place_in_a_paper(name):
         assert (JOURNAL_PLACE if value == "refractive_index" else PAPER_PLACE).match(source)
     assert ("refractive_index" in material.sources) is material.spectral
     assert set(material.assumed) == ASSUMED.get(name, set())
+    assert all(assumption.why.endswith(".") for assumption in material.assumed.values())
 
 
 @pytest.mark.parametrize("name", presets())
@@ -231,6 +234,99 @@ def test_the_excess_of_magnesium_oxide():
     assert 53.0 < excess.from_theta_i_deg < 54.0
 
 
+ANGLES_DEG = (0.0, 30.0, 60.0, 75.0, 80.0, 82.5, 85.0, 87.0, 89.0, 89.9, 89.99, 90.0)
+VISIBLE_NM = (450.0, 550.0, 650.0)  # of a material that may be used at any wavelength
+RECORDED = 6e-4  # absolute, of a largest albedo: three decimals are recorded, and the quadrature is good to 1e-4
+
+
+def largest_albedo(material: Material) -> float:
+    """The largest directional albedo, Dirac part included, over angles and wavelengths."""
+    wavelengths = (None,) if not material.spectral else material.wavelengths_nm or VISIBLE_NM
+    return max(
+        float(
+            np.max(
+                directional_albedo(
+                    material.model,
+                    np.deg2rad(ANGLES_DEG),
+                    tolerance=1e-4,
+                    specular=material.spec.specular is not None,
+                    **material.arguments(wavelength_nm),
+                ).albedo
+            )
+        )
+        for wavelength_nm in wavelengths
+    )
+
+
+def changed(material: Material, **values: Number | str) -> Material:
+    """The material with other values of its file, and nothing assumed or known of them."""
+    index = values.pop("refractive_index", material.refractive_index)
+    table = {
+        "title": material.title,
+        "model": material.model,
+        "source": material.source,
+        "parameters": material.file_parameters() | values,
+        "refractive_index": index,
+        "wavelengths_nm": material.wavelengths_nm and list(material.wavelengths_nm),
+    }
+    return Material.from_table(material.name, table)
+
+
+@pytest.mark.parametrize("name", [name for name, material in presets().items() if material.assumed])
+def test_the_sensitivity_to_every_assumption_is_what_is_recorded(name):
+    material = preset(name)
+    own = largest_albedo(material)
+    for assumption in material.assumed.values():
+        assert assumption.max_albedo == pytest.approx(own, abs=RECORDED)
+        assert assumption.alternatives
+        for other in assumption.alternatives:
+            found = largest_albedo(changed(material, **other.parameters))
+            assert other.max_albedo == pytest.approx(found, abs=RECORDED)
+
+
+def test_verdicts_that_rest_on_an_assumption_are_known():
+    deciding = {
+        (name, own) for name, material in presets().items() for own in material.assumed if decides(material, own)
+    }
+    assert deciding == {
+        ("cotton-towel", "e_0"),
+        ("rendered-sphere-10deg", "rho"),
+        ("rendered-sphere-20deg", "rho"),
+        ("scene-object-rough", "rho"),
+    }
+    # as they are, none of the four reflects more than it receives
+    for name, own in deciding:
+        assert preset(name).assumed[own].max_albedo < 1.0
+
+
+def decides(material: Material, name: str) -> bool:
+    found = material.assumed[name].decides
+    assert found is not None
+    return found
+
+
+def test_no_excess_rests_on_an_assumption():
+    for material in presets().values():
+        if material.known_excess:
+            assert not any(decides(material, name) for name in material.assumed)
+
+
+def test_samples_with_a_surface_conserve_energy_whatever_unit_is_taken_but_one():
+    # with E_0 = 1, eq. 31 as it stands, the towel would reflect half as much again as it receives
+    literal = {name: largest_albedo(changed(preset(name), e_0=1.0)) for name in SURFACE_TERM_RATIOS}
+    assert [name for name, albedo in literal.items() if albedo > 1.0] == ["cotton-towel"]
+    assert 1.5 < literal["cotton-towel"] < 1.6
+    assert all(largest_albedo(preset(name)) < 1.0 for name in SURFACE_TERM_RATIOS)
+
+
+def test_the_surface_of_the_towel_is_seen_relative_to_a_white_facet():
+    towel, angles = preset("cotton-towel"), (0.5, 0.7, 2.5)
+    theta_i, theta_r, delta_phi = angles
+    found = towel.spec.evaluate(theta_i, 0.0, theta_r, delta_phi, **towel.parameters)
+    body, _, surface = oren_nayar_1994.body_surface(*angles, 0.75, np.deg2rad(42.0), k_b=1, k_s=0.085 / np.pi)
+    assert found == pytest.approx(float(body + surface), rel=1e-12)
+
+
 def test_arguments_of_a_spectral_material():
     cylinder, sandpaper = preset("aluminum-cylinder-12a"), preset("sandpaper-220-grit")
     arguments = cylinder.arguments([400.0, 700.0])
@@ -284,6 +380,14 @@ def test_the_papers_of_the_models_are_in_the_bibliography():
     bibliography = (Path(__file__).parents[1] / "references.bib").read_text(encoding="utf-8")
     keys = set(re.findall(r"^@\w+\{(\w+),$", bibliography, flags=re.MULTILINE))
     assert {preset(name).spec.reference for name in presets()} <= keys
+
+
+EXCESS = {"max_albedo": 1.1, "from_theta_i_deg": 80, "citation": "Fig. 1"}
+
+
+def guess(other: dict[str, object]) -> dict[str, object]:
+    """An assumption on which an excess of 1.1 rests."""
+    return {"why": "a guess", "max_albedo": 1.1, "alternatives": [{"parameters": other, "max_albedo": 0.9}]}
 
 
 def plaster(**changes: object) -> dict[str, object]:
@@ -357,10 +461,35 @@ def test_defaults_are_filled_in_and_integers_are_numbers():
         ),
         (
             "plaster",
-            plaster(assumed=["alpha"], note="alpha"),
+            plaster(assumed={"alpha": {"why": "a guess"}}),
             "plaster: assumed: 'alpha' is not one of rho, sigma, interreflection, refractive_index, wavelengths_nm",
         ),
-        ("plaster", plaster(assumed=["sigma"], note="rho"), "plaster: assumed: 'sigma' must be explained in the note"),
+        (
+            "plaster",
+            plaster(assumed={"sigma_deg": guess({"sigma": 20})}),
+            "plaster: assumed alternatives: 'sigma' is not one of rho, sigma_deg, interreflection, refractive_index, "
+            "wavelengths_nm",
+        ),
+        (
+            "plaster",
+            plaster(assumed={"rho": {"why": ""}}),
+            "plaster: assumed.rho.why: String should have at least 1 character",
+        ),
+        (
+            "plaster",
+            plaster(assumed={"rho": {"why": "a guess", "max_albedo": 0.9}}),
+            "plaster: assumed: max_albedo and alternatives are given together, or neither",
+        ),
+        (
+            "plaster",
+            plaster(assumed={"rho": guess({"rho": 0.5})}, known_excess=EXCESS),
+            "plaster: known_excess: it rests on 'rho', which is assumed and not published",
+        ),
+        (
+            "plaster",
+            plaster(assumed={"rho": {"why": "a guess"}}, known_excess=EXCESS),
+            "plaster: known_excess: it rests on 'rho', which is assumed and not published",
+        ),
         (
             "plaster",
             plaster(refractive_index="main/Al/Rakic"),
@@ -402,10 +531,11 @@ def test_in_memory_the_units_are_those_of_the_model():
 
 def test_sources_and_assumptions_take_the_names_of_the_file():
     material = Material.from_table(
-        "plaster", plaster(sources={"sigma_deg": "Fig. 2"}, assumed=["sigma_deg"], note="sigma_deg is a guess")
+        "plaster", plaster(sources={"sigma_deg": "Fig. 2"}, assumed={"sigma_deg": guess({"sigma_deg": 20})})
     )
     assert material.sources == {"sigma": "Fig. 2"}
-    assert material.assumed == ("sigma",)
+    assert list(material.assumed) == ["sigma"]
+    assert material.assumed["sigma"].decides is True
 
 
 @pytest.mark.parametrize("name", ["rolled-brass", "scene-copper-sphere", "aluminum-cylinder-12f"])

@@ -10,7 +10,7 @@ import pytest
 
 from brdfdb import accuracy
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.materials import Material, presets
+from brdfdb.materials import Assumption, Material, presets
 from brdfdb.misprints import MISPRINTS
 from brdfdb.models import oren_nayar_1994_surfaces
 from brdfdb.reference import he_torrance_1991, oren_nayar_1994, ward_1992
@@ -261,8 +261,8 @@ def test_a_table_of_another_model_says_where_its_numbers_come_from(model: str) -
         **preset.model_dump(exclude={"model", "sources", "assumed", "note"}),
         model=model,
         sources={first: "a figure", list(preset.parameters)[-1]: "a table"},
-        assumed=(second,),
-        note=f"{second} is a guess",
+        assumed={second: Assumption(why="a guess")},
+        note="of another paper",
     )
     forms, _ = of(material, TOLERANCE)
     layout = forms["table-10"].layout
@@ -272,7 +272,7 @@ def test_a_table_of_another_model_says_where_its_numbers_come_from(model: str) -
     assert (table.source, table.title, table.assumed, table.note) == (
         preset.source,
         preset.title,
-        (second,),
+        {second: Assumption(why="a guess")},
         material.note,
     )
     assert table.sources == {name: where for name, where in material.sources.items() if name in table.parameters}

@@ -178,7 +178,8 @@ def test_coordinates_and_variables_have_units() -> None:
 
 def test_attributes_say_where_every_number_comes_from() -> None:
     made_up = material(
-        "oren_nayar", rho=0.8, sigma_deg=30, sources={"sigma": "Fig. 9"}, assumed=["rho"], note="rho: a guess",
+        "oren_nayar", rho=0.8, sigma_deg=30, sources={"sigma": "Fig. 9"}, note="white",
+        assumed={"rho": {"why": "a guess"}},
     )  # fmt: skip
     attributes = tabulate(Layout(made_up, ISOTROPIC)).attrs
     assert attributes["title"] == "Made up"
@@ -190,16 +191,17 @@ def test_attributes_say_where_every_number_comes_from() -> None:
     assert attributes["parameter_sources"] == {
         "rho": "no paper", "sigma_deg": "Fig. 9", "interreflection": "no paper",
     }  # fmt: skip
-    assert (attributes["assumed"], attributes["note"]) == (["rho"], "rho: a guess")
+    assert attributes["assumed"] == {"rho": {"why": "a guess", "max_albedo": None, "alternatives": []}}
+    assert attributes["note"] == "white"
     assert attributes["refractive_index"] == ""
     assert attributes["known_excess"] == {}
     assert "delta_phi = phi_r - phi_i" in attributes["conventions"]
 
 
 def test_an_assumed_angle_is_named_as_its_parameter_is() -> None:
-    made_up = material("oren_nayar", rho=0.8, sigma_deg=30, assumed=["sigma"], note="sigma: a guess")
+    made_up = material("oren_nayar", rho=0.8, sigma_deg=30, assumed={"sigma": {"why": "a guess"}})
     attributes = tabulate(Layout(made_up, ISOTROPIC)).attrs
-    assert attributes["assumed"] == ["sigma_deg"]
+    assert list(attributes["assumed"]) == ["sigma_deg"]
     assert set(attributes["assumed"]) <= set(attributes["parameters"])
 
 

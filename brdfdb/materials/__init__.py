@@ -45,6 +45,42 @@ class KnownExcess(BaseModel):
     citation: Text
 
 
+class Alternative(BaseModel):
+    """Other values that the paper allows for an assumption, and the largest directional albedo [1] that they give."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    parameters: dict[str, Number | str] = Field(min_length=1)
+    max_albedo: float = Field(ge=0.0, allow_inf_nan=False)
+
+
+class Assumption(BaseModel):
+    """A value that the paper does not print: why it was chosen, and what depends on the choice.
+
+    `max_albedo` [1] is the largest directional albedo of the material as it is, Dirac part included, and is given where
+    `alternatives` are: the two together say how far the verdict on energy rests on the choice.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    why: Text
+    max_albedo: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
+    alternatives: tuple[Alternative, ...] = ()
+
+    @model_validator(mode="after")
+    def _check_compared(self) -> Assumption:
+        if (self.max_albedo is None) != (not self.alternatives):
+            raise ValueError("assumed: max_albedo and alternatives are given together, or neither")
+        return self
+
+    @property
+    def decides(self) -> bool | None:
+        """Whether an alternative moves the largest albedo across 1; None where no alternative is recorded."""
+        if self.max_albedo is None:
+            return None
+        return any((each.max_albedo > 1.0) != (self.max_albedo > 1.0) for each in self.alternatives)
+
+
 class Material(BaseModel):
     """One material: a model, its parameters in the units of the model, and where each number comes from.
 
@@ -60,8 +96,8 @@ class Material(BaseModel):
         Paper and table, figure or section of every value that is not in `sources`.
     sources : dict
         Where single values come from, where that is another place.
-    assumed : tuple of str
-        Values that the paper does not print: our choice, explained by name in `note`.
+    assumed : dict of str to Assumption
+        Values that the paper does not print, by parameter: why ours was chosen, and what the alternatives would give.
     refractive_index : str or None
         ``shelf/book/page`` for `brdfdb.spectra.refractive_index`; spectral models have one, no other model has.
     wavelengths_nm : tuple of float or None
@@ -73,7 +109,7 @@ class Material(BaseModel):
     ------
     ValueError
         For an unknown model, a missing, unknown or out-of-range parameter, a source or an assumption about a value
-        that the material does not have, an assumption that the note does not explain.
+        that the material does not have, a known excess that rests on an assumption.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -84,7 +120,7 @@ class Material(BaseModel):
     parameters: dict[str, Number]
     source: Text
     sources: dict[str, Text] = {}
-    assumed: tuple[str, ...] = ()
+    assumed: dict[str, Assumption] = {}
     note: str = ""
     refractive_index: str | None = Field(default=None, pattern=r"^[^/]+/[^/]+/[^/]+$")
     wavelengths_nm: tuple[float, ...] | None = Field(default=None, min_length=1)
@@ -102,11 +138,10 @@ class Material(BaseModel):
         try:
             if isinstance(model, str) and model in MODELS and isinstance(parameters, Mapping):
                 fields["parameters"] = _from_file(MODELS[model], parameters)
-                own = {_as_written(parameter).name: parameter.name for parameter in MODELS[model].parameters}
-                if isinstance(sources := table.get("sources"), Mapping):
-                    fields["sources"] = {own.get(written, written): source for written, source in sources.items()}
-                if isinstance(assumed := table.get("assumed"), list):
-                    fields["assumed"] = [own.get(str(written), written) for written in assumed]
+                own = {written_name(parameter): parameter.name for parameter in MODELS[model].parameters}
+                for field in ("sources", "assumed"):
+                    if isinstance(stated := table.get(field), Mapping):
+                        fields[field] = {own.get(written, written): each for written, each in stated.items()}
             return cls.model_validate(fields)
         except ValidationError as error:
             raise ValueError(f"{name}: {'; '.join(_sentence(item) for item in error.errors())}") from None
@@ -143,13 +178,21 @@ class Material(BaseModel):
                 f"refractive_index, wavelengths_nm: the model {self.model} is not spectral and has neither"
             )
         values = (*self.parameters, "refractive_index", "wavelengths_nm")
-        for field, names in (("sources", tuple(self.sources)), ("assumed", self.assumed)):
+        alternatives = (
+            name for each in self.assumed.values() for other in each.alternatives for name in other.parameters
+        )
+        written = (*map(written_name, self.spec.parameters), *values[-2:])
+        for field, names, allowed in (
+            ("sources", self.sources, values),
+            ("assumed", self.assumed, values),
+            ("assumed alternatives", alternatives, written),
+        ):
             for name in names:
-                if name not in values:
-                    raise ValueError(f"{field}: {name!r} is not one of {', '.join(values)}")
-        for name in self.assumed:
-            if name not in self.note:
-                raise ValueError(f"assumed: {name!r} must be explained in the note")
+                if name not in allowed:
+                    raise ValueError(f"{field}: {name!r} is not one of {', '.join(allowed)}")
+        for name, assumption in self.assumed.items():
+            if self.known_excess is not None and assumption.decides is not False:
+                raise ValueError(f"known_excess: it rests on {name!r}, which is assumed and not published")
         return self
 
     @property

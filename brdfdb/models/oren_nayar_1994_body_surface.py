@@ -14,7 +14,10 @@ from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow, torrance_sparr
 from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
 
 K_B = Parameter("k_b", "k_b", "1", 0.0, 1.0, "weight of the body's reflection", default=1.0)
-K_S = Parameter("k_s", "k_s", "1", 0.0, 1.0, "weight of the surface's reflection")
+K_S = Parameter("k_s", "k_s", "1", 0.0, 1.0, "weight of the surface's reflection, eq. 31 as printed")
+E_0 = Parameter(
+    "e_0", "E_0", "1", 1.0, 10.0, "irradiance of a facet facing the light, in the unit of eq. 31", default=1.0
+)
 WITH_INTERREFLECTION = replace(INTERREFLECTION, default=False)
 
 
@@ -28,11 +31,12 @@ def oren_nayar_body_surface(
     sigma: ArrayLike,
     k_s: ArrayLike,
     k_b: ArrayLike = 1.0,
+    e_0: ArrayLike = 1.0,
     interreflection: ArrayLike = False,
     n: ArrayLike | None = None,
     k: ArrayLike | None = None,
 ) -> Floats:
-    """BRDF of a rough body with a glossy surface, k_b times `oren_nayar` plus k_s times `torrance_sparrow`.
+    """BRDF of a rough body with a glossy surface, k_b times `oren_nayar` plus k_s / e_0 times `torrance_sparrow`.
 
     Parameters
     ----------
@@ -45,6 +49,8 @@ def oren_nayar_body_surface(
     k_b, k_s : array_like [1]
         Weights of body and surface, each in [0, 1]. The paper prints k_s / k_b: 0.019 foam, 0.085 cotton towel, 0.043
         wood shavings.
+    e_0 : array_like [1]
+        E_0, the irradiance of a facet that faces the light, in the unit of the radiance of eq. 31; in [1, 10].
     interreflection : bool
         Add the body's second bounce (eq. 28); section 5 of the paper leaves it out.
     n, k : array_like [1], optional
@@ -63,8 +69,11 @@ def oren_nayar_body_surface(
 
     Notes
     -----
-    Eq. (32) with eqs (27) and (31), divided by E_0 cos(theta_i), E_0 = 1. Weights are fitted, not derived: nothing
-    holds the sum to the light received (see `torrance_sparrow`).
+    Eq. (32) with eqs (27) and (31), divided by E_0 cos(theta_i). Weights are fitted, not derived: nothing holds the sum
+    to the light received (see `torrance_sparrow`).
+    Departures from the paper: eq. 27 has the factor E_0, eq. 31 as printed has none. The printed k_s / k_b so carries
+    the unit of a radiance over an irradiance, and the paper does not say which. With e_0 = 1 eq. 31 stands as printed.
+    With e_0 = pi radiances are relative to that of a white Lambertian facet that faces the light.
 
     References
     ----------
@@ -78,7 +87,7 @@ def oren_nayar_body_surface(
     directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
     angles = directions.given
     body = oren_nayar(*angles, rho=rho, sigma=sigma, interreflection=interreflection)
-    return _sum(body, torrance_sparrow(*angles, sigma=sigma, n=n, k=k), k_b, k_s, directions)
+    return _sum(body, torrance_sparrow(*angles, sigma=sigma, n=n, k=k), k_b, k_s, e_0, directions)
 
 
 def oren_nayar_body_surface_vectors(
@@ -89,6 +98,7 @@ def oren_nayar_body_surface_vectors(
     sigma: ArrayLike,
     k_s: ArrayLike,
     k_b: ArrayLike = 1.0,
+    e_0: ArrayLike = 1.0,
     interreflection: ArrayLike = False,
     n: ArrayLike | None = None,
     k: ArrayLike | None = None,
@@ -97,26 +107,35 @@ def oren_nayar_body_surface_vectors(
     directions = checked_vectors(wi, wr)
     w_i, w_r = directions.w_i.astype(np.float64), directions.w_r.astype(np.float64)
     body = oren_nayar_vectors(w_i, w_r, rho=rho, sigma=sigma, interreflection=interreflection)
-    return _sum(body, torrance_sparrow_vectors(w_i, w_r, sigma=sigma, n=n, k=k), k_b, k_s, directions)
+    return _sum(body, torrance_sparrow_vectors(w_i, w_r, sigma=sigma, n=n, k=k), k_b, k_s, e_0, directions)
 
 
-def _sum(body: Floats, surface: Floats, k_b: ArrayLike, k_s: ArrayLike, directions: Directions) -> Floats:
+def _sum(
+    body: Floats, surface: Floats, k_b: ArrayLike, k_s: ArrayLike, e_0: ArrayLike, directions: Directions
+) -> Floats:
     # Eq. (32), of values in float64
-    return finished(K_B.check(k_b) * body + K_S.check(k_s) * surface, directions)
+    return finished(K_B.check(k_b) * body + K_S.check(k_s) / E_0.check(e_0) * surface, directions)
 
 
 def lobe(
-    cos_i: Floats, *, rho: ArrayLike, sigma: ArrayLike, k_s: ArrayLike, k_b: ArrayLike = 1.0, **_: ArrayLike
+    cos_i: Floats,
+    *,
+    rho: ArrayLike,
+    sigma: ArrayLike,
+    k_s: ArrayLike,
+    k_b: ArrayLike = 1.0,
+    e_0: ArrayLike = 1.0,
+    **_: ArrayLike,
 ) -> Lobe:
     """Where to look for the lobe of the surface: share by the albedos, slopes by sigma."""
     whole = torrance_sparrow_1967.lobe(cos_i, sigma=sigma)
-    surface = np.asarray(k_s) * 4.0 * np.pi * whole.alpha_x**2  # the albedo of a narrow lobe with F = 1
+    surface = np.asarray(k_s) / np.asarray(e_0) * 4.0 * np.pi * whole.alpha_x**2  # albedo of a narrow lobe with F = 1
     body = np.asarray(k_b) * np.asarray(rho)
     total = surface + body
     return whole._replace(share=np.divide(surface, total, where=total > 0.0, out=np.zeros(np.shape(total))))
 
 
-# The sum of those of the two models, at rho = k_b = k_s = 1
+# The sum of those of the two models, at rho = k_b = k_s = e_0 = 1
 _KNOWN_EXCESS: dict[str, float | str] = {
     "max_albedo": 21.2,
     "from_theta_i_deg": 0.0,
@@ -129,7 +148,7 @@ SPEC = ModelSpec(
     title="Oren-Nayar body with a Torrance-Sparrow surface",
     equation="eq. 32",
     reference="orennayar1994",
-    parameters=(RHO, SIGMA, K_S, K_B, WITH_INTERREFLECTION),
+    parameters=(RHO, SIGMA, K_S, K_B, E_0, WITH_INTERREFLECTION),
     evaluate=oren_nayar_body_surface,
     vectors=oren_nayar_body_surface_vectors,
     grazing_pole=True,

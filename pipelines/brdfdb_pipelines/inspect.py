@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,23 +68,34 @@ def show(root: Path, name: str) -> None:
     )
     print("  parameters")
     for parameter, value in attributes["parameters"].items():
-        note = (
-            "assumed, see the note"
-            if parameter in attributes["assumed"]
-            else attributes["parameter_sources"][parameter]
-        )
+        assumed = parameter in attributes["assumed"]
+        note = "assumed, see below" if assumed else attributes["parameter_sources"][parameter]
         print(f"    {parameter:<16}{value!s:<8} {note}")
     print(f"  source      {attributes['source']}")
     if attributes["refractive_index"]:
         print(f"  n, k        {attributes['refractive_index']} of refractiveindex.info")
     if attributes["note"]:
         print(f"  note        {attributes['note']}")
+    _print_assumptions(attributes["assumed"])
     if attributes["known_excess"]:
         print(f"  excess      {attributes['known_excess']['citation']}")
     _print_grid(table)
     _print_error(table.error)
     _print_albedo(table)
     print(f"  files       {store.path(name)} (zarr v3, {terminal.size(_stored(store.path(name)))})")
+
+
+def _print_assumptions(assumed: Any) -> None:
+    """Print why each assumed value was chosen and the largest albedo [1] of it and of its alternatives."""
+    if not isinstance(assumed, Mapping):  # tables built earlier list the names alone; their note has the reasons
+        return
+    for parameter, assumption in assumed.items():
+        print(f"  assumed     {parameter}: {assumption['why']}")
+        if assumption["alternatives"]:
+            print(f"    {'largest albedo':<16}{assumption['max_albedo']:.3f} as tabulated")
+        for other in assumption["alternatives"]:
+            values = ", ".join(f"{name} = {value}" for name, value in other["parameters"].items())
+            print(f"    {'':<16}{other['max_albedo']:.3f} with {values}")
 
 
 def _print_grid(table: Table) -> None:

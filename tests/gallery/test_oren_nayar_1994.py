@@ -195,8 +195,9 @@ def test_fig_18_leaves_the_plane_of_incidence_by_45_and_60_degrees() -> None:
 
 
 def test_fig_20_is_eq_32_with_eq_27_for_the_body() -> None:
-    body_normal, _, surface_normal = oren_nayar_1994.body_surface(rad(45.0), *line(0.0), 0.75, rad(42.0), 1, "0.085")
-    body, _, surface = oren_nayar_1994.body_surface(rad(45.0), *line(-50.0), 0.75, rad(42.0), 1, "0.085")
+    weights = {"k_b": 1, "k_s": 0.085 / np.pi}  # E_0 = pi, as the preset assumes
+    body_normal, _, surface_normal = oren_nayar_1994.body_surface(rad(45.0), *line(0.0), 0.75, rad(42.0), **weights)
+    body, _, surface = oren_nayar_1994.body_surface(rad(45.0), *line(-50.0), 0.75, rad(42.0), **weights)
     both, alone = curves("fig-20", panel=1)
     close(at(both, -50.0), (body + surface) / (body_normal + surface_normal))
     close(at(alone, -50.0), body / (body_normal + surface_normal))

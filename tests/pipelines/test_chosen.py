@@ -55,7 +55,7 @@ def test_a_chosen_table_states_its_error_and_where_it_comes_from(store: Path) ->
     attributes = table.attrs
     for name in ("title", "source", "note", "refractive_index"):
         assert attributes[name] == getattr(material, name)
-    assert attributes["assumed"] == list(material.assumed)
+    assert list(attributes["assumed"]) == list(material.assumed)
     assert set(attributes["parameter_sources"].values()) == {material.source}
     said = "table, planned for 10 %, chosen for table-top, within 1 (CIEDE2000) at every pixel; "
     assert attributes["reason"] == said + planned.reason
