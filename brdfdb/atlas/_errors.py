@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.atlas import _proofs_he_torrance, _proofs_oren_nayar, _proofs_ward
+from brdfdb.atlas._proofs import Proof, proved
 from brdfdb.figure import Figure, Map, Panel, Picture, Role, Statement, curve_of, rows
 from brdfdb.geometry import radians
-from brdfdb.misprints import MISPRINTS
+from brdfdb.misprints import MISPRINTS, Kind, Misprint
 
 Array = NDArray[np.float64]
 Arguments = Mapping[str, Any]
@@ -23,6 +25,15 @@ ERROR = "relative error (1e-17: none)"
 FAILS = 100.0  # a form that is off by so many times what ours is held to is said to fail
 
 BY_KEY = {misprint.key: misprint for misprint in MISPRINTS}
+PROOFS: Mapping[str, Proof] = {
+    **_proofs_oren_nayar.PROOFS,
+    **_proofs_he_torrance.PROOFS,
+    **_proofs_ward.PROOFS,
+}
+# How a figure names the form that is not right, in its caption and its legend, and how it draws it
+LEADS: Mapping[Kind, str] = {"printed": "Printed", "customary": "Customary", "words": "In words alone"}
+LABELS: Mapping[Kind, str] = {"printed": "as printed", "customary": "as is customary", "words": "as the words say"}
+ROLES: Mapping[Kind, Role] = {"printed": "printed", "customary": "textbook", "words": "printed"}
 PAPERS = {"orennayar1994": "Oren and Nayar 1994", "he1991": "He et al. 1991", "ward1992": "Ward 1992"}
 
 
@@ -184,11 +195,19 @@ def worst_of(found: Array) -> tuple[float, int]:
 def of_misprint(
     key: str, title: str, caption: str, measured: Sequence[Measured], *, within: float, more: Sequence[Statement] = ()
 ) -> Figure:
-    """The figure of a misprint; what is printed and what is right stands before the caption."""
+    """Return the figure of a misprint: its kind and both forms stand before the caption, its proof among `more`."""
     entry = BY_KEY[key]
-    where = f"{'eqs' if re.search(r'[,-] ?[0-9]', entry.equation) else 'eq.'} {entry.equation}"
-    text = f"Printed: {entry.printed}. Right: {entry.right}. {caption}"
-    return figure(key, entry.paper, where, title, text, measured, within=within, more=more)
+    where = entry.equation
+    if where[0].isdigit():
+        where = f"{'eqs' if re.search(r'[,-] ?[0-9]', where) else 'eq.'} {where}"
+    text = f"{LEADS[entry.kind]}: {entry.printed}. Right: {entry.right}. {caption}"
+    proof = proved(entry, PROOFS[key], f"{where}, {PAPERS[entry.paper]}")
+    return figure(key, entry.paper, where, title, text, measured, within=within, more=[*more, proof])
+
+
+def wrong(entry: Misprint, label: str = "") -> Form:
+    """Return the form of an entry that is not right, labelled and drawn by its kind."""
+    return Form(label or LABELS[entry.kind], ROLES[entry.kind], entry.as_printed)
 
 
 def misprint(
@@ -201,12 +220,11 @@ def misprint(
     *,
     caption: str,
     within: float,
-    ours: Callable[..., Any] | None = None,
     log_x: bool = False,
     scale: float | None = None,
 ) -> Figure:
     """The figure of a misprint: the printed form and ours over x, the other arguments those where the two differ."""
     entry = BY_KEY[key]
-    forms = [Form("as printed", "printed", entry.as_printed), Form("ours", "ours", ours or entry.corrected)]
+    forms = [wrong(entry), Form("ours", "ours", entry.corrected)]
     panel = sweep(x, x_label, lambda each: {**entry.where, **arguments(each)}, truth, forms, log_x=log_x, scale=scale)
     return of_misprint(key, title, caption, [panel], within=within)

@@ -11,20 +11,21 @@ import numpy as np
 from brdfdb import fresnel, models
 from brdfdb.atlas._errors import (
     BY_KEY,
+    ROLES,
     Form,
     Measured,
-    directions,
     error_map,
     errors,
     figure,
     misprint,
     of_misprint,
     sweep,
+    wrong,
 )
 from brdfdb.figure import Figure
 from brdfdb.geometry import unit_vector
 from brdfdb.misprints import HE
-from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
+from brdfdb.models._he_torrance_kernels import hidden, variance
 from brdfdb.models._he_torrance_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
 
@@ -36,7 +37,6 @@ _TRUTH = "Truth: 40 digits."
 _CORNER = 1e-13  # drawn for 0 on a logarithmic axis
 _BACK = "viewer off the light [radians]"
 _DISTANCES = [*np.logspace(-0.5, -12.0, 24), _CORNER]
-_MIRROR = 1e-3, 1e4  # n and k
 _GLOSSY = {"wavelength_nm": 500.0, "sigma_0_um": 0.1, "tau_um": 1.5, "n": 1.5, "k": 0.0}
 
 
@@ -80,7 +80,7 @@ def _corrected_limit(g: float, V: float) -> Any:
 def ten_terms() -> Figure:
     entry = BY_KEY["ten-terms"]
     forms = [
-        Form("ten terms", "printed", entry.as_printed),
+        wrong(entry, "ten terms"),
         Form("all terms, from e^-g on", "textbook", _all_terms),
         Form("ours", "ours", _ours),
     ]
@@ -98,7 +98,7 @@ def ten_terms() -> Figure:
 def beckmanns_limit() -> Figure:
     entry = BY_KEY["beckmanns-limit"]
     forms = [
-        Form("Beckmann's limit", "printed", entry.as_printed),
+        wrong(entry, "Beckmann's limit"),
         Form("the limit, corrected to first order", "textbook", _corrected_limit),
         Form("ours", "ours", _ours),
     ]
@@ -120,8 +120,8 @@ def large_g() -> Figure:
     rows = [{"g": x, "V": y} for y in V for x in g]
     truths = [float(_sum(**row)) for row in rows]
     forms = [
-        Form("ten terms", "printed", BY_KEY["ten-terms"].as_printed),
-        Form("Beckmann's limit", "textbook", BY_KEY["beckmanns-limit"].as_printed),
+        wrong(BY_KEY["ten-terms"], "ten terms"),
+        wrong(BY_KEY["beckmanns-limit"], "Beckmann's limit"),
         Form("ours", "ours", _ours),
     ]
     maps = [error_map(g, V, form, errors(form.evaluate, rows, truths), x_label="g", y_label="V") for form in forms]
@@ -133,10 +133,6 @@ def large_g() -> Figure:
 # Shadowing, and eq. 81
 
 
-def _smith(theta: float, slope: float) -> Any:
-    return shadowing(np.sin(theta), np.cos(theta), slope) * np.cos(theta)
-
-
 def lambda_without_gaussian() -> Figure:
     return misprint(
         "lambda-without-gaussian",
@@ -145,7 +141,6 @@ def lambda_without_gaussian() -> Figure:
         "direction [degrees from the normal]",
         lambda theta: {"theta": np.deg2rad(theta)},
         lambda theta, slope: he_torrance_1991.shadowing(theta, slope, 1),
-        ours=_smith,
         caption=f"Shadowing S_1 of one direction, sigma_0 / tau of 0.16. {_TRUTH}",
         within=CLOSED,
     )
@@ -159,10 +154,7 @@ def shadowing_divided_by_cosines() -> Figure:
             return mp.sqrt(mp.pi) / (2 * mp.mpf(slope))
         return he_torrance_1991.shadowing(mp.acos(cos_theta), slope, 1) / mp.mpf(cos_theta)
 
-    def ours(cos_theta: float, slope: float) -> Any:
-        return shadowing(np.sqrt((1.0 - cos_theta) * (1.0 + cos_theta)), cos_theta, slope)
-
-    forms = [Form("as printed", "printed", entry.as_printed), Form("ours", "ours", ours)]
+    forms = [wrong(entry), Form("ours", "ours", entry.corrected)]
     towards = sweep(
         [*np.logspace(-0.1, -16.0, 32), horizon],
         "cosine of the direction (1e-17: 0, the horizon)",
@@ -195,7 +187,10 @@ def root_search() -> Figure:
     def ours(theta_i: float, theta_r: float, slope: float) -> Any:
         return np.sqrt(variance(sum(hidden(np.sin(theta), np.cos(theta), slope) for theta in (theta_i, theta_r))))
 
-    forms = [Form("Newton's search", "printed", effective(entry.as_printed)), Form("Lambert's W, ours", "ours", ours)]
+    forms = [
+        Form("Newton's search", ROLES[entry.kind], effective(entry.as_printed)),
+        Form("Lambert's W, ours", "ours", ours),
+    ]
 
     def of(slope: float) -> Measured:
         return sweep(
@@ -214,121 +209,7 @@ def root_search() -> Figure:
     return of_misprint(entry.key, title, caption, panels, within=CLOSED)
 
 
-# Vectors
-
-
-def _jones(theta_i: float, phi_i: float, theta_r: float, phi_r: float, *, n: float, k: float) -> Any:
-    return he_torrance_1991.jones(theta_i, theta_r, mp.mpf(phi_r) - mp.mpf(phi_i), n, k)
-
-
-def _geometry(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> Any:
-    """Eq. 76 without its factor that is 1."""
-    theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(phi_r) - mp.mpf(phi_i)
-    v_z = mp.cos(theta_i) + mp.cos(theta_r)
-    v_xy2 = mp.sin(theta_i) ** 2 + mp.sin(theta_r) ** 2
-    v_xy2 += 2 * mp.sin(theta_i) * mp.sin(theta_r) * mp.cos(delta_phi)
-    return ((v_xy2 + v_z**2) / v_z) ** 2
-
-
-def amplitudes_over_cross_product() -> Figure:
-    return misprint(
-        "amplitudes-over-cross-product",
-        "Amplitudes at backscatter: 0 over 0",
-        _DISTANCES,
-        f"{_BACK} (1e-13: 0, backscatter)",
-        lambda x: {"theta_r": np.deg2rad(40.0) + _zero(x), "phi_r": _zero(x)},
-        _jones,
-        caption=f"Light and viewer at 40 degrees, n of 1.5: the 2x2 matrix of amplitudes, over its largest. {_TRUTH}",
-        within=CLOSED,
-        log_x=True,
-    )
-
-
-def sign_of_m_ps() -> Figure:
-    return misprint(
-        "sign-of-m-ps",
-        "The sign of M_ps",
-        np.linspace(5.0, 175.0, 35),
-        "viewer's azimuth from the light's [degrees]",
-        lambda x: {"phi_r": np.deg2rad(x)},
-        _jones,
-        caption="Light at 50 degrees, viewer at 30, a perfect mirror: the 2x2 matrix of amplitudes, over its largest. "
-        f"{_TRUTH}",
-        within=CLOSED,
-    )
-
-
-def four_dot_products() -> Figure:
-    entry = BY_KEY["four-dot-products"]
-    forms = [Form("dot products", "printed", entry.as_printed), Form("ours", "ours", entry.corrected)]
-    back = sweep(
-        _DISTANCES,
-        f"{_BACK} (1e-13: 0)",
-        lambda x: directions(40.0, 40.0 + np.rad2deg(_zero(x)), np.rad2deg(_zero(x))),
-        _geometry,
-        forms,
-        title="towards backscatter, at 40 degrees",
-        log_x=True,
-    )
-    normal = sweep(
-        _DISTANCES,
-        "light and viewer [radians from the normal] (1e-13: 0)",
-        lambda x: directions(0.0, 0.0, 90.0) | dict.fromkeys(("theta_i", "theta_r"), _zero(x)),
-        _geometry,
-        forms,
-        title="towards the normal",
-        log_x=True,
-    )
-    caption = f"The factor G of eq. 76. {_TRUTH}"
-    title = "Four dot products over a cross product"
-    return of_misprint(entry.key, title, caption, [back, normal], within=CLOSED)
-
-
 # The whole
-
-
-def uniform_diffuse_without_pi() -> Figure:
-    return misprint(
-        "uniform-diffuse-without-pi",
-        "An albedo is no BRDF",
-        np.linspace(0.05, 1.0, 20),
-        "a(lambda)",
-        lambda a: {"a": a},
-        he_torrance_1991.uniform_diffuse,
-        caption=f"The uniform diffuse part. {_TRUTH}",
-        within=CLOSED,
-    )
-
-
-def _of_a_mirror(
-    theta_i: Any,
-    phi_i: Any,
-    theta_r: Any,
-    phi_r: Any,
-    *,
-    wavelength_nm: float,
-    sigma_0_um: float,
-    tau_um: float,
-) -> Any:
-    """Eq. 71 with abs(F)^2 = 1: what a good mirror reflects is divided out."""
-    angles = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(phi_r) - mp.mpf(phi_i)
-    cosines, sines = (f(angles[0]) * f(angles[1]) for f in (mp.cos, mp.sin))
-    half = mp.sqrt((1 + cosines + sines * mp.cos(angles[2])) / 2)
-    f_r = he_torrance_1991.directional_diffuse(*angles, wavelength_nm, sigma_0_um, tau_um, *_MIRROR)
-    return f_r / he_torrance_1991.fresnel_unpolarised(half, *_MIRROR)
-
-
-def v_without_wave_number() -> Figure:
-    return misprint(
-        "v-without-wave-number",
-        "The unit of v",
-        np.linspace(0.0, 85.0, 35),
-        "viewer [degrees from the normal]",
-        lambda theta: directions(0.0, theta, 0.0),
-        _of_a_mirror,
-        caption=f"Aluminum of Fig. 8 as a perfect mirror, light along the normal, 500 nm: f_r. {_TRUTH}",
-        within=CLOSED,
-    )
 
 
 def plainly() -> Figure:
@@ -434,13 +315,8 @@ def in_float32() -> Figure:
 
 
 FIGURES: dict[str, Callable[[], Figure]] = {
-    "uniform-diffuse-without-pi": uniform_diffuse_without_pi,
     "shadowing-divided-by-cosines": shadowing_divided_by_cosines,
     "lambda-without-gaussian": lambda_without_gaussian,
-    "amplitudes-over-cross-product": amplitudes_over_cross_product,
-    "sign-of-m-ps": sign_of_m_ps,
-    "four-dot-products": four_dot_products,
-    "v-without-wave-number": v_without_wave_number,
     "ten-terms": ten_terms,
     "beckmanns-limit": beckmanns_limit,
     "root-search": root_search,

@@ -74,6 +74,19 @@ def gaf_of_the_larger() -> Figure:
     )
 
 
+def shadowed_facet() -> Figure:
+    return misprint(
+        "shadowed-facet",
+        "What a shadowed facet shows",
+        np.linspace(0.0, 85.0, 35),
+        _LIGHT,
+        lambda theta: directions(theta, 20.0, 0.0),
+        _cavity(0),
+        caption=f"Cavities of slopes of 45 degrees, seen from 20: direct part of f_r. {_TRUTH}",
+        within=CLOSED,
+    )
+
+
 def visible_and_masked_widths() -> Figure:
     return misprint(
         "visible-and-masked-widths",
@@ -167,6 +180,26 @@ def surface_radiance_as_brdf() -> Figure:
     )
 
 
+def surface_without_e_0() -> Figure:
+    def truth(theta_i: float, phi_i: float, theta_r: float, phi_r: float, *, e_0: float) -> Any:
+        sigma, weights = np.deg2rad(42.0), {"k_b": 1, "k_s": mp.mpf(0.085) / mp.mpf(np.pi)}
+        body, _, surface = oren_nayar_1994.body_surface(theta_i, theta_r, phi_r - phi_i, 0.75, sigma, **weights)
+        return body + surface + 0 * e_0
+
+    return misprint(
+        "surface-without-e-0",
+        "A surface that does not follow the light",
+        np.logspace(0.0, 1.0, 21),
+        "E_0, in the unit of the radiance of eq. 31",
+        lambda e_0: {"e_0": e_0},
+        truth,
+        caption="The towel of Fig. 20, light at 60 degrees, viewer at 70 opposite: f_r = L_r / (E_0 cos(theta_i)) in "
+        f"more and more light. Ours is scaled for E_0 = pi, where the two agree. {_TRUTH}",
+        within=CLOSED,
+        log_x=True,
+    )
+
+
 def fit_in_float32() -> Figure:
     """Angles of 32 bits: the same cancellation eight digits earlier, unless arithmetic is of 64."""
 
@@ -192,11 +225,13 @@ def fit_in_float32() -> Figure:
 
 FIGURES: dict[str, Callable[[], Figure]] = {
     "gaf-of-the-larger": gaf_of_the_larger,
+    "shadowed-facet": shadowed_facet,
     "visible-and-masked-widths": visible_and_masked_widths,
     "normalised-over-the-hemisphere": normalised_over_the_hemisphere,
     "fit-below-zero": fit_below_zero,
     "tangent-at-grazing": tangent_at_grazing,
     "surface-radiance-as-brdf": surface_radiance_as_brdf,
+    "surface-without-e-0": surface_without_e_0,
     "interreflection-factor": interreflection_factor,
     "oren-nayar-float32": fit_in_float32,
 }

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb.atlas import _errors, he_torrance_1991, oren_nayar_1994, ward_1992
+from brdfdb.atlas import _errors, he_torrance_1991, he_torrance_1991_vectors, oren_nayar_1994, ward_1992
 from brdfdb.atlas._errors import Form
 from brdfdb.figure import Curve, Figure, Map, Panel, Role
 from brdfdb.misprints import MISPRINTS
 
-MODULES = (oren_nayar_1994, he_torrance_1991, ward_1992)
+MODULES = (oren_nayar_1994, he_torrance_1991, he_torrance_1991_vectors, ward_1992)
 FIGURES: dict[str, Callable[[], Figure]] = {key: made for module in MODULES for key, made in module.FIGURES.items()}
 every_figure = pytest.mark.parametrize("key", FIGURES)
 
@@ -37,8 +37,8 @@ def curve(key: str, role: Role) -> Curve:
     return found
 
 
-def printed(key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    found = curve(key, "printed")
+def wrong(key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    found = curve(key, _errors.ROLES[_errors.BY_KEY[key].kind])
     return np.array(found.x), np.array(found.y, dtype=np.float64)
 
 
@@ -52,7 +52,7 @@ def test_keys_are_those_of_one_figure() -> None:
 
 @every_figure
 def test_a_figure_has_the_key_and_the_paper_that_it_is_listed_under(key: str) -> None:
-    papers = dict(zip(MODULES, ("orennayar1994", "he1991", "ward1992"), strict=True))
+    papers = dict(zip(MODULES, ("orennayar1994", "he1991", "he1991", "ward1992"), strict=True))
     (module,) = [module for module in MODULES if key in module.FIGURES]
     assert (figure(key).key, figure(key).paper) == (key, papers[module])
     assert re.fullmatch(r"[a-z0-9-]+", key)
@@ -90,26 +90,32 @@ def test_every_point_of_ours_is_drawn(key: str) -> None:
 
 
 def test_a_radiance_for_a_brdf_is_off_by_the_cosine_of_the_light() -> None:
-    theta, off = printed("surface-radiance-as-brdf")
+    theta, off = wrong("surface-radiance-as-brdf")
     np.testing.assert_allclose(off[1:], 1.0 - np.cos(np.deg2rad(theta[1:])), rtol=ROUNDED)
 
 
 def test_an_albedo_for_a_brdf_is_off_by_pi() -> None:
-    np.testing.assert_allclose(printed("uniform-diffuse-without-pi")[1], np.pi - 1.0, rtol=ROUNDED)
+    np.testing.assert_allclose(wrong("uniform-diffuse-without-pi")[1], np.pi - 1.0, rtol=ROUNDED)
 
 
 def test_slopes_over_the_hemisphere_leave_a_part_in_2_pi() -> None:
-    np.testing.assert_allclose(printed("normalised-over-the-hemisphere")[1], 1.0 - 0.5 / np.pi, rtol=ROUNDED)
+    np.testing.assert_allclose(wrong("normalised-over-the-hemisphere")[1], 1.0 - 0.5 / np.pi, rtol=ROUNDED)
 
 
 def test_the_slope_for_its_arctan_is_off_by_their_ratio() -> None:
-    alpha, off = printed("delta-without-arctan")
+    alpha, off = wrong("delta-without-arctan")
     slope = alpha * np.sqrt(np.log(100.0))
     np.testing.assert_allclose(off, slope / np.arctan(slope) - 1.0, rtol=ROUNDED)
 
 
 def test_beckmanns_limit_is_off_by_a_part_in_g_at_the_peak() -> None:
-    g, off = printed("beckmanns-limit")
+    found = curve("beckmanns-limit", "ours")
+    panel = figure("beckmanns-limit").panels[0]
+    assert isinstance(panel, Panel)
+    limit, first_order, ours = panel.curves
+    assert (limit.label, ours) == ("Beckmann's limit", found)
+    assert first_order.role == limit.role == "textbook"
+    g, off = np.array(limit.x), np.array(limit.y, dtype=np.float64)
     np.testing.assert_allclose(off[g > 1e3], 1.0 / g[g > 1e3], rtol=ROUNDED)
 
 

@@ -35,6 +35,7 @@ HOLDING = [
     ("energy-he-torrance", "n = 0.001 and k = 10000 stand for |F|^2 = 1"),
     ("energy-he-torrance", "where slopes are gentle all light near normal incidence"),
     ("energy-he-torrance", "towards grazing the albedo falls"),
+    ("energy-he-torrance", "before it falls it passes 1: 1.042 at 80 degrees"),
     ("energy-magnesium-oxide", "it reflects more than it receives beyond about 54 degrees"),
     ("energy-magnesium-oxide", "with a at the bound nothing exceeds 1"),
     ("energy-minnaert", "rho is the reflectance along the normal"),
@@ -55,8 +56,8 @@ FAILING = {
     "rest of the lobe does not vanish at grazing for any alpha",
     ("energy-ward-samples", '"Uniformly weighted sample rays'): "Ward 1992, section 5.1: eq. 7 draws with another "
     "density than f_r cos(theta_r)",
-    ("energy-he-torrance", '"The formulation is self consistent'): "He et al. 1991, eqs 71-73: tangent planes do not "
-    "conserve energy near grazing; shadowing and the effective roughness only take light away",
+    ("energy-he-torrance", '"The formulation is self consistent'): "He et al. 1991, eqs 53 and 71-73: the effective "
+    "roughness of the mirror direction differs from that of other viewers, and nothing renormalises their sum",
     (
         "energy-magnesium-oxide",
         "the published a(lambda) keeps",

@@ -1,0 +1,14 @@
+"""What the three papers print wrong, ambiguously or unsafely: each printed form beside the right one, and nothing else.
+
+The models hold the right forms only. The printed ones stand here, literal and short, for the atlas that sets the two
+side by side and for the chart of their costs; no other module of the library knows them. Angles are radians, lengths of
+the surface micrometres; a BRDF is f_r in 1/sr, by the conventions of `brdfdb.geometry`. Division by zero gives inf or
+nan here, as it does in print.
+"""
+
+from brdfdb.misprints import he_torrance_1991, oren_nayar_1994, ward_1992
+from brdfdb.misprints._entry import HE, ORENNAYAR, WARD, Kind, Misprint
+
+__all__ = ["HE", "MISPRINTS", "ORENNAYAR", "WARD", "Kind", "Misprint"]
+
+MISPRINTS: tuple[Misprint, ...] = (*oren_nayar_1994.ENTRIES, *he_torrance_1991.ENTRIES, *ward_1992.ENTRIES)

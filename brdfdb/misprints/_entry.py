@@ -1,0 +1,66 @@
+"""The type of an entry, and what the entries of the three papers share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import radians, unit_vector
+
+Array = NDArray[np.float64]
+Form = Callable[..., Any]
+Kind = Literal["printed", "customary", "words"]
+
+ORENNAYAR, HE, WARD = "orennayar1994", "he1991", "ward1992"  # keys of references.bib
+
+
+@dataclass(frozen=True)
+class Misprint:
+    """One misprint, ambiguity or unsafe form of a paper: in words, and as two functions of the same arguments.
+
+    `kind` says whose fault the first function is: "printed", the formula that the paper prints; "customary", a formula
+    or method that is common in its place; "words", the formula is right, and the first function does what the words or
+    names beside it say.
+    """
+
+    key: str
+    paper: str  # key in references.bib
+    equation: str
+    kind: Kind
+    printed: str
+    right: str
+    consequence: str
+    as_printed: Form = field(compare=False)
+    corrected: Form = field(compare=False)
+    where: Mapping[str, Any] = field(compare=False)  # arguments at which the two differ visibly
+
+
+def at(theta_i: Any, theta_r: Any, delta_phi: Any) -> dict[str, Any]:
+    """Directions in degrees, as arguments."""
+    return {"theta_i": radians(theta_i), "phi_i": 0.0, "theta_r": radians(theta_r), "phi_r": radians(delta_phi)}
+
+
+def part(model: Form, name: str) -> Form:
+    return lambda **arguments: getattr(model(**arguments), name)
+
+
+def dot(a: Array, b: Array) -> Any:
+    return np.sum(a * b, axis=-1)
+
+
+def propagation(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any) -> tuple[Array, Array]:
+    """k_i and k_r, the directions in which light travels to the surface and away from it."""
+    k_i, k_r = np.broadcast_arrays(-unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+    return k_i, k_r
+
+
+def polarisation(k: Array, normal: Any) -> tuple[Array, Array]:
+    """s = k x n / abs(k x n) and p = s x k of eqs 14, 35, 37 and 42 of He et al.; nan where k is along the normal."""
+    s = np.cross(k, normal)
+    with np.errstate(all="ignore"):
+        s = s / np.linalg.norm(s, axis=-1, keepdims=True)
+    return s, np.cross(s, k)
