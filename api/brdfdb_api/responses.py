@@ -109,7 +109,7 @@ class ParameterDocument(BaseModel):
     unit: str
     meaning: str
     source: str
-    assumed: bool = Field(description="the paper does not print it: our choice, explained in the note")
+    assumed: bool = Field(description="the paper does not print it: our choice, explained in attributes.assumed")
 
 
 class Material(BaseModel):

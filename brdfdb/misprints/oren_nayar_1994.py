@@ -148,7 +148,7 @@ def _towel(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **_: Any) -> Any:
 ENTRIES: tuple[Misprint, ...] = (
     Misprint("gaf-of-the-larger", ORENNAYAR, "11, 36-38", "printed",
         printed="GAF = Min[1, Max[0, A, B]]",
-        right="GAF = Min[1, Max[0, Min[A, B]]], and nothing from a facet that faces away from light or viewer",
+        right="GAF = Min[1, Max[0, Min[A, B]]], and no direct light from a facet that faces away from light or viewer",
         consequence="slopes of 45 degrees, light and viewer opposite at 80: the direct BRDF is -2.10 rho, not 0",
         as_printed=_direct_with_max, corrected=part(models.oren_nayar_unidirectional_parts, "direct"),
         where=at(80.0, 80.0, 180.0) | {"rho": 1.0, "theta_a": radians(45.0), "phi_a": 0.0}),

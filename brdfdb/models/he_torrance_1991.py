@@ -114,7 +114,8 @@ def he_torrance(
     direction, `variance` eqs 80-83, `fresnel.unpolarised` eq. 75 at the bisecting angle, `diffraction_series` the
     sum of eq. 78. Departures from the paper: (72) reads a / pi; Smith's Lambda in (25) has its Gaussian; v_xy in
     (78) carries the wave number, v in (76) does not; the dot products of (76) cancel exactly, so that
-    G = (|v|^2 / v_z)^2; (81) is solved by Lambert's W. v_z^2 is taken from G into the sum: g / v_z^2 is finite.
+    G = (|v|^2 / v_z)^2; (75) has moduli; (57) and (58) have lambda^2 in place of (2 pi lambda)^2, and (66) has S, as
+    (6) and (7) need; (81) is solved by Lambert's W. v_z^2 is taken from G into the sum: g / v_z^2 is finite.
     Gentle slopes (sigma_0 / tau well below 1) or (v_z sigma)^2 well above 1 are the model's range of validity.
 
     References

@@ -72,9 +72,10 @@ def he_torrance_jones(
     (A - B has no limit there, but F_s + F_p is 0) and A - B where they are opposite at grazing (A + B has none, but
     F_s - F_p is 0). So J is continuous everywhere but at the poles, where s and p themselves turn with phi.
 
-    Departure from the paper: M_ps of eq. (64) is -(F_s .. - F_p ..), with the sign that M_sp of eq. (62) has. As
+    Departures from the paper: M_ps of eq. (64) is -(F_s .. - F_p ..), with the sign that M_sp of eq. (62) has. As
     printed, a perfect mirror would reflect light polarised at 45 degrees with a factor between 0 and 2. Intensities
-    of incident s, p and unpolarised light are the same either way.
+    of incident s, p and unpolarised light are the same either way. The first matrix of eq. (46) is T_in of eq. (39).
+    n of eqs (85) and (86) is the z axis, not the local normal that Table 1 calls so.
 
     References
     ----------

@@ -135,8 +135,10 @@ def oren_nayar_unidirectional(
     Eq. (22), the mean over both facets of a cavity of eqs (10) and (11), direct light, and of eqs (15) to (20), light
     from the opposite facet. Anisotropic, and only for phi_a along an axis its own mirror image. Towards exact
     backscatter at grazing it grows as 1 / cos; at 90 degrees it is the finite value at the float64 nearest pi/2.
-    Departures from the paper: GAF = Min[1, Max[0, Min[A, B]]] (eq. 33 of the paper asks for it); m_v and m_s of eqs
-    (15) and (16) are the widths masked and shadowed; a facet that faces away from light or viewer adds nothing.
+    Departures from the paper: GAF = Min[1, Max[0, Min[A, B]]] (eq. 33 of the paper asks for it); the shadowed row of
+    Table 1 is over <v,n>, not <s,a>; a facet that faces away from light or viewer adds nothing, but one that faces away
+    from the light alone is lit by its neighbour. Eqs (15) and (16) are as printed: m_v and m_s are the widths that are
+    masked and shadowed, which the paper's words call visible and illuminated.
 
     References
     ----------

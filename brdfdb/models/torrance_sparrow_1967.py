@@ -91,7 +91,8 @@ def torrance_sparrow(
     paper fits the factor k_s in front of it: by itself the lobe is no share of anything, and with F = 1 its albedo
     passes 1 for sigma above about 12 degrees. In the mirror direction it grows as 1 / cos^2 towards grazing; at 90
     degrees it is the finite value at the float64 nearest pi/2.
-    Departures from the paper: GAF = Min[1, Min[A, B]], not Max (eq. 33 of the paper asks for it).
+    Departures from the paper: GAF = Min[1, Min[A, B]], not Max (eq. 33 of the paper asks for it). No E_0 is
+    printed: the unit of the lobe is left to whoever weights it (see `oren_nayar_body_surface`).
 
     References
     ----------

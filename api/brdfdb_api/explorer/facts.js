@@ -20,7 +20,7 @@ export function show(info) {
     ]),
     element("h3", {}, "Parameters"),
     pairs(info.parameters.map((each) => [each.name, value(each), each.meaning,
-      each.source === attributes.source ? "" : each.source, each.assumed ? "assumed: the paper does not print it" : ""])),
+      each.source === attributes.source ? "" : each.source, assumed(each, attributes)])),
     element("h3", {}, "Error of the table"),
     error ? pairs([
       ["99 of 100", `within ${percent(error.overall.p99)}`], ["median", percent(error.overall.median)],
@@ -32,6 +32,12 @@ export function show(info) {
     element("p", { className: "links" }, ...links(info)),
     element("p", { className: "quiet" }, `${info.name}, revision ${info.revision}`),
   );
+}
+
+/** Why a value that no paper prints was chosen; tables built earlier have the names alone, and reasons in their note. */
+function assumed(parameter, attributes) {
+  const why = attributes.assumed?.[parameter.name]?.why ?? "the paper does not print it";
+  return parameter.assumed ? `assumed: ${why}` : "";
 }
 
 /** Know nothing. */
