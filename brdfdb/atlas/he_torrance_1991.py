@@ -25,7 +25,6 @@ from brdfdb.atlas._errors import (
 from brdfdb.figure import Figure
 from brdfdb.geometry import unit_vector
 from brdfdb.misprints import HE
-from brdfdb.models._he_torrance_kernels import hidden, variance
 from brdfdb.models._he_torrance_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
 
@@ -184,12 +183,9 @@ def root_search() -> Figure:
     def effective(height: Callable[..., Any]) -> Callable[..., Any]:
         return lambda **arguments: 1.0 / np.sqrt(1.0 + height(**arguments) ** 2)
 
-    def ours(theta_i: float, theta_r: float, slope: float) -> Any:
-        return np.sqrt(variance(sum(hidden(np.sin(theta), np.cos(theta), slope) for theta in (theta_i, theta_r))))
-
     forms = [
         Form("Newton's search", ROLES[entry.kind], effective(entry.as_printed)),
-        Form("Lambert's W, ours", "ours", ours),
+        Form("Lambert's W, ours", "ours", effective(entry.corrected)),
     ]
 
     def of(slope: float) -> Measured:

@@ -12,7 +12,7 @@ from brdfdb import fresnel, models
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import checked_angles, radians, unit_vector
 from brdfdb.misprints._entry import HE, Misprint, at, dot, polarisation, propagation
-from brdfdb.models._he_torrance_kernels import shadowing
+from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models._he_torrance_series import diffraction_series
 from brdfdb.models.he_torrance_1991 import checked_surface, directional_diffuse
 from brdfdb.quadrature import directional_albedo
@@ -65,13 +65,14 @@ def _height_by_newton(theta_i: Any, theta_r: Any, slope: Any) -> Any:
     return z
 
 
+def _effective_variance(theta_i: Any, theta_r: Any, slope: Any) -> Any:
+    """(sigma / sigma_0)^2 of eq. 80, as the model computes it."""
+    return variance(sum(hidden(np.sin(theta), np.cos(theta), slope) for theta in (theta_i, theta_r)))
+
+
 def _height_by_lambert_w(theta_i: Any, theta_r: Any, slope: Any) -> Any:
-    """z_0 / sigma_0, the root of w = W_0(2 K^2 / pi): from below, Newton's steps in w + ln(w) cannot overshoot."""
-    y = np.maximum(2.0 / np.pi * _hidden_slope(theta_i, theta_r, slope) ** 2, 1e-300)
-    w = y / (1.0 + y)
-    for _ in range(STEPS):
-        w = w * (1.0 + np.log(y) - np.log(w)) / (1.0 + w)
-    return np.sqrt(w)
+    """z_0 / sigma_0 of the model, eq. 80 solved for it."""
+    return np.sqrt(1.0 / _effective_variance(theta_i, theta_r, slope) - 1.0)
 
 
 def _rough_mirror(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **surface: Any) -> Any:
@@ -99,7 +100,7 @@ def _rough_mirror_by_eq_71(
     v = k_r - k_i
     v_xy2, v_z = v[..., 0] ** 2 + v[..., 1] ** 2, v[..., 2]
     # Eqs (79) to (83)
-    sigma = sigma_0_um / np.sqrt(1.0 + _height_by_lambert_w(theta_i, theta_r, slope) ** 2)
+    sigma = sigma_0_um * np.sqrt(_effective_variance(theta_i, theta_r, slope))
     g = (2.0 * np.pi * sigma / wavelength * v_z) ** 2
     # Eq. (78)
     V = v_xy2 * tau_um**2 / 4.0 * ((2.0 * np.pi / wavelength) ** 2 if wave_number else 1.0)

@@ -95,7 +95,8 @@ def _print_assumptions(assumed: Any) -> None:
             print(f"    {'largest albedo':<16}{assumption['max_albedo']:.3f} as tabulated")
         for other in assumption["alternatives"]:
             values = ", ".join(f"{name} = {value}" for name, value in other["parameters"].items())
-            print(f"    {'':<16}{other['max_albedo']:.3f} with {values}")
+            excess = ", more than arrives" if other["max_albedo"] > 1.0 else ""
+            print(f"    {'':<16}{other['max_albedo']:.3f} with {values}{excess}")
 
 
 def _print_grid(table: Table) -> None:

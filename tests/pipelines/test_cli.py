@@ -177,7 +177,10 @@ def test_show_says_what_was_assumed(built: Path, capsys: Captured) -> None:
     out, _ = capsys.readouterr()
     assert "    tau_um          1.0      assumed, see below\n" in out
     assert "  assumed     tau_um: the autocorrelation length plays no role at sigma_0_um = 0.\n" in out
-    assert "    largest albedo  1.150 as tabulated\n                    1.150 with tau_um = 10.0\n" in out
+    assert (
+        "    largest albedo  1.150 as tabulated\n                    1.150 with tau_um = 10.0, more than arrives\n"
+        in out
+    )
     assert "  excess      He et al. 1991" in out
     assert "  n, k        other/ZeonexE48R/Sultanova of refractiveindex.info\n" in out
 
