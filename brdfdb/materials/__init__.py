@@ -7,6 +7,7 @@ One TOML file a paper, one table a material. In the files an angle is written in
 from __future__ import annotations
 
 import tomllib
+import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -15,7 +16,16 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import ErrorDetails
 
 from brdfdb.geometry import degrees, radians
@@ -23,7 +33,23 @@ from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 from brdfdb.spectra import refractive_index
 
-Text = Annotated[str, Field(min_length=1)]
+MOST_NAME = 128  # characters: file systems take 255 bytes
+
+
+def _printable(text: str) -> str:
+    """Return a text without control characters; a terminal would obey them."""
+    wrong = next(
+        (letter for letter in text if unicodedata.category(letter) in _CONTROLS and letter not in "\n\t"), None
+    )
+    if wrong is not None:
+        raise ValueError(f"{text[:40]!r} holds the control character {wrong!r}")
+    return text
+
+
+_CONTROLS = ("Cc", "Cf", "Cs")
+_SOURCED = ("refractive_index", "wavelengths_nm")  # what may have a source of its own, besides parameters
+Words = Annotated[str, AfterValidator(_printable)]
+Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
 Number = float | bool
 
 # Directions from which on a call each is faster than one for all wavelengths: they are one row of the kernel then. One
@@ -78,16 +104,16 @@ class Material(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")
+    name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=MOST_NAME)
     title: Text
     model: str
     parameters: dict[str, Number]
     source: Text
     sources: dict[str, Text] = {}
-    assumed: tuple[str, ...] = ()
-    note: str = ""
+    assumed: Annotated[tuple[str, ...], Field(fail_fast=True)] = ()
+    note: Words = ""
     refractive_index: str | None = Field(default=None, pattern=r"^[^/]+/[^/]+/[^/]+$")
-    wavelengths_nm: tuple[float, ...] | None = Field(default=None, min_length=1)
+    wavelengths_nm: Annotated[tuple[float, ...], Field(fail_fast=True)] | None = Field(default=None, min_length=1)
     known_excess: KnownExcess | None = None
 
     @classmethod
@@ -104,6 +130,9 @@ class Material(BaseModel):
                 fields["parameters"] = _from_file(MODELS[model], parameters)
                 own = {_as_written(parameter).name: parameter.name for parameter in MODELS[model].parameters}
                 if isinstance(sources := table.get("sources"), Mapping):
+                    unknown = next((each for each in sources if each not in {*own, *own.values(), *_SOURCED}), None)
+                    if unknown is not None:  # before pydantic keeps an error for each of a million
+                        raise ValueError(f"sources: {unknown!r} is not one of {', '.join((*own, *_SOURCED))}")
                     fields["sources"] = {own.get(written, written): source for written, source in sources.items()}
                 if isinstance(assumed := table.get("assumed"), list):
                     fields["assumed"] = [own.get(str(written), written) for written in assumed]
@@ -142,7 +171,7 @@ class Material(BaseModel):
             raise ValueError(
                 f"refractive_index, wavelengths_nm: the model {self.model} is not spectral and has neither"
             )
-        values = (*self.parameters, "refractive_index", "wavelengths_nm")
+        values = (*self.parameters, *_SOURCED)
         for field, names in (("sources", tuple(self.sources)), ("assumed", self.assumed)):
             for name in names:
                 if name not in values:

@@ -13,6 +13,7 @@ from typing import Any
 
 # Exit codes: an error in one sentence; an audit that found a new violation; Ctrl-C
 FAILED, VIOLATED, INTERRUPTED = 2, 1, 130
+_LONGEST = 1000  # characters of an error: what a recipe gives may be a megabyte
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,7 +37,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if not _is_users(error):
             raise
-        print(f"brdfdb: {_sentence(error)}", file=sys.stderr)
+        from brdfdb_pipelines.terminal import plain
+
+        sentence = plain(_sentence(error))
+        print(f"brdfdb: {sentence if len(sentence) <= _LONGEST else sentence[:_LONGEST] + ' ...'}", file=sys.stderr)
         return FAILED
 
 

@@ -62,25 +62,26 @@ def show(root: Path, name: str) -> None:
         return
     table = store[name]
     attributes = table.attrs
-    print(f"{name}: {attributes['title']}")
-    print(
-        f"  model       {attributes['model_title']}, {attributes['model_equation']} [{attributes['model_reference']}]"
-    )
-    print("  parameters")
+    lines = [
+        f"{name}: {attributes['title']}",
+        f"  model       {attributes['model_title']}, {attributes['model_equation']} [{attributes['model_reference']}]",
+        "  parameters",
+    ]
     for parameter, value in attributes["parameters"].items():
         note = (
             "assumed, see the note"
             if parameter in attributes["assumed"]
             else attributes["parameter_sources"][parameter]
         )
-        print(f"    {parameter:<16}{value!s:<8} {note}")
-    print(f"  source      {attributes['source']}")
+        lines.append(f"    {parameter:<16}{value!s:<8} {note}")
+    lines.append(f"  source      {attributes['source']}")
     if attributes["refractive_index"]:
-        print(f"  n, k        {attributes['refractive_index']} of refractiveindex.info")
+        lines.append(f"  n, k        {attributes['refractive_index']} of refractiveindex.info")
     if attributes["note"]:
-        print(f"  note        {attributes['note']}")
+        lines.append(f"  note        {attributes['note']}")
     if attributes["known_excess"]:
-        print(f"  excess      {attributes['known_excess']['citation']}")
+        lines.append(f"  excess      {attributes['known_excess']['citation']}")
+    print(terminal.plain("\n".join(lines)))
     _print_grid(table)
     _print_error(table.error)
     _print_albedo(table)
@@ -106,9 +107,9 @@ def _print_grid(table: Table) -> None:
     print(f"    {'values':<16}{table.values.size}, {stored}")
     print(f"    {'interpolation':<16}{_interpolation(table)}")
     if attributes.get("reason"):
-        print(f"    {'reason':<16}{attributes['reason']}")
+        print(terminal.plain(f"    {'reason':<16}{attributes['reason']}"))
     if attributes.get("reconstruction"):
-        print(f"  f_r         {attributes['reconstruction']}")
+        print(terminal.plain(f"  f_r         {attributes['reconstruction']}"))
 
 
 def _interpolation(table: Table) -> str:
