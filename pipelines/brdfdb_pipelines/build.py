@@ -38,6 +38,7 @@ from brdfdb_pipelines.recipe import Job, Recipe, load
 from brdfdb_pipelines.report import Bars, Event, Lines, Tally
 from brdfdb_pipelines.workers import Workers
 
+_LOOK_S = 2.0  # between looks at workers that say nothing
 _POLL_S = 0.1  # between looks at a lock that another build holds
 
 
@@ -204,6 +205,7 @@ class _Builder:
         self.built: dict[str, Built] = {}
         self.error: Exception | None = None
         self.tally = Tally(0)
+        self.idle = False  # whether it was said that there are no workers
 
     def run(self) -> list[Built]:
         """Survey, tabulate, publish; in the order of the recipe what became of each job."""
@@ -235,13 +237,16 @@ class _Builder:
 
     @property
     def _room(self) -> bool:
-        most = 2 * self.at.slots()  # a worker that is done finds the next task waiting
+        most = 2 * max(1, self.at.slots())  # a worker that is done finds the next task waiting
         if self.memory is not None:
             most = min(most, self.memory // self.task_bytes)
         return len(self.running) < max(1, most)
 
     def _wait(self) -> None:
-        done, _ = wait(self.running, return_when=FIRST_COMPLETED)
+        done, _ = wait(self.running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
+        if (idle := not done and self.at.slots() == 0) and not self.idle:
+            self.report({"event": "idle"})
+        self.idle = idle
         for future in done:
             self.running.pop(future)(future)
 
@@ -259,7 +264,7 @@ class _Builder:
         for job in self.jobs:
             if job.tolerance is not None:
                 wavelengths = 1 if job.wavelength_nm is None else job.wavelength_nm.size
-                self._claim(f"planning {job.material.name}", resources.plan_bytes(wavelengths))
+                self._claim(f"planning {job.material.name}", resources.plan_bytes(wavelengths, job.tolerance))
         jobs = deque(self.jobs)
         while jobs or self.running:
             while jobs and self._room:

@@ -282,13 +282,14 @@ class Recipe(BaseModel):
                 raise RecipeError(f"define.{error}") from None
         families: dict[str, list[str]] = {}
         count = 0
-        for name, table in self.sweep.items():
+        for name, table in self.sweep.items():  # before the first member of the first family is made
             count += math.prod(map(len, _swept(name, table).values()))
             if count > _MOST_MEMBERS:
                 raise RecipeError(
                     f"sweep.{name}.parameters: the lists make {count} members, more than the {_MOST_MEMBERS} that all "
                     "families of a recipe may have"
                 )
+        for name, table in self.sweep.items():
             members = {material.name: (material, family) for material, family in _members(name, table)}
             for taken in (name, *members):
                 if taken in known or taken in families:

@@ -12,8 +12,10 @@ from brdfdb.layout import Layout
 from brdfdb_pipelines import terminal
 
 _TASK = 10_000_000  # bytes of any task: the interpreter's own
-# Bytes of a planner's candidates, for each wavelength and in all: copper at 41 wavelengths peaks at 119 MB
+# Bytes of a planner's candidates, in all and for each wavelength: copper at 41 wavelengths peaks at 119 MB for a
+# tolerance of 0.01, at 377 MB for 0.001; grey foam at 49 MB for 0.0001
 _PLAN, _PLAN_WAVELENGTH = 10_000_000, 3_000_000
+_FINE, _FINE_TIMES = 0.005, 4
 _SLAB = 1 << 17  # directions that `tabulate.block` evaluates at once, or one row of the grid if that is more
 # Bytes of intermediates for each direction of a slab, measured: 22 to 36 over light and viewer, 237 over half vectors
 _PLAIN, _HALF = 40, 250
@@ -24,9 +26,9 @@ _VALUE = 16  # bytes for each value of a block: float32, the copy of the codec, 
 _ROW, _DRAW = 80, 1_300_000
 
 
-def plan_bytes(wavelengths: int) -> int:
+def plan_bytes(wavelengths: int, tolerance: float) -> int:
     """Return the memory [byte] that the planner takes for a material at so many wavelengths."""
-    return _PLAN + _PLAN_WAVELENGTH * wavelengths
+    return (_PLAN + _PLAN_WAVELENGTH * wavelengths) * (1 if tolerance >= _FINE else _FINE_TIMES)
 
 
 def task_bytes(layout: Layout) -> int:

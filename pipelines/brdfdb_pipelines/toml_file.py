@@ -40,15 +40,16 @@ def read(source: Path | Traversable) -> dict[str, Any]:
     content = _bounded(source) if isinstance(source, Path) else source.read_bytes()
     try:
         text = content.decode("utf-8")
-        if _LONG_KEY.search(text):
-            raise ValueError(f"a key has more than {MOST_KEY_PARTS} parts between dots")
-        return tomllib.loads(text)
-    except RecursionError:
-        raise ValueError("not TOML of a recipe or scene: values are nested too deeply") from None
     except UnicodeDecodeError as error:
         raise ValueError(f"not TOML: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"not TOML: {error}") from None
+    if _LONG_KEY.search(text):
+        raise ValueError(f"a key has more than {MOST_KEY_PARTS} parts between dots")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("values are nested too deeply") from None
+    except ValueError as error:  # after a semicolon, int() tells programmers how to allow more digits
+        raise ValueError(f"not TOML: {str(error).partition(';')[0]}") from None
 
 
 def _bounded(path: Path) -> bytes:

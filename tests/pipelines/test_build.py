@@ -22,7 +22,6 @@ from brdfdb import manifest, tabulate
 from brdfdb.layout import Layout, digest
 from brdfdb.staging import Lock
 from brdfdb.store import Store, StoreError
-from brdfdb_pipelines import build as module
 from brdfdb_pipelines import cli, resources
 from brdfdb_pipelines.build import Built, build
 from brdfdb_pipelines.recipe import Job, Recipe, RecipeError, load
