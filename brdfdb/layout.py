@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -168,12 +169,12 @@ class Layout:
     @property
     def size(self) -> int:
         """Number of values of the variable."""
-        return int(np.prod(self.shape))
+        return math.prod(self.shape)
 
     @property
     def block_rows(self) -> int:
         """Rows of the first axis that make a block, the piece that a worker computes and a chunk of the store."""
-        return max(1, min(self.shape[0], _BLOCK_VALUES // int(np.prod(self.shape[1:]))))
+        return max(1, min(self.shape[0], _BLOCK_VALUES // math.prod(self.shape[1:])))
 
     @property
     def blocks(self) -> list[slice]:

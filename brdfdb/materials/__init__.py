@@ -7,6 +7,7 @@ One TOML file a paper, one table a material. In the files an angle is written in
 from __future__ import annotations
 
 import tomllib
+import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -15,7 +16,16 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import ErrorDetails
 
 from brdfdb.geometry import degrees, radians
@@ -23,7 +33,23 @@ from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 from brdfdb.spectra import refractive_index
 
-Text = Annotated[str, Field(min_length=1)]
+MOST_NAME = 128  # characters: file systems take 255 bytes
+
+
+def _printable(text: str) -> str:
+    """Return a text without control characters; a terminal would obey them."""
+    wrong = next(
+        (letter for letter in text if unicodedata.category(letter) in _CONTROLS and letter not in "\n\t"), None
+    )
+    if wrong is not None:
+        raise ValueError(f"{text[:40]!r} holds the control character {wrong!r}")
+    return text
+
+
+_CONTROLS = ("Cc", "Cf", "Cs")
+_SOURCED = ("refractive_index", "wavelengths_nm")  # what may have a source of its own, besides parameters
+Words = Annotated[str, AfterValidator(_printable)]
+Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
 Number = float | bool
 
 # Directions from which on a call each is faster than one for all wavelengths: they are one row of the kernel then. One
@@ -114,16 +140,16 @@ class Material(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")
+    name: str = Field(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=MOST_NAME)
     title: Text
     model: str
     parameters: dict[str, Number]
     source: Text
     sources: dict[str, Text] = {}
     assumed: dict[str, Assumption] = {}
-    note: str = ""
+    note: Words = ""
     refractive_index: str | None = Field(default=None, pattern=r"^[^/]+/[^/]+/[^/]+$")
-    wavelengths_nm: tuple[float, ...] | None = Field(default=None, min_length=1)
+    wavelengths_nm: Annotated[tuple[float, ...], Field(fail_fast=True)] | None = Field(default=None, min_length=1)
     known_excess: KnownExcess | None = None
 
     @classmethod
@@ -139,8 +165,11 @@ class Material(BaseModel):
             if isinstance(model, str) and model in MODELS and isinstance(parameters, Mapping):
                 fields["parameters"] = _from_file(MODELS[model], parameters)
                 own = {written_name(parameter): parameter.name for parameter in MODELS[model].parameters}
+                most = len(own) + len(_SOURCED)
                 for field in ("sources", "assumed"):
                     if isinstance(stated := table.get(field), Mapping):
+                        if len(stated) > most:  # pydantic would keep an error for each of a million
+                            raise ValueError(f"{field}: {len(stated)} are given, {model} has {most} values at most")
                         fields[field] = {own.get(written, written): each for written, each in stated.items()}
             return cls.model_validate(fields)
         except ValidationError as error:
@@ -177,11 +206,11 @@ class Material(BaseModel):
             raise ValueError(
                 f"refractive_index, wavelengths_nm: the model {self.model} is not spectral and has neither"
             )
-        values = (*self.parameters, "refractive_index", "wavelengths_nm")
+        values = (*self.parameters, *_SOURCED)
         alternatives = (
             name for each in self.assumed.values() for other in each.alternatives for name in other.parameters
         )
-        written = (*map(written_name, self.spec.parameters), *values[-2:])
+        written = (*map(written_name, self.spec.parameters), *_SOURCED)
         for field, names, allowed in (
             ("sources", self.sources, values),
             ("assumed", self.assumed, values),

@@ -14,13 +14,14 @@ from typing import Any
 
 from brdfdb.family import FamilyRecord, Sweep
 from brdfdb.family_records import recorded, write_family
-from brdfdb.layout import Layout
+from brdfdb.layout import Layout, digest
 from brdfdb.manifest import Entry, StoreError
 from brdfdb.revisions import Standing, standing
 from brdfdb.staging import (
     Block,
     BusyError,
     Lock,
+    directory_of,
     discard,
     make_store,
     planned,
@@ -32,14 +33,13 @@ from brdfdb.staging import (
     write_frame,
     writing,
 )
-from brdfdb_pipelines import terminal, workers
+from brdfdb_pipelines import resources, terminal, workers
 from brdfdb_pipelines.recipe import Job, Recipe, load
 from brdfdb_pipelines.report import Bars, Event, Lines, Tally
 from brdfdb_pipelines.workers import Workers
 
+_LOOK_S = 2.0  # between looks at workers that say nothing
 _POLL_S = 0.1  # between looks at a lock that another build holds
-_TASK_BYTES = 16_000_000  # that a task takes, whatever its block: intermediates of the kernel
-_VALUE_BYTES = 16  # and for each value of its block: float32, zarr's copy, the encoded bytes and theirs
 
 
 @dataclass(frozen=True)
@@ -79,16 +79,13 @@ class Survey:
     layout: str = ""
     shape: tuple[int, ...] = ()
     block_values: tuple[int, ...] = ()
+    task_bytes: int = 0  # memory that a task takes
+    disk_bytes: int = 0  # that are still to be written, at most
 
     @property
     def size(self) -> int:
         """Values to compute."""
         return sum(self.block_values)
-
-    @property
-    def task_bytes(self) -> int:
-        """Memory that a task takes."""
-        return _TASK_BYTES + _VALUE_BYTES * max(self.block_values, default=0)
 
 
 def survey(root: str, job: Job) -> Survey:
@@ -109,7 +106,9 @@ def survey(root: str, job: Job) -> Survey:
     layout = Layout.from_document(json.loads(text))
     rest = layout.size // layout.shape[0]
     values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
-    return Survey(found, head, text, tuple(layout.shape), values)
+    staged = resources.stored_bytes([directory_of(store, name, digest(request)) / "table"])
+    disk = max(0, resources.table_bytes(layout) - staged)
+    return Survey(found, head, text, tuple(layout.shape), values, resources.task_bytes(layout), disk)
 
 
 def _head(root: Path, name: str) -> str:
@@ -169,13 +168,19 @@ def build(
     RecipeError
         Before anything is written, if the recipe cannot be built.
     ValueError
-        If a single block does not fit into `memory`.
+        If a single task does not fit into `memory`, or the tables do not fit on the disk. On given grids, this is
+        found before anything is written.
     StoreError
         If the store cannot be written. What was published stays, and so does every block that is whole: the next build
         of the same recipe goes on from there. Any other error of a table lets the others be built first.
     """
     jobs = recipe.jobs()
     sweeps = recipe.sweeps(jobs)
+    if not root.exists():  # refuse what needs no plan before anything is written
+        layouts = [job.layout() for job in jobs if job.grid is not None]
+        for layout in layouts:
+            resources.check_memory(f"a block of {layout.material.name}", resources.task_bytes(layout), memory)
+        resources.check_disk(sum(map(resources.table_bytes, layouts)), root)
     make_store(root)
     return _Builder(jobs, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory).run()
 
@@ -191,7 +196,7 @@ class _Builder:
         memory: int | None,
     ) -> None:
         self.jobs, self.sweeps, self.root, self.at, self.report, self.memory = jobs, sweeps, root, at, report, memory
-        self.task_bytes = _TASK_BYTES
+        self.task_bytes = 1
         self.running: dict[Future[Any], Callable[[Future[Any]], None]] = {}
         self.surveys: dict[str, Survey] = {}
         self.waiting: deque[_Table] = deque()  # not begun
@@ -200,6 +205,7 @@ class _Builder:
         self.built: dict[str, Built] = {}
         self.error: Exception | None = None
         self.tally = Tally(0)
+        self.idle = False  # whether it was said that there are no workers
 
     def run(self) -> list[Built]:
         """Survey, tabulate, publish; in the order of the recipe what became of each job."""
@@ -231,13 +237,16 @@ class _Builder:
 
     @property
     def _room(self) -> bool:
-        most = 2 * self.at.slots()  # a worker that is done finds the next task waiting
+        most = 2 * max(1, self.at.slots())  # a worker that is done finds the next task waiting
         if self.memory is not None:
             most = min(most, self.memory // self.task_bytes)
         return len(self.running) < max(1, most)
 
     def _wait(self) -> None:
-        done, _ = wait(self.running, return_when=FIRST_COMPLETED)
+        done, _ = wait(self.running, timeout=_LOOK_S, return_when=FIRST_COMPLETED)
+        if (idle := not done and self.at.slots() == 0) and not self.idle:
+            self.report({"event": "idle"})
+        self.idle = idle
         for future in done:
             self.running.pop(future)(future)
 
@@ -252,6 +261,10 @@ class _Builder:
     # Survey
 
     def _survey(self) -> None:
+        for job in self.jobs:
+            if job.tolerance is not None:
+                wavelengths = 1 if job.wavelength_nm is None else job.wavelength_nm.size
+                self._claim(f"planning {job.material.name}", resources.plan_bytes(wavelengths, job.tolerance))
         jobs = deque(self.jobs)
         while jobs or self.running:
             while jobs and self._room:
@@ -265,16 +278,17 @@ class _Builder:
             self._wait()
         missing = sorted(self.waiting, key=lambda table: table.survey.size, reverse=True)  # the largest first
         self.waiting = deque(missing)
+        self.task_bytes = 1
         for table in missing:
-            need = table.survey.task_bytes
-            self.task_bytes = max(self.task_bytes, need)
-            if self.memory is not None and need > self.memory:
-                raise ValueError(
-                    f"memory: a block of {table.name} takes about {terminal.size(need)}, "
-                    f"more than the {terminal.size(self.memory)} allowed"
-                )
+            self._claim(f"a block of {table.name}", table.survey.task_bytes)
+        resources.check_disk(sum(table.survey.disk_bytes for table in missing), self.root)
         self.tally = Tally(sum(table.survey.size for table in missing))
         self.report({"event": "planned", "tables": len(missing), "values": self.tally.total})
+
+    def _claim(self, what: str, need: int) -> None:
+        """Count the memory [byte] of a task among those that run side by side; refuse one that alone takes too much."""
+        self.task_bytes = max(self.task_bytes, need)
+        resources.check_memory(what, need, self.memory)
 
     def _surveyed(self, job: Job, found: Survey) -> None:
         name = job.material.name
@@ -458,6 +472,8 @@ def run(
     """Build a recipe file, by default the built-in one; show progress and what came out."""
     recipe = load(recipe_path)
     start = time.perf_counter()
+    if memory is None and scheduler is None:
+        memory = resources.machine_memory()
     at: AbstractContextManager[Workers] = (
         workers.cluster(scheduler) if scheduler else (workers.processes if processes else workers.threads)(jobs)
     )

@@ -13,6 +13,9 @@ from typing import Any
 
 # Exit codes: an error in one sentence; an audit that found a new violation; Ctrl-C
 FAILED, VIOLATED, INTERRUPTED = 2, 1, 130
+# Threads or processes; pixels across a picture, and rays across a pixel: a picture of more takes tens of gigabytes
+MOST_JOBS, MOST_WIDTH, MOST_ACROSS = 1024, 4096, 16
+_LONGEST = 1000  # characters of an error: what a recipe gives may be a megabyte
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,7 +39,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if not _is_users(error):
             raise
-        print(f"brdfdb: {_sentence(error)}", file=sys.stderr)
+        from brdfdb_pipelines.terminal import plain
+
+        sentence = plain(_sentence(error))
+        if len(sentence) > _LONGEST:  # its middle is what the user gave
+            sentence = f"{sentence[: _LONGEST // 2]} ... {sentence[-_LONGEST // 2 :]}"
+        print(f"brdfdb: {sentence}", file=sys.stderr)
         return FAILED
 
 
@@ -82,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("recipe", type=Path, nargs="?", help="a TOML file; by default every material of the papers")
     build.add_argument(
         "--jobs",
-        type=_positive,
+        type=_up_to(MOST_JOBS),
         default=len(os.sched_getaffinity(0)),
         metavar="N",
         help="threads or processes (default: %(default)s)",
@@ -98,7 +106,7 @@ def _parser() -> argparse.ArgumentParser:
         "--memory",
         type=_bytes,
         metavar="SIZE",
-        help="of all blocks in work, such as 500MB (default: no limit)",
+        help="of all tasks together, such as 500MB (default: that of the machine)",
     )
     build.add_argument("--json", action="store_true", help="print progress as JSON, an object a line")
 
@@ -114,7 +122,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     audit.add_argument(
         "--jobs",
-        type=_positive,
+        type=_up_to(MOST_JOBS),
         default=len(os.sched_getaffinity(0)),
         metavar="N",
         help="processes (default: %(default)s)",
@@ -160,7 +168,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     choose.add_argument(
         "--width",
-        type=_positive,
+        type=_up_to(MOST_WIDTH),
         default=128,
         metavar="N",
         help="pixels where forms are compared; the whole is checked at half as many more (default: %(default)s)",
@@ -203,8 +211,10 @@ def _parser() -> argparse.ArgumentParser:
         "--out", type=Path, default=Path("brdf-scenes"), metavar="DIR", help="directory (default: %(default)s)"
     )
     # no defaults: what is recorded has the pixels of its file
-    render.add_argument("--width", type=_positive, metavar="N", help="pixels (default: 256)")
-    render.add_argument("--across", type=_positive, metavar="N", help="rays across a pixel, and down (default: 1)")
+    render.add_argument("--width", type=_up_to(MOST_WIDTH), metavar="N", help="pixels (default: 256)")
+    render.add_argument(
+        "--across", type=_up_to(MOST_ACROSS), metavar="N", help="rays across a pixel, and down (default: 1)"
+    )
 
     listing = command("list", _list, "List the materials and families of the store, or the built-in presets.")
     listing.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")
@@ -244,7 +254,9 @@ def _parser() -> argparse.ArgumentParser:
     serve = command("serve", _serve, "Answer lookups over HTTP.")
     serve.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     serve.add_argument("--port", type=int, default=8000, help="port (default: %(default)s)")
-    serve.add_argument("--workers", type=_positive, default=1, metavar="N", help="processes (default: %(default)s)")
+    serve.add_argument(
+        "--workers", type=_up_to(MOST_JOBS), default=1, metavar="N", help="processes (default: %(default)s)"
+    )
     return parser
 
 
@@ -253,6 +265,18 @@ def _positive(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"{value} is not at least 1")
     return value
+
+
+def _up_to(most: int) -> Callable[[str], int]:
+    """Return a parser of whole numbers from 1 to `most`."""
+
+    def number(text: str) -> int:
+        value = _positive(text)
+        if value > most:
+            raise argparse.ArgumentTypeError(f"{value} is more than {most}")
+        return value
+
+    return number
 
 
 def _bytes(text: str) -> int:

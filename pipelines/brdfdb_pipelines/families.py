@@ -43,7 +43,7 @@ def print_list(store: Store) -> None:
 def show(family: Family) -> None:
     """Print what a store knows of a family but its error, which is printed as that of a table."""
     record = family.record
-    print(f"{record.name}: {record.title}")
+    print(terminal.plain(f"{record.name}: {record.title}"))
     print(f"  model       {record.model}")
     print(f"  tables      {len(record.members)}, {record.members[0]} to {record.members[-1]}")
     print("  over")

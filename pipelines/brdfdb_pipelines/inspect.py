@@ -62,41 +62,44 @@ def show(root: Path, name: str) -> None:
         return
     table = store[name]
     attributes = table.attrs
-    print(f"{name}: {attributes['title']}")
-    print(
-        f"  model       {attributes['model_title']}, {attributes['model_equation']} [{attributes['model_reference']}]"
-    )
-    print("  parameters")
+    lines = [
+        f"{name}: {attributes['title']}",
+        f"  model       {attributes['model_title']}, {attributes['model_equation']} [{attributes['model_reference']}]",
+        "  parameters",
+    ]
     for parameter, value in attributes["parameters"].items():
         assumed = parameter in attributes["assumed"]
         note = "assumed, see below" if assumed else attributes["parameter_sources"][parameter]
-        print(f"    {parameter:<16}{value!s:<8} {note}")
-    print(f"  source      {attributes['source']}")
+        lines.append(f"    {parameter:<16}{value!s:<8} {note}")
+    lines.append(f"  source      {attributes['source']}")
     if attributes["refractive_index"]:
-        print(f"  n, k        {attributes['refractive_index']} of refractiveindex.info")
+        lines.append(f"  n, k        {attributes['refractive_index']} of refractiveindex.info")
     if attributes["note"]:
-        print(f"  note        {attributes['note']}")
-    _print_assumptions(attributes["assumed"])
+        lines.append(f"  note        {attributes['note']}")
+    lines += _assumptions(attributes["assumed"])
     if attributes["known_excess"]:
-        print(f"  excess      {attributes['known_excess']['citation']}")
+        lines.append(f"  excess      {attributes['known_excess']['citation']}")
+    print(terminal.plain("\n".join(lines)))
     _print_grid(table)
     _print_error(table.error)
     _print_albedo(table)
     print(f"  files       {store.path(name)} (zarr v3, {terminal.size(_stored(store.path(name)))})")
 
 
-def _print_assumptions(assumed: Any) -> None:
-    """Print why each assumed value was chosen and the largest albedo [1] of it and of its alternatives."""
+def _assumptions(assumed: Any) -> list[str]:
+    """Return lines on why each assumed value was chosen, with the largest albedo [1] of it and its alternatives."""
     if not isinstance(assumed, Mapping):  # tables built earlier list the names alone; their note has the reasons
-        return
+        return []
+    lines = []
     for parameter, assumption in assumed.items():
-        print(f"  assumed     {parameter}: {assumption['why']}")
+        lines.append(f"  assumed     {parameter}: {assumption['why']}")
         if assumption["alternatives"]:
-            print(f"    {'largest albedo':<16}{assumption['max_albedo']:.3f} as tabulated")
+            lines.append(f"    {'largest albedo':<16}{assumption['max_albedo']:.3f} as tabulated")
         for other in assumption["alternatives"]:
             values = ", ".join(f"{name} = {value}" for name, value in other["parameters"].items())
             excess = ", more than arrives" if other["max_albedo"] > 1.0 else ""
-            print(f"    {'':<16}{other['max_albedo']:.3f} with {values}{excess}")
+            lines.append(f"    {'':<16}{other['max_albedo']:.3f} with {values}{excess}")
+    return lines
 
 
 def _print_grid(table: Table) -> None:
@@ -118,9 +121,9 @@ def _print_grid(table: Table) -> None:
     print(f"    {'values':<16}{table.values.size}, {stored}")
     print(f"    {'interpolation':<16}{_interpolation(table)}")
     if attributes.get("reason"):
-        print(f"    {'reason':<16}{attributes['reason']}")
+        print(terminal.plain(f"    {'reason':<16}{attributes['reason']}"))
     if attributes.get("reconstruction"):
-        print(f"  f_r         {attributes['reconstruction']}")
+        print(terminal.plain(f"  f_r         {attributes['reconstruction']}"))
 
 
 def _interpolation(table: Table) -> str:

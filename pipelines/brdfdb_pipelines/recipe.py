@@ -5,7 +5,6 @@ from __future__ import annotations
 import fnmatch
 import itertools
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -14,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, FailFast, Field, Tag, TypeAdapter, ValidationError
 
 from brdfdb.family import Sweep
 from brdfdb.grids import Axis, Grid, check_wavelengths
@@ -22,10 +21,13 @@ from brdfdb.layout import TABLE_VERSION, Interpolation, Layout, digest
 from brdfdb.materials import Material, presets, written_name
 from brdfdb.models import MODELS
 from brdfdb.plan import PLAN_VERSION, coarsest, offset_of, plan
+from brdfdb_pipelines import toml_file
 
 _STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
-_MOST_NODES = 100_000  # of a range: far above any axis, far below what fills the memory
-_MOST_MEMBERS = 100_000  # of a family
+_MOST_NODES = 100_000  # of an axis: far above any that is used, far below what fills the memory
+_MOST_VALUES = 1 << 36  # of a table: 275 GB
+_MOST_PATTERNS = 10_000  # each is compared with every name
+_MOST_MEMBERS = 100_000  # of all families of a recipe
 _MOST_SWEPT = 6  # parameters of a family: a lookup is made of two members for each, 64 in all
 
 
@@ -52,12 +54,20 @@ class Range(BaseModel):
         return np.linspace(self.start, self.stop, round(count) + 1)
 
 
-Nodes = Annotated[list[float | Range], Field(min_length=1)]
+# FailFast: pydantic would keep two errors for each wrong number
+Nodes = Annotated[list[float | Range], FailFast(), Field(min_length=1, max_length=_MOST_NODES)]
 _VALUES: TypeAdapter[list[float | Range]] = TypeAdapter(Nodes, config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
 def _nodes(name: str, parts: list[float | Range]) -> Axis:
-    return np.concatenate([part.nodes(name) if isinstance(part, Range) else np.array([part]) for part in parts])
+    """Return the numbers of a list with ranges; RecipeError if there are more than an axis may have."""
+    pieces, count = [], 0
+    for part in parts:
+        pieces.append(part.nodes(name) if isinstance(part, Range) else np.array([part]))
+        count += pieces[-1].size
+        if count > _MOST_NODES:
+            raise RecipeError(f"{name}: the list makes more than the {_MOST_NODES} nodes an axis may have")
+    return np.concatenate(pieces)
 
 
 class IsotropicGrid(BaseModel):
@@ -151,7 +161,10 @@ class Job:
     def check(self) -> None:
         """Raise the ValueError that `layout` would raise for what does not suit the material."""
         grid = coarsest(self.material) if self.grid is None else self.grid
-        Layout(self.material, grid, self.wavelength_nm)
+        layout = Layout(self.material, grid, self.wavelength_nm)
+        if layout.size > _MOST_VALUES:
+            shape = " x ".join(map(str, layout.shape))
+            raise ValueError(f"{shape} are {layout.size:.3g} values, more than the {_MOST_VALUES:.3g} of a table")
 
     @property
     def request(self) -> dict[str, Any]:
@@ -176,7 +189,9 @@ class Recipe(BaseModel):
     model_config = _STRICT
 
     title: str = ""
-    materials: list[str] = Field(min_length=1, description="names or shell patterns")
+    materials: Annotated[list[str], FailFast()] = Field(
+        min_length=1, max_length=_MOST_PATTERNS, description="names or shell patterns"
+    )
     wavelengths_nm: Nodes
     tolerance: float | None = Field(
         default=None, ge=1e-4, le=0.5, description="99th percentile of the relative error, instead of grids"
@@ -266,6 +281,14 @@ class Recipe(BaseModel):
             except ValueError as error:
                 raise RecipeError(f"define.{error}") from None
         families: dict[str, list[str]] = {}
+        count = 0
+        for name, table in self.sweep.items():  # before the first member of the first family is made
+            count += math.prod(map(len, _swept(name, table).values()))
+            if count > _MOST_MEMBERS:
+                raise RecipeError(
+                    f"sweep.{name}.parameters: the lists make {count} members, more than the {_MOST_MEMBERS} that all "
+                    "families of a recipe may have"
+                )
         for name, table in self.sweep.items():
             members = {material.name: (material, family) for material, family in _members(name, table)}
             for taken in (name, *members):
@@ -307,9 +330,6 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
         if not all(low < high for low, high in itertools.pairwise(values)):
             raise RecipeError(f"{where}.{x}: the values must increase strictly")
         axes[x] = values
-    count = math.prod(map(len, axes.values()))
-    if count > _MOST_MEMBERS:
-        raise RecipeError(f"{where}: the lists make {count} members, more than {_MOST_MEMBERS}")
     return axes
 
 
@@ -346,11 +366,11 @@ def load(path: Path | None = None) -> Recipe:
     """
     source = resources.files("brdfdb_pipelines") / "recipes" / "default.toml" if path is None else path
     try:
-        content = tomllib.loads(source.read_text(encoding="utf-8"))
+        content = toml_file.read(source)
     except OSError as error:
         raise RecipeError(f"{source}: {error.strerror}") from None
     except ValueError as error:
-        raise RecipeError(f"{source}: not TOML: {error}") from None
+        raise RecipeError(f"{source}: {error}") from None
     try:
         recipe = Recipe.model_validate(content)
         recipe.jobs()

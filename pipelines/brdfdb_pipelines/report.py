@@ -82,6 +82,8 @@ class Bars:
                 self._progress.update(self._overall, completed=0 if event["values"] else 1, total=event["values"] or 1)
             case "waiting":
                 self._progress.console.print(f"waiting for {event['material']}: another build is at work on it")
+            case "idle":
+                self._progress.console.print("the cluster has no workers; waiting for one, Ctrl-C keeps what is whole")
             case "failed":
                 self._progress.console.print(f"{event['material']} failed: {event['error']}", markup=False)
             case "block":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib import resources
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from pydantic import ValidationError
 
 from brdfdb.parameters import closest
 from brdfdb.scene import Scene
+from brdfdb_pipelines import toml_file
 
 _SHIPPED = resources.files("brdfdb_pipelines") / "scenes"
 
@@ -41,13 +41,13 @@ def load(name: str) -> Scene:
     path = Path(name)
     source = path if name.endswith(".toml") else _SHIPPED / f"{name}.toml"
     try:
-        scene = Scene.model_validate(tomllib.loads(source.read_text(encoding="utf-8")))
+        scene = Scene.model_validate(toml_file.read(source))
     except OSError as error:
         raise SceneError(f"{name}: {error.strerror}") from None
     except ValidationError as error:
         raise SceneError(f"{name}: {_sentence(error)}") from None
     except ValueError as error:
-        raise SceneError(f"{name}: not TOML: {error}") from None
+        raise SceneError(f"{name}: {error}") from None
     return scene.resolved(path.parent)
 
 

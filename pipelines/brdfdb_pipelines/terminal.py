@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import unicodedata
 from collections.abc import Sequence
 
 from rich.cells import cell_len
@@ -12,6 +13,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 _MANY = 200  # rows, of which rich makes a page in a tenth of a second
+
+
+def plain(text: str) -> str:
+    """Return a text with its control characters written as escapes, so that a terminal shows and does not obey them."""
+    return "".join(
+        letter if letter == "\n" or unicodedata.category(letter)[0] != "C" else letter.encode("unicode_escape").decode()
+        for letter in text
+    )
 
 
 def progress(counted: bool = True, text: str = "", transient: bool = False) -> Progress:
@@ -42,6 +51,7 @@ def print_table(
 
     When the output is not a terminal, lines are as long as they need to be: nothing is cut for a program to read.
     """
+    title, rows = plain(title), [[plain(cell) for cell in row] for row in rows]
     if len(rows) > _MANY:
         _print_plainly(title, columns, rows, numbers)
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import multiprocessing
 import os
 import signal
@@ -21,7 +22,7 @@ _ASK_S = 1.0  # how often a cluster is asked for its size: it may grow
 
 @dataclass(frozen=True)
 class Workers:
-    """An executor, and how many tasks it runs at a time, which may change."""
+    """An executor, and how many tasks it runs at a time, which may change; 0 while it has no workers."""
 
     executor: Executor
     slots: Callable[[], int]
@@ -62,6 +63,8 @@ def cluster(address: str) -> Iterator[Workers]:
     ------
     ConnectionError
         If nothing answers there.
+    ChildProcessError
+        From `slots`, if the scheduler is gone.
     ValueError
         If dask is not installed.
     """
@@ -73,12 +76,18 @@ def cluster(address: str) -> Iterator[Workers]:
         client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ConnectionError(f"no dask scheduler answers at {address}") from error
+    # a scheduler that dies is one sentence of ours; dask gives its loggers levels of their own
+    for name in ("distributed", "distributed.client", "distributed.core", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     asked, known = -_ASK_S, 1
 
     def slots() -> int:
         nonlocal asked, known
         if time.monotonic() - asked >= _ASK_S:
-            known = max(1, sum(client.nthreads().values()))
+            try:
+                known = sum(client.nthreads().values())
+            except OSError as error:
+                raise ChildProcessError(f"the dask scheduler at {address} is gone; build again to resume") from error
             asked = time.monotonic()
         return known
 

@@ -11,6 +11,11 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.grids import Grid
+from brdfdb.layout import Layout
+from brdfdb.materials import presets
+from brdfdb.staging import publish_dataset
+from brdfdb.tabulate import tabulate
 from brdfdb_pipelines import cli, terminal
 
 RECIPE = """\
@@ -113,3 +118,16 @@ def test_lookup_as_json_has_the_stated_error_if_asked(planned: Path, capsys: Cap
 def test_planned_tables_pass_their_audit(planned: Path, capsys: Captured) -> None:
     assert run("audit", "--no-figures", "--jobs", 1, "--store", planned) == 0
     assert "2 audited: 2 pass, 0 exceed 1" in capsys.readouterr().out
+
+
+def test_a_title_of_a_strange_store_cannot_write_on_the_terminal(tmp_path: Path, capsys: Captured) -> None:
+    dataset = tabulate(
+        Layout(presets()["foam"], Grid({axis: [0, 80] for axis in ("theta_i", "theta_r")} | {"delta_phi": [0, 180]}))
+    )
+    publish_dataset(tmp_path, "foam", dataset.assign_attrs(title="\x1b[2Jgone\u202e"))
+    assert run("show", "foam", "--store", tmp_path) == 0
+    assert run("list", "--store", tmp_path) == 0
+    out = capsys.readouterr().out
+    assert out.count("\\x1b[2Jgone\\u202e") == 2
+    assert "\x1b" not in out
+    assert "\u202e" not in out

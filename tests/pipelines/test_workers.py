@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,9 +17,11 @@ from typing import Any
 import pytest
 
 import brdfdb
+from brdfdb_pipelines import build as builds
 from brdfdb_pipelines import cli, workers
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe import load
+from brdfdb_pipelines.workers import Workers
 
 START_S = 60.0
 
@@ -164,3 +167,50 @@ def test_without_dask_the_scheduler_option_says_what_to_install(
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert cli.main(["build", str(recipe), "--store", str(tmp_path), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     assert capsys.readouterr().err == "brdfdb: --scheduler needs dask: pip install 'brdfdb[dask]'\n"
+
+
+def test_a_cluster_without_workers_is_said_and_waited_for(
+    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(builds, "_LOOK_S", 0.05)
+    events = []
+
+    def slots() -> int:  # of a cluster whose workers come late
+        return int("idle" in events)
+
+    def later() -> None:
+        deadline = time.monotonic() + START_S
+        while "idle" not in events and time.monotonic() < deadline:
+            time.sleep(0.01)
+
+    with ThreadPoolExecutor(1) as executor:
+        executor.submit(later)
+        built = build(load(recipe), tmp_path, Workers(executor, slots), lambda event: events.append(event["event"]))
+    assert events.count("idle") == 1
+    assert {one.state for one in built} == {"published"}
+
+
+def test_a_scheduler_that_dies_is_one_sentence(recipe: Path, tmp_path: Path) -> None:
+    told = tmp_path / "scheduler.json"
+    scheduler = dask("dask_scheduler", "--host", "127.0.0.1", "--port", 0, "--no-dashboard", "--scheduler-file", told)
+    try:
+        deadline = time.monotonic() + START_S
+        while not told.is_file() or not told.read_text():
+            assert time.monotonic() < deadline, "no scheduler"
+            time.sleep(0.05)
+        address = json.loads(told.read_text())["address"]
+        # no worker: the build waits until the scheduler goes
+        command = [sys.executable, "-m", "brdfdb_pipelines.cli", "build", recipe, "--store", tmp_path / "store"]
+        with subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.PIPE, text=True) as builder:
+            assert builder.stderr is not None
+            lines = [builder.stderr.readline()]
+            scheduler.kill()
+            lines += builder.stderr.read().splitlines()
+    finally:
+        scheduler.kill()
+        scheduler.wait()
+    assert builder.returncode == 2
+    assert lines[0].startswith("the cluster has no workers; waiting for one")
+    # whichever is noticed first: its tasks are lost, or it does not answer
+    assert re.fullmatch("brdfdb: the (dask scheduler at .*|workers) (is|are) gone.*; build again to resume", lines[-1])
+    assert not [line for line in lines if "Traceback" in line or "distributed" in line]

@@ -1,0 +1,208 @@
+"""Hostile recipes: each is one sentence with exit code 2, in bounded time and memory, and nothing is written."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from brdfdb_pipelines import cli
+
+MOST_S = 10  # of a processor: the clock depends on what else runs
+MOST_BYTES = 500_000_000  # of the process, the program itself included: 190 MB
+
+GRIDS = """
+[grids.isotropic]
+theta_i_deg = [0, 80]
+theta_r_deg = [0, 80]
+delta_phi_deg = [0, 180]
+[grids.spectral]
+theta_i_deg = [0, 80]
+theta_r_deg = [0, 80]
+delta_phi_deg = [0, 180]
+[grids.anisotropic]
+theta_i_deg = [0, 80]
+phi_i_deg = [0, 360]
+theta_r_deg = [0, 80]
+phi_r_deg = [0, 360]
+"""
+HEAD = 'materials = ["foam"]\nwavelengths_nm = [500]\n'
+GOOD = HEAD + GRIDS
+DEFINE = '[define.mine]\ntitle = "T"\nmodel = "lambert"\nsource = "me"\nparameters = { rho = 0.5 }\n'
+MINE = GOOD.replace("foam", "mine") + DEFINE
+SWEEP = GOOD.replace("foam", "fam") + (
+    '[sweep.fam]\ntitle = "T"\nmodel = "ward"\nsource = "me"\n[sweep.fam.parameters]\n'
+    "rho_d = 0.1\nrho_s = 0.1\nalpha_x = [0.1, 0.2]\nalpha_y = 0.1\n"
+)
+LONG = "{ start = 0, stop = 99998, step = 1 },"
+AXIS = "theta_i_deg = [0, 80]"
+COPPER = GOOD.replace("foam", "scene-copper-sphere")
+
+
+def ranged(text: str, axis: str, step: float) -> str:
+    """A recipe whose isotropic grid has a fine step for one axis."""
+    end = 180 if axis == "delta_phi" else 80
+    return text.replace(f"{axis}_deg = [0, {end}]", f"{axis}_deg = [{{ start = 0, stop = {end}, step = {step} }}]", 1)
+
+
+def fine(text: str, step: float) -> str:
+    """A recipe whose isotropic grid has one step for all axes."""
+    return ranged(ranged(ranged(text, "theta_i", step), "theta_r", step), "delta_phi", step)
+
+
+def family(letter: str) -> str:
+    """A family of 60 001 members."""
+    table = SWEEP[SWEEP.index("[sweep.fam]") :].replace("sweep.fam", f"sweep.fam-{letter}")
+    return table.replace("[0.1, 0.2]", "[{ start = 0.1, stop = 0.7, step = 1e-5 }]")
+
+
+def many(count: int, text: Callable[[int], str]) -> str:
+    return "".join(map(text, range(count)))
+
+
+# name, text or bytes, and what the sentence must hold
+RECIPES: list[tuple[str, str | bytes, str]] = [
+    ("arrays in arrays, 500", f"materials = {'[' * 500}{']' * 500}", "nested too deeply"),
+    ("arrays in arrays, 200 000", f"materials = {'[' * 200_000}{']' * 200_000}", "nested too deeply"),
+    ("arrays in arrays, never closed", "materials = " + "[" * 200_000, "nested too deeply"),
+    ("tables in tables, 5000", "a = " + "{a = " * 5000 + "1" + "}" * 5000, "nested too deeply"),
+    ("arrays in arrays, 150", f"materials = {'[' * 150}{']' * 150}", "materials"),
+    ("arrays in a parameter", MINE.replace("0.5", "[" * 150 + "]" * 150), "rho"),
+    ("a key of 100 000 dots", "a." * 100_000 + "a = 1", "parts between dots"),
+    ("a key of 4 MB", "a." * 1_900_000 + "a = 1", "parts between dots"),
+    ("a table of 100 000 dots", "[" + "a." * 100_000 + "a]", "parts between dots"),
+    ("a quoted key of dots", '"a b".' * 100_000 + "a = 1", "parts between dots"),
+    ("a key of spaced dots", "a . " * 100_000 + "a = 1", "parts between dots"),
+    ("an array of tables of dots", "[[" + "a." * 100_000 + "a]]", "parts between dots"),
+    ("a key of dots in a table", "x = {" + "a." * 100_000 + "a = 1}", "parts between dots"),
+    ("200 MB of numbers", b"wavelengths_nm = [" + b"500," * 50_000_000 + b"]", "MB that a file may have"),
+    ("5 MB of a comment", "#" * 5_000_000, "MB that a file may have"),
+    ("3.9 MB of a comment", "#" * 3_900_000, "materials"),
+    ("3.9 MB of one word", "a" * 3_900_000, "not TOML"),
+    ("3.9 MB of quotes", "a = " + '"' * 3_900_000, "not TOML"),
+    ("3.9 MB of line ends", "\n" * 3_900_000, "materials"),
+    ("bytes of no text", b"\xff\xfe" * 1000, "not TOML"),
+    ("zeros", b"\0" * 100_000, "not TOML"),
+    ("nothing", "", "materials"),
+    ("a key of 3 MB", "a" * 3_000_000 + " = 1", "materials: Field required"),
+    ("300 000 unknown keys", many(300_000, lambda n: f"k{n} = 1\n"), "materials: Field required"),
+    ("a million wrong numbers", HEAD.replace("[500]", "[" + '"",' * 1_000_000 + "]"), "wavelengths_nm"),
+    ("a million right numbers", HEAD.replace("[500]", "[" + "5,".join(["1"] * 1_000_000) + "]"), "wavelengths_nm"),
+    ("a million materials", GOOD.replace('"foam"', '"x",' * 900_000), "materials"),
+    ("a million wrong materials", GOOD.replace('"foam"', "1," * 1_500_000), "materials"),
+    ("a pattern of stars", GOOD.replace("foam", "*a" * 5000 + "!"), "materials"),
+    ("9999 patterns", GOOD.replace('"foam"', many(9999, lambda n: f'"*x{n}",')), "materials"),
+    ("112 ranges of 99 999", GOOD.replace(AXIS, f"theta_i_deg = [{LONG * 112}]"), "nodes an axis may have"),
+    ("a range of 1e300 nodes", GOOD.replace(AXIS, "theta_i_deg = [{ start = 0, stop = 80, step = 1e-298 }]"), "nodes"),
+    ("a range of wavelengths", HEAD.replace("[500]", "[{ start = 1, stop = 1e9, step = 1e-9 }]") + GRIDS, "nodes"),
+    ("112 ranges of wavelengths", GOOD.replace("[500]", f"[{LONG * 112}]"), "nodes"),
+    ("a range of nan", GOOD.replace(AXIS, "theta_i_deg = [{ start = 0, stop = nan, step = 1 }]"), "theta_i_deg"),
+    ("a number of 100 000 digits", HEAD.replace("500", "5" * 100_000), "not TOML: Exceeds the limit"),
+    ("an exponent of 100 000 digits", HEAD.replace("500", "1e" + "5" * 100_000), "wavelengths_nm"),
+    ("a number of 4000 digits", HEAD.replace("500", "5" * 4000), "wavelengths_nm"),
+    ("1e12 values", fine(GOOD, 0.016), "values, more than"),
+    (
+        "axes of 80 001 nodes",
+        ranged(ranged(ranged(GOOD, "theta_i", 1e-3), "theta_r", 1e-3), "delta_phi", 9),
+        "values, more",
+    ),
+    (
+        "246 GB",
+        ranged(ranged(ranged(GOOD, "theta_i", 0.025), "theta_r", 0.025), "delta_phi", 0.03),
+        "disk: the tables take",
+    ),
+    ("rows of 50 GB", ranged(ranged(GOOD, "theta_r", 0.0016), "delta_phi", 0.0036), "memory: a block of foam"),
+    ("99 001 wavelengths", COPPER.replace("[500]", "[{ start = 300, stop = 1290, step = 0.01 }]"), "copper"),
+    ("a name of 129 letters", MINE.replace("mine", "m" * 129), "at most 128 characters"),
+    ("a name of a megabyte", MINE.replace("mine", "m" * 1_000_000), "at most 128 characters"),
+    ("a family of 125 letters", SWEEP.replace("fam", "f" * 125), "at most 128 characters"),
+    ("a title that clears the screen", MINE.replace('"T"', '"\\u001b[2J"'), "control character"),
+    ("a title that turns the text", MINE.replace('"T"', '"\\u202e"'), "control character"),
+    ("a source that rings", MINE.replace('"me"', '"\\u0007"'), "control character"),
+    ("a title of nothing", MINE.replace('"T"', '""'), "title"),
+    ("a value of 3 MB", MINE.replace("0.5", '"' + "x" * 3_000_000 + '"'), "rho"),
+    ("250 000 sources", MINE + "[define.mine.sources]\n" + many(250_000, lambda n: f"k{n} = 1\n"), "sources"),
+    ("a million assumptions", MINE + "assumed = [" + "1," * 1_000_000 + "]", "assumed"),
+    ("250 000 parameters", MINE.replace("rho = 0.5", many(250_000, lambda n: f"k{n} = 1, ") + "rho = 0.5"), "k0"),
+    ("a family of 1e10 members", SWEEP.replace("= 0.1", "= [{ start = 0.1, stop = 0.4, step = 1e-4 }]"), "members"),
+    ("20 families of 60 001", GOOD.replace("foam", "fam*") + many(20, lambda n: family(chr(97 + n))), "sweep.fam-"),
+    ("a family of 7 lists", SWEEP.replace("rho_d = 0.1", many(7, lambda n: f"p{n} = [1, 2]\n")), "at most 6"),
+    ("a family of itself", SWEEP.replace("[sweep.fam]", '[define."fam-001"]\n[sweep.fam]'), "fam-001"),
+    ("a table in place of a list", GOOD.replace(AXIS, "theta_i_deg = { a = { b = { c = 1 } } }"), "theta_i_deg"),
+    ("a date", GOOD.replace("500", "1979-05-27T07:32:00Z"), "wavelengths_nm"),
+    ("a name that climbs", GOOD + DEFINE.replace("mine", '"../../etc"'), "define.../../etc: name"),
+    ("a name that is none", GOOD.replace("foam", "\\u0000"), "materials"),
+]
+
+
+def test_there_are_sixty_recipes_and_each_has_a_name_of_its_own() -> None:
+    assert len({name for name, *_ in RECIPES}) == len(RECIPES) >= 60
+
+
+# Imports once, then forks a build for each line; a child says what it took
+NURSERY = """
+import json, os, resource, shutil, signal, sys
+from types import SimpleNamespace
+from brdfdb_pipelines import build, cli, resources
+resources.machine_memory = lambda: 24 * 10**9  # whatever this machine has
+shutil.disk_usage = lambda _: SimpleNamespace(free=50 * 10**9)
+for line in sys.stdin:
+    recipe, store, said, seconds = json.loads(line)
+    child = os.fork()
+    if child == 0:
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))  # of this child alone
+        signal.alarm(20 * seconds)  # what waits takes no processor
+        os.dup2(os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+        os._exit(cli.main(["build", recipe, "--store", store, "--jobs", "1"]))
+    _, status, usage = os.wait4(child, 0)
+    print(json.dumps([os.waitstatus_to_exitcode(status), usage.ru_maxrss * 1024]), flush=True)
+"""
+
+
+def test_sixty_hostile_recipes_are_a_sentence_each(tmp_path: Path) -> None:
+    failures = {}
+    with subprocess.Popen(
+        [sys.executable, "-c", NURSERY], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as nursery:
+        assert nursery.stdin is not None
+        assert nursery.stdout is not None
+        for name, content, said in RECIPES:
+            path, store, told = tmp_path / "recipe.toml", tmp_path / "store", tmp_path / "said.txt"
+            path.write_bytes(content.encode() if isinstance(content, str) else content)
+            print(json.dumps([str(path), str(store), str(told), MOST_S]), file=nursery.stdin, flush=True)
+            code, peak = json.loads(nursery.stdout.readline())
+            text = told.read_text(encoding="utf-8", errors="replace")
+            lines = text.splitlines()
+            good = code == 2 and peak <= MOST_BYTES and not store.exists() and "Traceback" not in text
+            good = good and len(lines) > 0 and lines[-1].startswith("brdfdb: ") and said in lines[-1]
+            if not good:
+                failures[name] = f"exit {code}, {peak // 10**6} MB, store begun: {store.exists()}, {text[-300:]}"
+                shutil.rmtree(store, ignore_errors=True)
+    assert not failures, "\n".join(f"{name}: {said}" for name, said in failures.items())
+
+
+@pytest.mark.parametrize("command", [("build",), ("render",), ("chart", "foam", "--recipe")], ids=lambda c: c[0])
+@pytest.mark.parametrize("kind", ["device", "pipe", "directory"])
+def test_what_is_no_file_is_refused(
+    command: tuple[str, ...], kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "recipe.toml"
+    if kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+    out = ["--out", str(tmp_path / "out")] if command[0] != "build" else []
+    store = ["--store", str(tmp_path / "store")] if command[0] != "render" else []
+    assert cli.main([*command, str(path), *out, *store]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith(f"brdfdb: {path}: ")
+    assert ("Is a directory" if kind == "directory" else "is no regular file") in said
+    assert sorted(tmp_path.iterdir()) == [path]
