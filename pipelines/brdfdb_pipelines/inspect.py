@@ -69,7 +69,9 @@ def show(root: Path, name: str) -> None:
     print("  parameters")
     for parameter, value in attributes["parameters"].items():
         assumed = parameter in attributes["assumed"]
-        note = "assumed, see below" if assumed else attributes["parameter_sources"][parameter]
+        # tables built earlier list the names alone, and have the reasons in their note
+        reason = "below" if isinstance(attributes["assumed"], Mapping) else "the note"
+        note = f"assumed, see {reason}" if assumed else attributes["parameter_sources"][parameter]
         print(f"    {parameter:<16}{value!s:<8} {note}")
     print(f"  source      {attributes['source']}")
     if attributes["refractive_index"]:
@@ -87,7 +89,7 @@ def show(root: Path, name: str) -> None:
 
 def _print_assumptions(assumed: Any) -> None:
     """Print why each assumed value was chosen and the largest albedo [1] of it and of its alternatives."""
-    if not isinstance(assumed, Mapping):  # tables built earlier list the names alone; their note has the reasons
+    if not isinstance(assumed, Mapping):
         return
     for parameter, assumption in assumed.items():
         print(f"  assumed     {parameter}: {assumption['why']}")
