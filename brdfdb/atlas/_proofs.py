@@ -35,7 +35,7 @@ class Proof:
 
 
 def proved(entry: Misprint, proof: Proof, where: str) -> Statement:
-    """The statement that the right form obeys the law and the printed one does not."""
+    """Return the statement that the right form obeys the law and the printed one breaks it."""
     with np.errstate(all="ignore"):
         right, printed = proof.off(entry.corrected), proof.off(entry.as_printed)
     seen = "no finite number" if np.isnan(printed) else f"off by {printed:.2g}"
@@ -51,14 +51,14 @@ NAMES = {"printed": "the printed form", "customary": "the customary form", "word
 
 
 def largest(deviations: Iterable[Any]) -> float:
-    """The largest absolute value; nan if one of them is not finite."""
+    """Return the largest absolute value; nan if one of them is not finite."""
     values = np.concatenate([np.ravel(np.abs(each)) for each in deviations])
     return float(values.max()) if np.isfinite(values).all() else np.nan
 
 
 @functools.cache
 def hemisphere(polar: int, azimuths: int) -> tuple[Array, Array, Array]:
-    """theta of shape (polar, 1), phi and the weights cos(theta) d omega, for integrals over a hemisphere."""
+    """Return theta of shape (polar, 1), phi, and the weights cos(theta) d omega of sums over a hemisphere."""
     x, w = np.polynomial.legendre.leggauss(polar)
     theta = (x[:, np.newaxis] + 1.0) * np.pi / 4.0
     phi = (np.arange(azimuths) + 0.5) * 2.0 * np.pi / azimuths
@@ -67,7 +67,7 @@ def hemisphere(polar: int, azimuths: int) -> tuple[Array, Array, Array]:
 
 
 def albedo(form: Form, theta_i: float, polar: int, azimuths: int, **arguments: Any) -> float:
-    """Share of the light from theta_i that f_r of a form reflects, a plain sum over the hemisphere."""
+    """Return the share [1] of the light from theta_i that a form reflects, a plain sum over the hemisphere."""
     theta_r, phi_r, weights = hemisphere(polar, azimuths)
     f_r = form(theta_i=theta_i, phi_i=0.0, theta_r=theta_r, phi_r=phi_r, **arguments)
     return float(np.sum(f_r * weights))

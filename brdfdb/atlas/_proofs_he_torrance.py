@@ -28,7 +28,7 @@ def _directions(pair: tuple[float, float, float]) -> dict[str, float]:
 
 
 def _image(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> Array:
-    """Field that a perfect mirror reflects, of light in s and in p: E_r = 2 n (n.E) - E, no field along its surface.
+    """Return the Jones matrix of a perfect mirror: E_r = 2 n (n.E) - E, no field is left along its surface.
 
     The mirror is the facet between light and viewer; s and p are those of the surface whose normal is z. Eqs 61 to 64
     are this field with the opposite sign, which no intensity shows.
@@ -48,13 +48,13 @@ def _off_image(form: Form, pairs: tuple[tuple[float, float, float], ...]) -> flo
 
 
 def _lost_by_a_mirror(form: Form) -> float:
-    """Off 1: the squared singular values of a Jones matrix, the largest and smallest share of light reflected."""
+    """Return how far the largest and smallest share of light reflected, squared singular values, are from 1."""
     return largest(np.linalg.svd(form(**_directions(pair), **_MIRROR), compute_uv=False) ** 2 - 1.0 for pair in _PAIRS)
 
 
 @functools.cache
 def _seen(theta: float, slope: float) -> tuple[float, float]:
-    """Share of the facets that face a direction, and their area across it over that of the mean surface.
+    """Return the share of facets that face a direction, and their area across it over that of the mean surface.
 
     Slopes along the direction are Gaussian, with the deviation sqrt(2) sigma_0 / tau of the correlation of eq. 48.
     """
@@ -66,7 +66,7 @@ def _seen(theta: float, slope: float) -> tuple[float, float]:
 
 
 def _unseen_area(form: Form) -> float:
-    """S_1 / cos(theta) is the share of facing facets over their area: what is seen of the area is cos(theta)."""
+    """Return the relative error of S_1 / cos(theta), the share of facing facets over their area."""
     cosines, slope = (0.0, 0.05, 0.3, 0.8), 0.2
     expected = [_seen(math.acos(cos), slope) for cos in cosines]
     return largest(
@@ -84,7 +84,7 @@ def _smiths_integral(form: Form) -> float:
 
 
 def _mirror_facets(form: Form) -> float:
-    """G from the solid angle into which mirror facets spread: 4 v_z^2 (i.h) / h_z d(slopes) / d(omega_r)."""
+    """Return the relative error of G; mirror facets give 4 v_z^2 (i.h) / h_z d(slopes) / d(omega_r)."""
     return largest(
         form(**_directions(pair)) / _spread(**_directions(pair)) - 1.0 for pair in (*_PAIRS, *_BACK, (0.0, 0.0, 0.0))
     )
@@ -105,7 +105,7 @@ def _spread(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> float
 
 
 def _diffracted_by_a_plate(form: Form) -> float:
-    """A mirror of 2000 x 2000 wavelengths: its diffracted light, summed over directions, is what it reflects."""
+    """Return the relative error of a mirror's reflectance; 2000 x 2000 wavelengths of it diffract all light."""
     half, step = 1000.0, 2e-5  # of the edge, in wavelengths; of a direction cosine
     u = np.arange(-0.3, 0.3, step)
     # A (sinc v_x L_x)^2 (sinc v_y L_y)^2, A = 4 L_x L_y; d omega cos(theta_r) = du_x du_y
@@ -124,7 +124,7 @@ def _all_lengths_doubled(form: Form) -> float:
 
 
 def _not_transmitted(form: Form) -> float:
-    """1 less the energy that enters a metal, from fields that are continuous across its surface; Poynting's theorem."""
+    """Return the error of a reflectance: 1 less the energy that enters, by fields continuous across the surface."""
 
     def reflected(cos: float, n: float, k: float) -> float:
         index = complex(n, k)
@@ -141,7 +141,7 @@ def _not_transmitted(form: Form) -> float:
 
 
 def _far_from_the_mirror(form: Form) -> float:
-    """What a nearly flat metal sends 30 degrees beside the mirror direction, over what goes there."""
+    """Return what a nearly flat metal sends 30 degrees beside the mirror direction, over what goes there."""
     flat = {"wavelength_nm": 500.0, "sigma_0_um": 0.28, "tau_um": 14.0, "n": 0.8126, "k": 6.048}
     return largest([form(**_directions((45.0, 15.0, 180.0)), **flat)])
 
@@ -156,7 +156,7 @@ def _waves_of_eq_56(form: Form, cases: tuple[tuple[float, float], ...]) -> float
 
 @functools.cache
 def _scattered(g: float, V: float) -> float:
-    """The left side of eq. 56 less its coherent part, over pi tau^2: an integral over t = r^2 / tau^2."""
+    """Return the left side of eq. 56 less its coherent part, over pi tau^2: an integral over t = r^2 / tau^2."""
     x, w = np.polynomial.legendre.leggauss(24)
     edges = np.concatenate([[0.0], np.geomspace(1e-3 / (1.0 + g), 60.0, 60)])
     half = np.diff(edges)[:, np.newaxis] / 2.0
@@ -176,7 +176,7 @@ def _limit_off_waves(form: Form) -> float:
 
 
 def _residual(form: Form) -> float:
-    """By how much z_0 does not solve eq. 81, in sigma_0."""
+    """Return by how much z_0 does not solve eq. 81, in sigma_0."""
 
     def off(theta: float, slope: float) -> Any:
         K = 2.0 * math.tan(theta) * math.erfc(1.0 / (2.0 * slope * math.tan(theta))) / 4.0

@@ -20,7 +20,7 @@ _SLOPE = np.deg2rad(45.0)
 
 
 def _facet(x: Array, towards: Array, theta_a: float, phi_a: float) -> Array:
-    """Whether rays leave a facet, in a direction, from distances x to the bottom of its groove; its width is 1."""
+    """Return whether rays in a direction leave a facet of width 1 from distances x to the bottom of its groove."""
     across = np.array([np.cos(phi_a), np.sin(phi_a), 0.0])
     d_u, d_z = towards @ across, towards[2]
     c, s = np.cos(theta_a), np.sin(theta_a)
@@ -34,7 +34,7 @@ def _facet(x: Array, towards: Array, theta_a: float, phi_a: float) -> Array:
 
 @functools.cache
 def traced(theta_i: float, theta_r: float, phi_r: float, theta_a: float, phi_a: float, points: int = 0) -> float:
-    """f_r [1/sr] of grooves of white facets: light that is seen after one reflection, or after two.
+    """Return f_r [1/sr] of grooves of white facets: light that is seen after one reflection, or after two.
 
     Rays from points across both facets: which leave towards the light and towards the viewer. With `points` on each
     facet it is light that bounces between them, by the angle that the one sees of the other.
@@ -55,7 +55,7 @@ def traced(theta_i: float, theta_r: float, phi_r: float, theta_a: float, phi_a: 
 
 
 def _exchange(x: Array, edges: Array, theta_a: float) -> Array:
-    """Form factors from points x of a facet to strips of the other: half of what they span in sines."""
+    """Return the form factors from points x of a facet to strips of the other: half of what they span in sines."""
     c, s = np.cos(theta_a), np.sin(theta_a)
     along, up = (x[:, np.newaxis] + edges) * c, (edges - x[:, np.newaxis]) * s
     sines = (up * s - along * c) / np.hypot(along, up)
@@ -75,7 +75,7 @@ def _bounce(form: Form) -> float:
 
 
 def _averaged_bounce(form: Form) -> float:
-    """The bounce of grooves of Gaussian slopes in all azimuths, by rays; sigma of 30 degrees."""
+    """Return the relative error of the bounce, averaged over Gaussian slopes of 30 degrees and all azimuths."""
     sigma, theta_i, theta_r = np.deg2rad(30.0), np.deg2rad(75.0), np.deg2rad(10.0)
     nodes, w = np.polynomial.legendre.leggauss(10)
     slopes = (nodes + 1.0) * np.pi / 4.0
@@ -92,7 +92,7 @@ def _few_rays(theta_i: float, theta_r: float, theta_a: float, phi_a: float) -> f
 
 
 def _flat_and_white(form: Form) -> float:
-    """The reflectance of white facets that hardly lean, less 1."""
+    """Return the reflectance of white facets that hardly lean, less 1."""
     return largest([albedo(form, 0.7, 6, 4, rho=1.0, sigma=0.01) - 1.0])
 
 

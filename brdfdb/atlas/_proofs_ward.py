@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from brdfdb.atlas._proofs import Form, Proof, largest
+from brdfdb.atlas._proofs import Array, Form, Proof, largest
 from brdfdb.geometry import unit_vector
 
 _ALPHA = 0.1
@@ -15,13 +15,13 @@ _SAMPLED = 1e-3  # of 64 x 64 samples; worst seen: 4e-4
 
 
 def _not_all_reflected(form: Form) -> float:
-    """What a lobe with rho_s = 1 does not reflect, up to 60 degrees."""
+    """Return the largest share [1] of light up to 60 degrees that a lobe with rho_s = 1 does not reflect."""
     lobe = {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": _ALPHA, "alpha_y": _ALPHA}
     return largest(form(theta_i=np.deg2rad(theta), **lobe) - 1.0 for theta in (0.0, 30.0, 60.0))
 
 
 def _off_gaussian(form: Form) -> float:
-    """Off the exponent tan^2(delta) / alpha^2: the logarithm of the lobe, seen around a light along the normal."""
+    """Return how far the logarithm of the lobe is from -tan^2(delta) / alpha^2, for light along the normal."""
     delta, alpha = np.deg2rad([5.0, 10.0, 20.0, 30.0]), 0.2
     lobe = {"theta_i": 0.0, "phi_i": 0.0, "phi_r": 0.0, "rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
     peak, shoulder = form(theta_r=0.0, **lobe), form(theta_r=2.0 * delta, **lobe) * np.sqrt(np.cos(2.0 * delta))
@@ -29,7 +29,7 @@ def _off_gaussian(form: Form) -> float:
 
 
 def _deviation(form: Form) -> float:
-    """Off the root mean square of slopes along x whose density is exp(-(p / alpha_x)^2 - (q / alpha_y)^2)."""
+    """Return the relative error of the rms slope along x; the density is exp(-(p / alpha_x)^2 - (q / alpha_y)^2)."""
     alpha = 0.2
     p = np.linspace(-10.0 * alpha, 10.0 * alpha, 2001)
     density = np.exp(-((p / alpha) ** 2))
@@ -38,7 +38,10 @@ def _deviation(form: Form) -> float:
 
 
 def _mean_square_slope(form: Form) -> float:
-    """Off alpha^2: the mean square of the slopes that a round lobe draws, by Gauss and Laguerre in -log(u1)."""
+    """Return the relative error of the mean square slope that a round lobe draws, which is alpha^2.
+
+    The mean over u1 is Gauss and Laguerre's rule in -log(u1).
+    """
     x, weights = np.polynomial.laguerre.laggauss(6)
     alpha = 0.2
     delta = form(u1=np.exp(-x), u2=0.1, alpha_x=alpha, alpha_y=alpha)
@@ -46,14 +49,14 @@ def _mean_square_slope(form: Form) -> float:
 
 
 def _mean_direction(form: Form) -> float:
-    """The mean of the directions that are drawn, which is none for a lobe with a centre."""
+    """Return the mean of the directions drawn, which is 0 for a lobe that is the same on both sides of its centre."""
     u2 = (np.arange(400) + 0.5) / 400
     phi = form(u1=0.3, u2=u2, alpha_x=0.1, alpha_y=0.2)
     return largest([np.cos(phi).mean(), np.sin(phi).mean()])
 
 
 def _mean_weight(form: Form) -> float:
-    """Off the integral of eq. 5a over slopes of the half vector: the mean weight of samples, at four lights."""
+    """Return the difference of the mean weight of samples and the integral of eq. 5a, the largest of four lights."""
     u = (np.arange(64.0) + 0.5) / 64.0
 
     def off(theta: float) -> float:
@@ -64,7 +67,8 @@ def _mean_weight(form: Form) -> float:
     return largest(off(theta) for theta in np.deg2rad([0.0, 30.0, 60.0, 75.0]))
 
 
-def _lobe_albedo(wi: np.ndarray) -> float:
+def _lobe_albedo(wi: Array) -> float:
+    """Return the albedo [1] of eq. 5a, a sum over slopes of the half vector."""
     slopes = np.linspace(-6.0 * _ALPHA, 6.0 * _ALPHA, 301)
     p, q = slopes[:, np.newaxis], slopes
     h_z = 1.0 / np.sqrt(1.0 + p**2 + q**2)

@@ -40,26 +40,28 @@ class Misprint:
 
 
 def at(theta_i: Any, theta_r: Any, delta_phi: Any) -> dict[str, Any]:
-    """Directions in degrees, as arguments."""
+    """Return the arguments of a model for directions in degrees."""
     return {"theta_i": radians(theta_i), "phi_i": 0.0, "theta_r": radians(theta_r), "phi_r": radians(delta_phi)}
 
 
 def part(model: Form, name: str) -> Form:
+    """Return a form that is one part of what a model returns."""
     return lambda **arguments: getattr(model(**arguments), name)
 
 
 def dot(a: Array, b: Array) -> Any:
+    """Return the scalar products of vectors along the last axis."""
     return np.sum(a * b, axis=-1)
 
 
 def propagation(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any) -> tuple[Array, Array]:
-    """k_i and k_r, the directions in which light travels to the surface and away from it."""
+    """Return k_i and k_r, the directions in which light travels to the surface and away from it."""
     k_i, k_r = np.broadcast_arrays(-unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
     return k_i, k_r
 
 
 def polarisation(k: Array, normal: Any) -> tuple[Array, Array]:
-    """s = k x n / abs(k x n) and p = s x k of eqs 14, 35, 37 and 42 of He et al.; nan where k is along the normal."""
+    """Return s = k x n / abs(k x n) and p = s x k, eqs 14, 35, 37 and 42 of He et al.; nan where k is along n."""
     s = np.cross(k, normal)
     with np.errstate(all="ignore"):
         s = s / np.linalg.norm(s, axis=-1, keepdims=True)

@@ -69,7 +69,9 @@ def show(root: Path, name: str) -> None:
     ]
     for parameter, value in attributes["parameters"].items():
         assumed = parameter in attributes["assumed"]
-        note = "assumed, see below" if assumed else attributes["parameter_sources"][parameter]
+        # tables built earlier list the names alone, and have the reasons in their note
+        reason = "below" if isinstance(attributes["assumed"], Mapping) else "the note"
+        note = f"assumed, see {reason}" if assumed else attributes["parameter_sources"][parameter]
         lines.append(f"    {parameter:<16}{value!s:<8} {note}")
     lines.append(f"  source      {attributes['source']}")
     if attributes["refractive_index"]:
@@ -88,7 +90,7 @@ def show(root: Path, name: str) -> None:
 
 def _assumptions(assumed: Any) -> list[str]:
     """Return lines on why each assumed value was chosen, with the largest albedo [1] of it and its alternatives."""
-    if not isinstance(assumed, Mapping):  # tables built earlier list the names alone; their note has the reasons
+    if not isinstance(assumed, Mapping):
         return []
     lines = []
     for parameter, assumption in assumed.items():
