@@ -153,9 +153,10 @@ class Table(Described):
         theta_i, phi_i, theta_r, phi_r : array_like [rad]
             Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
         wavelength_nm : float or array_like (M,) [nm], optional
-            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table.
+            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table. Between them
+            the numbers that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
         with_error : bool
-            Give the error that the table states beside the values.
+            Give the error that the table states beside the values, between its wavelengths, too: see `Stated`.
 
         Returns
         -------
@@ -168,7 +169,7 @@ class Table(Described):
         ------
         ValueError
             If an angle or a wavelength is outside its range; the message names it. If an error is asked of a table
-            that states none.
+            that states none, or between the wavelengths of a table of before version 3.
         """
         if with_error:
             brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
