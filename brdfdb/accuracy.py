@@ -143,7 +143,7 @@ def measure(
     Returns
     -------
     Error
-        For each band and wavelength, and overall, to three digits.
+        For each band and wavelength, and overall, to three digits; and limits in places and between wavelengths.
     """
     if count is None:
         several = layout.wavelength_nm is not None and layout.wavelength_nm.size > _FEW
@@ -233,13 +233,11 @@ def _in_places(error: Floats, pairs: places.Pairs) -> Places:
         row = int(pairs.row[here][0])
         rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[here]))
 
-    def between(first: int, last: int) -> list[list[float]]:
-        return [_short(rows[row]) for row in range(first, last)]
-
+    limits = {row: _short(limit) for row, limit in rows.items()}
     return Places(
-        alongside=between(places.ALONGSIDE, places.ONE_GRAZING),
-        one_grazing=between(places.ONE_GRAZING, places.BOTH_GRAZING),
-        both_grazing=between(places.BOTH_GRAZING, places.ROWS),
+        alongside=[limits[row] for row in range(places.ALONGSIDE, places.ONE_GRAZING)],
+        one_grazing=[limits[row] for row in range(places.ONE_GRAZING, places.BOTH_GRAZING)],
+        both_grazing=[limits[row] for row in range(places.BOTH_GRAZING, places.ROWS)],
     )
 
 
@@ -257,12 +255,13 @@ def _rank(count: int) -> int:
     The number of values beyond the quantile is binomial. That fewer than the rank are is the chance of a limit that is
     too low.
     """
-    rank, chance, low = 1, _WITHIN**count, 0.0
-    while low + chance <= 1.0 - _CONFIDENCE:
-        low += chance
-        chance *= (count - rank + 1) / rank * (1.0 - _WITHIN) / _WITHIN
+    rank, chance = 0, 0.0  # the chance that no more than `rank` are beyond
+    while True:
+        ways = math.lgamma(count + 1) - math.lgamma(rank + 1) - math.lgamma(count - rank + 1)
+        chance += math.exp(ways + rank * math.log(1.0 - _WITHIN) + (count - rank) * math.log(_WITHIN))
+        if chance > 1.0 - _CONFIDENCE:
+            return max(rank, 1)
         rank += 1
-    return max(rank - 1, 1)
 
 
 def compare(found: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:

@@ -143,11 +143,13 @@ def _print_error(error: Error | None) -> None:
     print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
     for label, bands in rows:
         print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in bands))
+    said = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
+    said += [] if error.between is None else ["between: any wavelength between those of the table"]
+    if said:
+        print(f"    {'; '.join(said)}")
+        print("    98 of 100 values are within these limits, and within those next to the horizon, if given")
     if error.places is None:
         return
-    between = "" if error.between is None else "; between: any wavelength between those of the table"
-    print(f"    alongside: theta_r within 10° of theta_i, delta_phi within 90°{between}")
-    print("    98 of 100 values are within these limits, and within those next to the horizon:")
     print("    horizon     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(RINGS_DEG)))
     for label, rings in (("one there", error.places.one_grazing), ("both beyond", error.places.both_grazing)):
         print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in rings))
