@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -326,10 +327,7 @@ def test_what_is_stored_is_what_is_interpolated_over_wavelengths() -> None:
     np.testing.assert_allclose(table.lookup(0.3, 0.0, 0.4, 1.0, asked), expected, rtol=1e-5, atol=1e-7)
     # the same numbers in parts
     basis = np.linalg.qr(np.random.default_rng(1).normal(size=(5, 5)))[0]
-    parts = Table(
-        "lobe", "", {}, grid, wavelengths, (values @ basis.T).astype(np.float32), None,
-        interpolation=how, spectra=basis,
-    )  # fmt: skip
+    parts = replace(table, values=(values @ basis.T).astype(np.float32), spectra=basis)
     np.testing.assert_allclose(parts.lookup(0.3, 0.0, 0.4, 1.0, asked), expected, rtol=1e-5, atol=1e-7)
 
 
