@@ -229,14 +229,16 @@ def finished(
     mu: Array,
     spectra: Array,
     uniform: Array,
-    low: NDArray[np.int64],
+    nodes: NDArray[np.int64],
     weight: Array,
     count: int,
     out: Array,
 ) -> None:
-    """f_r at the wavelengths asked for, point after point, from what was interpolated.
+    """Write f_r [1/sr] at the wavelengths asked for, point after point, from what was interpolated over the angles.
 
-    `spectra` of shape (channels, L) says how the channels make up L wavelengths, of shape (0, 0) that they are them.
+    `spectra` of shape (channels, L) says how the channels make up L wavelengths. If it is empty, the channels are the
+    wavelengths. `nodes` and `weight`, of shape (wavelengths, 4), say which of the L count: between them the numbers
+    that are stored are interpolated, not f_r.
     """
     if rule.power == 0.5:
         for j in range(count):
@@ -247,7 +249,8 @@ def finished(
     else:
         for j in range(count):
             mu[j] = 1.0
-    if channels == 1 and low.size == 1 and spectra.size == 0:
+    wavelengths = nodes.shape[0]
+    if channels == 1 and wavelengths == 1 and spectra.size == 0:
         if rule.logarithm:
             for j in range(count):
                 numbers[j] = exp(numbers[j]) - rule.offset
@@ -258,23 +261,35 @@ def finished(
         for j in range(count):
             out[j] = numbers[j] * mu[j] + uniform[0]
         return
-    wavelengths = low.size
+    total, column = np.empty(BLOCK), np.empty(channels)
     for m in range(wavelengths):
-        for side in range(2 if weight[m] > 0.0 else 1):
-            w = low[m] + side
-            part = weight[m] if side == 1 else 1.0 - weight[m]
+        apart, overshoots = 0.0, True
+        for side in range(4):
+            apart += weight[m, side] * uniform[nodes[m, side]]
+            overshoots = overshoots and weight[m, side] != 1.0  # on a node nothing is interpolated
+        overshoots = overshoots or rule.overshoots
+        for j in range(count):
+            total[j] = 0.0
+        if spectra.size > 0:
+            for channel in range(channels):
+                column[channel] = 0.0
+                for side in range(4):
+                    column[channel] += weight[m, side] * spectra[channel, nodes[m, side]]
             for j in range(count):
-                value = 0.0
-                if spectra.size > 0:
-                    for channel in range(channels):
-                        value += numbers[j * channels + channel] * spectra[channel, w]
-                else:
-                    value = numbers[j * channels + w]
-                value = exp(value) - rule.offset if rule.logarithm else value
-                value = 0.0 if rule.overshoots and value < 0.0 else value  # nan stays nan
-                value = part * (value * mu[j] + uniform[w])
-                at = j * wavelengths + m
-                out[at] = value if side == 0 else out[at] + value
+                for channel in range(channels):
+                    total[j] += numbers[j * channels + channel] * column[channel]
+        else:
+            for side in range(4):
+                part, w = weight[m, side], nodes[m, side]
+                if part != 0.0:  # what does not count may be nan
+                    for j in range(count):
+                        total[j] += part * numbers[j * channels + w]
+        if rule.logarithm:
+            for j in range(count):
+                total[j] = exp(total[j]) - rule.offset
+        for j in range(count):
+            value = 0.0 if overshoots and total[j] < 0.0 else total[j]  # nan stays nan
+            out[j * wavelengths + m] = value * mu[j] + apart
 
 
 @loop
@@ -306,7 +321,7 @@ def by_angles(
     channels: int,
     spectra: Array,
     uniform: Array,
-    low: NDArray[np.int64],
+    nodes: NDArray[np.int64],
     weight: Array,
     theta_i: Array,
     phi_i: Array,
@@ -319,12 +334,13 @@ def by_angles(
     x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
     wi, wr = np.empty(3 * BLOCK), np.empty(3 * BLOCK)
     numbers = np.empty(BLOCK * channels)
+    wavelengths = nodes.shape[0]
     good = True
     for start in range(0, theta_i.size, BLOCK):
         count = min(BLOCK, theta_i.size - start)
         here = slice(start, start + count)  # an index that starts at 0 is known not to be negative: loops vectorise
         t_i, p_i, t_r, p_r = theta_i[here], phi_i[here], theta_r[here], phi_r[here]
-        f_r = out[start * low.size : (start + count) * low.size]
+        f_r = out[start * wavelengths : (start + count) * wavelengths]
         if rule.half_difference:
             vectors_of_angles(t_i, p_i, count, wi)
             vectors_of_angles(t_r, p_r, count, wr)
@@ -332,7 +348,7 @@ def by_angles(
         else:
             points_of_angles(rule, t_i, p_i, t_r, p_r, count, x, mu)
         interpolated(axes, table, channels, x, count, numbers)
-        finished(rule, numbers, channels, mu, spectra, uniform, low, weight, count, f_r)
+        finished(rule, numbers, channels, mu, spectra, uniform, nodes, weight, count, f_r)
         odd = 0
         for j in range(count):
             usual = (t_i[j] >= 0.0) & (t_i[j] <= horizon) & (t_r[j] >= 0.0) & (t_r[j] <= horizon)
@@ -342,7 +358,7 @@ def by_angles(
                 bad = t_i[j] < 0.0 or t_i[j] > PI or t_r[j] < 0.0 or t_r[j] > PI
                 good = good and not (bad or abs(p_i[j]) > PHI_MAX or abs(p_r[j]) > PHI_MAX)
                 below = t_i[j] > horizon or t_r[j] > horizon
-                _outside(t_i[j] + t_r[j] + p_i[j] + p_r[j], below, j, low.size, f_r)
+                _outside(t_i[j] + t_r[j] + p_i[j] + p_r[j], below, j, wavelengths, f_r)
     return good
 
 
@@ -362,7 +378,7 @@ def by_vectors(
     channels: int,
     spectra: Array,
     uniform: Array,
-    low: NDArray[np.int64],
+    nodes: NDArray[np.int64],
     weight: Array,
     wi: Array,
     wr: Array,
@@ -371,14 +387,14 @@ def by_vectors(
     """f_r of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
     x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
     numbers = np.empty(BLOCK * channels)
-    points = wi.size // 3
+    points, wavelengths = wi.size // 3, nodes.shape[0]
     for start in range(0, points, BLOCK):
         count = min(BLOCK, points - start)
         ui, ur = wi[3 * start : 3 * (start + count)], wr[3 * start : 3 * (start + count)]
-        f_r = out[start * low.size : (start + count) * low.size]
+        f_r = out[start * wavelengths : (start + count) * wavelengths]
         points_of_vectors(rule, ui, ur, count, x, mu, scratch)
         interpolated(axes, table, channels, x, count, numbers)
-        finished(rule, numbers, channels, mu, spectra, uniform, low, weight, count, f_r)
+        finished(rule, numbers, channels, mu, spectra, uniform, nodes, weight, count, f_r)
         odd = 0
         for j in range(count):
             flat = abs(ui[3 * j]) + abs(ui[3 * j + 1]) + abs(ur[3 * j]) + abs(ur[3 * j + 1])
@@ -386,22 +402,25 @@ def by_vectors(
         if odd > 0:
             for j in range(count):
                 direction = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]
-                _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, j, low.size, f_r)
+                _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, j, wavelengths, f_r)
 
 
 @kernel
 def specular(
-    nodes: Array,
+    theta_nodes: Array,
     rows: NDArray[np.float32],
-    low: NDArray[np.int64],
+    nodes: NDArray[np.int64],
     weight: Array,
     theta: Array,
     horizon: float,
     out: Array,
 ) -> bool:
-    """The Dirac part, linear between its nodes; what `out` holds stays where there are none. As `by_angles` else."""
-    wavelengths = low.size
-    last = nodes.size - 1
+    """Write the Dirac part [1], linear between its nodes `theta_nodes` [rad]; `out` stays as it is if there are none.
+
+    Wavelengths, directions below the horizon and the result are as by `by_angles`.
+    """
+    wavelengths = nodes.shape[0]
+    last = theta_nodes.size - 1
     good = True
     for j in range(theta.size):
         t = theta[j]
@@ -410,18 +429,18 @@ def specular(
             below, above = 0, last
             while above - below > 1:
                 middle = (below + above) // 2
-                if nodes[middle] <= t:
+                if theta_nodes[middle] <= t:
                     below = middle
                 else:
                     above = middle
-            part = (t - nodes[below]) / (nodes[above] - nodes[below])
+            part = (t - theta_nodes[below]) / (theta_nodes[above] - theta_nodes[below])
             part = min(max(part, 0.0), 1.0)
             for m in range(wavelengths):
-                w = low[m]
-                value = (1.0 - part) * rows[below, w] + part * rows[above, w]
-                if weight[m] > 0.0:
-                    upper = (1.0 - part) * rows[below, w + 1] + part * rows[above, w + 1]
-                    value = (1.0 - weight[m]) * value + weight[m] * upper
-                out[j * wavelengths + m] = value
+                value = 0.0
+                for side in range(4):
+                    w = nodes[m, side]
+                    if weight[m, side] != 0.0:
+                        value += weight[m, side] * ((1.0 - part) * rows[below, w] + part * rows[above, w])
+                out[j * wavelengths + m] = 0.0 if value < 0.0 else value
         _outside(t, t > horizon, j, wavelengths, out)
     return good

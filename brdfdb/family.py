@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brdfdb.described import Stated
 from brdfdb.error import Error
-from brdfdb.geometry import radians
+from brdfdb.geometry import checked_angles, checked_vectors, radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
 from brdfdb.manifest import StoreError, read_json
@@ -310,8 +310,8 @@ class Family:
         brdf = self._blended(parts, [part.table.lookup(*given) for part in parts])
         if not with_error:
             return brdf
-        stated = parts[0].table.stated_by(self.error, np.asarray(theta_i, dtype=np.float64), brdf, wavelength_nm)
-        return Stated(brdf, stated)
+        directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
+        return Stated(brdf, parts[0].table.stated_by(self.error, directions, brdf, wavelength_nm))
 
     @overload
     def lookup_vectors(
@@ -354,8 +354,7 @@ class Family:
         brdf = self._blended(parts, [part.table.lookup_vectors(wi, wr, wavelength_nm) for part in parts])
         if not with_error:
             return brdf
-        theta_i = np.arccos(np.clip(np.asarray(wi, dtype=np.float64)[..., 2], -1.0, 1.0))
-        return Stated(brdf, parts[0].table.stated_by(self.error, theta_i, brdf, wavelength_nm))
+        return Stated(brdf, parts[0].table.stated_by(self.error, checked_vectors(wi, wr), brdf, wavelength_nm))
 
     def specular_reflectance(
         self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb import accuracy
+from brdfdb.error import Between
 from brdfdb.family import (
     Blend,
     FamilyRecord,
@@ -24,10 +25,12 @@ from brdfdb.family import (
     stencil,
 )
 from brdfdb.geometry import degrees, radians
+from brdfdb.layout import PLAIN
 from brdfdb.lookup import Table
 from brdfdb.manifest import StoreError, sync_directory, write_json
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
+from brdfdb.places import BANDS
 from brdfdb.staging import Lock, writing
 from brdfdb.store import Store, UnknownMaterialError
 
@@ -36,6 +39,7 @@ Power = Literal[-2, -1, 0, 1, 2]
 SEED = 1991
 POINTS = 256  # parameters at which a family is measured, at least
 _DIRECTIONS = 50  # of a band of theta_i at each of them
+_DIRECTIONS_BETWEEN, _SEARCHED = 10, 40  # between wavelengths; and of one member, to find out where
 _FEWEST_DIRECTIONS = 10
 _CORNER_VALUES = 10_000_000  # that are held at a time: of more, fewer directions are drawn
 _THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # where the Dirac part is measured
@@ -123,6 +127,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     best = min(ways, key=lambda way: ways[way])
     value = blended(*_weighted(sweep, found, found.corners, best), best.offset)
     specular_offset, specular_error = _specular(sweep, found, best)
+    between = _between(sweep, tables, seed, best, floor) if floor.size > 1 else None
     p99 = [
         float(np.percentile(accuracy.relative(v, t, floor)[d.above], 99.0, axis=0).max())
         for v, t, d in zip(value, found.truth, found.drawn, strict=True)
@@ -139,25 +144,46 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
                 f"{way.said(sweep)}: p99 {left:.3g}" for way, left in sorted(ways.items(), key=lambda item: item[1])
             ),
         ),
-        error=accuracy.compare(value.reshape(truth.shape), truth, drawn, seed),
+        error=accuracy.compare(value.reshape(truth.shape), truth, drawn, seed).model_copy(update={"between": between}),
         points=len(found.points),
         worst=WorstPoint(parameters=_written(sweep, found.parameters[worst]), p99=float(f"{p99[worst]:.3g}")),
         specular_error=specular_error,
     )
 
 
-def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int) -> _Measured:
-    """The model and the members around, at directions of their own at each point."""
+def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, floor: Floats) -> Between:
+    """Measure the error between the wavelengths of the members, at fewer directions."""
+    first = member_loader(sweep, tables)(0)
+    material, stored = Material.model_validate(first.attrs["request"]["material"]), first.wavelength_nm
+    assert stored is not None
+    pairs = accuracy.draw(material, stored, _SEARCHED, seed)
+    wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
+    at = accuracy.worst_wavelengths(material, stored, PLAIN, wi, wr, floor)
+    found = _look(sweep, tables, seed, at)
+    drawn = accuracy.Draw(*(np.concatenate(parts) for parts in zip(*found.drawn, strict=True)))
+    truth = found.truth.reshape(-1, at.size)
+    value = blended(*_weighted(sweep, found, found.corners, way), way.offset).reshape(truth.shape)
+    error = accuracy.relative(truth, value, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
+    bands = accuracy.limits_of_bands(error[drawn.above], drawn.band[drawn.above])
+    return Between(wavelength_nm=at.tolist(), bands=bands)
+
+
+def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[np.float64] | None = None) -> _Measured:
+    """Return the model and the members around, at directions of their own at each point.
+
+    By default they are looked at at the wavelengths of the members, else at those given and fewer directions.
+    """
     nodes = sweep.nodes
     shape = tuple(values.size for values in nodes.values())
     member = member_loader(sweep, tables)
     base = Material.model_validate(member(0).attrs["request"]["material"])
-    wavelength_nm = member(0).wavelength_nm
+    wavelength_nm = member(0).wavelength_nm if at_nm is None else at_nm
     points = parameter_points(shape, seed)
-    bands = accuracy.BANDS_DEG.size - 1
     stencils = tuple(min(_width(shape), nodes) for nodes in shape)
-    values = len(points) * bands * math.prod(stencils) * (1 if wavelength_nm is None else wavelength_nm.size)
-    count = max(_FEWEST_DIRECTIONS, min(_DIRECTIONS, _CORNER_VALUES // values))
+    values = len(points) * BANDS * math.prod(stencils) * (1 if wavelength_nm is None else wavelength_nm.size)
+    count = max(
+        _FEWEST_DIRECTIONS, min(_DIRECTIONS if at_nm is None else _DIRECTIONS_BETWEEN, _CORNER_VALUES // values)
+    )
     spec = base.spec
     parameters, corners, truth, draws, specular_corners, specular_truth = [], [], [], [], [], []
     for number, (cell, within) in enumerate(points):
@@ -172,8 +198,8 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int) -> _Measured:
         parameters.append(at)
         draws.append(drawn)
         truth.append(accuracy.model_values(material, wavelength_nm, drawn.wi, drawn.wr))
-        corners.append([table.lookup_vectors(drawn.wi, drawn.wr).reshape(truth[-1].shape) for table in around])
-        if spec.specular is not None:
+        corners.append([table.lookup_vectors(drawn.wi, drawn.wr, at_nm).reshape(truth[-1].shape) for table in around])
+        if spec.specular is not None and at_nm is None:
             specular_corners.append(
                 [table.specular_reflectance(_THETA_I).reshape(_THETA_I.size, -1) for table in around]
             )

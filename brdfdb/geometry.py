@@ -144,6 +144,8 @@ class Vectors:
     y_r = functools.cached_property(lambda self: self.w_r[..., 1].astype(np.float64))
     cos_r = functools.cached_property(lambda self: np.maximum(self.w_r[..., 2].astype(np.float64), COS_HORIZON))
     sin_r = functools.cached_property(lambda self: np.hypot(self.x_r, self.y_r))
+    theta_i = functools.cached_property(lambda self: np.arctan2(self.sin_i, self.cos_i))
+    theta_r = functools.cached_property(lambda self: np.arctan2(self.sin_r, self.cos_r))
 
     @functools.cached_property
     def cos_dphi(self) -> NDArray[np.float64]:

@@ -89,6 +89,46 @@ def prepared(axes: Sequence[Array], ends: Sequence[tuple[str, str]], *, cubic: b
     )
 
 
+def weights_of_nodes(
+    nodes: Array, x: Array, ends: tuple[str, str] = ("open", "open"), *, cubic: bool = True
+) -> tuple[NDArray[np.int64], Array]:
+    """Return the nodes of one axis that count at points, and their weights, both of shape (points, 4).
+
+    Parameters
+    ----------
+    nodes : float64 array (N,)
+        Strictly increasing.
+    x : float64 array (points,)
+        Within the nodes.
+    ends, cubic
+        As in `prepared`.
+
+    Returns
+    -------
+    index : int64 array (points, 4)
+        Which nodes count.
+    weight : float64 array (points, 4)
+        Their weights. They add up to 1. On a node the weight of that node is exactly 1, and the others are 0.
+    """
+    index, weight = np.zeros((x.size, 4), np.int64), np.zeros((x.size, 4))
+    if nodes.size == 1:
+        weight[:, 0] = 1.0
+        return index, weight
+    cell = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2)
+    t = (x - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
+    if not cubic or nodes.size == 2:
+        index[:, 0], index[:, 1] = cell, cell + 1
+        weight[:, 0], weight[:, 1] = 1.0 - t, t
+        return index, weight
+    stencil, slopes = _cubic_cells(nodes, ends)
+    rise = t * t * (3.0 - 2.0 * t)
+    for k in range(4):
+        weight[:, k] = t * (1 - t) ** 2 * slopes[cell, k] + t * t * (t - 1) * slopes[cell, k + 4]
+    weight[:, 1] += 1.0 - rise
+    weight[:, 2] += rise
+    return stencil[cell], weight
+
+
 def _buckets(nodes: Array) -> tuple[NDArray[np.int64], float, bool]:
     """Equal pieces of an axis, none longer than its shortest cell: the cell in which each begins, pieces a unit."""
     steps = np.diff(nodes)

@@ -16,7 +16,7 @@ from brdfdb.grids import Grid, check_wavelengths
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
-TABLE_VERSION = 2  # of the variables, dimensions and attributes of a table
+TABLE_VERSION = 3  # of the variables, dimensions and attributes of a table
 
 _METHODS = ("linear", "cubic")
 

@@ -153,9 +153,10 @@ class Table(Described):
         theta_i, phi_i, theta_r, phi_r : array_like [rad]
             Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
         wavelength_nm : float or array_like (M,) [nm], optional
-            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table.
+            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table. Between them
+            the numbers that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
         with_error : bool
-            Give the error that the table states beside the values.
+            Give the error that the table states beside the values, between its wavelengths, too: see `Stated`.
 
         Returns
         -------
@@ -168,12 +169,12 @@ class Table(Described):
         ------
         ValueError
             If an angle or a wavelength is outside its range; the message names it. If an error is asked of a table
-            that states none.
+            that states none, or between the wavelengths of a table of before version 3.
         """
         if with_error:
             brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
-            return Stated(brdf, self._stated(np.asarray(theta_i), brdf, wavelength_nm))
-        low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
+            return Stated(brdf, self._stated(checked_angles(theta_i, phi_i, theta_r, phi_r), brdf, wavelength_nm))
+        at = self._wavelengths(wavelength_nm)
         given: Sequence[ArrayLike] = (theta_i, phi_i, theta_r, phi_r)
         shape: tuple[int, ...] = ()
         if all(isinstance(angle, float) for angle in given):  # broadcasting takes longer than the lookup of one point
@@ -187,13 +188,13 @@ class Table(Described):
                 checked_angles(*given)
             shape = np.broadcast_shapes(*(angle.shape for angle in arrays))
             flat = [_flat(angle, shape, dtype) for angle in arrays]
-        values = np.empty(flat[0].size * weight.size, dtype)
+        values = np.empty(flat[0].size * at.size, dtype)
         horizon = float(dtype.type(HALF_PI))
         if not _lookup_kernels.by_angles(
-            *self._kernel, low, weight, flat[0], flat[1], flat[2], flat[3], horizon, values
+            *self._kernel, at.nodes, at.weight, flat[0], flat[1], flat[2], flat[3], horizon, values
         ):
             checked_angles(*given)
-        return values.reshape(shape + wavelength_shape)[()]
+        return values.reshape(shape + at.tail)[()]
 
     @overload
     def lookup_vectors(
@@ -216,15 +217,14 @@ class Table(Described):
         """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
         if with_error:
             brdf = self.lookup_vectors(wi, wr, wavelength_nm)
-            theta_i = np.arccos(np.clip(np.asarray(wi)[..., 2], -1.0, 1.0))
-            return Stated(brdf, self._stated(theta_i, brdf, wavelength_nm))
-        low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
+            return Stated(brdf, self._stated(checked_vectors(wi, wr), brdf, wavelength_nm))
+        at = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
         flat = [_flat(w, shape, vectors.dtype) for w in (vectors.w_i, vectors.w_r)]
-        values = np.empty(flat[0].size // 3 * weight.size, vectors.dtype)
-        _lookup_kernels.by_vectors(*self._kernel, low, weight, flat[0], flat[1], values)
-        return values.reshape(shape[:-1] + wavelength_shape)[()]
+        values = np.empty(flat[0].size // 3 * at.size, vectors.dtype)
+        _lookup_kernels.by_vectors(*self._kernel, at.nodes, at.weight, flat[0], flat[1], values)
+        return values.reshape(shape[:-1] + at.tail)[()]
 
     @functools.cached_property
     def _kernel(self) -> _Ready:
@@ -262,17 +262,19 @@ class Table(Described):
         ValueError
             If theta_i or a wavelength is outside its range.
         """
-        low, weight, wavelength_shape = self._wavelengths(wavelength_nm)
+        at = self._wavelengths(wavelength_nm)
         given = np.asarray(theta_i)
         dtype = asked_for(theta_i)
         if given.dtype.kind not in "iuf":
             checked_angles(theta_i, 0.0, 0.0, 0.0)
-        values = np.zeros(given.size * weight.size, dtype)
+        values = np.zeros(given.size * at.size, dtype)
         horizon = float(dtype.type(HALF_PI))
         nodes, rows = self._specular_rows
-        if not _lookup_kernels.specular(nodes, rows, low, weight, _flat(given, given.shape, dtype), horizon, values):
+        if not _lookup_kernels.specular(
+            nodes, rows, at.nodes, at.weight, _flat(given, given.shape, dtype), horizon, values
+        ):
             checked_angles(theta_i, 0.0, 0.0, 0.0)
-        return values.reshape(given.shape + wavelength_shape)[()]
+        return values.reshape(given.shape + at.tail)[()]
 
     @functools.cached_property
     def _specular_rows(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:

@@ -22,7 +22,7 @@ from brdfdb.grids import (
     Axis,
     Grid,
 )
-from brdfdb.interpolation import prepared
+from brdfdb.interpolation import weights_of_nodes
 from brdfdb.layout import Interpolation, Layout
 from brdfdb.lookup import Table, points
 from brdfdb.materials import Material
@@ -361,19 +361,9 @@ def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weight
     name = grid.names[axis]
     x = _points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, rows.shape[1]))
     nodes = x[at]
-    ready = prepared([nodes], [grid.ends[axis]], cubic=layout.interpolation.cubic)
-    cell = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2)
-    t = (x - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
+    index, weight = weights_of_nodes(nodes, x, grid.ends[axis], cubic=layout.interpolation.cubic)
     matrix = np.zeros((x.size, nodes.size))
-    here = np.arange(x.size)
-    if ready.width[0] == 2:
-        matrix[here, cell], matrix[here, cell + 1] = 1.0 - t, t
-    else:
-        rise = t * t * (3.0 - 2.0 * t)
-        for k in range(4):
-            share = t * (1 - t) ** 2 * ready.slopes[cell, k] + t * t * (t - 1) * ready.slopes[cell, k + 4]
-            share = share + (1.0 - rise if k == 1 else rise if k == 2 else 0.0)
-            np.add.at(matrix, (here, ready.stencil[cell, k]), share)
+    np.add.at(matrix, (np.arange(x.size)[:, np.newaxis], index), weight)
     error = np.abs(rows[:, at] @ matrix.T - rows) * weights
     return float(np.percentile(error[weights > 0.0], 99)) if np.any(weights > 0.0) else 0.0
 

@@ -263,7 +263,7 @@ class RemoteTable(Described):
         np.broadcast_shapes(*(np.shape(angle) for angle in (theta_i, phi_i, theta_r, phi_r)))
         given = checked_angles(theta_i, phi_i, theta_r, phi_r)
         brdf = self._looked_up((given.theta_i, given.phi_i, given.theta_r, given.phi_r), given, wavelength_nm)
-        return Stated(brdf, self._stated(np.asarray(theta_i), brdf, wavelength_nm)) if with_error else brdf
+        return Stated(brdf, self._stated(given, brdf, wavelength_nm)) if with_error else brdf
 
     @overload
     def lookup_vectors(
@@ -288,7 +288,7 @@ class RemoteTable(Described):
         given = checked_vectors(wi, wr)
         (theta_i, phi_i), (theta_r, phi_r) = spherical_angles(given.w_i), spherical_angles(given.w_r)
         brdf = self._looked_up((theta_i, phi_i, theta_r, phi_r), given, wavelength_nm)
-        return Stated(brdf, self._stated(theta_i, brdf, wavelength_nm)) if with_error else brdf
+        return Stated(brdf, self._stated(given, brdf, wavelength_nm)) if with_error else brdf
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Interpolate the Dirac part: parameters, shapes [1] and errors as by `Table.specular_reflectance`."""
@@ -312,8 +312,8 @@ class RemoteTable(Described):
 
     def _asked(self, wavelength_nm: ArrayLike | None) -> tuple[int, tuple[int, ...]]:
         """How many wavelengths are asked for, and the shape they add."""
-        low, _, tail = self._wavelengths(wavelength_nm)
-        return low.size, tail
+        at = self._wavelengths(wavelength_nm)
+        return at.size, at.tail
 
     def _looked_up(self, angles: Sequence[NDArray[Any]], given: Directions, wavelength_nm: ArrayLike | None) -> Floats:
         """f_r [1/sr] at checked angles [rad], which are those of the directions `given`."""

@@ -222,8 +222,9 @@ def _coordinate(name: str, nodes: Axis) -> tuple[str, Axis, dict[str, str]]:
 
 def _reconstruction(layout: Layout) -> str:
     """How to rebuild f_r from the arrays of a table, in one line."""
+    spectrum = "" if layout.wavelength_nm is None else "; over wavelengths cubic"
     if layout.plain:
-        return f"brdf is f_r; between nodes {layout.interpolation.method}"
+        return f"brdf is f_r; between nodes {layout.interpolation.method}{spectrum}"
     how = layout.interpolation
     number = "parts @ spectra" if layout.spectra is not None else "parts"
     value = f"max(exp({number}) - {how.offset!r}, 0)" if how.logarithm else number
@@ -231,7 +232,7 @@ def _reconstruction(layout: Layout) -> str:
         value = f"{value} / (cos(theta_i) * cos(theta_r))**{how.power:g}"
     value = f"uniform + {value}" if layout.uniform is not None else value
     beyond = "; nodes below the horizon hold a continuation" if layout.grid.half_difference else ""
-    return f"brdf = {value}; between nodes, parts are interpolated, {how.method}{beyond}"
+    return f"brdf = {value}; between nodes, parts are interpolated, {how.method}{spectrum}{beyond}"
 
 
 def _attributes(material: Material) -> dict[str, Any]:

@@ -7,11 +7,12 @@ import pytest
 
 from brdfdb import chart as charting
 from brdfdb import cost
-from brdfdb.accuracy import BANDS_DEG, Draw, classes, draw, mean_error
+from brdfdb.accuracy import Draw, classes, draw, mean_error
 from brdfdb.chart import STEPS, Chart, FamilyChart, chart, chart_family
 from brdfdb.family import Sweep
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material, presets
+from brdfdb.places import BANDS_DEG
 from brdfdb.representations import representations
 
 

@@ -157,6 +157,24 @@ def test_the_stated_error_and_one_measured_afresh_agree(name: str, families: Fam
     assert family.record.points >= POINTS
 
 
+def test_what_a_family_states_between_wavelengths_holds(families: Families) -> None:
+    family, tables = families["copper"]
+    assert family.error.between is not None
+    rng = np.random.default_rng(8)
+    base = Material.model_validate(next(iter(tables.values())).attrs["request"]["material"])
+    held = []
+    for number in range(60):
+        at = {name: float(rng.uniform(nodes[0], nodes[-1])) for name, nodes in family.axes.items()}
+        material = base.model_copy(update={"parameters": {**base.parameters, **at}})
+        wavelength = rng.uniform(WAVELENGTHS[0], WAVELENGTHS[-1], 1)
+        drawn = accuracy.draw(material, wavelength, 20, 2000 + number)
+        wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
+        stated = family.lookup_vectors(wi, wr, wavelength, with_error=True, **at)
+        truth = accuracy.model_values(material, wavelength, wi, wr)
+        held.append(np.abs(stated.brdf - truth) <= stated.error)
+    assert np.mean(np.concatenate(held)) >= 0.98  # promised
+
+
 def test_the_dirac_part_is_as_far_off_as_stated(families: Families) -> None:
     family, _ = families["copper"]
     theta_i = np.linspace(0.0, 1.5, 20)

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline, RegularGridInterpolator
 
 from brdfdb import interpolation
 from brdfdb._elementary import BLOCK
-from brdfdb.interpolation import Axes, locate, prepared, tricubic, trilinear, weighted
+from brdfdb.interpolation import Axes, locate, prepared, tricubic, trilinear, weighted, weights_of_nodes
 
 EXACT = 2e-13  # measured: 4e-14, cubics on unequal steps down to 0.01
 UNEQUAL = np.array([0.0, 0.3, 0.35, 1.0, 1.7, 1.71, 2.9, 3.0])
@@ -145,3 +145,27 @@ def test_the_kernel_for_three_cubic_axes_is_the_general_one() -> None:
     out = np.empty(BLOCK)
     tricubic(ready, cell, share, BLOCK, table.reshape(-1), out)
     np.testing.assert_allclose(out, at(ready, points, table), atol=1e-14)
+
+
+@NODES
+def test_weights_of_nodes_make_scipys_cubic(nodes: NDArray[np.float64]) -> None:
+    values = np.random.default_rng(5).normal(size=nodes.size)
+    x = np.concatenate([np.linspace(nodes[0], nodes[-1], 200), nodes])
+    index, weight = weights_of_nodes(nodes, x)
+    slopes = np.gradient(values, nodes, edge_order=2)  # of the parabolas, at the ends, too
+    np.testing.assert_allclose(
+        np.sum(values[index] * weight, axis=1), CubicHermiteSpline(nodes, values, slopes)(x), rtol=0.0, atol=EXACT
+    )
+    np.testing.assert_allclose(weight.sum(axis=1), 1.0, rtol=0.0, atol=EXACT)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8])
+@pytest.mark.parametrize("cubic", [True, False])
+def test_on_a_node_its_weight_is_exactly_1(count: int, cubic: bool) -> None:
+    nodes = UNEQUAL[:count]
+    index, weight = weights_of_nodes(nodes, nodes, cubic=cubic)
+    assert np.all((weight == 0.0) | (weight == 1.0))
+    np.testing.assert_array_equal(np.sum(np.where(weight == 1.0, nodes[index], 0.0), axis=1), nodes)
+    if count > 1 and (count < 3 or not cubic):
+        index, weight = weights_of_nodes(nodes, nodes[:-1] + 0.25 * np.diff(nodes), cubic=cubic)
+        np.testing.assert_allclose(weight, np.tile([0.75, 0.25, 0.0, 0.0], (count - 1, 1)), rtol=0.0, atol=EXACT)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
+from scipy.interpolate import CubicHermiteSpline, RegularGridInterpolator
 
 from brdfdb import _lookup_kernels, lookup
 from brdfdb.geometry import unit_vector
 from brdfdb.grids import Grid
-from brdfdb.layout import Layout
+from brdfdb.layout import Interpolation, Layout
 from brdfdb.lookup import Table, points
 from brdfdb.materials import Material
 from brdfdb.tabulate import tabulate
@@ -77,8 +78,14 @@ def test_the_stored_value_comes_back_on_every_node(kind: str, wavelengths: Any) 
     np.testing.assert_allclose(found, table.brdf, rtol=0.0, atol=NODE_TOLERANCE)
 
 
+def scipys_cubic(values: NDArray[np.float64], wavelengths: Any) -> NDArray[np.float64]:
+    """Catmull-Rom over wavelengths by others: slopes of parabolas are second-order differences; nothing below 0."""
+    slopes = np.gradient(values, WAVELENGTHS, axis=-1, edge_order=2)
+    return np.maximum(CubicHermiteSpline(WAVELENGTHS, values, slopes, axis=-1)(wavelengths), 0.0)
+
+
 @KINDS
-def test_between_nodes_it_is_scipys_linear_interpolator(kind: str) -> None:
+def test_between_nodes_it_is_scipys_interpolators_linear_in_angles_and_cubic_in_wavelengths(kind: str) -> None:
     table = made_up(kind, WAVELENGTHS)
     theta_i, phi_i, theta_r, phi_r = random_directions(500)
     wavelengths = np.random.default_rng(3).uniform(400.0, 2000.0, 9)
@@ -89,13 +96,13 @@ def test_between_nodes_it_is_scipys_linear_interpolator(kind: str) -> None:
     else:
         points = [inside_i, inside_r, np.arccos(np.cos(phi_r - phi_i))]
     scipys = RegularGridInterpolator(
-        (*(np.deg2rad(axis) for axis in table.axes_deg.values()), WAVELENGTHS), table.brdf.astype(np.float64)
+        [np.deg2rad(axis) for axis in table.axes_deg.values()], table.brdf.astype(np.float64)
     )
-    asked = np.stack(np.broadcast_arrays(*(p[:, np.newaxis] for p in points), wavelengths), axis=-1)
+    expected = scipys_cubic(scipys(np.stack(np.broadcast_arrays(*points), axis=-1)), wavelengths)
     found = table.lookup(theta_i, phi_i, theta_r, phi_r, wavelengths)
     # arccos(cos) folds the azimuth in another way than the table does: worth 1e-8 rad near 0 and 180 degrees
     tolerance = INTERPOLATION_TOLERANCE if kind == "anisotropic" else 1e-7
-    np.testing.assert_allclose(found, scipys(asked), rtol=0.0, atol=tolerance)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=tolerance)
 
 
 def test_between_nodes_of_an_isotropic_table_scipy_agrees_to_the_last_digits() -> None:
@@ -304,10 +311,40 @@ def test_every_wavelength_of_the_table_gives_its_stored_values_whatever_is_besid
     np.testing.assert_array_equal(table.lookup(0.0, 0.0, 0.0, 0.0, WAVELENGTHS), table.brdf[0, 0, 0])
 
 
-def test_wavelengths_are_interpolated_in_nanometres() -> None:
-    table = made_up("isotropic", WAVELENGTHS)
-    at = {wavelength: table.lookup(0.3, 0.0, 0.4, 1.0, wavelength) for wavelength in WAVELENGTHS}
-    assert table.lookup(0.3, 0.0, 0.4, 1.0, 550.0) == pytest.approx((at[450.0] + 2.0 * at[600.0]) / 3.0, rel=1e-12)
+def test_what_is_stored_is_what_is_interpolated_over_wavelengths() -> None:
+    # logarithms of a lobe whose exponent is a parabola in the wavelength: a cubic has it but for float32
+    wavelengths = np.array([400.0, 430.0, 500.0, 550.0, 700.0])
+    grid = Grid({name: np.array(nodes, dtype=np.float64) for name, nodes in AXES["isotropic"].items()})
+
+    def exponent(at: Any) -> Any:
+        return 2.0 - 1e-4 * (at - 520.0) ** 2
+
+    values = np.broadcast_to(exponent(wavelengths), (*grid.shape, 5)).astype(np.float32)
+    how = Interpolation("linear", logarithm=True, offset=0.01)
+    asked = np.linspace(400.0, 700.0, 31)
+    table = Table("lobe", "", {}, grid, wavelengths, values, None, interpolation=how)
+    expected = np.maximum(np.exp(exponent(asked)) - 0.01, 0.0)
+    np.testing.assert_allclose(table.lookup(0.3, 0.0, 0.4, 1.0, asked), expected, rtol=1e-5, atol=1e-7)
+    # the same numbers in parts
+    basis = np.linalg.qr(np.random.default_rng(1).normal(size=(5, 5)))[0]
+    parts = replace(table, values=(values @ basis.T).astype(np.float32), spectra=basis)
+    np.testing.assert_allclose(parts.lookup(0.3, 0.0, 0.4, 1.0, asked), expected, rtol=1e-5, atol=1e-7)
+
+
+def test_two_wavelengths_are_a_straight_line() -> None:
+    table = made_up("isotropic", WAVELENGTHS[1:3], dirac=True)
+    low, high = table.lookup(0.3, 0.0, 0.4, 1.0)
+    assert table.lookup(0.3, 0.0, 0.4, 1.0, 550.0) == pytest.approx((low + 2.0 * high) / 3.0, rel=1e-12)
+
+
+def test_a_cubic_over_wavelengths_does_not_fall_below_0() -> None:
+    table = made_up("isotropic", WAVELENGTHS, dirac=True)
+    table.brdf[...] = np.array([1.0, 0.0, 0.0, 1.0], dtype=np.float32)
+    assert table.specular is not None
+    table.specular[...] = np.array([1.0, 0.0, 0.0, 1.0], dtype=np.float32)
+    at = np.linspace(400.0, 2000.0, 161)
+    assert table.lookup(0.3, 0.0, 0.4, 1.0, at).min() == 0.0
+    assert table.specular_reflectance(0.3, at).min() == 0.0
 
 
 def test_a_grey_table_is_the_same_at_any_wavelength() -> None:
@@ -379,8 +416,8 @@ def test_the_dirac_part_is_interpolated_over_theta_and_wavelength() -> None:
     assert table.specular is not None
     np.testing.assert_array_equal(table.specular_reflectance(nodes), table.specular)
     theta_i, asked = np.linspace(0.0, nodes[-1], 40), np.linspace(400.0, 2000.0, 7)
-    scipys = RegularGridInterpolator((nodes, WAVELENGTHS), table.specular.astype(np.float64))
-    expected = scipys(np.stack(np.broadcast_arrays(theta_i[:, np.newaxis], asked), axis=-1))
+    scipys = RegularGridInterpolator([nodes], table.specular.astype(np.float64))
+    expected = scipys_cubic(scipys(theta_i[:, np.newaxis]), asked)
     np.testing.assert_allclose(
         table.specular_reflectance(theta_i, asked), expected, rtol=0.0, atol=INTERPOLATION_TOLERANCE
     )

@@ -140,7 +140,9 @@ def _interpolation(table: Table) -> str:
 
 
 def _print_error(error: Error | None) -> None:
-    """The error that is stated: overall, and for each band of theta_i at the wavelength where it is largest."""
+    """Print the error that is stated: overall, and by bands and places at the wavelength where it is largest."""
+    from brdfdb.places import RINGS_DEG
+
     if error is None:
         print("  error       not measured")
         return
@@ -150,9 +152,24 @@ def _print_error(error: Error | None) -> None:
         f"directions (median {overall.median:.2g}, largest {overall.max:.2g}, of what is reflected {overall.l1:.2g})"
     )
     edges = error.theta_i_deg
+    rows = [("99 of 100", error.p99), ("reflected", error.l1)]
+    if error.places is not None:
+        rows.append(("alongside", error.places.alongside))
+    if error.between is not None:
+        rows.append(("between", error.between.bands))
     print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
-    for label, rows in (("99 of 100", error.p99), ("reflected", error.l1)):
-        print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in rows))
+    for label, bands in rows:
+        print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in bands))
+    said = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
+    said += [] if error.between is None else ["between: any wavelength between those of the table"]
+    if said:
+        print(f"    {'; '.join(said)}")
+        print("    98 of 100 values are within these limits, and within those next to the horizon, if given")
+    if error.places is None:
+        return
+    print("    horizon     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(RINGS_DEG)))
+    for label, rings in (("one there", error.places.one_grazing), ("both beyond", error.places.both_grazing)):
+        print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in rings))
 
 
 def _print_albedo(table: Table) -> None:

@@ -95,6 +95,29 @@ def test_show_tells_grid_numbers_and_error_of_a_planned_table(name: str, planned
     assert f"  error       {terminal.error(table.error.overall.p99)} of f_r" in out
     (reflected,) = re.findall(r"^    reflected +(.*)$", out, flags=re.MULTILINE)
     assert [float(text) for text in reflected.split()] == [float(f"{max(row):.2g}") for row in table.error.l1]
+    places = table.error.places
+    assert places is not None
+    limits = {"alongside": places.alongside, "one there": places.one_grazing, "both beyond": places.both_grazing}
+    if table.error.between is not None:
+        limits["between"] = table.error.between.bands
+    assert ("between" in limits) == (table.wavelength_nm is not None)
+    for label, rows in limits.items():
+        (printed,) = re.findall(rf"^    {label}  +(.*)$", out, flags=re.MULTILINE)
+        assert [float(text) for text in printed.split()] == [float(f"{max(row):.2g}") for row in rows]
+
+
+def test_lookup_prints_the_stated_error_between_wavelengths(planned: Path, capsys: Captured) -> None:
+    wavelengths = brdfdb.open(planned)["scene-copper-sphere"].wavelength_nm
+    assert wavelengths is not None
+    middle = float(0.5 * (wavelengths[0] + wavelengths[1]))
+    command = ("lookup", "scene-copper-sphere", 30, 0, 30, 10, "--wavelength-nm", middle, "--with-error")
+    assert run(*command, "--store", planned) == 0
+    found = brdfdb.open(planned)["scene-copper-sphere"].lookup(
+        *np.deg2rad([30.0, 0.0, 30.0, 10.0]), middle, with_error=True
+    )
+    truth = presets()["scene-copper-sphere"].lookup(*np.deg2rad([30.0, 0.0, 30.0, 10.0]), middle)
+    assert capsys.readouterr().out.startswith(f"{middle:g} nm  {found.brdf:.6g} +- {found.error:.2g} /sr")
+    assert abs(found.brdf - truth) <= found.error
 
 
 def test_lookup_prints_the_stated_error_beside_each_value(planned: Path, capsys: Captured) -> None:
