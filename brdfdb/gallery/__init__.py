@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from brdfdb.figure import Figure
-from brdfdb.gallery import he_torrance_1991, oren_nayar_1994, ward_1992
+from brdfdb.gallery import he_torrance_1991, oren_nayar_1994, oren_nayar_1994_bounces, ward_1992
 
 GALLERY: Mapping[str, Callable[[], Figure]] = {
     **oren_nayar_1994.FIGURES,
+    **oren_nayar_1994_bounces.FIGURES,
     **he_torrance_1991.FIGURES,
     **ward_1992.FIGURES,
 }
