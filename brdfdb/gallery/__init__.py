@@ -5,11 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from brdfdb.figure import Figure
-from brdfdb.gallery import he_torrance_1991, oren_nayar_1994, oren_nayar_1994_bounces, ward_1992
+from brdfdb.gallery import (
+    he_torrance_1991,
+    he_torrance_1991_polarisation,
+    he_torrance_1991_roughness,
+    oren_nayar_1994,
+    oren_nayar_1994_bounces,
+    ward_1992,
+)
 
 GALLERY: Mapping[str, Callable[[], Figure]] = {
     **oren_nayar_1994.FIGURES,
     **oren_nayar_1994_bounces.FIGURES,
     **he_torrance_1991.FIGURES,
+    **he_torrance_1991_roughness.FIGURES,
+    **he_torrance_1991_polarisation.FIGURES,
     **ward_1992.FIGURES,
 }

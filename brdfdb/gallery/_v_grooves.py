@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STRIPS = 32  # of each facet; twice as many move no bounce of the figures by 0.2 % of the radiance
-AZIMUTHS = 72  # of the grooves, over half a turn
-SLOPES = 16  # nodes of Gauss and Legendre
+AZIMUTHS = 48  # of the grooves, over half a turn
+SLOPES = 12  # nodes of Gauss and Legendre
 _REACH = 4.5  # slopes over sigma; beyond is 4e-5 of the weight
 
 

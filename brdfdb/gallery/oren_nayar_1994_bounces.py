@@ -33,7 +33,7 @@ from brdfdb.parameters import Floats
 
 RADIANCE = "radiance L_r, of E_0 = 1"
 RAPIDLY = 0.5  # our reading of "diminishes rapidly": a bounce has at most half of the one before
-SAME = 0.005  # of strips and slopes that are summed, not integrated: 0.4 % of the bounce at most
+SAME = 0.01  # of strips, slopes and azimuths that are summed, not integrated: 0.6 % at 88 degrees
 ORDERS = 5  # bounces 1 to 4, and all later ones
 SAMPLES = {"Fig. 8, and wall plaster": (0.9, 30.0), "painted sandpaper": (0.8, 40.0), "white sand": (0.8, 35.0)}
 
@@ -46,7 +46,7 @@ class _Bounces(NamedTuple):
     second: Floats
 
 
-VIEWERS_DEG = np.arange(-88.0, 89.0, 2.0)
+VIEWERS_DEG = np.arange(-88.0, 89.0, 4.0)
 
 
 def _bounces(theta_i_deg: float, rho: float, sigma_deg: float) -> _Bounces:
@@ -107,7 +107,7 @@ def _diminishes(lines: list[_Bounces], lights_deg: list[float]) -> Statement:
 def _good() -> Statement:
     off, worst = [], []
     for rho, sigma_deg in SAMPLES.values():
-        lines = [_bounces(light, rho, sigma_deg) for light in (30.0, 45.0, 60.0, 75.0)]
+        lines = [_bounces(light, rho, sigma_deg) for light in (30.0, 60.0)]
         totals = [each.summed.sum(axis=0) for each in lines]
         pairs = list(zip(lines, totals, strict=True))
         off.append(max(distance(each.direct + each.second, total) for each, total in pairs))
@@ -116,7 +116,7 @@ def _good() -> Statement:
         says="simulations of the interreflection process were used to verify that this approximation (two bounces) is "
         "good",
         where="section 4.1.2",
-        seen=f"Of {', '.join(SAMPLES)} (θ_i of 30, 45, 60 and 75°) two bounces lack at most {listed(off, '.1%')} of "
+        seen=f"Of {', '.join(SAMPLES)} (θ_i of 30 and 60°) two bounces lack at most {listed(off, '.1%')} of "
         f"the mean radiance, root mean square (good: {SMALL:.0%}); in single directions up to {listed(worst, '.0%')} "
         "of the value.",
         holds=max(off) < SMALL,
