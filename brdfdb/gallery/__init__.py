@@ -12,6 +12,9 @@ from brdfdb.gallery import (
     oren_nayar_1994,
     oren_nayar_1994_bounces,
     ward_1992,
+    ward_1992_box,
+    ward_1992_gonioreflectometer,
+    ward_1992_sampling,
 )
 
 GALLERY: Mapping[str, Callable[[], Figure]] = {
@@ -21,4 +24,7 @@ GALLERY: Mapping[str, Callable[[], Figure]] = {
     **he_torrance_1991_roughness.FIGURES,
     **he_torrance_1991_polarisation.FIGURES,
     **ward_1992.FIGURES,
+    **ward_1992_gonioreflectometer.FIGURES,
+    **ward_1992_sampling.FIGURES,
+    **ward_1992_box.FIGURES,
 }

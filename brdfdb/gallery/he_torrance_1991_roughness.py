@@ -25,7 +25,7 @@ from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_parts
 from brdfdb.parameters import Floats
 
 GREEN_NM = 550.0
-LOWEST = 1e-3  # [1/sr] drawn for less, on a logarithmic axis
+LOWEST = 1e-3  # [1/sr] less is not drawn
 NARROW_SR = 1e-6  # of cones in which the lobe is flat
 PARTS_DEG = 60.0  # where all three parts of the table top are seen
 FAR = 10.0  # times: our reading of "far from ideal diffuse"
@@ -81,7 +81,7 @@ def _parts_panel(kind: Literal["curves", "polar"], total: Cut, directional: Floa
         log_y=kind == "curves",
         curves=[
             curve_of("all, through the cones", total.x_deg, total.f_r, "ours"),
-            curve_of("directional diffuse", total.x_deg, np.maximum(directional, LOWEST)),
+            curve_of("directional diffuse", total.x_deg, np.where(directional < LOWEST, np.nan, directional)),
             curve_of("uniform diffuse", total.x_deg, uniform),
         ],
     )
