@@ -126,6 +126,7 @@ def _highlights() -> Statement:
         where="section 6, Fig. 9",
         seen=f"Along the line the light overhead makes {waves} highlights (maxima above half of the highest) with the "
         f"wave, {even} brushed evenly and {isotropic} not brushed.",
+        threshold_from="the paper's words: highlights, in the plural, of one light",
         holds=waves >= 2 > max(even, isotropic),
     )
 
@@ -140,6 +141,7 @@ def _local_control(x: Array, y: Array) -> Statement:
         where="section 6, Fig. 9",
         seen=f"Turning the brushed direction, and nothing else, changes the radiance of {share:.0%} of the lid by a "
         f"factor of two or more; of a lid with eq. 4 {isotropic:.0%}.",
+        threshold_from="our reading: affected is a factor of two, over a tenth of the lid",
         holds=share > 0.1 and isotropic == 0.0,
     )
 

@@ -117,6 +117,7 @@ def _good() -> Statement:
         seen=f"For D / R of {listed(OFFSETS)} they are {listed([float(each.max()) for each in off], '.2f')}° off at "
         f"most, and {listed([float(np.median(each)) for each in off], '.2f')}° in the median (good: {GOOD_DEG:g}° for "
         f"{SMALL:g}); the angles of the camera itself would be {listed(plain, '.1f')}° off.",
+        threshold_from="our reading: good is within 1°, half a pixel of the reduced picture",
         holds=float(off[OFFSETS.index(SMALL)].max()) < GOOD_DEG,
     )
 
@@ -129,6 +130,7 @@ def _second_order() -> Statement:
         "D / R",
         where="known of the form: the middle of a sphere is its own image, without coma",
         seen=f"From D / R of {D[0]:g} to {D[1]:g} it grows with the power {slope:.3f}.",
+        threshold_from="a limit: the second power for small D / R",
         holds=abs(slope - 2.0) < 0.1,
     )
 

@@ -214,6 +214,7 @@ def _misses(rays: _Rays, total: Array) -> Statement:
         where="section 5, Fig. 7a",
         seen=f"Beside the highlight (a) lacks {missed[0]:.0%} of the radiance, in it {missed.min():.0%}: what the "
         f"stripes send through the lobe, {albedo:.2f} of their mean radiance.",
+        threshold_from="our reading: who fails to pick something up lacks more than half of it",
         holds=bool(missed[0] > 0.5),
     )
 
@@ -225,6 +226,7 @@ def _excessive(noise: Array) -> Statement:
         where="section 5, Fig. 7b",
         seen=f"In the highlight, where the source adds half of its most or more, the standard deviation of {RAYS} "
         f"rays is {noise.min():.0%} to {noise.max():.0%} of the radiance (excessive: {EXCESSIVE:.0%}).",
+        threshold_from="our reading: excessive is half of the radiance",
         holds=bool(noise.min() > EXCESSIVE),
     )
 
@@ -236,6 +238,7 @@ def _clean(strict: Array, hybrid: Array) -> Statement:
         where="section 5, Fig. 7c",
         seen=f"In the highlight the standard deviation of (c) is {hybrid.max():.1%} of the radiance at most (clean: "
         f"{CLEAN:.0%}); its variance times work is {gain.min():.1e} times smaller than that of (b) or less.",
+        threshold_from="our reading: clean is within a tenth of the radiance",
         holds=bool(hybrid.max() < CLEAN and gain.min() > MUCH),
     )
 
@@ -255,6 +258,7 @@ def _unbiased(met: float) -> Statement:
         seen=f"In the highlight rays by eq. 7 find {found:.3f} ± {error:.3f} times the source's light that eq. 6 has "
         f"(a disc of {2.0 * HALF_ANGLE_DEG:g}° taken as a point). Counted as well, they would double it; left out, "
         f"{met:.2%} of the rays of picture (c) are wasted.",
+        threshold_from="our reading: accuracy is kept within 5 % of the light of the source",
         holds=abs(found - 1.0) < ACCURATE and error < 0.4 * ACCURATE,
     )
 
@@ -272,6 +276,7 @@ def _efficient(seven: Array, even: Array) -> Statement:
         seen=f"Along the line of the picture the variance of evenly drawn rays is {gain:.0f} times that of eq. 7, for "
         f"as many rays (much: {MUCH:.0f}). Rejection under the peak keeps one of {1.0 / accepted:.0f} directions "
         "along the normal; eq. 7 keeps all but those below the horizon.",
+        threshold_from="our reading: much more is ten times",
         holds=bool(gain > MUCH and 1.0 / accepted > MUCH),
     )
 
@@ -291,6 +296,7 @@ def _uniform_weights() -> Statement:
         where="section 5.1, eq. 7",
         seen=f"In light from all around they bring {listed(uniform, '.2f')} times what eq. 5a reflects, for θ_r of "
         f"{listed(thetas_deg, '.0f')}°; with weights f_r cos θ_i over their density {listed(weighted, '.3f')} times.",
+        threshold_from="our reading: correct is within 5 % of the lobe",
         holds=bool(np.abs(uniform - 1.0).max() < CORRECT),
     )
 

@@ -30,6 +30,7 @@ STATEMENTS = [
     ("eq-44", "only for"),
     ("eq-44", "is slight"),
     ("eq-44", "across it"),
+    ("eq-44", "nothing is hidden"),
     ("eq-44", "nearly all is"),
 ]
 BROKEN = {
