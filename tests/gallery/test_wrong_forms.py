@@ -27,8 +27,19 @@ FIGURES = {
         "oren-nayar-1994-bounces",
         "oren-nayar-1994-eq-44",
     ],
-    "he-torrance": ["he-torrance-1991-polarisation", "he-torrance-1991-mueller"],
-    "ward": ["ward-1992-fig-03", "ward-1992-fig-07-techniques", "ward-1992-fig-07-noise"],
+    "he-torrance": [
+        "he-torrance-1991-fig-06",
+        "he-torrance-1991-effective-roughness",
+        "he-torrance-1991-polarisation",
+        "he-torrance-1991-mueller",
+    ],
+    "ward": [
+        "ward-1992-fig-03",
+        "ward-1992-fig-07-techniques",
+        "ward-1992-fig-07-noise",
+        "ward-1992-fig-09",
+        "ward-1992-fig-09-profile",
+    ],
 }
 FORMS = {
     "oren-nayar": wrong_forms.OREN_NAYAR,

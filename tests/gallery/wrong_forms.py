@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brdfdb import fresnel, sampling
+from brdfdb.gallery import _he_torrance_cuts as cuts
 from brdfdb.gallery import _v_grooves as grooves
 from brdfdb.gallery import ward_1992_gonioreflectometer as gonioreflectometer
 from brdfdb.geometry import unit_vector
@@ -149,7 +150,30 @@ def exchanged(cos: Any, n: Any, k: Any) -> tuple[Any, Any]:
     return half_sum, -half_difference
 
 
+right_specular, right_reflected = cuts.specular, cuts.reflected
+
+
+def altered(**changes: float) -> dict[Function, Function]:
+    """Specular reflectance and albedo of another surface: each change is a factor, of `a` a value."""
+
+    def of(surface: Any) -> Any:
+        return {key: changes.get(key, 1.0) * value if key != "a" else changes.get(key, value)
+                for key, value in surface.items()}  # fmt: skip
+
+    return {
+        right_specular: lambda surface, theta: right_specular(of(surface), theta),
+        right_reflected: lambda surface, theta, **options: right_reflected(of(surface), theta, **options),
+    }
+
+
 HE_TORRANCE = (
+    WrongForm("no e^-g", "the specular part is |F|^2 S", "the lobe is added to a mirror that is already there",
+              {right_specular: lambda surface, theta: right_specular({**surface, "wavelength_nm": 1e7}, theta)}),
+    WrongForm("tau times 1.5", "the autocorrelation length is 1.5 times as long",
+              "tau is read as where C(r) has fallen to a tenth", altered(tau_um=1.5)),
+    WrongForm("sigma_0 times 0.8", "the rms roughness is 0.8 times as large", "R_a of workshops is that",
+              altered(sigma_0_um=0.8)),
+    WrongForm("a of 1", "all that enters the surface returns", "nothing is known of a", altered(a=1.0)),
     WrongForm("M_ps without its minus", "eq. 64 as it is printed", "eq. 62 alone has the minus",
               {polarised._jones: printed_minus}),
     WrongForm("s and p not turned", "the facet's s and p are taken for those of the mean surface",
@@ -199,7 +223,20 @@ def mapped(shift: float) -> Function:
     return eq_3
 
 
+def one_alpha(wi: Any, wr: Any, *, alpha_x: Any, alpha_y: Any, **rest: Any) -> Any:
+    alpha = np.sqrt(alpha_x * alpha_y)
+    return ward_vectors(wi, wr, alpha_x=alpha, alpha_y=alpha, **rest)
+
+
+def other_side(wi: Any, wr: Any, **surface: Any) -> Any:
+    return ward_vectors(np.asarray(wi) * [-1.0, -1.0, 1.0], wr, **surface)
+
+
 WARD = (
+    WrongForm("one alpha", "eq. 4 with sqrt(alpha_x alpha_y)", "an engine without tangents has no x axis",
+              {ward_vectors: one_alpha}),
+    WrongForm("light from the other side", "the lobe lies on the side of the light",
+              "the paper's d_i may be read as the direction in which light travels", {ward_vectors: other_side}),
     WrongForm("density of the half vector", "the density lacks 1 / (4 h.i)", "eq. 7 draws half vectors",
               {right_density: of_half_vector}),
     WrongForm("samples along the normal", "half vectors are those of a light along the normal",
