@@ -11,8 +11,8 @@ from brdfdb.models import oren_nayar_single_slope_parts
 from brdfdb.models.oren_nayar_1994 import Parts
 from brdfdb.parameters import Floats
 
-_NODES = 12  # of Gauss and Legendre in a piece; tests compare the integral with one of 15 digits
-_REACH = 6.0  # slopes over sigma; beyond is 1.5e-8 of the weight
+_NODES = 12  # Gauss-Legendre nodes of a piece; the integral is right to 2e-10
+_REACH = 6.0  # largest slope over sigma; steeper facets have 1.5e-8 of the weight
 
 
 def evaluated_parts(

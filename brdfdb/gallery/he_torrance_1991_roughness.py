@@ -28,9 +28,9 @@ GREEN_NM = 550.0
 LOWEST = 1e-3  # [1/sr] less is not drawn
 NARROW_SR = 1e-6  # of cones in which the lobe is flat
 PARTS_DEG = 60.0  # where all three parts of the table top are seen
-FAR = 10.0  # times: our reading of "far from ideal diffuse"
-CONSERVED = 0.01  # of the light; what gentle slopes leave of one with all reflected (section 3.1)
-SMALL = 0.1  # our reading of "somewhat", and of "found to agree"
+FAR = 10.0  # ratio of f_r: our reading of "far from ideal diffuse"
+CONSERVED = 0.01  # share of the light that gentle slopes may lose or gain (section 3.1)
+SMALL = 0.1  # relative change: our reading of "somewhat"
 
 
 def fig_06() -> Figure:
@@ -172,7 +172,7 @@ def _partition(shares: _Shares) -> Statement:
 ANGLES_DEG = np.append(np.arange(0.0, 85.0, 2.5), [85.0, 86.0, 87.0, 88.0, 88.5, 89.0])
 SLOPES = {"aluminum of Fig. 8": 0.28 / 1.77, "table top of Fig. 14": 0.1, "σ_0/τ = 0.05": 0.05}
 SIMULATED_DEG = np.array([45.0, 60.0, 70.0, 75.0, 80.0, 83.0, 86.0, 88.0, 89.0])
-LONG_NM = 1e7  # so long that e^-g is 1: what is left of rho_s over |F|^2 is S
+LONG_NM = 1e7  # at this wavelength e^-g is 1, and rho_s over |F|^2 is S
 
 
 class _Seen(NamedTuple):

@@ -20,7 +20,7 @@ CAMERA = np.array([0.0, -2.2, 2.0])  # of a lid from -1 to 1 in x and from -0.7 
 CANDLES = (np.array([-1.6, 1.3, 0.9]), np.array([1.5, 1.5, 0.8]))
 OVERHEAD = np.array([0.5, 2.0, 2.2])
 MOON = unit_vector(radians(65.0), radians(115.0))  # through the window
-STRENGTHS = 0.35, 0.35, 1.0, 0.15  # irradiance of the middle of the lid, facing the light
+STRENGTHS = 0.35, 0.35, 1.0, 0.15  # irradiance at the middle of the lid, across each light
 LINE = 0.45  # y of the line of the profile
 ROWS, COLUMNS = 44, 72
 

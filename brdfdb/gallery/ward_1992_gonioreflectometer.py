@@ -13,8 +13,8 @@ from brdfdb.geometry import degrees, radians, unit_vector
 Array = NDArray[np.float64]
 
 GOOD_DEG = 1.0  # our reading of "a good approximation": the prototype's picture has 108 by 80 pixels, about 2° each
-SMALL = 0.1  # of D over R, "small in relation to R"
-OFFSETS = (0.05, 0.1, 0.2)  # D over R that is drawn
+SMALL = 0.1  # D over R: our reading of "small in relation to R"
+OFFSETS = (0.05, 0.1, 0.2)  # D over R of the statement
 
 
 def eq_3(theta_c: Array, phi_c: Array, D: float) -> Array:

@@ -21,18 +21,18 @@ CAMERA_DEG, LIGHT_DEG = 35.0, 75.0  # above the equator of the sphere, as in Fig
 HALF_ANGLE_DEG = 2.0  # of the disc of light
 SOLID_ANGLE = float(np.pi * np.sin(radians(HALF_ANGLE_DEG)) ** 2)  # sr
 RAYS = 16  # "even with 16 samples per pixel"
-MANY = 2000  # rays a point, of which noise is measured
+MANY = 2000  # rays of a point; noise is measured from them
 PIXELS = 64
-AMBIENT = 0.1  # radiance of the dark stripes around; the light has irradiance 1
-STRIPES = 0.3  # and of the bright ones
-WHITE = 0.25  # radiance that is drawn white
+AMBIENT = 0.1  # radiance of the dark stripes; the light has an irradiance of 1
+STRIPES = 0.3  # radiance of the bright stripes
+WHITE = 0.25  # radiance drawn as white
 
 STRICT, HYBRID = "strict Monte Carlo, eq. 7 (Fig. 7b)", "hybrid, eq. 6 with eq. 7 (Fig. 7c)"
-EXCESSIVE = 0.5  # of the radiance: our reading of "excessive noise"
-CLEAN = 0.1  # and of "a clean result"
-ACCURATE = 0.05  # and of "without compromising accuracy": a disc is not a point
-MUCH = 10.0  # times: and of "much more efficient"
-CORRECT = 0.05  # and of "correctly reproduce"
+EXCESSIVE = 0.5  # standard deviation over radiance: our reading of "excessive noise"
+CLEAN = 0.1  # standard deviation over radiance: our reading of "a clean result"
+ACCURATE = 0.05  # relative error: our reading of "without compromising accuracy"; a disc is not a point
+MUCH = 10.0  # ratio of variances: our reading of "much more efficient"
+CORRECT = 0.05  # relative error: our reading of "correctly reproduce"
 
 
 class _Points(NamedTuple):

@@ -167,11 +167,12 @@ def altered(**changes: float) -> dict[Function, Function]:
 
 
 HE_TORRANCE = (
-    WrongForm("no e^-g", "the specular part is |F|^2 S", "the lobe is added to a mirror that is already there",
+    WrongForm("mirrors without e^-g", "the specular part is |F|^2 S",
+              "the lobe is added to a mirror that is already there",
               {right_specular: lambda surface, theta: right_specular({**surface, "wavelength_nm": 1e7}, theta)}),
-    WrongForm("tau times 1.5", "the autocorrelation length is 1.5 times as long",
+    WrongForm("reflectances with 1.5 tau", "the autocorrelation length is 1.5 times as long",
               "tau is read as where C(r) has fallen to a tenth", altered(tau_um=1.5)),
-    WrongForm("sigma_0 times 0.8", "the rms roughness is 0.8 times as large", "R_a of workshops is that",
+    WrongForm("0.8 sigma_0 of reflectances", "the rms roughness is 0.8 times as large", "R_a of workshops is that",
               altered(sigma_0_um=0.8)),
     WrongForm("a of 1", "all that enters the surface returns", "nothing is known of a", altered(a=1.0)),
     WrongForm("M_ps without its minus", "eq. 64 as it is printed", "eq. 62 alone has the minus",
@@ -233,9 +234,10 @@ def other_side(wi: Any, wr: Any, **surface: Any) -> Any:
 
 
 WARD = (
-    WrongForm("one alpha", "eq. 4 with sqrt(alpha_x alpha_y)", "an engine without tangents has no x axis",
+    WrongForm("one alpha of lids and rays", "eq. 4 with sqrt(alpha_x alpha_y)",
+              "an engine without tangents has no x axis",
               {ward_vectors: one_alpha}),
-    WrongForm("light from the other side", "the lobe lies on the side of the light",
+    WrongForm("light from the other side of lids and spheres", "the lobe lies on the side of the light",
               "the paper's d_i may be read as the direction in which light travels", {ward_vectors: other_side}),
     WrongForm("density of the half vector", "the density lacks 1 / (4 h.i)", "eq. 7 draws half vectors",
               {right_density: of_half_vector}),
