@@ -16,12 +16,11 @@ from brdfdb.gallery._he_torrance_cuts import (
     described,
     measured,
     reflected,
-    smooth,
     specular,
     surface_of,
 )
 from brdfdb.geometry import radians
-from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_parts
+from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_parts, he_torrance_smooth
 from brdfdb.parameters import Floats
 
 GREEN_NM = 550.0
@@ -190,7 +189,10 @@ def _of_model(slope: float, angles_deg: Floats) -> _Seen:
     # at this wavelength g is (sigma / sigma_0)^2
     short_nm = 4.0 * np.pi * sigma_0_um * 1000.0 * cosine
     short, long = (specular({**surface, "wavelength_nm": each}, angles_deg) for each in (short_nm, LONG_NM))
-    return _Seen(long / smooth(surface, angles_deg), np.sqrt(np.maximum(-np.log(short / long), 0.0)))
+    return _Seen(
+        long / he_torrance_smooth(radians(angles_deg), n=surface["n"], k=surface["k"]),
+        np.sqrt(np.maximum(-np.log(short / long), 0.0)),
+    )
 
 
 def _of_profiles(slope: float, angles_deg: Floats) -> tuple[_Seen, Floats]:
@@ -213,7 +215,7 @@ def effective_roughness() -> Figure:
     rho_s = specular(aluminum, ANGLES_DEG)
     cosine = np.cos(radians(ANGLES_DEG))
     g_0 = (4.0 * np.pi * aluminum["sigma_0_um"] * 1000.0 * cosine / aluminum["wavelength_nm"]) ** 2
-    fixed = smooth(aluminum, ANGLES_DEG) * drawn.shadowing * np.exp(-g_0)
+    fixed = he_torrance_smooth(radians(ANGLES_DEG), n=aluminum["n"], k=aluminum["k"]) * drawn.shadowing * np.exp(-g_0)
     return Figure(
         key="he-torrance-1991-effective-roughness",
         paper="he1991",
