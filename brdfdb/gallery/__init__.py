@@ -5,10 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from brdfdb.figure import Figure
-from brdfdb.gallery import he_torrance_1991, oren_nayar_1994, ward_1992
+from brdfdb.gallery import (
+    he_torrance_1991,
+    he_torrance_1991_polarisation,
+    he_torrance_1991_roughness,
+    oren_nayar_1994,
+    oren_nayar_1994_bounces,
+    ward_1992,
+    ward_1992_box,
+    ward_1992_gonioreflectometer,
+    ward_1992_sampling,
+)
 
 GALLERY: Mapping[str, Callable[[], Figure]] = {
     **oren_nayar_1994.FIGURES,
+    **oren_nayar_1994_bounces.FIGURES,
     **he_torrance_1991.FIGURES,
+    **he_torrance_1991_roughness.FIGURES,
+    **he_torrance_1991_polarisation.FIGURES,
     **ward_1992.FIGURES,
+    **ward_1992_gonioreflectometer.FIGURES,
+    **ward_1992_sampling.FIGURES,
+    **ward_1992_box.FIGURES,
 }

@@ -1,0 +1,138 @@
+"""Ward 1992, Fig. 3: where an imaging gonioreflectometer looks, eq. 3 against rays that a sphere reflects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.figure import Figure, Map, Panel, Statement, curve_of, listed, rows
+from brdfdb.geometry import degrees, radians, unit_vector
+
+Array = NDArray[np.float64]
+
+GOOD_DEG = 1.0  # our reading of "a good approximation": the prototype's picture has 108 by 80 pixels, about 2° each
+SMALL = 0.1  # D over R: our reading of "small in relation to R"
+OFFSETS = (0.05, 0.1, 0.2)  # D over R of the statement
+
+
+def eq_3(theta_c: Array, phi_c: Array, D: float) -> Array:
+    """Return the direction from the target, unit vectors (..., 3), that eq. 3 gives for one of the camera.
+
+    `theta_c`, `phi_c` [rad] are relative to the camera, D is half of the distance of target and camera, and R is 1.
+    """
+    sine = np.sin(phi_c) * np.sin(theta_c)
+    r_c = D * sine + np.sqrt(D**2 * sine**2 + 1.0 - D**2)
+    x, y, z = r_c * np.cos(phi_c) * np.sin(theta_c), r_c * sine - 2.0 * D, r_c * np.cos(theta_c)
+    theta_r = np.arccos(z / np.sqrt(x**2 + y**2 + z**2))
+    return unit_vector(theta_r, np.arctan2(y, x))
+
+
+def traced(theta_c: Array, phi_c: Array, D: float) -> Array:
+    """Return the direction in which the light that the camera sees leaves the sample, unit vectors (..., 3).
+
+    The camera stands at (0, -D, 0), the target at (0, D, 0), and the middle of a sphere of radius 1 between them. A ray
+    from the camera is mirrored once, and meets the sample in or beside the middle of the target.
+    """
+    out = unit_vector(theta_c, phi_c)
+    camera = np.array([0.0, -D, 0.0])
+    along = out @ camera
+    point = camera + (-along + np.sqrt(along**2 + 1.0 - D**2))[..., None] * out
+    return np.asarray(2.0 * np.sum(out * point, axis=-1, keepdims=True) * point - out)
+
+
+def _grid() -> tuple[Array, Array]:
+    return np.meshgrid(radians(np.arange(0.0, 76.0, 5.0)), radians(np.arange(-180.0, 180.0, 10.0)), indexing="ij")
+
+
+def _apart_deg(one: Array, other: Array) -> Array:
+    """Return the angle between unit vectors [degree], exact where it is small."""
+    return np.asarray(degrees(2.0 * np.arcsin(np.minimum(np.linalg.norm(one - other, axis=-1) / 2.0, 1.0))))
+
+
+def _off_deg(D: float) -> Array:
+    theta_c, phi_c = _grid()
+    return _apart_deg(eq_3(theta_c, phi_c, D), traced(theta_c, phi_c, D))
+
+
+def fig_03() -> Figure:
+    """Return how far off eq. 3 is, over D and over the picture of the camera."""
+    spread = np.geomspace(0.005, 0.3, 15)
+    most = np.array([float(_off_deg(each).max()) for each in spread.tolist()])
+    middle = np.array([float(np.median(_off_deg(each))) for each in spread.tolist()])
+    without = np.array([float(_ignoring(each).max()) for each in spread.tolist()])
+    axis = np.linspace(-75.0, 75.0, 31)
+    x, y = np.meshgrid(axis, axis)
+    theta_c, phi_c = radians(np.hypot(x, y)), np.arctan2(y, x)
+    inside = np.hypot(x, y) <= 75.0
+    seen = np.where(inside, theta_c, 0.0)
+    off = _apart_deg(eq_3(seen, phi_c, SMALL), traced(seen, phi_c, SMALL))
+    return Figure(
+        key="ward-1992-fig-03",
+        paper="ward1992",
+        title="Fig. 3: from a pixel of the gonioreflectometer to the angles of reflection, eq. 3",
+        caption="Camera and target stand D beside the middle of a hemisphere of radius R; a ray from the camera is "
+        "mirrored once and followed to the sample. The paper prints neither D nor R. Directions of the camera up to "
+        "75°: it calls those near grazing a limitation (section 3.3). Right, D is a tenth of R.",
+        panels=[
+            Panel(
+                title="How far off eq. 3 is",
+                x_label="D / R",
+                y_label="angle at the sample [degree]",
+                log_x=True,
+                log_y=True,
+                curves=[
+                    curve_of("eq. 3, largest", spread, most, "printed"),
+                    curve_of("eq. 3, median", spread, middle),
+                    curve_of("camera's own angles, largest", spread, without),
+                ],
+            ),
+            Map(
+                title=f"Eq. 3 off by, D / R = {SMALL:g}",
+                x_label="θ_c cos(φ_c) [degree]",
+                y_label="θ_c sin(φ_c) [degree]",
+                value_label="degrees",
+                x=axis.tolist(),
+                y=axis.tolist(),
+                values=rows(np.where(inside, off, np.nan), 3),
+            ),
+        ],
+        statements=[_good(), _second_order()],
+    )
+
+
+def _ignoring(D: float) -> Array:
+    """Return how far off the angles of the camera would be, taken as those of the target [degree]."""
+    theta_c, phi_c = _grid()
+    return _apart_deg(unit_vector(theta_c, phi_c), traced(theta_c, phi_c, D))
+
+
+def _good() -> Statement:
+    off = [_off_deg(each) for each in OFFSETS]
+    plain = [float(_ignoring(each).max()) for each in OFFSETS]
+    return Statement(
+        says='"the above equations are a good approximation [...] as long as D is small in relation to R"',
+        where="section 3.2, eq. 3",
+        seen=f"For D / R of {listed(OFFSETS)} they are {listed([float(each.max()) for each in off], '.2f')}° off at "
+        f"most, and {listed([float(np.median(each)) for each in off], '.2f')}° in the median (good: {GOOD_DEG:g}° for "
+        f"{SMALL:g}); the angles of the camera itself would be {listed(plain, '.1f')}° off.",
+        threshold_from="our reading: good is within 1°, half a pixel of the reduced picture",
+        holds=float(off[OFFSETS.index(SMALL)].max()) < GOOD_DEG,
+    )
+
+
+def _second_order() -> Statement:
+    D = np.array([0.01, 0.02])
+    slope = float(np.diff(np.log([_off_deg(each).max() for each in D.tolist()]))[0] / np.log(2.0))
+    return Statement(
+        says="a sphere images points near its middle onto the opposite side: the error of eq. 3 is of second order in "
+        "D / R",
+        where="known of the form: the middle of a sphere is its own image, without coma",
+        seen=f"From D / R of {D[0]:g} to {D[1]:g} it grows with the power {slope:.3f}.",
+        threshold_from="a limit: the second power for small D / R",
+        holds=abs(slope - 2.0) < 0.1,
+    )
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {"ward-1992-fig-03": fig_03}
