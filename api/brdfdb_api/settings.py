@@ -20,6 +20,8 @@ class Settings:
     ----------
     store : Path
         Directory that ``brdfdb build --store`` wrote.
+    snapshot : str or None
+        Name of the snapshot of the store that is served; by default what is current.
     audit : Path or None
         What ``brdfdb audit`` wrote as JSON; by default ``audit.json`` in the store, where that command puts it.
     max_points : int
@@ -36,6 +38,7 @@ class Settings:
     """
 
     store: Path = Path("brdf-store")
+    snapshot: str | None = None
     audit: Path | None = None
     max_points: int = 10_000
     max_body_bytes: int = 64 * 2**20
@@ -69,6 +72,7 @@ class Settings:
                 )
         return cls(
             store=Path(environ.get("BRDFDB_STORE", cls.store)),
+            snapshot=environ.get("BRDFDB_SNAPSHOT") or None,
             audit=Path(environ["BRDFDB_AUDIT"]) if "BRDFDB_AUDIT" in environ else None,
             max_points=_positive(environ, "BRDFDB_MAX_POINTS", cls.max_points),
             max_body_bytes=_positive(environ, "BRDFDB_MAX_BODY_BYTES", cls.max_body_bytes),

@@ -15,7 +15,7 @@ from typing import Any
 from brdfdb.family import FamilyRecord, Sweep
 from brdfdb.family_records import recorded, write_family
 from brdfdb.layout import Layout
-from brdfdb.manifest import Entry, StoreError
+from brdfdb.manifest import Entry, StoreError, read_manifest
 from brdfdb.revisions import Standing, standing
 from brdfdb.staging import (
     Block,
@@ -27,7 +27,7 @@ from brdfdb.staging import (
     point_to,
     prepare,
     publish,
-    summary_of,
+    remove_begun,
     write_block,
     write_frame,
     writing,
@@ -176,8 +176,19 @@ def build(
     """
     jobs = recipe.jobs()
     sweeps = recipe.sweeps(jobs)
-    make_store(root)
-    return _Builder(jobs, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory).run()
+    root = root.absolute()  # workers may be in another directory
+    existed = root.exists()
+    made = make_store(root)
+    try:
+        return _Builder(
+            jobs, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory
+        ).run()
+    except ValueError:
+        if made:
+            remove_begun(root)
+            if existed:
+                root.mkdir(exist_ok=True)
+        raise
 
 
 class _Builder:
@@ -286,7 +297,7 @@ class _Builder:
 
     def _is_current(self, job: Job, revision: str) -> None:
         name = job.material.name
-        stored = summary_of(self.root / "materials" / name / revision)["bytes"]
+        stored = read_manifest(self.root / "materials" / name / revision, None)[0]["summary"]["bytes"]
         self.built[name] = Built(job, "unchanged", revision, stored)
         self.report({"event": "unchanged", "material": name, "revision": revision})
 
@@ -351,7 +362,7 @@ class _Builder:
             with writing(self.root, name):
                 point_to(self.root / "materials" / name, found.revision)
             discard(self.root, name, job.request)  # where the build was killed that made this revision
-            stored = summary_of(self.root / "materials" / name / found.revision)["bytes"]
+            stored = read_manifest(self.root / "materials" / name / found.revision, None)[0]["summary"]["bytes"]
             self.built[name] = Built(job, "adopted", found.revision, stored, found.why)
             self.report({"event": "adopted", "material": name, "revision": found.revision, "why": found.why})
         else:
