@@ -151,6 +151,32 @@ def test_a_write_that_fails_leaves_the_old_revision_served(
     assert rho(root) == 0.75
 
 
+def test_every_directory_of_a_revision_is_synced_before_the_pointer_is_swapped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int] = []
+    sync, replace = os.fsync, os.replace
+    before: list[set[int]] = []
+
+    def fsync(handle: int) -> None:
+        sync(handle)
+        synced.append(os.fstat(handle).st_ino)
+
+    def swap(source: Any, target: Any) -> None:
+        if Path(target).name == "HEAD.json":
+            before.append(set(synced))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(os, "replace", swap)
+    publish_dataset(tmp_path, "white", lambert(0.5))
+    (known,) = before
+    group = tmp_path / "materials" / "white" / "r000001"
+    directories = [group, *(path for path in group.rglob("*") if path.is_dir()), *list(group.parents)[:3]]
+    assert len(directories) > 10
+    assert [path for path in directories if path.stat().st_ino not in known] == []
+
+
 KILLED = """
 import os, signal, sys
 from pathlib import Path

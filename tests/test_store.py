@@ -349,6 +349,22 @@ def test_a_damaged_chunk_is_found_before_xarray_reads_nan_in_its_place(
         brdfdb.open(root).dataset("white")
 
 
+def test_a_chunk_that_is_damaged_while_a_dataset_is_read_is_named(root: Path) -> None:
+    with brdfdb.open(root).dataset("white") as lazy:
+        flip(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
+        with pytest.raises(StoreError, match=r"^white r000001 is damaged: the content of brdf/c/0/0/0 changed$"):
+            lazy["brdf"].load()
+
+
+def test_a_store_of_a_relative_path_stays_where_it_was_opened(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = root.parent / "elsewhere" / root.name
+    publish(other, white=lambert(0.75))
+    monkeypatch.chdir(root.parent)
+    store = brdfdb.open(root.name)
+    monkeypatch.chdir(other.parent)
+    assert (rho(store), store.path("white")) == (0.25, root / "materials" / "white" / "r000001")
+
+
 @pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
 def test_damaged_attributes_are_not_served(root: Path, damage: Callable[[Path], None]) -> None:
     damage(root / "materials" / "white" / "r000001" / "zarr.json")
