@@ -20,8 +20,6 @@ class Settings:
     ----------
     store : Path
         Directory that ``brdfdb build --store`` wrote.
-    snapshot : str or None
-        Name of the snapshot of the store that is served; by default what is current.
     audit : Path or None
         What ``brdfdb audit`` wrote as JSON; by default ``audit.json`` in the store, where that command puts it.
     max_points : int
@@ -35,16 +33,18 @@ class Settings:
         own. Separated by commas in the environment.
     log_level : str
         "info" logs each request as a line of JSON, "warning" those that were refused, "error" those that failed here.
+    snapshot : str or None
+        Name of the snapshot of the store that is served; by default what is current.
     """
 
     store: Path = Path("brdf-store")
-    snapshot: str | None = None
     audit: Path | None = None
     max_points: int = 10_000
     max_body_bytes: int = 64 * 2**20
     cache_bytes: int = 256 * 2**20
     cors_origins: tuple[str, ...] = ()
     log_level: LogLevel = "info"
+    snapshot: str | None = None
 
     @property
     def audit_file(self) -> Path:
@@ -72,13 +72,13 @@ class Settings:
                 )
         return cls(
             store=Path(environ.get("BRDFDB_STORE", cls.store)),
-            snapshot=environ.get("BRDFDB_SNAPSHOT") or None,
             audit=Path(environ["BRDFDB_AUDIT"]) if "BRDFDB_AUDIT" in environ else None,
             max_points=_positive(environ, "BRDFDB_MAX_POINTS", cls.max_points),
             max_body_bytes=_positive(environ, "BRDFDB_MAX_BODY_BYTES", cls.max_body_bytes),
             cache_bytes=_positive(environ, "BRDFDB_CACHE_BYTES", cls.cache_bytes),
             cors_origins=tuple(origin for origin in origins if origin),
             log_level=cast(LogLevel, level),
+            snapshot=environ.get("BRDFDB_SNAPSHOT") or None,
         )
 
 
