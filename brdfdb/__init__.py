@@ -18,10 +18,10 @@ __all__ = ["open"]
 
 
 @overload
-def open(root: os.PathLike[str]) -> Store: ...
+def open(root: os.PathLike[str], *, snapshot: str | None = None) -> Store: ...
 @overload
-def open(root: str) -> Store | RemoteStore: ...
-def open(root: str | os.PathLike[str]) -> Store | RemoteStore:
+def open(root: str, *, snapshot: str | None = None) -> Store | RemoteStore: ...
+def open(root: str | os.PathLike[str], *, snapshot: str | None = None) -> Store | RemoteStore:
     """Open a store of tables for reading.
 
     Parameters
@@ -29,6 +29,8 @@ def open(root: str | os.PathLike[str]) -> Store | RemoteStore:
     root : path or address
         The directory that ``brdfdb build --store`` wrote, or the address of a service (``brdfdb serve``), such as
         ``http://127.0.0.1:8000``.
+    snapshot : str, optional
+        Name of a snapshot of a directory (``brdfdb snapshot NAME``): the store is then what it names, for good.
 
     Returns
     -------
@@ -38,15 +40,20 @@ def open(root: str | os.PathLike[str]) -> Store | RemoteStore:
     Raises
     ------
     brdfdb.store.StoreError
-        If there is no store at `root`, or one of another format version; if no service answers there.
+        If there is no store at `root`, or one of another format version; if it has no such snapshot; if no service
+        answers there.
+    ValueError
+        If a snapshot is named beside an address: a service serves the one that it was started with.
     """
     if isinstance(root, str) and root.startswith(("http://", "https://")):
         from brdfdb.remote import RemoteStore
 
+        if snapshot is not None:
+            raise ValueError(f"snapshot: {snapshot!r} of a service is chosen there, by `brdfdb serve --snapshot`")
         return RemoteStore(root)
     from brdfdb.store import Store
 
-    return Store(root)
+    return Store(root, snapshot=snapshot)
 
 
 _LOADED_WHEN_USED = (

@@ -22,7 +22,7 @@ from brdfdb.error import Error
 from brdfdb.geometry import checked_angles, checked_vectors, radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
-from brdfdb.manifest import StoreError, read_json
+from brdfdb.manifest import StoreError, read_sealed
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, Parameter
@@ -110,23 +110,31 @@ class FamilyRecord(Sweep):
 
 
 def path_of(root: Path, name: str) -> Path:
-    """Where the record of a family lies in the store at `root`."""
+    """Return the path of the record of a family in the store at `root`."""
     return root / "families" / f"{name}.json"
 
 
 def read_record(path: Path) -> FamilyRecord:
-    """Read the record of a family; StoreError, naming the file, if it is none that this program reads."""
-    content = read_json(path)
+    """Read the record of a family; StoreError, naming the family, if it is none that this program reads."""
+    where = f"the family {path.stem}"
+    return record_from(read_sealed(path, where), where)
+
+
+def record_from(content: Mapping[str, Any], where: str) -> FamilyRecord:
+    """Return a family from its JSON; StoreError, beginning with `where`, if it is none that this program reads."""
     if (content.get("format"), content.get("version")) != (FORMAT, FORMAT_VERSION):
         raise StoreError(
-            f"{path} says format {content.get('format')} version {content.get('version')}, "
+            f"{where} is of format {content.get('format')} version {content.get('version')}, "
             f"this program reads {FORMAT} version {FORMAT_VERSION}"
         )
     try:
-        return FamilyRecord.model_validate(content)
+        record = FamilyRecord.model_validate(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise StoreError(f"{path} is damaged: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+        raise StoreError(f"{where} is damaged: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+    if where != f"the family {record.name}":
+        raise StoreError(f"{where} is damaged: its record is that of {record.name}")
+    return record
 
 
 def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], Table]:

@@ -27,7 +27,7 @@ from brdfdb.family import (
 from brdfdb.geometry import degrees, radians
 from brdfdb.layout import PLAIN
 from brdfdb.lookup import Table
-from brdfdb.manifest import StoreError, sync_directory, write_json
+from brdfdb.manifest import StoreError, sync_directory, write_sealed
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 from brdfdb.places import BANDS
@@ -297,7 +297,7 @@ def _written(sweep: Sweep, at: Mapping[str, float]) -> dict[str, float]:
 
 
 def recorded(root: Path, sweep: Sweep) -> FamilyRecord | None:
-    """The record of a family in the store at `root`, if it is there and of these very members; else None."""
+    """Return the record of a family in the store at `root`, if it is there and of these very members; else None."""
     try:
         record = read_record(path_of(root, sweep.name))
     except StoreError:
@@ -322,7 +322,7 @@ def write_family(root: str, sweep: Sweep) -> FamilyRecord:
         record = measure(sweep, Store(store))
         with writing(store, sweep.name):
             path.parent.mkdir(exist_ok=True)
-            write_json(path, record.model_dump(mode="json"), lock.path.parent)
+            write_sealed(path, record.model_dump(mode="json"), lock.path.parent)
             sync_directory(path.parent)
             sync_directory(store)
     return record
@@ -339,7 +339,7 @@ def verify_family(root: Path, name: str) -> int:
     store, path = Store(root), path_of(root, name)
     record = read_record(path)
     if not len(record.members) == len(record.request_sha256) == math.prod(map(len, record.axes.values())):
-        raise StoreError(f"{path} is damaged: its axes do not make {len(record.members)} members")
+        raise StoreError(f"the family {name} is damaged: its axes do not make {len(record.members)} members")
     for member, request_sha256 in zip(record.members, record.request_sha256, strict=True):
         try:
             if store.summary(member)["request_sha256"] != request_sha256:

@@ -22,8 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.described import Described, Stated
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, degrees, finished, spherical_angles
 from brdfdb.grids import Axis
+from brdfdb.manifest import NAME
 from brdfdb.parameters import Floats
-from brdfdb.store import NAME, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.store import StoreError, UnknownMaterialError, UnknownRevisionError
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,28 +1,29 @@
-"""The revisions of a material: how the current one stands to a request, history, rollback, verification, collection."""
+"""The revisions of a material: how the current one stands to a request, history, rollback, collection."""
 
 from __future__ import annotations
 
 import json
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
-
-import numpy as np
 
 from brdfdb.layout import digest
 from brdfdb.manifest import (
     Summary,
     check_manifest,
-    manifest_of,
     number_of,
-    read_json,
+    read_manifest,
+    read_snapshot,
+    snapshot_names,
+    whole_revisions,
 )
-from brdfdb.staging import BusyError, Lock, adoptable, point_to, summary_of, writing
+from brdfdb.staging import BusyError, Lock, adoptable, known_manifests, point_to, writing
 from brdfdb.store import Store, StoreError, UnknownMaterialError
 
-REQUIRED = ("title", "material", "table_version", "model", "model_version", "parameters", "source", "conventions")
+SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turns; no material has such a name
 
 
 @dataclass(frozen=True)
@@ -45,21 +46,19 @@ class Standing:
 
 
 def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
-    """How a material stands to a request, after a look at every byte of the revisions in question."""
+    """Return how a material stands to a request, after a look at every byte of the revisions in question."""
     wanted = digest(request)
-    pointer = root / "materials" / name / "HEAD.json"
-    why = "new"
-    if pointer.is_file():
-        try:
-            store = Store(root)
-            group, manifest_sha256 = store.location(name)
-            head = read_json(pointer)
-            if head.get("request_sha256") == wanted:
-                check_manifest(group, manifest_sha256, contents=True)
-                return Standing("current", group.name)
-            why = difference(store.attributes(name).get("request", {}), request)
-        except StoreError as error:
-            why = str(error)
+    store = Store(root)
+    try:
+        group, _, head = store.current(name)
+        if head["request_sha256"] == wanted:
+            store.verify(name)
+            return Standing("current", group.name)
+        why = difference(store.attributes(name).get("request", {}), request)
+    except UnknownMaterialError:
+        why = "new"
+    except StoreError as error:
+        why = str(error)
     found = adoptable(root, name, wanted)
     return Standing("missing", "", why) if found is None else Standing("adoptable", found, why)
 
@@ -104,18 +103,20 @@ def history(root: Path, name: str) -> list[Revision]:
     StoreError
         If a manifest cannot be read.
     """
-    current = Store(root).path(name)
-    return [Revision(group.name, summary_of(group), group == current) for group in _whole(current.parent)]
-
-
-def _whole(material: Path) -> list[Path]:
-    """The revisions of a material that have a directory and a manifest, oldest first."""
-    found = sorted((number_of(path.name), path) for path in material.iterdir())
-    return [path for number, path in found if number and path.is_dir() and manifest_of(path).is_file()]
+    current, _, head = Store(root).current(name)
+    return [
+        Revision(group.name, read_manifest(group, head["manifests"].get(group.name))[0]["summary"], group == current)
+        for group in whole_revisions(current.parent)
+    ]
 
 
 def rollback(root: Path, name: str, revision: str) -> str:
-    """Make an older revision current again, or a newer one; returns the one that was current.
+    """Make an older revision current again, or a newer one; this repairs a pointer that is missing or damaged, too.
+
+    Returns
+    -------
+    str
+        The revision that was current; empty if the pointer was missing or damaged.
 
     Raises
     ------
@@ -124,77 +125,20 @@ def rollback(root: Path, name: str, revision: str) -> str:
     StoreError
         If the material has no such revision, or it is damaged.
     """
-    current = Store(root).path(name)
+    store, material = Store(root), root / "materials" / name
+    if name not in store:
+        raise UnknownMaterialError(name, list(store))
     with Lock(root, name):
-        known = [group.name for group in _whole(current.parent)]
+        known = [group.name for group in whole_revisions(material)]
         if revision not in known:
-            raise StoreError(f"{name} has no revision {revision!r}; it has {', '.join(known)}")
-        before = Store(root).path(name).name
-        check_manifest(current.with_name(revision), None, contents=True)
+            raise StoreError(f"{name} has no revision {revision[:40]!r}; it has {', '.join(known)}")
+        before = ""
+        with suppress(StoreError):
+            before = store.head(name)
+        check_manifest(material / revision, known_manifests(material).get(revision), contents=True)
         with writing(root, name):
-            point_to(current.parent, revision)
+            point_to(material, revision)
     return before
-
-
-def verify(root: Path, name: str) -> int:
-    """Check all of the current revision of a material; returns its bytes.
-
-    Sizes and sha256 of its files against the manifest, that against the pointer, and that nothing else lies there;
-    every chunk is decoded, which checks its crc32c; dimensions, types and shapes agree, and the attributes are those of
-    a table.
-
-    Raises
-    ------
-    UnknownMaterialError
-        If the store has no such material.
-    StoreError
-        Naming what is damaged first.
-    """
-    import zarr
-
-    from brdfdb.whole import Whole
-
-    group, manifest_sha256 = Store(root).location(name)
-    where = f"{name} {group.name}"
-    files = check_manifest(group, manifest_sha256, contents=True)["files"]
-    for path in group.rglob("*"):
-        if path.is_file() and path.relative_to(group).as_posix() not in files:
-            raise StoreError(f"{where} is damaged: {path.relative_to(group)} does not belong there")
-    try:
-        opened = zarr.open_group(Whole(group, files), mode="r")
-        arrays = dict(opened.arrays())
-    except StoreError:
-        raise
-    except Exception as error:
-        raise StoreError(f"{where} is damaged: its metadata cannot be read: {error}") from error
-    attributes = dict(opened.attrs)
-    if missing := [key for key in REQUIRED if key not in attributes]:
-        raise StoreError(f"{where} is not a table: it lacks the attribute {missing[0]}")
-    sizes: dict[str, int] = {}
-    for key, array in arrays.items():
-        metadata: Any = array.metadata
-        dims = metadata.dimension_names or ()
-        if len(dims) != len(array.shape):
-            raise StoreError(f"{where} is not a table: {key} does not name its dimensions")
-        for dimension, size in zip(dims, array.shape, strict=True):
-            if sizes.setdefault(dimension, size) != size:
-                raise StoreError(
-                    f"{where} is not a table: {key} has {size} values along {dimension}, not {sizes[dimension]}"
-                )
-        if len(dims) > 1 and key in ("brdf", "parts") and array.dtype != np.float32:
-            raise StoreError(f"{where} is not a table: {key} is {array.dtype}, not float32")
-        step = array.chunks[0] if array.shape else 1
-        for number, start in enumerate(range(0, array.shape[0] if array.shape else 1, step)):
-            try:
-                array[start : start + step] if array.shape else array[...]
-            except StoreError:
-                raise
-            except Exception as error:
-                raise StoreError(f"{where} is damaged: chunk {number} of {key} cannot be decoded: {error}") from error
-    for dimension in sizes:
-        if dimension not in arrays:
-            raise StoreError(f"{where} is not a table: it lacks the coordinate {dimension}")
-    return sum(entry["size"] for entry in files.values())
 
 
 @dataclass
@@ -216,13 +160,14 @@ class Collected:
     freed: int = 0
 
 
-def collect(root: Path, keep: int = 2) -> Collected:
+def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
     """Remove what no reader is served and no build is at work on.
 
     Staging directories of builds that were broken off (they could have been resumed), revisions that are neither
-    current nor among the newest, and what crashes left behind: directories without a manifest, manifests without a
-    directory, temporary files. A reader that holds a decoded table keeps it; one that is just reading a revision that
-    goes reads the current one instead, or is told.
+    current nor among the newest nor named by a snapshot, and what crashes and others left behind: directories without
+    a manifest, manifests without a directory, temporary files, files in a revision that its manifest does not list. A
+    reader that holds a decoded table keeps it; one that is just reading a revision that goes reads the current one
+    instead, or is told.
 
     Parameters
     ----------
@@ -230,55 +175,99 @@ def collect(root: Path, keep: int = 2) -> Collected:
         Directory of the store.
     keep : int
         How many revisions of each material stay, the current one included; at least 1.
+    damaged : bool
+        Whether to read all other revisions that stay but the current one, and remove those that are damaged.
 
     Raises
     ------
     StoreError
-        If there is no store, or something cannot be removed.
+        If there is no store, a snapshot is damaged, or something cannot be removed.
     """
     if keep < 1:
         raise ValueError(f"keep: {keep} is not at least 1; the current revision always stays")
     store = Store(root)
     collected = Collected()
     try:
-        for path in root.glob(".brdfdb.json.*"):
-            _remove(root, path, collected)
-        staged, materials = root / ".staging", root / "materials"
-        names = {path.name for directory in (staged, materials) for path in directory.iterdir() if path.is_dir()}
-        for name in sorted(names):
-            try:
-                with Lock(root, name, wait=False) as lock:
-                    for path in lock.path.parent.iterdir():
-                        if path != lock.path:
-                            _remove(root, path, collected)
-                    if (materials / name).is_dir():
-                        _collect_material(store, materials / name, keep, collected)
-            except BusyError:
-                collected.busy.append(name)
-        for path in staged.iterdir():
-            if path.is_file():
-                _remove(root, path, collected)
+        with Lock(store.root, SNAPSHOTS):
+            _collect(store, keep, damaged, collected)
     except OSError as error:
         raise StoreError(f"cannot collect in the store at {root}: {error.filename}: {error.strerror}") from error
     return collected
 
 
-def _collect_material(store: Store, material: Path, keep: int, collected: Collected) -> None:
-    whole = _whole(material)
+def pinned(root: Path) -> dict[Path, str]:
+    """Return the revisions that snapshots name, each with the name of one; StoreError if a snapshot is damaged."""
+    found = {}
+    for name in snapshot_names(root):
+        for material, pin in read_snapshot(root, name)["materials"].items():
+            found[root / "materials" / material / pin["revision"]] = name
+    return found
+
+
+def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> None:
+    try:
+        stay = pinned(store.root)
+    except StoreError as error:
+        raise StoreError(f"nothing is collected, since {error}; remove it with `brdfdb snapshot --remove`") from error
+    for path in store.root.glob(".brdfdb.json.*"):
+        _remove(store.root, path, collected)
+    staged, materials = store.root / ".staging", store.root / "materials"
+    names = {path.name for directory in (staged, materials) for path in directory.iterdir() if path.is_dir()}
+    for name in sorted(names - {SNAPSHOTS}):
+        try:
+            with Lock(store.root, name, wait=False) as lock:
+                material = materials / name
+                if whole_revisions(material) and not (material / "HEAD.json").is_file():
+                    continue  # killed before the first pointer, or it was lost: the next build makes one
+                for path in lock.path.parent.iterdir():
+                    if path != lock.path:
+                        _remove(store.root, path, collected)
+                if material.is_dir():
+                    _collect_material(store, material, keep, damaged, set(stay), collected)
+        except BusyError:
+            collected.busy.append(name)
+    for path in staged.iterdir():
+        if path.is_file():
+            _remove(store.root, path, collected)
+
+
+def _collect_material(
+    store: Store, material: Path, keep: int, damaged: bool, stay: set[Path], collected: Collected
+) -> None:
+    whole, known = whole_revisions(material), known_manifests(material)
+    kept: set[Path] = set()
     try:
         current = store.path(material.name)
         others = [group for group in whole if group != current]
-        kept = {current, *others[max(0, len(others) - (keep - 1)) :]}
-    except UnknownMaterialError:  # never published: the next build of the same request takes what is whole
-        kept = set(whole)
+        kept = {current, *others[max(0, len(others) - (keep - 1)) :], *(group for group in others if group in stay)}
+    except UnknownMaterialError:  # nothing but what crashes left behind
+        current = material
     except StoreError:
         return  # nobody knows what the pointer pointed to: the next build repairs it
+    for group in sorted(kept & set(whole)):
+        if damaged and group != current and group not in stay:
+            try:
+                check_manifest(group, known.get(group.name), contents=True)
+            except StoreError:
+                kept.remove(group)
+                continue
+        for path in strangers(group, known.get(group.name)):
+            _remove(store.root, path, collected)
     for path in sorted(material.iterdir(), reverse=True):  # a manifest before its directory: that is then an orphan
         group = path.with_name(path.name.removesuffix(".MANIFEST.json"))
         if (number_of(group.name) and group not in kept) or path.name.startswith("."):
             _remove(store.root, path, collected)
     if not any(material.iterdir()):
         material.rmdir()
+
+
+def strangers(group: Path, digest: str | None) -> list[Path]:
+    """Return the files in a revision that its manifest does not list; none where the manifest is damaged."""
+    try:
+        files = read_manifest(group, digest)[0]["files"]
+    except StoreError:
+        return []
+    return [path for path in group.rglob("*") if path.is_file() and path.relative_to(group).as_posix() not in files]
 
 
 def _remove(root: Path, path: Path, collected: Collected) -> None:

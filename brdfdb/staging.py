@@ -18,7 +18,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
@@ -31,20 +31,29 @@ from numpy.typing import NDArray
 from brdfdb import tabulate
 from brdfdb.layout import Layout, digest
 from brdfdb.manifest import (
+    NAME,
     Entry,
+    Head,
     Manifest,
     StoreError,
     Summary,
     check_manifest,
     manifest_of,
     number_of,
+    read_head,
     read_json,
+    read_manifest,
+    read_sealed,
+    sealed,
     sha256_of,
-    swap_json,
+    swap_sealed,
+    sync_directory,
+    whole_revisions,
     write_file,
     write_json,
+    write_sealed,
 )
-from brdfdb.store import FORMAT, FORMAT_VERSION, NAME, Store
+from brdfdb.store import FORMAT, FORMAT_VERSION, DamagedMarkerError, Store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,28 +67,65 @@ class Block(TypedDict):
     kept: bool
 
 
-def make_store(root: Path) -> None:
-    """Make a store, or see that there is one.
+def make_store(root: Path) -> bool:
+    """Make a store, or see that there is one; return whether it was made.
+
+    A brdfdb.json that is missing or damaged beside tables of this version is written anew.
 
     Raises
     ------
     StoreError
         If `root` cannot be written, or is something other than a store.
     """
-    marker = root / "brdfdb.json"
+    marker, made = root / "brdfdb.json", False
     try:
         root.mkdir(parents=True, exist_ok=True)
         strangers = [path for path in root.iterdir() if not path.name.startswith(f".{marker.name}.")]
         if marker.exists():  # asked after the look around: another build may be making the store right now
-            Store(root)
-        elif strangers:
+            try:
+                Store(root)
+            except DamagedMarkerError:
+                if not _has_tables(root):
+                    raise
+                made = True
+        elif strangers and not _has_tables(root):
             raise StoreError(f"{root} is not empty and not a store; name an empty or a new directory")
         else:
-            swap_json(marker, {"format": FORMAT, "version": FORMAT_VERSION})
+            made = True
+        if made:
+            swap_sealed(marker, {"format": FORMAT, "version": FORMAT_VERSION})
         (root / "materials").mkdir(exist_ok=True)
         (root / ".staging").mkdir(exist_ok=True)
+        if made:
+            sync_directory(root)
     except OSError as error:
         raise StoreError(f"cannot write a store at {root}: {error.strerror or error}") from error
+    return made and not strangers
+
+
+def _has_tables(root: Path) -> bool:
+    """Return whether a revision in `root` has a manifest of this version."""
+    for path in root.glob("materials/*/r*.MANIFEST.json"):
+        with suppress(StoreError):
+            read_sealed(path, path.parent.name)
+            return True
+    return False
+
+
+def remove_begun(root: Path) -> None:
+    """Remove a store in which nothing was built: plans and empty directories; anything else makes it stay."""
+    if any(root.glob(".staging/*/*/blocks/*")) or any(root.glob("materials/*")):
+        return
+    with suppress(OSError, BusyError, StoreError):
+        for staged in list((root / ".staging").iterdir()):
+            with Lock(root, staged.name, wait=False):
+                for path in staged.iterdir():
+                    if path.is_dir():
+                        shutil.rmtree(path)
+        (root / "materials").rmdir()
+        (root / ".staging").rmdir()
+        (root / "brdfdb.json").unlink()
+        root.rmdir()
 
 
 @contextmanager
@@ -156,6 +202,7 @@ class Lock:
                 self.path.parent.rmdir()
         except OSError:  # another build has come in: it is theirs
             pass
+        fcntl.flock(self._handle, fcntl.LOCK_UN)  # closing is not enough where a child was forked meanwhile
         self._handle.close()
         self._handle = None
 
@@ -174,9 +221,10 @@ def prepare(root: Path, name: str, request: Mapping[str, Any], layout: str) -> P
     staging = directory_of(root, name, digest(request))
     with writing(root, name):
         (staging / "blocks").mkdir(parents=True, exist_ok=True)
-        for file, text in (("request.json", json.dumps(request, sort_keys=True)), ("layout.json", layout)):
-            if not (staging / file).is_file() or (staging / file).read_bytes() != text.encode():
-                write_file(staging / file, text.encode(), staging)
+        texts = sealed(dict(request)), sealed(json.loads(layout))
+        for file, text in zip(("request.json", "layout.json"), texts, strict=True):
+            if not (staging / file).is_file() or (staging / file).read_bytes() != text:
+                write_file(staging / file, text, staging)
     return staging
 
 
@@ -189,9 +237,9 @@ def planned(root: Path, name: str, request: Mapping[str, Any]) -> str | None:
     """The layout that an earlier build of the same request left in the staging directory, as JSON; None without."""
     staging = directory_of(root, name, digest(request))
     try:
-        if read_json(staging / "request.json") != json.loads(json.dumps(request)):
+        if read_sealed(staging / "request.json", name) != json.loads(json.dumps(request)):
             return None
-        text = (staging / "layout.json").read_text(encoding="utf-8")
+        text = json.dumps(read_sealed(staging / "layout.json", name))
         _layout(text)
     except (OSError, StoreError, ValueError, KeyError):
         return None
@@ -278,7 +326,7 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
 
     directory = Path(staging)
     table = _layout(layout)
-    request = read_json(directory / "request.json")
+    request = read_sealed(directory / "request.json", table.material.name)
     with writing(directory.parent.parent.parent, table.material.name):
         write_file(directory / "table" / table.variable / "zarr.json", array_metadata(table), directory)
     frame = tabulate.frame(table).assign_attrs(
@@ -343,53 +391,56 @@ def publish(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) ->
             "bytes": stored,
         }
         manifest: Manifest = {"summary": summary, "files": dict(files)}
+        for directory, _, _ in os.walk(table, topdown=False):
+            sync_directory(Path(directory))
         material.mkdir(exist_ok=True)
+        sync_directory(material.parent)
         revision = f"r{newest(material) + 1:06d}"
-        write_json(manifest_of(material / revision), manifest, staging)
+        write_sealed(manifest_of(material / revision), manifest, staging)
         table.rename(material / revision)
+        sync_directory(material)
         point_to(material, revision)
         shutil.rmtree(staging, ignore_errors=True)
     return revision, stored
 
 
 def point_to(material: Path, revision: str) -> None:
-    """Swap the pointer of a material to one of its revisions; the lock must be held."""
-    path = manifest_of(material / revision)
-    summary = summary_of(material / revision)
-    head = {
+    """Swap the pointer of a material to one of its revisions; the lock must be held.
+
+    Raises
+    ------
+    StoreError
+        If the manifest of the revision is damaged, or not the one that the pointer before knew.
+    """
+    known = known_manifests(material)
+    manifest, manifests = read_manifest(material / revision, known.get(revision))[0], {}
+    for group in whole_revisions(material):
+        with suppress(StoreError):  # of another revision, whose damage `verify` names
+            manifests[group.name] = known.get(group.name) or read_manifest(group, None)[1]
+    head: Head = {
+        "material": material.name,
         "revision": revision,
-        "manifest_sha256": sha256_of(path),
-        **summary,
+        **manifest["summary"],
+        "manifests": manifests,
         "last": newest(material),
     }
-    swap_json(material / "HEAD.json", head)
+    swap_sealed(material / "HEAD.json", head)
 
 
-def summary_of(group: Path) -> Summary:
-    """What the manifest of a revision says of it; of one from before manifests did, what its attributes say."""
-    found: Any = read_json(manifest_of(group))
-    if "summary" in found:
-        summary: Summary = found["summary"]
-        return summary
-    attributes = read_json(group / "zarr.json")["attributes"]
-    created = datetime.fromtimestamp(manifest_of(group).stat().st_mtime, UTC)
-    return {
-        "title": attributes["title"],
-        "model": attributes["model"],
-        "model_version": attributes["model_version"],
-        "request_sha256": "",
-        "error_p99": None,
-        "created": created.isoformat(timespec="seconds"),
-        "bytes": sum(entry["size"] for entry in found["files"].values()),
-    }
+def known_manifests(material: Path) -> dict[str, str]:
+    """Return the digests of manifests that the pointer of a material knows; none of one that is damaged or missing."""
+    with suppress(StoreError):
+        head = read_head(material)
+        return {} if head is None else head["manifests"]
+    return {}
 
 
 def newest(material: Path) -> int:
-    """The highest number that a revision of a material ever had, also of one that was removed since; 0 without any."""
-    try:
-        last = int(read_json(material / "HEAD.json").get("last", 0))
-    except (StoreError, TypeError, ValueError):
-        last = 0
+    """Return the highest number that a revision of a material ever had, also one removed since; 0 without any."""
+    last = 0
+    with suppress(StoreError):
+        head = read_head(material)
+        last = 0 if head is None else head["last"]
     numbers = (number_of(name.removesuffix(".MANIFEST.json")) for name in os.listdir(material))
     return max(last, *numbers, 0)
 
@@ -438,18 +489,13 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
 
 
 def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
-    """The newest revision of a material that answers a request and is undamaged; None without any."""
+    """Return the newest revision of a material that answers a request and is undamaged; None without any."""
     material = root / "materials" / name
-    try:
-        numbers = sorted((number_of(entry) for entry in os.listdir(material)), reverse=True)
-    except OSError:
-        return None
-    for number in numbers:
-        group = material / f"r{number:06d}"
-        try:
-            if number and summary_of(group)["request_sha256"] == request_sha256:
-                check_manifest(group, None, contents=True)
+    known = known_manifests(material)
+    for group in reversed(whole_revisions(material)):
+        with suppress(StoreError):
+            manifest, digest = read_manifest(group, known.get(group.name))
+            if manifest["summary"]["request_sha256"] == request_sha256:
+                check_manifest(group, digest, contents=True)
                 return group.name
-        except (StoreError, KeyError, TypeError, OSError):
-            continue
     return None

@@ -16,7 +16,7 @@ from brdfdb.family_records import POINTS, measure, parameter_points
 from brdfdb.grids import Grid
 from brdfdb.layout import Interpolation, Layout
 from brdfdb.lookup import Table, table_from
-from brdfdb.manifest import StoreError
+from brdfdb.manifest import StoreError, sealed
 from brdfdb.materials import Material
 from brdfdb.representations import of_family, of_table
 from brdfdb.tabulate import tabulate
@@ -332,13 +332,20 @@ def test_a_record_comes_back_and_a_damaged_one_is_named(tmp_path: Path, families
     path = path_of(tmp_path, "copper")
     path.parent.mkdir()
     content = json.loads(json.dumps(record.model_dump(mode="json")))
-    path.write_text(json.dumps(content), encoding="utf-8")
+    path.write_bytes(sealed(content))
     assert read_record(path) == record == FamilyRecord.model_validate(content)
-    path.write_text(json.dumps({**content, "version": 2}), encoding="utf-8")
-    with pytest.raises(StoreError, match=r"copper\.json says format brdfdb-family version 2, this program reads"):
-        read_record(path)
-    path.write_text(json.dumps({**content, "points": "many"}), encoding="utf-8")
-    with pytest.raises(StoreError, match=r"copper\.json is damaged: points: "):
+    for change, said in (
+        ({"version": 2}, r"is of format brdfdb-family version 2, this program reads brdfdb-family version 1$"),
+        ({"points": "many"}, r"is damaged: points: "),
+        ({"name": "gold"}, r"is damaged: its record is that of gold$"),
+    ):
+        path.write_bytes(sealed({**content, **change}))
+        with pytest.raises(StoreError, match=rf"^the family copper {said}"):
+            read_record(path)
+    data = bytearray(sealed(content))
+    data[data.index(b'"points": 2') + 10] ^= 1  # 256 becomes 356
+    path.write_bytes(data)
+    with pytest.raises(StoreError, match=r"^the family copper is damaged: the content of copper\.json changed$"):
         read_record(path)
 
 

@@ -24,7 +24,7 @@ from brdfdb import manifest, staging
 from brdfdb.accuracy import measure
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout, digest
-from brdfdb.manifest import StoreError, check_manifest
+from brdfdb.manifest import StoreError, check_manifest, unsealed
 from brdfdb.materials import Material
 from brdfdb.staging import BusyError, Lock, planned, prepare, publish, publish_dataset, write_block, write_frame
 from brdfdb.tabulate import tabulate
@@ -94,7 +94,8 @@ def test_a_name_that_would_not_be_found_again_is_refused(tmp_path: Path, name: s
 
 def test_an_empty_directory_becomes_a_store(tmp_path: Path) -> None:
     assert publish_dataset(tmp_path, "white", lambert(0.5))[0] == "r000001"
-    assert json.loads((tmp_path / "brdfdb.json").read_bytes()) == {"format": "brdfdb", "version": 1}
+    marker = unsealed((tmp_path / "brdfdb.json").read_bytes(), "", "")
+    assert marker == {"format": "brdfdb", "version": 2}
 
 
 def test_what_a_build_that_was_killed_at_once_left_behind_becomes_a_store(tmp_path: Path) -> None:
@@ -150,6 +151,32 @@ def test_a_write_that_fails_leaves_the_old_revision_served(
     assert rho(root) == 0.75
 
 
+def test_every_directory_of_a_revision_is_synced_before_the_pointer_is_swapped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int] = []
+    sync, replace = os.fsync, os.replace
+    before: list[set[int]] = []
+
+    def fsync(handle: int) -> None:
+        sync(handle)
+        synced.append(os.fstat(handle).st_ino)
+
+    def swap(source: Any, target: Any) -> None:
+        if Path(target).name == "HEAD.json":
+            before.append(set(synced))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(os, "replace", swap)
+    publish_dataset(tmp_path, "white", lambert(0.5))
+    (known,) = before
+    group = tmp_path / "materials" / "white" / "r000001"
+    directories = [group, *(path for path in group.rglob("*") if path.is_dir()), *list(group.parents)[:3]]
+    assert len(directories) > 10
+    assert [path for path in directories if path.stat().st_ino not in known] == []
+
+
 KILLED = """
 import os, signal, sys
 from pathlib import Path
@@ -168,8 +195,8 @@ staging.publish_dataset(root, "white", xr.Dataset({"brdf": (("theta_i", "theta_r
 
 
 @pytest.mark.parametrize(
-    "step", ["staging write_file", "staging publish", "staging write_json", "Path rename", "staging point_to",
-             "staging swap_json", "manifest sync_directory"],
+    "step", ["staging write_file", "staging publish", "staging sync_directory", "staging write_sealed", "Path rename",
+             "staging point_to", "staging swap_sealed", "manifest sync_directory"],
 )  # fmt: skip
 def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(root: Path, step: str) -> None:
     command = [sys.executable, "-c", KILLED, root, *step.split()]
@@ -184,7 +211,7 @@ def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(ro
     assert (rho(root), store.head("white"), list(store)) == (0.25, "r000001", ["white"])
     before = contents(root / "materials")
     revision, _ = publish_dataset(root, "white", lambert(0.75))
-    taken = step in ("Path rename", "staging point_to", "staging swap_json")
+    taken = step in ("Path rename", "staging point_to", "staging swap_sealed")
     assert revision == ("r000003" if taken else "r000002")
     assert staged(root) == []
     after = contents(root / "materials")

@@ -21,6 +21,7 @@ from brdfdb import chunks
 from brdfdb import store as module
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout
+from brdfdb.manifest import Head, sealed, unsealed
 from brdfdb.materials import Material
 from brdfdb.staging import publish_dataset
 from brdfdb.store import Store, StoreError, UnknownMaterialError, UnknownRevisionError
@@ -97,7 +98,7 @@ def test_the_manifest_holds_size_and_digest_of_every_file_and_the_pointer_that_o
     assert stored == sum(len(data) for data in contents(group).values())
     head = json.loads(pointer(root, "copper").read_bytes())
     manifest = (group.parent / f"{revision}.MANIFEST.json").read_bytes()
-    assert (head["revision"], head["manifest_sha256"]) == (revision, hashlib.sha256(manifest).hexdigest())
+    assert (head["revision"], head["manifests"]) == (revision, {revision: hashlib.sha256(manifest).hexdigest()})
 
 
 def test_nothing_is_left_of_a_build_that_went_well(root: Path) -> None:
@@ -157,16 +158,16 @@ def test_an_open_store_serves_the_new_head_and_the_old_table_stays_whole(root: P
 
 def test_a_table_never_mixes_two_revisions(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = brdfdb.open(root)
-    read = module.json_object
+    read = module.head_from
     waiting = [lambert(0.75)]
 
-    def overtaken(path: Path, data: bytes) -> dict[str, Any]:
-        content = read(path, data)
-        if path.name == "HEAD.json" and waiting:  # another process publishes while we read
+    def overtaken(path: Path, data: bytes) -> Head:
+        head = read(path, data)
+        if waiting:  # another process publishes while we read
             publish(root, white=waiting.pop())
-        return content
+        return head
 
-    monkeypatch.setattr(module, "json_object", overtaken)
+    monkeypatch.setattr(module, "head_from", overtaken)
     table = store["white"]
     assert not waiting
     assert (table.revision, float(table.brdf[0, 0, 0])) == ("r000001", np.float32(0.25 / np.pi))
@@ -348,6 +349,22 @@ def test_a_damaged_chunk_is_found_before_xarray_reads_nan_in_its_place(
         brdfdb.open(root).dataset("white")
 
 
+def test_a_chunk_that_is_damaged_while_a_dataset_is_read_is_named(root: Path) -> None:
+    with brdfdb.open(root).dataset("white") as lazy:
+        flip(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
+        with pytest.raises(StoreError, match=r"^white r000001 is damaged: the content of brdf/c/0/0/0 changed$"):
+            lazy["brdf"].load()
+
+
+def test_a_store_of_a_relative_path_stays_where_it_was_opened(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = root.parent / "elsewhere" / root.name
+    publish(other, white=lambert(0.75))
+    monkeypatch.chdir(root.parent)
+    store = brdfdb.open(root.name)
+    monkeypatch.chdir(other.parent)
+    assert (rho(store), store.path("white")) == (0.25, root / "materials" / "white" / "r000001")
+
+
 @pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
 def test_damaged_attributes_are_not_served(root: Path, damage: Callable[[Path], None]) -> None:
     damage(root / "materials" / "white" / "r000001" / "zarr.json")
@@ -378,19 +395,24 @@ def test_any_flipped_bit_of_a_chunk_is_found(root: Path) -> None:
         b"[]",
         b'"r000001"',
         b"{}",
-        b'{"revision": "r000001"}',
-        b'{"revision": 1, "manifest_sha256": "0"}',
-        b'{"revision": "../../../white/r000001", "manifest_sha256": "0"}',
-        b'{"revision": "", "manifest_sha256": "0"}',
-        b'{"revision": "r000009", "manifest_sha256": "0"}',
-        b'{"revision": "r000001", "manifest_sha256": "0"}',
-        b'{"revision": "r000001", "manifest_sha256": null}',
+        {"revision": 1},
+        {"revision": "../../../white/r000001", "manifests": {"../../../white/r000001": "0"}},
+        {"revision": "", "manifests": {"": "0"}},
+        {"revision": "r000009"},
+        {"revision": "r000009", "manifests": {"r000009": "0"}},
+        {"manifests": {"r000001": "0"}},
+        {"manifests": {"r000001": None}},
+        {"manifests": None},
+        {"material": "black"},
     ],
 )
 @pytest.mark.parametrize("ask", [Store.__getitem__, Store.verify, Store.attributes, Store.dataset])
-def test_a_pointer_that_was_changed_is_not_followed(root: Path, content: bytes, ask: Any) -> None:
+def test_a_pointer_that_was_changed_is_not_followed(root: Path, content: bytes | dict[str, Any], ask: Any) -> None:
+    """Not even one that was sealed again."""
+    if isinstance(content, dict):
+        content = sealed({**unsealed(pointer(root).read_bytes(), "", ""), **content})
     pointer(root).write_bytes(content)
-    with pytest.raises(StoreError):
+    with pytest.raises(StoreError, match=r"^white .*(is damaged|manifest)"):
         ask(brdfdb.open(root), "white")
 
 
@@ -416,8 +438,11 @@ def test_a_store_of_another_format_is_neither_read_nor_written(tmp_path: Path, m
 
 
 def test_another_version_is_named(tmp_path: Path) -> None:
-    (tmp_path / "brdfdb.json").write_text('{"format": "brdfdb", "version": 2}')
-    with pytest.raises(StoreError, match=r"says format brdfdb version 2, this program reads brdfdb version 1$"):
+    (tmp_path / "brdfdb.json").write_bytes(sealed({"format": "brdfdb", "version": 3}))
+    with pytest.raises(StoreError, match=r"says format brdfdb version 3, this program reads brdfdb version 2; `brdfdb"):
+        brdfdb.open(tmp_path)
+    (tmp_path / "brdfdb.json").write_bytes(b'{\n "format": "brdfdb",\n "version": 1\n}')  # before there were seals
+    with pytest.raises(StoreError, match=r"says format brdfdb version 1, .*; `brdfdb build --store DIR` builds its"):
         brdfdb.open(tmp_path)
 
 

@@ -10,8 +10,8 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
-from brdfdb.manifest import check_manifest, manifest_digest, manifest_of, sha256_of
-from brdfdb.store import StoreError, UnknownRevisionError
+from brdfdb.manifest import check_manifest, manifest_of, sha256_of
+from brdfdb.store import StoreError
 from brdfdb_api.documented import answers
 from brdfdb_api.responses import RequestError, cache_headers, not_modified
 from brdfdb_api.routes import both, query_names, shelf_of
@@ -33,12 +33,12 @@ files = APIRouter()
 )
 def download(request: Request, name: str, revision: str | None = None) -> Response:
     """A revision as one zip file, not compressed again: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
-    group = _group(request, name, revision)
-    headers = cache_headers(f"{name}-{group.name}-{manifest_digest(group)[:16]}", "zip", immutable=revision is not None)
+    group, digest = _located(request, name, revision)
+    headers = cache_headers(f"{name}-{group.name}-{digest[:16]}", "zip", immutable=revision is not None)
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
-    listed = sorted(check_manifest(group, None, contents=True)["files"])
+    listed = sorted(check_manifest(group, digest, contents=True)["files"])
     return StreamingResponse(_zipped(group, listed), media_type=ZIP, headers=headers)
 
 
@@ -50,8 +50,8 @@ def download(request: Request, name: str, revision: str | None = None) -> Respon
 )
 def stored_file(request: Request, name: str, revision: str, file: str) -> Response:
     """A file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these."""
-    group = _group(request, name, revision)
-    listed = check_manifest(group, None, contents=False)["files"]
+    group, digest = _located(request, name, revision)
+    listed = check_manifest(group, digest, contents=False)["files"]
     if file not in listed:
         raise RequestError(404, f"{name} {revision} has no such file")
     kind = "json" if file.endswith(".json") else "file"  # JSON may be compressed on its way
@@ -64,16 +64,16 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
     return FileResponse(group / file, media_type=media, headers=headers)
 
 
-def _group(request: Request, name: str, revision: str | None) -> Path:
-    """Directory of a revision that the store has; names are compared with what is there, never joined unseen."""
+def _located(request: Request, name: str, revision: str | None) -> tuple[Path, str]:
+    """Return the directory of a revision that the store has, and the digest of its manifest.
+
+    Names are compared with what is there, never joined unseen.
+    """
     shelf = shelf_of(request)
-    current = shelf.head(name)
-    if revision not in (None, current) and revision not in shelf.store.revisions(name):
-        raise UnknownRevisionError(f"{name} has no revision {str(revision)[:40]!r}; the current one is {current}")
-    group = shelf.store.path(name).with_name(revision or current)
+    group, digest = shelf.store.located(name, revision or shelf.head(name))
     if not manifest_of(group).is_file():
         raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
-    return group
+    return group, digest
 
 
 class _Pieces:

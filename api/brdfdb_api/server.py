@@ -28,7 +28,7 @@ LOG = logging.getLogger("brdfdb.server")
 OTHERS = ("uvicorn", LOG.name, "py.warnings")  # loggers beside that of requests
 
 
-def serve(store_dir: Path, host: str, port: int, workers: int = 1) -> None:
+def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str | None = None) -> None:
     """Serve a store over HTTP until interrupted.
 
     Parameters
@@ -41,11 +41,13 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1) -> None:
         0 to 65535; 0 takes any free port.
     workers : int
         Processes that answer, each with tables of its own in memory.
+    snapshot : str, optional
+        Name of the snapshot that is served whatever is built later; by default ``BRDFDB_SNAPSHOT``, or none.
 
     Raises
     ------
     brdfdb.store.StoreError
-        If there is no store at `store_dir`.
+        If there is no store at `store_dir`, or no such snapshot in it.
     ValueError
         If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.
     OSError
@@ -54,8 +56,10 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1) -> None:
     if not 0 <= port <= 65535:
         raise ValueError(f"port: {port} is outside [0, 65535]")
     os.environ["BRDFDB_STORE"] = str(store_dir)  # workers read it
-    Settings.from_environment()
-    brdfdb.open(store_dir)
+    if snapshot is not None:
+        os.environ["BRDFDB_SNAPSHOT"] = snapshot
+    settings = Settings.from_environment()
+    brdfdb.open(store_dir, snapshot=settings.snapshot)
     config = _config()
     with contextlib.ExitStack() as stack:
         listener = stack.enter_context(_listening(host, port))

@@ -33,6 +33,8 @@ class Settings:
         own. Separated by commas in the environment.
     log_level : str
         "info" logs each request as a line of JSON, "warning" those that were refused, "error" those that failed here.
+    snapshot : str or None
+        Name of the snapshot of the store that is served; by default what is current.
     """
 
     store: Path = Path("brdf-store")
@@ -42,6 +44,7 @@ class Settings:
     cache_bytes: int = 256 * 2**20
     cors_origins: tuple[str, ...] = ()
     log_level: LogLevel = "info"
+    snapshot: str | None = None
 
     @property
     def audit_file(self) -> Path:
@@ -75,6 +78,7 @@ class Settings:
             cache_bytes=_positive(environ, "BRDFDB_CACHE_BYTES", cls.cache_bytes),
             cors_origins=tuple(origin for origin in origins if origin),
             log_level=cast(LogLevel, level),
+            snapshot=environ.get("BRDFDB_SNAPSHOT") or None,
         )
 
 

@@ -48,6 +48,7 @@ class Shelf:
 
     def __init__(self, settings: Settings, store: Store | None = None) -> None:
         self._settings = settings
+        self._root = settings.store.absolute()  # as it is now, not when the store is opened
         self._store = store
         self._seen: set[str] = set()
         self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
@@ -64,7 +65,7 @@ class Shelf:
     def store(self) -> Store:
         """The store; StoreError where there is none."""
         if self._store is None:
-            self._store = Store(self._settings.store, self._settings.cache_bytes)
+            self._store = Store(self._root, self._settings.cache_bytes, snapshot=self._settings.snapshot)
         return self._store
 
     def held(self, name: str) -> Table | None:

@@ -15,7 +15,7 @@ from typing import Any
 from brdfdb.family import FamilyRecord, Sweep
 from brdfdb.family_records import recorded, write_family
 from brdfdb.layout import Layout, digest
-from brdfdb.manifest import Entry, StoreError
+from brdfdb.manifest import Entry, StoreError, read_manifest
 from brdfdb.revisions import Standing, standing
 from brdfdb.staging import (
     Block,
@@ -28,7 +28,7 @@ from brdfdb.staging import (
     point_to,
     prepare,
     publish,
-    summary_of,
+    remove_begun,
     write_block,
     write_frame,
     writing,
@@ -168,21 +168,27 @@ def build(
     RecipeError
         Before anything is written, if the recipe cannot be built.
     ValueError
-        If a single task does not fit into `memory`, or the tables do not fit on the disk. On given grids, this is
-        found before anything is written.
+        If a single task does not fit into `memory`, or the tables do not fit on the disk. A store that was made for
+        them is removed again.
     StoreError
         If the store cannot be written. What was published stays, and so does every block that is whole: the next build
         of the same recipe goes on from there. Any other error of a table lets the others be built first.
     """
     jobs = recipe.jobs()
     sweeps = recipe.sweeps(jobs)
-    if not root.exists():  # refuse what needs no plan before anything is written
-        layouts = [job.layout() for job in jobs if job.grid is not None]
-        for layout in layouts:
-            resources.check_memory(f"a block of {layout.material.name}", resources.task_bytes(layout), memory)
-        resources.check_disk(sum(map(resources.table_bytes, layouts)), root)
-    make_store(root)
-    return _Builder(jobs, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory).run()
+    root = root.absolute()  # workers may be in another directory
+    existed = root.exists()
+    made = make_store(root)
+    try:
+        return _Builder(
+            jobs, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory
+        ).run()
+    except ValueError:
+        if made:
+            remove_begun(root)
+            if existed:
+                root.mkdir(exist_ok=True)
+        raise
 
 
 class _Builder:
@@ -300,7 +306,7 @@ class _Builder:
 
     def _is_current(self, job: Job, revision: str) -> None:
         name = job.material.name
-        stored = summary_of(self.root / "materials" / name / revision)["bytes"]
+        stored = read_manifest(self.root / "materials" / name / revision, None)[0]["summary"]["bytes"]
         self.built[name] = Built(job, "unchanged", revision, stored)
         self.report({"event": "unchanged", "material": name, "revision": revision})
 
@@ -365,7 +371,7 @@ class _Builder:
             with writing(self.root, name):
                 point_to(self.root / "materials" / name, found.revision)
             discard(self.root, name, job.request)  # where the build was killed that made this revision
-            stored = summary_of(self.root / "materials" / name / found.revision)["bytes"]
+            stored = read_manifest(self.root / "materials" / name / found.revision, None)[0]["summary"]["bytes"]
             self.built[name] = Built(job, "adopted", found.revision, stored, found.why)
             self.report({"event": "adopted", "material": name, "revision": found.revision, "why": found.why})
         else:

@@ -232,7 +232,8 @@ def _parser() -> argparse.ArgumentParser:
     verify = command(
         "verify",
         _verify,
-        "Verify tables: sizes, sha256, each chunk with its crc32c, dimensions and attributes; and families.",
+        "Verify tables: sizes, sha256, each chunk with its crc32c, dimensions and attributes; families and snapshots. "
+        "Say which command repairs what is wrong.",
     )
     verify.add_argument("names", nargs="*", metavar="NAME", help="materials and families (default: all)")
 
@@ -240,7 +241,8 @@ def _parser() -> argparse.ArgumentParser:
         "gc",
         _gc,
         "Remove builds that were broken off and could be resumed, revisions that are neither current nor kept, and "
-        "what crashes left behind. Nothing of a material that a build is at work on. Readers may be running: tables "
+        "what crashes left behind. Nothing that a snapshot names, and nothing of a material that a build is at work "
+        "on. Readers may be running: tables "
         "that they hold stay, a revision that is removed while it is read is never read as data.",
     )
     gc.add_argument(
@@ -251,13 +253,37 @@ def _parser() -> argparse.ArgumentParser:
         help="revisions of each material that stay: the current one and the newest others (default: %(default)s)",
     )
 
+    gc.add_argument(
+        "--damaged",
+        action="store_true",
+        help="read all other revisions that stay, and remove those that are damaged and neither current nor in a "
+        "snapshot",
+    )
+
+    snapshot = command(
+        "snapshot",
+        _snapshot,
+        "Name the current revisions of all materials and families of the store, for good; without a name, list the "
+        "snapshots.",
+    )
+    snapshot.add_argument("name", nargs="?", metavar="NAME", help="lower-case letters, digits and single hyphens")
+    snapshot.add_argument("--remove", action="store_true", help="remove the snapshot; the revisions stay until gc")
+
+    for reader in (listing, show, lookup):
+        _pinning(reader)
+
     serve = command("serve", _serve, "Answer lookups over HTTP.")
     serve.add_argument("--host", default="127.0.0.1", help="address to listen on (default: %(default)s)")
     serve.add_argument("--port", type=int, default=8000, help="port (default: %(default)s)")
     serve.add_argument(
         "--workers", type=_up_to(MOST_JOBS), default=1, metavar="N", help="processes (default: %(default)s)"
     )
+    _pinning(serve)
     return parser
+
+
+def _pinning(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--snapshot", metavar="NAME", help="read the store as this snapshot names it")
 
 
 def _positive(text: str) -> int:
@@ -334,7 +360,21 @@ def _verify(options: argparse.Namespace) -> int:
 def _gc(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import maintain
 
-    maintain.collect(options.store, options.keep)
+    maintain.collect(options.store, options.keep, damaged=options.damaged)
+    return 0
+
+
+def _snapshot(options: argparse.Namespace) -> int:
+    from brdfdb_pipelines import maintain
+
+    if options.remove and options.name is None:
+        raise ValueError("snapshot: --remove needs the NAME of a snapshot")
+    if options.remove:
+        maintain.remove_snapshot(options.store, options.name)
+    elif options.name is not None:
+        maintain.snapshot(options.store, options.name)
+    else:
+        maintain.list_snapshots(options.store)
     return 0
 
 
@@ -397,6 +437,7 @@ def _lookup(options: argparse.Namespace) -> int:
         settings=options.set,
         as_json=options.json,
         with_error=options.with_error,
+        snapshot=options.snapshot,
     )
     return 0
 
@@ -414,21 +455,21 @@ def _list(options: argparse.Namespace) -> int:
     if options.presets:
         inspect.list_presets()
     else:
-        inspect.list_store(options.store)
+        inspect.list_store(options.store, snapshot=options.snapshot)
     return 0
 
 
 def _show(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import inspect
 
-    inspect.show(options.store, options.name)
+    inspect.show(options.store, options.name, snapshot=options.snapshot)
     return 0
 
 
 def _serve(options: argparse.Namespace) -> int:
     from brdfdb_api.server import serve
 
-    serve(options.store, options.host, options.port, options.workers)
+    serve(options.store, options.host, options.port, options.workers, options.snapshot)
     return 0
 
 

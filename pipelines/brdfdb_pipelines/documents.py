@@ -38,6 +38,10 @@ def schema(name: str) -> str:
     """The text of ``schemas/<name>.schema.json``."""
     dialect = "https://json-schema.org/draft/2020-12/schema"
     document: dict[str, Any] = {"$schema": dialect, **SCHEMAS[name].model_json_schema()}
+    if name == "family":  # the file that the store keeps begins with its digest
+        seal = {"description": "of the lines below the first", "pattern": "^[0-9a-f]{64}$", "type": "string"}
+        document["properties"] = {"sha256": seal, **document["properties"]}
+        document["required"] = ["sha256", *document["required"]]
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 

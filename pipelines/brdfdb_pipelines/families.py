@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from brdfdb.manifest import read_json
-from brdfdb.store import Store
+from brdfdb.store import Store, StoreError
 from brdfdb_pipelines import terminal
 
 if TYPE_CHECKING:
@@ -18,11 +17,16 @@ def is_family(store: Store, name: str) -> bool:
     return name not in store and name in store.families()
 
 
-def print_list(store: Store) -> None:
-    """Print a line for each family of a store, if it has any: what its record says, without a look at the members."""
+def print_list(store: Store) -> list[str]:
+    """Print a line for each family of a store from its record alone; return what is damaged."""
     rows = []
+    damaged = []
     for name in store.families():
-        record = read_json(store.root / "families" / f"{name}.json")
+        try:
+            record = store.family_content(name)
+        except StoreError as error:
+            damaged.append(str(error))
+            continue
         over = ", ".join(f"{x} {v[0]:g} to {v[-1]:g}" for x, v in record.get("axes", {}).items())
         p99 = record.get("error", {}).get("overall", {}).get("p99")
         rows.append(
@@ -38,6 +42,7 @@ def print_list(store: Store) -> None:
     if rows:
         columns = ("family", "title", "model", "tables", "over", "error (p99)")
         terminal.print_table(f"{len(rows)} families", columns, rows, numbers=("tables", "error (p99)"))
+    return damaged
 
 
 def show(family: Family) -> None:

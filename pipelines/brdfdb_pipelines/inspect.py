@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
 
-def list_store(root: Path) -> None:
-    """Print a line for each material of a store, and for each family."""
-    store = brdfdb.open(root)
+def list_store(root: Path, *, snapshot: str | None = None) -> None:
+    """Print a line for each material of a store, or of a snapshot of it, and for each family."""
+    store = brdfdb.open(root, snapshot=snapshot)
     rows, damaged = [], []
     for name in store:
         try:
@@ -38,7 +38,7 @@ def list_store(root: Path) -> None:
         rows,
         numbers=("error (p99)",),
     )
-    families.print_list(store)
+    damaged += families.print_list(store)
     if damaged:
         raise StoreError("; ".join(damaged))
 
@@ -51,9 +51,9 @@ def list_presets() -> None:
     terminal.print_table(f"{len(rows)} built-in materials", ("material", "title", "model", "source"), rows)
 
 
-def show(root: Path, name: str) -> None:
-    """Print what a store knows of a material or a family."""
-    store = brdfdb.open(root)
+def show(root: Path, name: str, *, snapshot: str | None = None) -> None:
+    """Print what a store, or a snapshot of it, knows of a material or a family."""
+    store = brdfdb.open(root, snapshot=snapshot)
     if families.is_family(store, name):
         family = store.family(name)
         families.show(family)
@@ -208,6 +208,7 @@ def lookup(
     settings: Sequence[str] = (),
     as_json: bool,
     with_error: bool = False,
+    snapshot: str | None = None,
 ) -> None:
     """Print f_r at theta_i, phi_i, theta_r, phi_r [degree], and the Dirac part's reflectance if the model has one.
 
@@ -224,7 +225,7 @@ def lookup(
             raise ValueError(f"{angle}: {value} is not a number of degrees")
         if angle.startswith("theta") and not 0.0 <= value <= 180.0:
             raise ValueError(f"{angle}: {value:g} is outside [0, 180] degrees")
-    store = brdfdb.open(root)
+    store = brdfdb.open(root, snapshot=snapshot)
     source: Table | Family
     point: dict[str, Any] = {}
     if families.is_family(store, name):

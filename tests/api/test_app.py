@@ -37,11 +37,12 @@ def test_settings_of_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: 
         "BRDFDB_CACHE_BYTES": "1000",
         "BRDFDB_CORS_ORIGINS": "https://a.example, https://b.example",
         "BRDFDB_LOG_LEVEL": "warning",
+        "BRDFDB_SNAPSHOT": "paper",
     }
     for variable, value in told.items():
         monkeypatch.setenv(variable, value)
     expected = Settings(
-        tmp_path, Path("other.json"), 7, 99, 1000, ("https://a.example", "https://b.example"), "warning"
+        tmp_path, Path("other.json"), 7, 99, 1000, ("https://a.example", "https://b.example"), "warning", "paper"
     )
     assert create_app().state.settings == expected
 

@@ -12,6 +12,8 @@ import pytest
 import xarray as xr
 from zarr.storage import ZipStore
 
+from brdfdb import snapshots
+from brdfdb.revisions import collect
 from brdfdb.store import Store
 from tests.api.a_store import Client, client_of, publish, serving
 
@@ -141,3 +143,19 @@ def test_fsspec_finds_sizes_and_reads_parts(root: Path, store: Store) -> None:
         assert files.cat_file(f"{url}{STORED}/{CHUNK}", 4, 12) == content[4:12]
         assert files.cat_file(f"{url}{STORED}/{CHUNK}", start=-8) == content[-8:]
         assert not files.exists(f"{url}{STORED}/nothing")
+
+
+def test_a_service_that_is_pinned_to_a_snapshot_goes_on_serving_it(tmp_path: Path) -> None:
+    publish(tmp_path, "white", "lambert", rho=0.25)
+    snapshots.create(tmp_path, "paper")
+    publish(tmp_path, "white", "lambert", rho=0.5)
+    publish(tmp_path, "black", "lambert", rho=0.0)
+    collect(tmp_path, 1)
+    at = "/v1/materials/white/lookup?theta_i=30&theta_r=30"
+    pinned, current = client_of(tmp_path, snapshot="paper"), client_of(tmp_path)
+    assert current.get(at).json()["brdf"] == 2 * pinned.get(at).json()["brdf"]
+    assert [each["name"] for each in pinned.get("/v1/materials").json()["materials"]] == ["white"]
+    assert pinned.get("/v1/materials/white").json()["revisions"] == ["r000001"]
+    assert pinned.get("/v1/store/materials/white/r000001/zarr.json").status_code == 200
+    pinned.problem("GET", "/v1/store/materials/white/r000002/zarr.json", 404)
+    client_of(tmp_path, snapshot="poster").problem("GET", at, 503)

@@ -384,8 +384,7 @@ def test_a_damaged_store_is_one_sentence(built: Path, tmp_path: Path, capsys: Ca
     out, err = capsys.readouterr()
     assert "rolled-brass" in out
     assert "foam" not in out
-    assert err.startswith(f"brdfdb: cannot read {root}/materials/foam/HEAD.json: ")
-    assert len(err.splitlines()) == 1
+    assert err == "brdfdb: foam is damaged: the first line of HEAD.json is not its digest\n"
 
 
 # Directories that cannot be written

@@ -59,7 +59,7 @@ def test_list_goes_on_past_what_is_damaged_and_fails(planned: Path, tmp_path: Pa
     assert cli.main(["list", "--store", str(root)]) == 2
     out, err = capsys.readouterr()
     assert second in out
-    assert f"{first}/HEAD.json" in err
+    assert f"{first} is damaged: the first line of HEAD.json is not its digest" in err
     assert "Traceback" not in err
 
 

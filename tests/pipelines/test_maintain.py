@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -61,8 +62,9 @@ def test_verify_names_all_that_is_damaged(root: Path, capsys: Captured) -> None:
     assert run(root, "verify") == 2
     out, err = capsys.readouterr()
     assert ": 2 damaged\n" in out
-    assert "brdfdb: foam r000002 is damaged: brdf/c/0/0/0 is missing\n" in err
-    assert "brdfdb: mirror r000001 is damaged: zarr.json has 0 bytes, not " in err
+    repair = "`brdfdb build` with its recipe makes it anew, then `brdfdb gc --damaged` removes this revision\n"
+    assert f"brdfdb: foam r000002 is damaged: brdf/c/0/0/0 is missing; {repair}" in err
+    assert re.search(rf"brdfdb: mirror r000001 is damaged: zarr.json has 0 bytes, not \d+; {repair}", err)
     assert run(root, "verify", "blue-plastic") == 0
 
 
@@ -77,3 +79,28 @@ def test_gc_says_what_it_removed(root: Path, capsys: Captured) -> None:
     assert "removed materials/foam/r000001" in lines
     assert "removed materials/blue-plastic/r000001" in lines
     assert run(root, "verify") == 0
+
+
+def test_a_snapshot_is_made_listed_read_and_removed(root: Path, capsys: Captured) -> None:
+    assert run(root, "snapshot", "paper") == 0
+    said = capsys.readouterr().out
+    assert re.fullmatch(r"paper: 5 materials, 0 families; sha256 [0-9a-f]{64}\n", said)
+    before = brdfdb.open(root).head("foam")
+    assert run(root, "rollback", "foam", "r000001") == 0
+    capsys.readouterr()
+    for command in (["list"], ["show", "foam"], ["lookup", "foam", "30", "0", "30", "180", "--json"]):
+        assert run(root, *command, "--snapshot", "paper") == 0
+        assert before in capsys.readouterr().out
+        assert run(root, *command) == 0
+        assert "r000001" in capsys.readouterr().out
+    assert run(root, "snapshot") == 0
+    assert capsys.readouterr().out == said
+    assert run(root, "gc", "--keep", "1") == 0
+    assert run(root, "verify") == 0
+    capsys.readouterr()
+    assert run(root, "snapshot", "--remove", "paper") == 0
+    assert capsys.readouterr().out.startswith("paper is removed; `brdfdb gc` ")
+    assert run(root, "lookup", "foam", "30", "0", "30", "180", "--snapshot", "paper") == 2
+    assert capsys.readouterr().err == f"brdfdb: no snapshot 'paper' in the store at {root}; it has none\n"
+    assert run(root, "snapshot", "--remove") == 2
+    assert capsys.readouterr().err == "brdfdb: snapshot: --remove needs the NAME of a snapshot\n"

@@ -1,0 +1,232 @@
+"""Flip bits in every file of a store: nothing may be wrong in silence, and what is damaged is named and repaired.
+
+python tests/benchmarks/bitflips.py --count 300
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import random
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+from brdfdb_pipelines import cli
+
+# A grey, a spectral and two members of a family, on grids so coarse that the store is built in seconds
+RECIPE = """\
+materials = ["white", "copper", "shade"]
+wavelengths_nm = [450, 550, 650]
+[grids.isotropic]
+theta_i_deg = [0, 40, 80]
+theta_r_deg = [0, 40, 80]
+delta_phi_deg = [0, 90, 180]
+[grids.spectral]
+theta_i_deg = [0, 40, 80]
+theta_r_deg = [0, 40, 80]
+delta_phi_deg = [0, 90, 180]
+[grids.anisotropic]
+theta_i_deg = [0, 80]
+phi_i_deg = [0, 360]
+theta_r_deg = [0, 80]
+phi_r_deg = [0, 360]
+[define.white]
+title = "White"
+model = "lambert"
+source = "no paper"
+[define.white.parameters]
+rho = RHO
+[define.copper]
+title = "Copper"
+model = "he_torrance"
+source = "no paper"
+refractive_index = "main/Cu/Johnson"
+[define.copper.parameters]
+sigma_0_um = 0.1
+tau_um = 2.0
+[sweep.shade]
+title = "Shades"
+model = "lambert"
+source = "a sweep"
+[sweep.shade.parameters]
+rho = [0.2, 0.8]
+"""
+LOOKUPS = (
+    ("white", "30", "0", "50", "120"),
+    ("copper", "30", "0", "50", "120"),
+    ("shade-001", "30", "0", "50", "120"),
+    ("shade-002", "30", "0", "50", "120"),
+    ("shade", "30", "0", "50", "120", "--set", "rho=0.6"),
+)
+NAMES = ("white", "copper", "shade-001", "shade-002")
+_ROUNDS = 6  # of verify and the repairs that it names
+
+
+class Flips(NamedTuple):
+    """What was counted: flips by the kind of file, and every fault as a sentence."""
+
+    kinds: Counter[str]
+    outcomes: Counter[str]
+    faults: list[str]
+
+
+def run(*arguments: object) -> tuple[int, str, str]:
+    """Run a command; return its exit code, stdout and stderr. A traceback is an exit code of -1."""
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        try:
+            code = cli.main([str(argument) for argument in arguments])
+        except Exception as error:
+            return -1, out.getvalue(), f"{type(error).__name__}: {error}"
+        except SystemExit as error:
+            return int(error.code or 0), out.getvalue(), err.getvalue()
+    return code, out.getvalue(), err.getvalue()
+
+
+def make(folder: Path) -> tuple[Path, Path]:
+    """Build a store with two revisions of white, a family and a snapshot; return it and its recipe."""
+    root, recipe = folder / "store", folder / "recipe.toml"
+    for rho in (0.25, 0.5):
+        recipe.write_text(RECIPE.replace("RHO", str(rho)), encoding="utf-8")
+        code, _, err = run("build", recipe, "--store", root, "--jobs", 1, "--json")
+        assert code == 0, err
+    code, _, err = run("snapshot", "paper", "--store", root)
+    assert code == 0, err
+    return root, recipe
+
+
+def answers(root: Path) -> dict[str, tuple[int, str, str]]:
+    """Everything a reader asks of a store, with what it is told, whether it is an answer or a refusal."""
+    asked: list[tuple[str, ...]] = [("list",), ("list", "--snapshot", "paper")]
+    asked += [("lookup", *lookup, "--with-error", "--json") for lookup in LOOKUPS]
+    asked += [("lookup", *LOOKUPS[0], "--json", "--snapshot", "paper"), ("show", "white"), ("show", "shade")]
+    asked += [("history", name) for name in NAMES]
+    return {" ".join(arguments): run(*arguments, "--store", root) for arguments in asked}
+
+
+def kind(path: Path) -> str:
+    """Return the kind of a file of a store."""
+    name = path.name
+    if name.endswith("MANIFEST.json"):
+        return "manifest"
+    if name in ("HEAD.json", "brdfdb.json", "zarr.json"):
+        return name
+    return {"families": "family record", "snapshots": "snapshot"}.get(path.parent.name, "chunk")
+
+
+def repair(root: Path, recipe: Path, said: str) -> None:
+    """Run the commands that a sentence of verify names."""
+    if "brdfdb build`" in said:
+        run("build", recipe, "--store", root, "--jobs", 1, "--json")
+    elif "brdfdb snapshot --remove" in said:
+        run("snapshot", "--remove", "paper", "--store", root)
+        if "gc --damaged" not in said:
+            run("snapshot", "paper", "--store", root)
+    if "gc --damaged" in said:
+        run("gc", "--damaged", "--keep", 9, "--store", root)
+    elif "brdfdb gc`" in said:
+        run("gc", "--keep", 9, "--store", root)
+
+
+def flip(
+    master: Path, recipe: Path, file: Path, bit: int, told: dict[str, tuple[int, str, str]]
+) -> tuple[str, list[str]]:
+    """Flip a bit in a copy of a store; return what verify said first, and every fault as a sentence."""
+    faults: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder) / "store"
+        shutil.copytree(master, root)
+        data = bytearray((root / file).read_bytes())
+        data[bit // 8] ^= 1 << (bit % 8)
+        (root / file).write_bytes(data)
+        where = f"bit {bit} of {file}"
+        for asked, (code, out, err) in answers(root).items():
+            if code == -1:
+                faults.append(f"{where}: {asked}: traceback: {err}")
+            elif code == 0 and out.replace(str(root), str(master)) != told[asked][1]:
+                faults.append(f"{where}: {asked}: another answer in silence: {out}")
+        first = ""
+        for _ in range(_ROUNDS):
+            code, _, err = run("verify", "--store", root)
+            sentences = [line for line in err.splitlines() if line.startswith("brdfdb: ")]
+            if code == -1:
+                faults.append(f"{where}: verify: traceback: {err}")
+            if code == 0 or not sentences:
+                break
+            first = first or sentences[0]
+            repair(root, recipe, " ".join(sentences))
+        if not first:
+            faults.append(f"{where}: verify says nothing")
+        if code != 0:
+            faults.append(f"{where}: not repaired: {err}")
+        code, _, err = run("build", recipe, "--store", root, "--jobs", 1, "--json")
+        if code != 0:
+            faults.append(f"{where}: build: {err}")
+        for lookup in LOOKUPS:
+            code, out, err = run("lookup", *lookup, "--with-error", "--json", "--store", root)
+            before = json.loads(told[" ".join(("lookup", *lookup, "--with-error", "--json"))][1])
+            if code != 0 or {**json.loads(out), "revision": ""} != {**before, "revision": ""}:
+                faults.append(f"{where}: after the repair {lookup[0]} is {out or err}, not {before}")
+    return first, faults
+
+
+def flips(count: int, seed: int, folder: Path) -> Flips:
+    """Flip `count` bits, at least one in every file of a store.
+
+    Parameters
+    ----------
+    count : int
+        Flips, each in a copy of its own; of fewer than there are files, files are drawn at random.
+    seed : int
+        Of the files and bits.
+    folder : Path
+        Where the store is built.
+    """
+    master, recipe = make(folder)
+    told = answers(master)
+    assert all(code == 0 for code, _, _ in told.values()), told
+    assert run("verify", "--store", master)[0] == 0
+    draw = random.Random(seed)
+    files = sorted(
+        path.relative_to(master) for path in master.rglob("*") if path.is_file() and ".staging" not in path.parts
+    )
+    kinds = {kind(file): file for file in draw.sample(files, len(files))}  # of few flips, one of each kind
+    rest = draw.sample(files, len(files))
+    chosen = [*kinds.values(), *(file for file in rest if file not in kinds.values())]
+    while len(chosen) < count:
+        chosen.append(draw.choice(list(kinds.values()) + files))
+    result = Flips(Counter(), Counter(), [])
+    for number, file in enumerate(chosen[:count], 1):
+        first, faults = flip(master, recipe, file, draw.randrange(8 * (master / file).stat().st_size), told)
+        result.kinds[kind(file)] += 1
+        result.outcomes["named and repaired" if first and not faults else "faulty"] += 1
+        result.faults.extend(faults)
+        print(f"\r{number} of {count} flips, {len(result.faults)} faults", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return result
+
+
+def main() -> int:
+    """Flip bits, and print what became of them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=300, metavar="N", help="flips (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=20261122, metavar="N", help="of files and bits")
+    parser.add_argument("--quick", action="store_true", help="20 flips")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        result = flips(20 if options.quick else options.count, options.seed, Path(folder))
+    print(", ".join(f"{number} in {name}" for name, number in sorted(result.kinds.items())))
+    print(", ".join(f"{number} {name}" for name, number in sorted(result.outcomes.items())))
+    for fault in result.faults:
+        print(fault)
+    print(f"{len(result.faults)} faults")
+    return 1 if result.faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
