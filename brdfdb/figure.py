@@ -71,7 +71,7 @@ class Picture(BaseModel):
 
 
 class Statement(BaseModel):
-    """What is said of a figure, and what is seen in ours."""
+    """A sentence about a figure, and the result of holding our figure against it."""
 
     model_config = _STRICT
 
@@ -79,6 +79,9 @@ class Statement(BaseModel):
     where: str = Field(description="where it says so")
     seen: str = Field(description="what was computed, with its numbers")
     holds: bool
+    threshold_from: str | None = Field(
+        default=None, description="the basis of the threshold, in the form 'BASIS: reason', or null where none is given"
+    )
 
 
 class Figure(BaseModel):

@@ -408,7 +408,7 @@ def _slight_sacrifice(lines: list[_Forms]) -> Statement:
 
 def _hemispheres() -> tuple[Floats, Floats, Floats, Floats]:
     """theta_i, theta_r, phi_r - phi_i [rad] of pairs of directions, and weights of f_r: its albedo in uniform light."""
-    theta, azimuth = radians(np.arange(2.5, 90.0, 5.0)), radians(np.arange(5.0, 180.0, 10.0))
+    theta, azimuth = radians(np.arange(5.0, 90.0, 10.0)), radians(np.arange(10.0, 180.0, 20.0))
     theta_i, theta_r, delta_phi = np.meshgrid(theta, theta, azimuth, indexing="ij")
     cosines = np.sin(2.0 * theta_i) * np.sin(2.0 * theta_r)
     return theta_i, theta_r, delta_phi, cosines * np.pi / cosines.sum()

@@ -1,0 +1,130 @@
+"""Named wrong models, how one takes the place of the right model, and which statements of the gallery notice it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from brdfdb.gallery import GALLERY
+from brdfdb.models import MODELS
+
+UNDRAWN = "the figure can be drawn"
+_UNTOUCHED = ("brdfdb.reference", "brdfdb.misprints")  # they judge the models, and are no part of them
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A wrong model: functions of `brdfdb`, each with the wrong one that takes its place."""
+
+    name: str
+    changes: str
+    because: str
+    functions: Mapping[Callable[..., Any], Callable[..., Any]]
+
+
+@contextmanager
+def planted(mutant: Mutant) -> Iterator[None]:
+    """Put the wrong functions of a mutant wherever `brdfdb`, or its registry of models, names the right ones.
+
+    Raises
+    ------
+    LookupError
+        If no module names a function that the mutant replaces.
+    """
+    places = [
+        (vars(module), name, mutant.functions[value])
+        for title, module in list(sys.modules.items())
+        if title.split(".")[0] == "brdfdb" and not title.startswith(_UNTOUCHED)
+        for name, value in list(vars(module).items())
+        if callable(value) and _hashable(value) and value in mutant.functions
+    ]
+    missed = set(mutant.functions.values()) - {wrong for _, _, wrong in places}
+    if missed:
+        raise LookupError(f"{mutant.name}: no module of brdfdb names what {missed} takes the place of")
+    before = [(space, name, space[name]) for space, name, _ in places]
+    specs = dict(MODELS)
+    try:
+        for space, name, wrong in places:
+            space[name] = wrong
+        for key, spec in specs.items():
+            fields = {name: getattr(spec, name) for name in ("evaluate", "vectors", "specular")}
+            wrong_fields = {name: mutant.functions[f] for name, f in fields.items() if f in mutant.functions}
+            MODELS[key] = replace(spec, **wrong_fields)
+        yield
+    finally:
+        for space, name, right in before:
+            space[name] = right
+        MODELS.update(specs)
+
+
+def _hashable(value: object) -> bool:
+    return type(value).__hash__ is not None
+
+
+class Said(NamedTuple):
+    """A statement by its figure and its words."""
+
+    figure: str
+    says: str
+
+
+class Matrix(NamedTuple):
+    """The statements of a paper that hold, and of each mutant those that do not hold with it."""
+
+    holding: frozenset[Said]
+    noticed: dict[str, frozenset[Said]]
+
+    @property
+    def blind(self) -> list[Said]:
+        """The statements that hold whatever is wrong."""
+        return sorted(self.holding - frozenset().union(*self.noticed.values()))
+
+    @property
+    def overlooked(self) -> list[str]:
+        """The mutants that fewer than two statements notice."""
+        return [name for name, failing in self.noticed.items() if len(failing) < 2]
+
+    def __str__(self) -> str:
+        lines = [f"{len(self.holding)} statements hold; of them notice"]
+        lines += [f"{len(failing):6d}  {name}" for name, failing in self.noticed.items()]
+        lines += [f"fails for no mutant: {said.figure}: {said.says}" for said in self.blind]
+        return "\n".join(lines)
+
+
+def verdicts(keys: Sequence[str]) -> dict[Said, bool]:
+    """Return which statements of some figures hold; a figure that cannot be drawn is one statement, and does not.
+
+    Raises
+    ------
+    ValueError
+        If two statements of a figure have the same words.
+    """
+    found: dict[Said, bool] = {}
+    for key in keys:
+        try:
+            statements = GALLERY[key]().statements
+        except ArithmeticError:  # a lobe of 0 has no height to be divided by
+            found[Said(key, UNDRAWN)] = False
+            continue
+        for each in statements:
+            if Said(key, each.says) in found:
+                raise ValueError(f"{key}: two statements have the same words: {each.says}")
+            found[Said(key, each.says)] = each.holds
+    return found
+
+
+def matrix_of(keys: Sequence[str], mutants: Sequence[Mutant]) -> Matrix:
+    """Compute some figures by the right models and by each wrong one."""
+    holding = frozenset(said for said, holds in verdicts(keys).items() if holds)
+    noticed: dict[str, frozenset[Said]] = {}
+    for mutant in mutants:
+        with planted(mutant), np.errstate(all="ignore"):
+            wrong = verdicts(keys)
+        undrawn = {said for said in wrong if said.says == UNDRAWN}
+        noticed[mutant.name] = frozenset(said for said in holding if not wrong.get(said, True)) | undrawn
+    return Matrix(holding, noticed)
