@@ -39,13 +39,15 @@ def by_vectors(f_r: Function) -> Function:
     )
 
 
+def each_form(by_angles: Function, by_vectors: Function | None = None) -> dict[Function, Function]:
+    """All four forms, of angles and of vectors, as a function of the right one returns them."""
+    found = {angles: by_angles(angles) for angles in FORMS}
+    return found | {vectors: (by_vectors or by_angles)(vectors) for vectors in FORMS.values()}
+
+
 def with_surface(change: Callable[[dict[str, Any]], dict[str, Any]]) -> dict[Function, Function]:
     """All four forms with other parameters."""
-    return {
-        right: lambda *directions, right=right, **surface: right(*directions, **change(surface))
-        for each in FORMS.items()
-        for right in each
-    }
+    return each_form(lambda right: lambda *directions, **surface: right(*directions, **change(surface)))
 
 
 def parts(lobe: float = 1.0, diffuse: float = 1.0) -> dict[Function, Function]:
@@ -58,7 +60,7 @@ def parts(lobe: float = 1.0, diffuse: float = 1.0) -> dict[Function, Function]:
 
         return f_r
 
-    return {right: wrong(right) for each in FORMS.items() for right in each}
+    return each_form(wrong)
 
 
 def wider(factor: float) -> dict[Function, Function]:
@@ -86,15 +88,26 @@ def printed(tan: Any, phi: Any, cos_i: Any, cos_r: Any, alpha_x: Any, alpha_y: A
     return np.exp(-exponent) / (4.0 * np.pi * alpha_x * alpha_y * np.sqrt(cos_i * cos_r))
 
 
+def half_vector(factor: float) -> dict[Function, Function]:
+    """Eq. 5b with another factor in its exponent."""
+
+    def vectors(wi: Any, wr: Any, *, rho_d: Any, rho_s: Any, alpha_x: Any, alpha_y: Any) -> Any:
+        wi, wr = np.asarray(wi, dtype=np.float64), np.asarray(wr, dtype=np.float64)
+        h = (wi + wr) / np.linalg.norm(wi + wr, axis=-1, keepdims=True)
+        exponent = factor * ((h[..., 0] / alpha_x) ** 2 + (h[..., 1] / alpha_y) ** 2) / (1.0 + h[..., 2])
+        cosines = np.maximum(wi[..., 2], HORIZON) * np.maximum(wr[..., 2], HORIZON)
+        lobe = rho_s * np.exp(-exponent) / (4.0 * np.pi * alpha_x * alpha_y * np.sqrt(cosines))
+        return np.where((wi[..., 2] >= 0.0) & (wr[..., 2] >= 0.0), rho_d / np.pi + lobe, 0.0)
+
+    return {ward_half_vector: by_vectors(vectors), ward_half_vector_vectors: vectors}
+
+
 def turned() -> dict[Function, Function]:
     """Light from the other side: where the paper's d_i points along the light, ours points to it."""
-    found: dict[Function, Function] = {}
-    for angles, vectors in FORMS.items():
-        found[angles] = lambda ti, pi, tr, pr, angles=angles, **surface: angles(ti, pi + np.pi, tr, pr, **surface)
-        found[vectors] = lambda wi, wr, vectors=vectors, **surface: vectors(
-            np.asarray(wi) * [-1.0, -1.0, 1.0], wr, **surface
-        )
-    return found
+    return each_form(
+        lambda right: lambda ti, pi, tr, pr, **surface: right(ti, pi + np.pi, tr, pr, **surface),
+        lambda right: lambda wi, wr, **surface: right(np.asarray(wi) * [-1.0, -1.0, 1.0], wr, **surface),
+    )
 
 
 def taken(wrong: tuple[Function, Function], right: tuple[Function, Function]) -> dict[Function, Function]:
@@ -102,11 +115,10 @@ def taken(wrong: tuple[Function, Function], right: tuple[Function, Function]) ->
 
 
 def folded() -> dict[Function, Function]:
-    found: dict[Function, Function] = {}
-    for angles, vectors in FORMS.items():
-        found[angles] = lambda ti, pi, tr, pr, angles=angles, **surface: angles(ti, pi, tr, pr, **surface) * np.cos(tr)
-        found[vectors] = lambda wi, wr, vectors=vectors, **s: vectors(wi, wr, **s) * np.asarray(wr)[..., 2]
-    return found
+    return each_form(
+        lambda right: lambda ti, pi, tr, pr, **surface: right(ti, pi, tr, pr, **surface) * np.cos(tr),
+        lambda right: lambda wi, wr, **surface: right(wi, wr, **surface) * np.asarray(wr)[..., 2],
+    )
 
 
 def mean(surface: dict[str, Any]) -> dict[str, Any]:
@@ -118,7 +130,14 @@ def swapped(surface: dict[str, Any]) -> dict[str, Any]:
     return {**surface, "alpha_x": surface["alpha_y"], "alpha_y": surface["alpha_x"]}
 
 
-UNCHANGED = (Mutant("eq. 5a anew", "nothing", "the twin that the others change", elliptical(printed)),)
+UNCHANGED = (
+    Mutant(
+        "eqs 5a and 5b anew",
+        "nothing",
+        "the twins that the others change",
+        {**elliptical(printed), **half_vector(factor=2.0)},
+    ),
+)
 
 MUTANTS = (
     Mutant(
@@ -132,6 +151,12 @@ MUTANTS = (
         "the half-vector form is taken for the same as the model",
         "the two agree at the peak",
         taken((ward, ward_vectors), (ward_half_vector, ward_half_vector_vectors)),
+    ),
+    Mutant(
+        "eq. 5b without its 2",
+        "the exponent is -(..) / (1 + h.n)",
+        "(1 + h.n) / 2 is 1 at the peak, where the two are compared",
+        half_vector(factor=1.0),
     ),
     Mutant(
         "half of rho_s",
