@@ -23,3 +23,11 @@ def matrix() -> Matrix:
 
 def test_the_twin_that_mutants_change_is_the_model() -> None:
     assert not matrix_of(KEYS, UNCHANGED).noticed[UNCHANGED[0].name]
+
+
+def test_every_statement_fails_for_a_wrong_model() -> None:
+    assert not matrix().blind, str(matrix())
+
+
+def test_every_wrong_model_is_noticed_by_two_statements() -> None:
+    assert not matrix().overlooked, str(matrix())
