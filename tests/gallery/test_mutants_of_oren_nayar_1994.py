@@ -21,3 +21,11 @@ def matrix() -> Matrix:
 @pytest.mark.parametrize("twin", UNCHANGED, ids=lambda twin: twin.name)
 def test_the_twin_that_mutants_change_is_the_model(twin: Mutant) -> None:
     assert not matrix_of(KEYS, [twin]).noticed[twin.name]
+
+
+def test_every_statement_fails_for_a_wrong_model() -> None:
+    assert not matrix().blind, str(matrix())
+
+
+def test_every_wrong_model_is_noticed_by_two_statements() -> None:
+    assert not matrix().overlooked, str(matrix())

@@ -233,7 +233,9 @@ def bounce_by_eq_48(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any
     angles = [each[..., None] for each in np.broadcast_arrays(theta_i, 0.0, theta_r, azimuth)]
     x, w = np.polynomial.legendre.leggauss(SLOPES)
     theta_a = 0.5 * np.pi * 0.5 * (x + 1.0)
-    P = w * np.exp(-(theta_a**2) / (2.0 * max(float(sigma), 1e-3) ** 2)) * np.sin(theta_a)
+    if float(sigma) == 0.0:
+        return right_facets(d, rho, sigma, only)
+    P = w * np.exp(-(theta_a**2) / (2.0 * float(sigma) ** 2)) * np.sin(theta_a)
     one = oren_nayar_single_slope_parts(*angles, rho=float(rho), theta_a=theta_a)
     return right_facets(d, rho, sigma, only)[0], one.interreflected @ P / P.sum(), d
 
@@ -280,6 +282,6 @@ MUTANTS = (
     Mutant("k_s over pi", "the surface is pi times weaker", "eq. 31 prints no E_0; with E_0 = pi it is that",
            {right_lobe: lambda d, sigma, n, k: right_lobe(d, sigma, n, k) / np.pi}),
     Mutant("eq. 31 times cos(theta_r)", "1 / cos(theta_r) is left out of the surface",
-           "Blinn and Cook print other cosines there",
+           "the lobe is often given for intensity, which has this cosine",
            {right_lobe: lambda d, sigma, n, k: right_lobe(d, sigma, n, k) * d.cos_r}),
 )  # fmt: skip
