@@ -13,6 +13,18 @@ import numpy as np
 from brdfdb.gallery import GALLERY
 from brdfdb.models import MODELS
 
+# What `Statement.threshold_from` begins with, and its meaning
+BASES = {
+    "the paper's words": "a word of the sentence sets the threshold, as *increases* or *exactly* do",
+    "the paper's number": "a number that the paper prints, within the digits that it has",
+    "the paper's curve": "a feature of a curve of the paper",
+    "our reading": "the sentence has a word like *nearly*, and we say which number we take it for",
+    "a limit": "what the equations tend to",
+    "a closed form": "equations of the paper by hand, which share no code with the models",
+    "conservation": "light that is neither made nor lost",
+    "an independent evaluation": "the same quantity by other means: a plain sum, rays, random directions, 50 digits",
+}
+
 UNDRAWN = "the figure can be drawn"
 _UNTOUCHED = ("brdfdb.reference", "brdfdb.misprints")  # they judge the models, and are no part of them
 
