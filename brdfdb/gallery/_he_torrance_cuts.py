@@ -10,7 +10,7 @@ import numpy as np
 from brdfdb.figure import Curve, Panel, curve_of
 from brdfdb.geometry import degrees, radians
 from brdfdb.materials import presets
-from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_specular
+from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_smooth, he_torrance_specular
 from brdfdb.parameters import Floats
 from brdfdb.quadrature import directional_albedo
 
@@ -98,6 +98,11 @@ def measured(surface: Surface, thetas_deg: Floats) -> list[Cut]:
 def specular(surface: Surface, theta_i_deg: float | Floats) -> Floats:
     """rho_s, eq. (73)."""
     return he_torrance_specular(radians(theta_i_deg), **{key: value for key, value in surface.items() if key != "a"})
+
+
+def smooth(surface: Surface, theta_i_deg: float | Floats) -> Floats:
+    """Return |F|^2 [1] of a surface, eq. (10)."""
+    return he_torrance_smooth(radians(theta_i_deg), n=surface["n"], k=surface["k"])
 
 
 def specular_of_peak(surface: Surface, cut: Cut) -> float:

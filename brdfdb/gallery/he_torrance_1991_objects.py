@@ -12,6 +12,7 @@ from brdfdb.gallery._he_torrance_cuts import (
     described,
     lobe_at,
     reflected,
+    smooth,
     specular,
     surface_of,
 )
@@ -162,9 +163,7 @@ def fig_13() -> Figure:
         for ratio in ratios
     ]
     from_rough = np.array([off(surface) for surface in scaled])
-    from_smooth = 1.0 - np.array([float(specular(surface, 30.0)) for surface in scaled]) / float(
-        by_hand.fresnel(30.0, **optics)
-    )
+    from_smooth = 1.0 - np.array([float(specular(surface, 30.0)) for surface in scaled]) / float(smooth(rough, 30.0))
     expected_g = (4.0 * np.pi * ratios[[0, 4]] * np.cos(np.deg2rad(30.0))) ** 2
     left = np.array([float(reflected(surface, 30.0, specular=False)) for surface in scaled])
     return Figure(

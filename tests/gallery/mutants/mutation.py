@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import wraps
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +30,9 @@ UNDRAWN = "the figure can be drawn"
 _UNTOUCHED = ("brdfdb.reference", "brdfdb.misprints")  # they judge the models, and are no part of them
 
 
+Function = Callable[..., Any]
+
+
 @dataclass(frozen=True)
 class Mutant:
     """A wrong model: functions of `brdfdb`, each with the wrong one that takes its place."""
@@ -36,7 +40,7 @@ class Mutant:
     name: str
     changes: str
     because: str
-    functions: Mapping[Callable[..., Any], Callable[..., Any]]
+    functions: Mapping[Function, Function]
 
 
 @contextmanager
@@ -130,13 +134,36 @@ def verdicts(keys: Sequence[str]) -> dict[Said, bool]:
     return found
 
 
+def calls_of(keys: Sequence[str], functions: Iterable[Function]) -> dict[str, set[Function]]:
+    """Return which of some functions each figure calls: no other figure changes with a mutant of them."""
+    called: set[Function] = set()
+
+    def recorded(right: Function) -> Function:
+        @wraps(right)
+        def call(*arguments: Any, **options: Any) -> Any:
+            called.add(right)
+            return right(*arguments, **options)
+
+        return call
+
+    found: dict[str, set[Function]] = {}
+    with planted(Mutant("none", "nothing", "calls are recorded", {right: recorded(right) for right in functions})):
+        for key in keys:
+            called.clear()
+            GALLERY[key]()
+            found[key] = set(called)
+    return found
+
+
 def matrix_of(keys: Sequence[str], mutants: Sequence[Mutant]) -> Matrix:
-    """Compute some figures by the right models and by each wrong one."""
+    """Compute some figures by the right models, and those that a mutant touches by each wrong one."""
     holding = frozenset(said for said, holds in verdicts(keys).items() if holds)
+    calls = calls_of(keys, {right for mutant in mutants for right in mutant.functions})
     noticed: dict[str, frozenset[Said]] = {}
     for mutant in mutants:
+        touched = [key for key in keys if calls[key] & mutant.functions.keys()]
         with planted(mutant), np.errstate(all="ignore"):
-            wrong = verdicts(keys)
+            wrong = verdicts(touched)
         undrawn = {said for said in wrong if said.says == UNDRAWN}
         noticed[mutant.name] = frozenset(said for said in holding if not wrong.get(said, True)) | undrawn
     return Matrix(holding, noticed)
