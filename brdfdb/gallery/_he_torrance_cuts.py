@@ -10,7 +10,7 @@ import numpy as np
 from brdfdb.figure import Curve, Panel, curve_of
 from brdfdb.geometry import degrees, radians
 from brdfdb.materials import presets
-from brdfdb.models import he_torrance_aperture, he_torrance_smooth, he_torrance_specular
+from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_smooth, he_torrance_specular
 from brdfdb.parameters import Floats
 from brdfdb.quadrature import directional_albedo
 
@@ -101,7 +101,7 @@ def specular(surface: Surface, theta_i_deg: float | Floats) -> Floats:
 
 
 def smooth(surface: Surface, theta_i_deg: float | Floats) -> Floats:
-    """|F|^2, eq. (10)."""
+    """Return |F|^2 [1] of a surface, eq. (10)."""
     return he_torrance_smooth(radians(theta_i_deg), n=surface["n"], k=surface["k"])
 
 
@@ -111,10 +111,18 @@ def specular_of_peak(surface: Surface, cut: Cut) -> float:
     return float(specular(surface, cut.theta_i_deg)) / (cos_i * CONE_SR) / cut.mirror
 
 
-def reflected(surface: Surface, theta_i_deg: float | Floats, *, specular: bool = True) -> Floats:
-    """rho_dh, with or without its specular part."""
+def lobe_at(surface: Surface, theta_i_deg: float, x_deg: float) -> float:
+    """Return f_r [1/sr] of the diffuse parts for one viewer in the plane of incidence."""
+    phi_r = np.pi if x_deg >= 0.0 else 0.0
+    return float(he_torrance(radians(theta_i_deg), 0.0, radians(abs(x_deg)), phi_r, **surface))
+
+
+def reflected(
+    surface: Surface, theta_i_deg: float | Floats, *, specular: bool = True, tolerance: float = TOLERANCE
+) -> Floats:
+    """Return rho_dh [1], with or without its specular part, within an absolute tolerance."""
     theta_i = radians(theta_i_deg)
-    return directional_albedo("he_torrance", theta_i, tolerance=TOLERANCE, specular=specular, **surface).albedo
+    return directional_albedo("he_torrance", theta_i, tolerance=tolerance, specular=specular, **surface).albedo
 
 
 def polar(cuts: Sequence[Cut]) -> Panel:

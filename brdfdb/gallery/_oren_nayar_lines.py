@@ -19,7 +19,21 @@ SMALL = 0.1  # what the paper's "near", "nearly" and "slight" are taken for, mos
 VERY_ACCURATE = 0.05  # and its "very accurate"
 ROUNDING = 1e-15  # "exactly", in float64
 
+RHO = 0.9  # the albedo of Figs 8 to 13
+GRAZING_LIGHT = 75.0  # degree: theta_i of Figs 8, 9 and 13
+RADIANCE = "radiance L_r, of E_0 = 1"
+
 Result = TypeVar("Result")
+
+
+def rough(sigma_deg: float) -> dict[str, float]:
+    """Return the parameters of a surface of RHO with slopes of sigma_deg [degree]."""
+    return {"rho": RHO, "sigma": float(radians(sigma_deg))}
+
+
+def to_radiance(theta_i_deg: float) -> float:
+    """Return the irradiance [1] of light from theta_i, for E_0 = 1: the factor from f_r to the radiance drawn."""
+    return float(np.cos(radians(theta_i_deg)))
 
 
 def across(model: Callable[..., Result], theta_i_deg: float, delta_phi_deg: float = 0.0, **parameters: float) -> Result:

@@ -17,6 +17,7 @@ STATEMENTS = [
     ("ward-1992-fig-04", "the half vectors that lean along the wider axis"),
     ("ward-1992-fig-04", '"Unfinished aluminum exhibits anisotropy'),
     ("ward-1992-fig-06", '"It is clear by inspection that the above formula is symmetric'),
+    ("ward-1992-fig-06", '"the normalization of the above anisotropic model'),
     ("ward-1992-fig-06", "1 / sqrt(cos(theta_r)) draws the peak of a slice beyond the mirror direction"),
     ("ward-1992-fig-07", '"Note that the crescent shape of the highlight'),
     ("ward-1992-lobes", "two perpendicular slope distributions"),
@@ -24,6 +25,8 @@ STATEMENTS = [
     ("ward-1992-forms", 'eq. 5b is "a computationally convenient approximation"'),
     ("ward-1992-forms", "away from the peak it is another lobe"),
     ("ward-1992-forms", "in the mirror direction Duer's lobe and the bounded one"),
+    ("ward-1992-forms", "away from the mirror direction the bounded lobe is Duer's"),
+    ("ward-1992-forms", "Ward's lobe loses energy towards grazing"),
 ]
 FORMS = {
     "eq. 5a": ward_1992.elliptical,

@@ -184,7 +184,13 @@ def material(
 
 def figure(key: str, paper: str, panels: list[Panel | Map | Picture]) -> Figure:
     statements = [
-        Statement(says=f"{key}: it peaks at 45°", where="Fig. 3", seen="the peak is at 45.0°", holds=True),
+        Statement(
+            says=f"{key}: it peaks at 45°",
+            where="Fig. 3",
+            seen="the peak is at 45.0°",
+            holds=True,
+            threshold_from="the paper's curve: its grid is a degree",
+        ),
         Statement(says=f"{key}: ten terms are enough", where="eq. 78", seen="81 % of the sum at g = 9", holds=False),
     ]
     caption = "He et al.'s eq. 78 against 50 digits, V = 3."

@@ -105,6 +105,7 @@ def test_every_material_figure_and_statement_is_there(document: Document, report
         for statement in each.statements:
             assert statement.says in words
             assert statement.seen in words
+            assert statement.threshold_from is None or f"Threshold from {statement.threshold_from}." in words
     drawings = sum(len(each.panels) for each in (*report.atlas, *report.gallery))
     drawings += sum(len(each.table_error.maps) for each in report.materials)
     drawings += 3 * 2 + 5  # grey: model and table, furnace; spectral: the model alone, uniform light, the bound, too

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -18,35 +16,9 @@ from brdfdb.models import he_torrance_1991 as he_torrance
 from brdfdb.models import he_torrance_1991_polarised as polarised
 from brdfdb.models import oren_nayar_1994_surfaces as surfaces
 from brdfdb.models import ward_vectors
+from tests.gallery.mutants.mutation import Mutant
 
 Function = Callable[..., Any]
-
-
-class WrongForm(NamedTuple):
-    """A wrong form: functions of `brdfdb`, each with the wrong one that takes its place."""
-
-    name: str
-    changes: str
-    because: str
-    functions: Mapping[Function, Function]
-
-
-@contextmanager
-def planted(form: WrongForm) -> Iterator[None]:
-    """Put wrong functions wherever a module of `brdfdb` names the right ones."""
-    before = []
-    for title, module in list(sys.modules.items()):
-        if title.split(".")[0] == "brdfdb" and not title.startswith("brdfdb.reference"):
-            for name, value in list(vars(module).items()):
-                if callable(value) and type(value).__hash__ is not None and value in form.functions:
-                    before.append((module, name, value))
-                    setattr(module, name, form.functions[value])
-    assert {value for _, _, value in before} == set(form.functions), form.name
-    try:
-        yield
-    finally:
-        for module, name, value in before:
-            setattr(module, name, value)
 
 
 # Oren and Nayar
@@ -109,21 +81,21 @@ def direct_unshadowed(i: Any, r: Any, S: Any, C: Any) -> Any:
 right_factors, right_met = grooves.view_factors, grooves._met
 
 OREN_NAYAR = (
-    WrongForm("light from the other side of closed forms", "cos(phi_r - phi_i) of eqs 45 and 49 has the other sign",
+    Mutant("light from the other side of closed forms", "cos(phi_r - phi_i) of eqs 45 and 49 has the other sign",
               "azimuths of light that travels towards the surface are half a turn off", closed(sign=-1.0)),
-    WrongForm("no eq. 49", "the closed forms have direct light alone", "eq. 49 stands at the end of the appendix",
+    Mutant("no eq. 49", "the closed forms have direct light alone", "eq. 49 stands at the end of the appendix",
               closed(bounced=0.0)),
-    WrongForm("critical angles of 0", "eq. 39 is 0: nothing is hidden", "both branches of eq. 39 begin there",
+    Mutant("critical angles of 0", "eq. 39 is 0: nothing is hidden", "both branches of eq. 39 begin there",
               closed(shadows=False)),
-    WrongForm("cos^2 in eq. 44", "planes are weighted by cos^2 and sin^2", "vectors are split so",
+    Mutant("cos^2 in eq. 44", "planes are weighted by cos^2 and sin^2", "vectors are split so",
               closed(power=2.0)),
-    WrongForm("widths of the words", "m_v and m_s are the widths visible and lit", "the words before eq. 15 say so",
+    Mutant("widths of the words", "m_v and m_s are the widths visible and lit", "the words before eq. 15 say so",
               {surfaces.bounce_of_cavity: cavity(hidden=False)}),
-    WrongForm("no GAF in cavities", "a facet is lit and seen whole or not at all", "Table 1 begins with that row",
+    Mutant("no GAF in cavities", "a facet is lit and seen whole or not at all", "Table 1 begins with that row",
               {surfaces.direct_of_cavity: direct_unshadowed}),
-    WrongForm("strings without a half", "view factors are twice as large", "Hottel's rule has a half to forget",
+    Mutant("strings without a half", "view factors are twice as large", "Hottel's rule has a half to forget",
               {grooves.view_factors: lambda *arguments: 2.0 * right_factors(*arguments)}),
-    WrongForm("strips without shadows", "light and viewer reach whole facets", "the first bounce is right without",
+    Mutant("strips without shadows", "light and viewer reach whole facets", "the first bounce is right without",
               {grooves._met: lambda slope, theta_a: (right_met(slope, theta_a)[0],
                                                      np.where(right_met(slope, theta_a)[0] > 0.0, 1.0, 0.0))}),
 )  # fmt: skip
@@ -167,21 +139,21 @@ def altered(**changes: float) -> dict[Function, Function]:
 
 
 HE_TORRANCE = (
-    WrongForm("mirrors without e^-g", "the specular part is |F|^2 S",
+    Mutant("mirrors without e^-g", "the specular part is |F|^2 S",
               "the lobe is added to a mirror that is already there",
               {right_specular: lambda surface, theta: right_specular({**surface, "wavelength_nm": 1e7}, theta)}),
-    WrongForm("reflectances with 1.5 tau", "the autocorrelation length is 1.5 times as long",
+    Mutant("reflectances with 1.5 tau", "the autocorrelation length is 1.5 times as long",
               "tau is read as where C(r) has fallen to a tenth", altered(tau_um=1.5)),
-    WrongForm("0.8 sigma_0 of reflectances", "the rms roughness is 0.8 times as large", "R_a of workshops is that",
+    Mutant("0.8 sigma_0 of reflectances", "the rms roughness is 0.8 times as large", "R_a of workshops is that",
               altered(sigma_0_um=0.8)),
-    WrongForm("a of 1", "all that enters the surface returns", "nothing is known of a", altered(a=1.0)),
-    WrongForm("M_ps without its minus", "eq. 64 as it is printed", "eq. 62 alone has the minus",
+    Mutant("a of 1", "all that enters the surface returns", "nothing is known of a", altered(a=1.0)),
+    Mutant("M_ps without its minus", "eq. 64 as it is printed", "eq. 62 alone has the minus",
               {polarised._jones: printed_minus}),
-    WrongForm("s and p not turned", "the facet's s and p are taken for those of the mean surface",
+    Mutant("s and p not turned", "the facet's s and p are taken for those of the mean surface",
               "they are the same in the plane of incidence", {polarised._jones: not_turned}),
-    WrongForm("F_s and F_p exchanged", "each polarisation has the amplitude of the other",
+    Mutant("F_s and F_p exchanged", "each polarisation has the amplitude of the other",
               "books differ in what they call parallel", {right_amplitudes: exchanged}),
-    WrongForm("amplitudes of a real index", "k is left out of F_s and F_p", "tables list n, and k in another column",
+    Mutant("amplitudes of a real index", "k is left out of F_s and F_p", "tables list n, and k in another column",
               {right_amplitudes: lambda cos, n, k: right_amplitudes(cos, n, 0.0 * k)}),
 )  # fmt: skip
 
@@ -234,21 +206,21 @@ def other_side(wi: Any, wr: Any, **surface: Any) -> Any:
 
 
 WARD = (
-    WrongForm("one alpha of lids and rays", "eq. 4 with sqrt(alpha_x alpha_y)",
+    Mutant("one alpha of lids and rays", "eq. 4 with sqrt(alpha_x alpha_y)",
               "an engine without tangents has no x axis",
               {ward_vectors: one_alpha}),
-    WrongForm("light from the other side of lids and spheres", "the lobe lies on the side of the light",
+    Mutant("light from the other side of lids and spheres", "the lobe lies on the side of the light",
               "the paper's d_i may be read as the direction in which light travels", {ward_vectors: other_side}),
-    WrongForm("density of the half vector", "the density lacks 1 / (4 h.i)", "eq. 7 draws half vectors",
+    Mutant("density of the half vector", "the density lacks 1 / (4 h.i)", "eq. 7 draws half vectors",
               {right_density: of_half_vector}),
-    WrongForm("samples along the normal", "half vectors are those of a light along the normal",
+    Mutant("samples along the normal", "half vectors are those of a light along the normal",
               "eq. 7 does not name the light",
               {sampling.mirrored_in_lobe: lambda u1, angle, i, lobe: without_arctan(
                   u1, angle, np.broadcast_to([0.0, 0.0, 1.0], np.shape(i)), lobe)}),
-    WrongForm("drawn by the cosine", "directions follow the cosine and not the lobe", "it is the sampler of Lambert",
+    Mutant("drawn by the cosine", "directions follow the cosine and not the lobe", "it is the sampler of Lambert",
               {right_sample: by_cosine}),
-    WrongForm("D for 2 D", "D is taken for the distance of target and camera", "Fig. 3 draws one D",
+    Mutant("D for 2 D", "D is taken for the distance of target and camera", "Fig. 3 draws one D",
               {gonioreflectometer.eq_3: mapped(1.0)}),
-    WrongForm("angles of the camera", "eq. 3 is left out", "the two are close where D is small",
+    Mutant("angles of the camera", "eq. 3 is left out", "the two are close where D is small",
               {gonioreflectometer.eq_3: lambda theta_c, phi_c, _: unit_vector(theta_c, phi_c)}),
 )  # fmt: skip
