@@ -234,7 +234,7 @@ def _sample(errors: Array, tolerance: float, confidence: float) -> Sample:
 
 def choose(
     planned: Look,
-    check: Callable[[int], Look],
+    check: Callable[[int], Look | None],
     offered: Mapping[str, Sequence[Candidate]],
     costs: Mapping[str, Floats],
     tick: Callable[[], None] = lambda: None,
@@ -248,7 +248,7 @@ def choose(
         otherwise.
     check : callable
         Gives the same scene at fresh places for a round, 1 or more: where the choices are held to the tolerance, all at
-        once.
+        once. None of a scene that has no other places.
     offered : mapping
         By the name of each material, its candidates, the truth first.
     costs : mapping
@@ -295,16 +295,13 @@ def choose(
     for number in itertools.count(1):
         forms = {name: offered[name][one.chosen] for name, one in picks.items()}
         checked = check(number)
-        looks = planned.errors(forms, forms), checked.errors(forms, forms)
-        whole = {name: Left(*np.max([_left(look[name], percentile) for look in looks], axis=0)) for name in forms}
+        looks = [planned] if checked is None else [planned, checked]
+        errors = [look.errors(forms, forms) for look in looks]
+        whole = {name: Left(*np.max([_left(each[name], percentile) for each in errors], axis=0)) for name in forms}
         tick()
         if max(whole.values()).counted <= tolerance:
             break
-        own = {
-            name: max(left(look, name, one.chosen) for look in (planned, checked))
-            for name, one in picks.items()
-            if one.chosen
-        }
+        own = {name: max(left(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
         broke = {name: each for name, each in own.items() if each.counted > tolerance}
         for name, each in (broke or {max(own, key=lambda name: own[name]): max(whole.values())}).items():
             refused[name, picks[name].chosen] = each
@@ -317,7 +314,7 @@ def choose(
             None if one.cheaper is None else known(name, one.cheaper),
             (name, one.cheaper) in refused,
             whole[name],
-            *(_sample(each, tolerance, confidence) for each in looks[1][name]),
+            *(_sample(each, tolerance, confidence) for fresh in errors[1:] for each in fresh[name]),
         )
         for name, one in picks.items()
     }

@@ -104,7 +104,7 @@ def _run(
         task = bar.add_task("choosing", total=len(materials) + 1)
         planned, check = _looks(scene, view, offered, materials)
 
-        def checked(number: int) -> Look:
+        def checked(number: int) -> Look | None:
             bar.update(task, total=len(materials) + number)
             return check(number)
 
@@ -149,12 +149,12 @@ def _run(
 
 def _looks(
     scene: Scene, view: View, offered: Mapping[str, Sequence[Candidate]], materials: Mapping[str, Reflector]
-) -> tuple[Look, Callable[[int], Look]]:
+) -> tuple[Look, Callable[[int], Look | None]]:
     """Return the scene where candidates are compared, and what gives it at fresh places for each round of checks."""
     truths = {key: forms[0] for key, forms in offered.items()}
     picture = Seen(scene, view, truths, materials)
     if isinstance(scene.objects[0].shape, Recorded):
-        return Look(picture, None), lambda _: Look(picture, None)
+        return Look(picture, None), lambda _: None
 
     def at(places: Array) -> Seen:
         return Seen(scene, gather_at(scene, places), truths, materials)
