@@ -124,9 +124,12 @@ def within(tolerance: Tolerance) -> str:
 def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequence[Material]) -> str:
     """Return in words what is proven of choices, and what follows from samples, with which confidence."""
     value = f"{tolerance.value:g}"
-    whole = tolerance.percentile == 100.0
-    which = "each of" if whole else f"{tolerance.percentile:g} % of each material's among"
-    proven = f"Proven: {which} the {picture[0]} x {picture[1]} pixels, seen through its middle, is within {value}."
+    size, share = f"{picture[0]} x {picture[1]}", tolerance.percentile
+    proven = f"Proven: each of the {size} pixels, seen through its middle, is within {value}."
+    if share != 100.0:
+        proven = (
+            f"Proven: {share:g} % of each material's pixels, of {size} seen through their middles, are within {value}."
+        )
     even = [each.even for each in materials if each.even is not None]
     edges = [each.edges for each in materials if each.edges is not None]
     if not even:

@@ -22,6 +22,8 @@ from brdfdb.scene import Scene, Tolerance
 from brdfdb.shapes import Array
 
 GRAZING_DEG = 89.99  # up to where errors count: nearer to the horizon models have poles, and a sphere shows 3e-8 of it
+# Of a statement from samples, over all rounds of checks that might be the last: a round has fresh places, which its
+# choices were not fitted to, and the one numbered j spends 1 / (j (j + 1)) of what may go wrong
 CONFIDENCE = 0.95
 DARK = 1e-3  # exposed radiance: relative errors of what is darker are relative to this
 FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # integrals over facets are known to 1e-6
@@ -267,11 +269,6 @@ def choose(
     ------
     InfeasibleError
         If the tolerance is finer than the truth is known.
-
-    Notes
-    -----
-    What passes round j has not been fitted to its places, and stands at the confidence 1 - (1 - `CONFIDENCE`) / (j (j +
-    1)): over all rounds that might be the last, at `CONFIDENCE`.
     """
     check_feasible(planned.even.scene.tolerance)
     tolerance, percentile = planned.even.scene.tolerance.value, planned.even.scene.tolerance.percentile
@@ -302,8 +299,7 @@ def choose(
         if max(whole.values()).counted <= tolerance:
             break
         own = {name: max(left(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
-        broke = {name: each for name, each in own.items() if each.counted > tolerance}
-        for name, each in (broke or {max(own, key=lambda name: own[name]): max(whole.values())}).items():
+        for name, each in _broken(own, max(whole.values()), tolerance).items():
             refused[name, picks[name].chosen] = each
             picks[name] = picked(name)
     confidence = 1.0 - (1.0 - CONFIDENCE) / (number * (number + 1))
@@ -318,3 +314,9 @@ def choose(
         )
         for name, one in picks.items()
     }
+
+
+def _broken(own: Mapping[str, Left], whole: Left, tolerance: float) -> dict[str, Left]:
+    """Return the choices that break the tolerance by themselves, or else the one that leaves the most, and how far."""
+    broke = {name: each for name, each in own.items() if each.counted > tolerance}
+    return broke or {max(own, key=lambda name: own[name]): whole}
