@@ -249,8 +249,8 @@ def choose(
         The picture, and places near edges: where candidates are compared, each against a picture that is true
         otherwise.
     check : callable
-        Gives the same scene at fresh places for a round, 1 or more: where the choices are held to the tolerance, all at
-        once. None of a scene that has no other places.
+        Gives the same scene at fresh places for a round from 1 on, where all choices at once are held to the tolerance;
+        None of a scene that has no other places.
     offered : mapping
         By the name of each material, its candidates, the truth first.
     costs : mapping

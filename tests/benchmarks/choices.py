@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 WIDTHS, QUICK_WIDTHS = (100, 128, 200, 512), (100, 200)
 LIMB, GRAZING, LAST = np.cos(np.radians([85.0, 89.99, 89.5]))
 WAVELENGTHS = np.arange(380.0, 781.0, 10.0)
-STEPS = 400  # along a ray through a surface of revolution
+STEPS = 200  # along a ray through a surface of revolution
 FAR = 1e-6  # how far off a surface other rays begin
 
 
@@ -130,24 +130,28 @@ class Body:
         start = np.maximum(np.where(level, enter, np.maximum(enter, slab[0])), 0.0)
         stop = np.where(level, leave, np.minimum(leave, slab[1]))
 
-        def inside(t: Array) -> NDArray[np.bool_]:
-            z = o[:, 2] + t * d[:, 2]
-            radius = self.profile(np.clip(z, low, high))
-            off = np.hypot(o[:, 0] + t * d[:, 0], o[:, 1] + t * d[:, 1])
-            return np.asarray((off < radius) & (z >= low) & (z <= high))
+        near = np.flatnonzero(start < stop)
+        o_near, d_near, start, stop = o[near], d[near], start[near], stop[near]
 
-        found, before = np.full(len(o), np.inf), start
+        def inside(t: Array) -> NDArray[np.bool_]:
+            p = o_near + t[:, None] * d_near
+            off = np.hypot(p[:, 0], p[:, 1]) < self.profile(np.clip(p[:, 2], low, high))
+            return np.asarray(off & (p[:, 2] >= low) & (p[:, 2] <= high))
+
+        met, before = np.full(len(near), np.inf), start
         for step in range(1, STEPS + 1):
             after = start + (stop - start) * step / STEPS
-            new = inside(after) & ~np.isfinite(found) & (start < stop)
+            new = inside(after) & ~np.isfinite(met)
             if new.any():
                 one, other = before.copy(), after.copy()
                 for _ in range(50):
                     middle = (one + other) / 2.0
                     within = inside(middle)
                     one, other = np.where(within, one, middle), np.where(within, middle, other)
-                found = np.where(new, other, found)
+                met = np.where(new, other, met)
             before = after
+        found = np.full(len(o), np.inf)
+        found[near] = met
         return found, *self._caps(o, d, [(float(self.profile(end)), end) for end in self.ends])
 
     def frames(self, points: Array) -> Array:
