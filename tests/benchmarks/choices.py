@@ -138,20 +138,19 @@ class Body:
             off = np.hypot(p[:, 0], p[:, 1]) < self.profile(np.clip(p[:, 2], low, high))
             return np.asarray(off & (p[:, 2] >= low) & (p[:, 2] <= high))
 
-        met, before = np.full(len(near), np.inf), start
+        one, other, met = start.copy(), stop.copy(), np.zeros(len(near), dtype=bool)
         for step in range(1, STEPS + 1):
             after = start + (stop - start) * step / STEPS
-            new = inside(after) & ~np.isfinite(met)
-            if new.any():
-                one, other = before.copy(), after.copy()
-                for _ in range(50):
-                    middle = (one + other) / 2.0
-                    within = inside(middle)
-                    one, other = np.where(within, one, middle), np.where(within, middle, other)
-                met = np.where(new, other, met)
-            before = after
+            new = inside(after) & ~met
+            other = np.where(new, after, other)
+            one = np.where(met | new, one, after)
+            met |= new
+        for _ in range(50):
+            middle = (one + other) / 2.0
+            within = inside(middle)
+            one, other = np.where(within, one, middle), np.where(within, middle, other)
         found = np.full(len(o), np.inf)
-        found[near] = met
+        found[near[met]] = other[met]
         return found, *self._caps(o, d, [(float(self.profile(end)), end) for end in self.ends])
 
     def frames(self, points: Array) -> Array:
