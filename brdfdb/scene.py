@@ -134,7 +134,7 @@ class Object(BaseModel):
 class Tolerance(BaseModel):
     """How far the picture may be from the true one: relative in radiance, or in CIEDE2000. One of the two.
 
-    All places that are looked at keep to it, or a percentile of those of each material where isolated ones do not matter.
+    All places that are looked at keep to it, or a percentile of those of each material if isolated ones do not matter.
     """
 
     model_config = STRICT
