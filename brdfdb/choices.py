@@ -9,7 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.choose import Candidate, Decision, Left
+from brdfdb.candidates import Candidate
+from brdfdb.choose import CONFIDENCE, GRAZING_DEG, Decision, Left, Sample
+from brdfdb.parameters import Floats
 from brdfdb.representations import Kind
 from brdfdb.scene import Scene, Tolerance
 
@@ -21,19 +23,36 @@ _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
 class Price(NamedTuple):
-    """Of a candidate: nanoseconds a pair of directions, all wavelengths of the scene; and what is weighed of it."""
+    """The price of a candidate: time [ns] of a pair of directions, and what is weighed in each round of timing."""
 
     ns: float
-    cost: float
+    costs: Floats
+
+    @property
+    def cost(self) -> float:
+        """The median cost."""
+        return float(np.median(self.costs))
 
 
 class Residue(BaseModel):
-    """Error over the pixels that show a material, in the unit of the tolerance."""
+    """Error over the places that show a material, in the unit of the tolerance."""
 
     model_config = _STRICT
 
     counted: float = Field(description="at the percentile of the tolerance: what keeps to it")
     most: float = Field(description="largest")
+
+
+class Sampled(BaseModel):
+    """A sample of the places that show a material, which played no part in the choice."""
+
+    model_config = _STRICT
+
+    places: int = Field(description="looked at")
+    most: float = Field(description="largest error at them")
+    one_in: int = Field(
+        description="fewer than 1 in so many of all places so drawn is beyond the tolerance, with the confidence stated"
+    )
 
 
 class Option(BaseModel):
@@ -60,12 +79,17 @@ class Material(BaseModel):
 
     material: str
     title: str
-    pixels: int = Field(description="that show it, directly or in a mirror")
+    pixels: int = Field(description="of the picture that show it, directly or in a mirror")
     truth: Option
     choice: Option
     next_cheaper: Option | None = Field(description="the most accurate of what is cheaper; null without any")
-    refused: bool = Field(description="whether the next cheaper breaks it only where it is checked")
-    whole: Residue = Field(description="of the choices all at once, where they are checked")
+    refused: bool = Field(description="whether the next cheaper breaks it only where choices are checked")
+    whole: Residue = Field(description="of the choices all at once: at all pixels of the picture, and all samples")
+    even: Sampled | None = Field(description="places anywhere in the picture, equally likely; null if recorded")
+    edges: Sampled | None = Field(
+        description="places beside limbs, terminators and edges of shadows: each power of ten of the distance, from a "
+        "pixel's width down to a hundred millionth of it, is equally likely; null if recorded"
+    )
     reason: str
     revision: str | None = Field(description="of the table in the store, if a store was named and a table chosen")
 
@@ -81,18 +105,43 @@ class Choice(BaseModel):
     scene: str
     tolerance: Tolerance
     weigh: Weigh
-    planned: tuple[int, int] = Field(description="pixels across and down where candidates are compared")
-    checked: tuple[int, int] = Field(
-        description="where the whole is held to the tolerance: half as many more across; if recorded, those of the file"
+    picture: tuple[int, int] = Field(
+        description="pixels across and down: the choices keep to the tolerance at each of them, seen through its middle"
     )
+    confidence: float = Field(description="of what is said of samples, for each material and each kind of sample")
+    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is said beyond")
+    statement: str = Field(description="what is proven, and what is sampled, in a few sentences")
     materials: list[Material]
 
 
 def within(tolerance: Tolerance) -> str:
-    """How far a picture may be off, and where, in words."""
+    """Return in words how far a picture may be off."""
     share = tolerance.percentile
-    where = "every pixel" if share == 100.0 else f"{share:g} % of the pixels of each material"
-    return f"within {tolerance.value:g} ({tolerance.unit}) at {where}"
+    where = "" if share == 100.0 else f" at {share:g} % of the places of each material"
+    return f"within {tolerance.value:g} ({tolerance.unit}){where}"
+
+
+def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequence[Material]) -> str:
+    """Return in words what is proven of choices, and what follows from samples, with which confidence."""
+    value = f"{tolerance.value:g}"
+    size, share = f"{picture[0]} x {picture[1]}", tolerance.percentile
+    proven = f"Proven: each of the {size} pixels, seen through its middle, is within {value}."
+    if share != 100.0:
+        proven = (
+            f"Proven: {share:g} % of each material's pixels, of {size} seen through their middles, are within {value}."
+        )
+    even = [each.even for each in materials if each.even is not None]
+    edges = [each.edges for each in materials if each.edges is not None]
+    if not even:
+        return f"{proven} The file holds no other places."
+    places, most = sum(each.places for each in (*even, *edges)), max(each.most for each in (*even, *edges))
+    return (
+        f"{proven} Sampled: all other places of the picture, for other widths and offsets of its pixels, at {places} "
+        f"places that were not used to choose; the largest error at them is {most:.2g}. With {100 * CONFIDENCE:g} % "
+        f"confidence for each material, fewer than 1 in {min(each.one_in for each in even)} of its places is beyond "
+        f"{value}, and fewer than 1 in {min(each.one_in for each in edges)} of those beside its edges. "
+        f"What is seen within {90.0 - GRAZING_DEG:.2g} degrees of grazing is left out."
+    )
 
 
 def describe(
@@ -138,6 +187,8 @@ def describe(
                 next_cheaper=cheaper,
                 refused=decision.refused,
                 whole=_residue(decision.whole),
+                even=_sampled(decision.even),
+                edges=_sampled(decision.edges),
                 reason=_reason(choice, cheaper, decision, scene.tolerance.value),
                 revision=revisions.get(name),
             )
@@ -152,7 +203,7 @@ def _reason(choice: Option, cheaper: Option | None, decision: Decision, toleranc
         said += f" at {choice.share:.2g} of the truth's cost, more than a third"
     if cheaper is None:
         return f"{said}, and nothing is cheaper"
-    where = " on the denser sampling" if decision.refused else ""
+    where = " at fresh places" if decision.refused else ""
     left = _above(tolerance, cheaper.error.counted)
     return f"{said}; the best of what is cheaper, {cheaper.title}, would leave {left}{where}"
 
@@ -164,6 +215,13 @@ def _above(tolerance: float, error: float) -> str:
 
 def _residue(left: Left) -> Residue:
     return Residue(counted=left.counted, most=left.most)
+
+
+def _sampled(sample: Sample | None) -> Sampled | None:
+    """Return a sample as it is written: bounds are rounded so that they hold."""
+    if sample is None:
+        return None
+    return Sampled(places=sample.places, most=sample.most, one_in=int(1.0 / sample.share))
 
 
 def _short(value: float) -> float:

@@ -3,69 +3,78 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
-from brdfdb.cost import ALIKE, CHEAPER
-from brdfdb.gather import View
-from brdfdb.materials import Material
+from brdfdb.candidates import Candidate
+from brdfdb.cost import ALIKE, clearly_cheaper
+from brdfdb.gather import Points, View
+from brdfdb.geometry import radians
 from brdfdb.parameters import Floats
 from brdfdb.picture import difference
 from brdfdb.render import Reflector, composed, radiance
-from brdfdb.representations import Representation, representations
 from brdfdb.scene import Scene, Tolerance
 from brdfdb.shapes import Array
 
-GREY_TOLERANCES = (0.1, 0.01, 0.0005)  # of planned tables; 0.001, as in charts, leaves limbs 1.05 off
-SAMPLINGS = (3, 8)  # wavelengths, evenly over those of the scene, that a form may be evaluated at in place of all
+GRAZING_DEG = 89.99  # up to where errors count: nearer to the horizon models have poles, and a sphere shows 3e-8 of it
+# Of a statement from samples, over all rounds of checks that might be the last: a round has fresh places, which its
+# choices were not fitted to, and the one numbered j spends 1 / (j (j + 1)) of what may go wrong
+CONFIDENCE = 0.95
 DARK = 1e-3  # exposed radiance: relative errors of what is darker are relative to this
 FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # integrals over facets are known to 1e-6
-
-_ROWS = 512  # of products at a time: larger ones BLAS gives to threads, which wait for each other on a busy machine
 
 
 class InfeasibleError(ValueError):
     """The tolerance is finer than the truth is known; str() is one sentence."""
 
 
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A form of a material, whose f_r is that of all wavelengths of the scene, and where it is evaluated itself.
-
-    `wavelength_nm` is None of a grey form; between its wavelengths f_r is interpolated on straight lines.
-    """
-
-    form: Representation
-    wavelength_nm: NDArray[np.float64] | None
-
-    def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
-        """f_r [1/sr], as `render` takes it."""
-        dtype = self.form.dtype
-        return self.form.evaluate(wi.astype(dtype, copy=False), wr.astype(dtype, copy=False)).astype(np.float64)
-
-
 class Left(NamedTuple):
-    """The error that is left over the pixels of a material: at the percentile of the tolerance, and the largest."""
+    """The error that is left over the places of a material: at the percentile of the tolerance, and the largest."""
 
     counted: float
     most: float
 
 
 class Pick(NamedTuple):
-    """What is chosen of the candidates of a material, as indices; `cheaper`, the best of what costs less, if any."""
+    """The candidate that is chosen for a material and the best of what is clearly cheaper, if any, as indices."""
 
     chosen: int
     cheaper: int | None
 
 
-class Decision(NamedTuple):
-    """What is chosen of a material: what it leaves by itself, and in the whole picture, sampled more densely.
+class Sample(NamedTuple):
+    """A sample of the places of a material: how many, and how far the choices are off there.
 
-    `cheaper_left` is how the next cheaper breaks the tolerance; `refused`, whether only on the denser sampling.
+    `share` is the upper bound, at `CONFIDENCE`, of the share of all places so drawn that are beyond the tolerance.
+    """
+
+    places: int
+    most: float
+    share: float
+
+
+class Decision(NamedTuple):
+    """The choice for a material: the error that it leaves by itself, and with all other choices.
+
+    Attributes
+    ----------
+    pick : Pick
+        What is chosen.
+    left : Left
+        By itself, where candidates are compared.
+    cheaper_left : Left or None
+        How the next cheaper breaks the tolerance.
+    refused : bool
+        Whether the next cheaper does so only where choices are checked.
+    whole : Left
+        With all other choices, at every pixel of the picture, and at fresh places.
+    even, edges : Sample or None
+        Fresh places: evenly spread over the picture, and at edges; None of a recorded scene.
     """
 
     pick: Pick
@@ -73,64 +82,8 @@ class Decision(NamedTuple):
     cheaper_left: Left | None
     refused: bool
     whole: Left
-
-
-def candidates(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
-) -> list[Candidate]:
-    """Forms to choose from, the truth first: at all wavelengths, and of spectral materials at fewer.
-
-    Parameters
-    ----------
-    material : Material
-        Of any model.
-    wavelength_nm : array of shape (L,) [nm], or None
-        Those of the scene, for spectral materials, and only for them.
-    tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.representations`. By default `GREY_TOLERANCES` of grey materials.
-
-    Returns
-    -------
-    list of Candidate
-        Without models that are meant to differ, and forms that differ from another in rounding alone.
-
-    Raises
-    ------
-    ValueError
-        As `brdfdb.representations.representations` does.
-    """
-    if tolerances is None and wavelength_nm is None:
-        tolerances = GREY_TOLERANCES
-    found = [Candidate(form, wavelength_nm) for form in representations(material, wavelength_nm, tolerances)]
-    for count in SAMPLINGS if wavelength_nm is not None else ():
-        assert wavelength_nm is not None
-        if count < wavelength_nm.size:
-            few = wavelength_nm[np.round(np.linspace(0, wavelength_nm.size - 1, count)).astype(np.int64)]
-            found += [
-                Candidate(_between(form, few, wavelength_nm), few)
-                for form in representations(material, few, tolerances)
-            ]
-    return [each for each in found if each.form.kind != "other model" and not each.form.rounded]
-
-
-def _between(form: Representation, few: Array, wavelength_nm: Array) -> Representation:
-    """A form at a few wavelengths, interpolated to all of them."""
-    weights = np.stack([np.interp(wavelength_nm, few, one) for one in np.eye(few.size)]).astype(form.dtype)
-
-    def evaluate(wi: Floats, wr: Floats) -> Floats:
-        values = form.evaluate(wi, wr)
-        whole = np.empty((len(values), wavelength_nm.size), values.dtype)
-        for start in range(0, len(values), _ROWS):
-            np.matmul(values[start : start + _ROWS], weights, out=whole[start : start + _ROWS])
-        return whole
-
-    return replace(
-        form,
-        key=f"{form.key}-{few.size}-wavelengths",
-        title=f"{form.title}, {few.size} wavelengths",
-        evaluate=evaluate,
-        bytes=form.bytes + weights.nbytes,
-    )
+    even: Sample | None = None
+    edges: Sample | None = None
 
 
 class Seen:
@@ -175,14 +128,20 @@ class Seen:
         return composed(self.scene, self.view, self._radiances(forms), self._materials)
 
     def pixels(self, material: str) -> NDArray[np.int64]:
-        """The pixels that show a material, directly or in a mirror."""
-        lists = self.view.points
-        at = [
-            points.at if points.via is None else lists[points.via].at[points.at]
-            for points in lists
-            if points.material == material
-        ]
-        return np.unique(np.concatenate(at))
+        """Return the pixels that show a material, directly or in a mirror, up to `GRAZING_DEG` from the normal."""
+        shown = [self._at(points) for points in self.view.points if points.material == material]
+        return np.setdiff1d(np.concatenate(shown), self._grazing) if shown else np.empty(0, dtype=np.int64)
+
+    def _at(self, points: Points) -> NDArray[np.int64]:
+        """Return the pixel of each point of a list."""
+        return points.at if points.via is None else self.view.points[points.via].at[points.at]
+
+    @functools.cached_property
+    def _grazing(self) -> NDArray[np.int64]:
+        """Return the pixels that show something between `GRAZING_DEG` and the horizon."""
+        least = np.cos(radians(GRAZING_DEG))
+        found = [self._at(points)[(points.wr[:, 2] > 0.0) & (points.wr[:, 2] < least)] for points in self.view.points]
+        return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *found]))
 
     def differences(self, picture: Array) -> Array:
         """How far each pixel of a picture is from the truth (height, width), as the tolerance of the scene counts.
@@ -191,11 +150,10 @@ class Seen:
         """
         return _differences(self.scene, self.truth, picture)
 
-    def left(self, material: str, picture: Array) -> Left:
-        """The error of a picture over the pixels of a material."""
+    def errors(self, material: str, picture: Array) -> Array:
+        """Return the errors (N,) of a picture at the pixels of a material, in the unit of the tolerance."""
         at = np.unravel_index(self.pixels(material), self.truth.shape[:2])
-        errors = _differences(self.scene, self.truth[at], picture[at])
-        return Left(float(np.percentile(errors, self.scene.tolerance.percentile)), float(errors.max()))
+        return _differences(self.scene, self.truth[at], picture[at])
 
 
 def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
@@ -204,37 +162,38 @@ def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
     return np.asarray((np.abs(picture - truth) / np.maximum(truth, DARK / scene.exposure)).max(axis=-1))
 
 
-def pick(costs: Sequence[float], error: Callable[[int], float], tolerance: float) -> Pick:
-    """The cheapest candidate that keeps to a tolerance; of those that cost about the same, the most accurate.
+def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick:
+    """Pick the cheapest candidate that keeps to a tolerance; of those that cost about the same, the most accurate.
 
     Parameters
     ----------
-    costs : sequence of float
-        Of each candidate, in one unit; one of them keeps to any tolerance, as the truth does.
+    costs : array of shape (rounds, candidates)
+        Of each candidate in each round of timing, in one unit; one round of costs that do not scatter.
     error : callable
-        Of the candidate with an index; asked in the order of costs, and of nothing clearly costlier than need be.
+        Of the candidate with an index, 0 of the truth; asked in the order of median costs, and of nothing clearly
+        costlier than need be.
     tolerance : float
         Of the error.
 
     Returns
     -------
     Pick
-        About the same cost is less than `brdfdb.cost.CHEAPER` times as much, about the same error less than
-        `brdfdb.cost.ALIKE` times: of those alike in both it is the one given first, whatever the clock says. Everything
-        that costs less than the cheapest one that keeps to the tolerance breaks it; the most accurate of that is the
-        next cheaper.
+        The cost is about the same where neither is clearly cheaper, which `brdfdb.cost.clearly_cheaper` decides as for
+        a chart; the error, where it is less than `brdfdb.cost.ALIKE` times as large. Of candidates alike in both it is
+        the one given first. The next cheaper is the most accurate of those that are clearly cheaper than the choice,
+        all of which break the tolerance.
     """
     errors: dict[int, float] = {}
-    least = np.inf
-    for index in np.argsort(costs, kind="stable").tolist():
-        if costs[index] > CHEAPER * least:
-            break
+    least: int | None = None
+    for index in np.argsort(np.median(costs, axis=0), kind="stable").tolist():
+        if least is not None and clearly_cheaper(costs, least, index):
+            continue
         errors[index] = error(index)
-        if errors[index] <= tolerance:
-            least = min(least, costs[index])
+        if errors[index] <= tolerance and least is None:
+            least = index
     kept = {index: errors[index] for index in sorted(errors) if errors[index] <= tolerance}
     chosen = next(index for index in kept if kept[index] <= ALIKE * min(kept.values()))
-    cheaper = [index for index in sorted(errors) if costs[index] < least]
+    cheaper = [index for index in sorted(errors) if index not in kept and clearly_cheaper(costs, index, chosen)]
     return Pick(chosen, min(cheaper, key=lambda index: errors[index], default=None))
 
 
@@ -245,79 +204,119 @@ def check_feasible(tolerance: Tolerance) -> None:
         raise InfeasibleError(f"tolerance: {value:g} ({unit}) is finer than the truth is known, {FINEST[unit]:g}")
 
 
+class Look(NamedTuple):
+    """A scene at places that are spread evenly, as the pixels of a picture are, and at places near edges, if any."""
+
+    even: Seen
+    edges: Seen | None
+
+    def errors(self, names: Iterable[str], forms: Mapping[str, Candidate]) -> dict[str, list[Array]]:
+        """Return the errors of materials with candidates for some, all at once: at even places, and at edges."""
+        seen = [self.even] if self.edges is None else [self.even, self.edges]
+        pictures = [each.picture(forms) for each in seen]
+        return {
+            name: [each.errors(name, picture) for each, picture in zip(seen, pictures, strict=True)] for name in names
+        }
+
+
+def _left(errors: Sequence[Array], percentile: float) -> Left:
+    """Return what is left of errors at even places, and at edges, which count where all places do."""
+    most = max(float(each.max(initial=0.0)) for each in errors)
+    if percentile == 100.0 or not errors[0].size:
+        return Left(most, most)
+    return Left(float(np.percentile(errors[0], percentile)), most)
+
+
+def _sample(errors: Array, tolerance: float, confidence: float) -> Sample:
+    """Return a sample with Clopper and Pearson's upper bound; where nothing was drawn, anything may be beyond."""
+    beyond, places = int(np.count_nonzero(errors > tolerance)), errors.size
+    share = 1.0 if beyond == places else float(stats.beta.ppf(confidence, beyond + 1, places - beyond))
+    return Sample(places, float(errors.max(initial=0.0)), share)
+
+
 def choose(
-    planned: Seen,
-    checked: Seen,
+    planned: Look,
+    check: Callable[[int], Look | None],
     offered: Mapping[str, Sequence[Candidate]],
-    costs: Mapping[str, Sequence[float]],
+    costs: Mapping[str, Floats],
     tick: Callable[[], None] = lambda: None,
 ) -> dict[str, Decision]:
     """Choose a candidate for each material of a scene, and check all of them together.
 
     Parameters
     ----------
-    planned : Seen
-        Where candidates are compared, each against a picture that is true otherwise.
-    checked : Seen
-        The same scene, sampled more densely: where the choices are held to the tolerance, all at once.
+    planned : Look
+        The picture, and places near edges: where candidates are compared, each against a picture that is true
+        otherwise.
+    check : callable
+        Gives the same scene at fresh places for a round from 1 on, where all choices at once are held to the tolerance;
+        None of a scene that has no other places.
     offered : mapping
         By the name of each material, its candidates, the truth first.
     costs : mapping
-        The same, what each of them costs.
+        The same, what each of them costs, of shape (rounds, candidates).
     tick : callable
-        Called for each material, and when the check is over.
+        Called for each material, and for each round of checks.
 
     Returns
     -------
     dict
         A decision for each material. Where the whole breaks the tolerance, the choices that do so by themselves are
-        refused there, or, if only all of them together do, the one that leaves the most; the truth is never refused.
+        refused, or, if only all of them together do, the one that leaves the most; the truth is never refused. Then the
+        next round looks at other places.
 
     Raises
     ------
     InfeasibleError
         If the tolerance is finer than the truth is known.
     """
-    check_feasible(planned.scene.tolerance)
-    tolerance = planned.scene.tolerance.value
+    check_feasible(planned.even.scene.tolerance)
+    tolerance, percentile = planned.even.scene.tolerance.value, planned.even.scene.tolerance.percentile
     refused: dict[tuple[str, int], Left] = {}
 
-    @functools.cache
-    def alone(name: str, index: int) -> Left:
-        return planned.left(name, planned.picture({name: offered[name][index]}))
+    def left(look: Look, name: str, index: int) -> Left:
+        return _left(look.errors([name], {name: offered[name][index]})[name], percentile)
 
-    def left(name: str, index: int) -> Left:
+    alone = functools.cache(functools.partial(left, planned))
+
+    def known(name: str, index: int) -> Left:
         return refused[name, index] if (name, index) in refused else alone(name, index)
 
     def picked(name: str) -> Pick:
-        return pick(costs[name], lambda index: left(name, index).counted, tolerance)
+        return pick(costs[name], lambda index: known(name, index).counted, tolerance)
 
     picks = {}
     for name in offered:
         picks[name] = picked(name)
         tick()
-    while True:
+    for number in itertools.count(1):
         forms = {name: offered[name][one.chosen] for name, one in picks.items()}
-        picture = checked.picture(forms)
-        whole = {name: checked.left(name, picture) for name in forms}
-        worst = max(whole.values())
-        if worst.counted <= tolerance:
+        checked = check(number)
+        looks = [planned] if checked is None else [planned, checked]
+        errors = [look.errors(forms, forms) for look in looks]
+        whole = {name: Left(*np.max([_left(each[name], percentile) for each in errors], axis=0)) for name in forms}
+        tick()
+        if max(whole.values()).counted <= tolerance:
             break
-        own = {
-            name: checked.left(name, checked.picture({name: forms[name]})) for name, one in picks.items() if one.chosen
-        }
-        broke = {name: each for name, each in own.items() if each.counted > tolerance}
-        for name, each in (broke or {max(own, key=lambda name: own[name]): worst}).items():
+        own = {name: max(left(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
+        for name, each in _broken(own, max(whole.values()), tolerance).items():
             refused[name, picks[name].chosen] = each
             picks[name] = picked(name)
-    tick()
+    confidence = 1.0 - (1.0 - CONFIDENCE) / (number * (number + 1))
     return {
         name: Decision(
             one,
             alone(name, one.chosen),
-            None if one.cheaper is None else left(name, one.cheaper),
+            None if one.cheaper is None else known(name, one.cheaper),
             (name, one.cheaper) in refused,
             whole[name],
+            *(_sample(each, tolerance, confidence) for fresh in errors[1:] for each in fresh[name]),
         )
         for name, one in picks.items()
     }
+
+
+def _broken(own: Mapping[str, Left], whole: Left, tolerance: float) -> dict[str, Left]:
+    """Return the choices that break the tolerance by themselves, or else the one that leaves the most, and how far."""
+    broke = {name: each for name, each in own.items() if each.counted > tolerance}
+    return broke or {max(own, key=lambda name: own[name]): whole}

@@ -113,6 +113,14 @@ def _counts(
     ]
 
 
+def clearly_cheaper(costs: Floats, one: int, other: int) -> bool:
+    """Return whether one form is `CHEAPER` times as cheap as another in three of four rounds.
+
+    `costs` has the shape (rounds, forms).
+    """
+    return bool(np.percentile(costs[:, other] / costs[:, one], 25.0) >= CHEAPER)
+
+
 def front(errors: Sequence[float], costs: Floats) -> list[int]:
     """The forms worth having, from the most accurate one down, each clearly cheaper than the one before.
 
@@ -132,7 +140,7 @@ def front(errors: Sequence[float], costs: Floats) -> list[int]:
     """
     chosen: list[int] = []
     for one in sorted(range(len(errors)), key=lambda index: errors[index]):
-        if chosen and np.percentile(costs[:, chosen[-1]] / costs[:, one], 25.0) < CHEAPER:
+        if chosen and not clearly_cheaper(costs, one, chosen[-1]):
             continue
         if chosen and errors[one] <= ALIKE * errors[chosen[-1]]:
             chosen.pop()

@@ -107,18 +107,44 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         height = _height(scene.camera, width, across)
         pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
         rays = scene.camera.rays(width * across, height * across)
-        points, surfaces, missed = _seen(scene, *rays, pixels.ravel())
-        _check_outside(scene, points)
-        background = _background(scene, rays[1][missed], pixels.ravel()[missed], width * height)
-        for number, surface in enumerate(surfaces):
-            if scene.materials[points[number].material].spec.specular is not None:
-                points += _mirrored(scene, points, number, surface)
+        points, background = _traced(scene, rays, pixels.ravel(), width * height)
+        _check_outside(scene, [each for each in points if each.via is None])
         unseen = [item.name for item in scene.objects if item.name not in {each.name for each in points}]
         if unseen:
             raise ValueError(f"objects: no ray of {width} x {height} pixels meets {', '.join(unseen)}")
         view = View(points, width, height, across**2, background)
     _check_lights(scene, view.points)
     return view
+
+
+def gather_at(scene: Scene, places: Array) -> View:
+    """Trace single rays through places in the picture.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen; not one that is recorded, which has no rays.
+    places : array of shape (N, 2)
+        As `brdfdb.scene.Camera.through` takes them.
+
+    Returns
+    -------
+    View
+        N pixels in one row, in the order of the places.
+    """
+    points, background = _traced(scene, scene.camera.through(places), np.arange(len(places)), len(places))
+    return View(points, len(places), 1, 1, background)
+
+
+def _traced(
+    scene: Scene, rays: tuple[Array, Array], pixels: NDArray[np.int64], count: int
+) -> tuple[list[Points], Array]:
+    """Return the points that rays meet, directly and in mirrors, and the background of each of `count` pixels."""
+    points, surfaces, missed = _seen(scene, *rays, pixels)
+    for number, surface in enumerate(surfaces):
+        if scene.materials[points[number].material].spec.specular is not None:
+            points += _mirrored(scene, points, number, surface)
+    return points, _background(scene, rays[1][missed], pixels[missed], count)
 
 
 class _Surface(NamedTuple):

@@ -99,14 +99,21 @@ class Camera(BaseModel):
         return 2.0 * np.tan(radians(self.fov_deg) / 2.0) * distance
 
     def rays(self, width: int, height: int) -> tuple[Array, Array]:
-        """Origins and unit directions (height * width, 3) through the middles of pixels, row by row from the top."""
-        eye = np.asarray(self.position)
-        forward = unit(np.subtract(self.target, self.position))
-        right = unit(np.cross(forward, self.up))
+        """Return origins and unit directions (height * width, 3) through the middles of pixels, row by row."""
         x, y = np.meshgrid(
             (2.0 * np.arange(width) + 1.0 - width) / height, 1.0 - (2.0 * np.arange(height) + 1.0) / height
         )
-        over = x.reshape(-1, 1) * right + y.reshape(-1, 1) * np.cross(right, forward)
+        return self.through(np.stack([x.ravel(), y.ravel()], axis=1))
+
+    def through(self, places: Array) -> tuple[Array, Array]:
+        """Return origins and unit directions (N, 3) of rays through places (N, 2) in the picture.
+
+        Places are x to the right and y upwards from the middle of the picture, in halves of its height.
+        """
+        eye = np.asarray(self.position)
+        forward = unit(np.subtract(self.target, self.position))
+        right = unit(np.cross(forward, self.up))
+        over = places[:, :1] * right + places[:, 1:] * np.cross(right, forward)
         if self.fov_deg is None:
             assert self.height is not None
             return eye + 0.5 * self.height * over, np.broadcast_to(forward, over.shape)
@@ -127,7 +134,7 @@ class Object(BaseModel):
 class Tolerance(BaseModel):
     """How far the picture may be from the true one: relative in radiance, or in CIEDE2000. One of the two.
 
-    It holds at every pixel, or at a percentile of those of each material where isolated pixels do not matter.
+    All places that are looked at keep to it, or a percentile of those of each material if isolated ones do not matter.
     """
 
     model_config = STRICT

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from brdfdb import cost, picture
-from brdfdb.choices import Choice, Price, Weigh, describe, within
-from brdfdb.choose import Candidate, Decision, Seen, candidates, check_feasible, choose
-from brdfdb.gather import View, gather
-from brdfdb.render import reflectors
+from brdfdb import cost, picture, positions
+from brdfdb.candidates import Candidate, candidates
+from brdfdb.choices import Choice, Price, Weigh, describe, statement, within
+from brdfdb.choose import CONFIDENCE, GRAZING_DEG, Decision, Look, Seen, check_feasible, choose
+from brdfdb.gather import View, gather, gather_at
+from brdfdb.recorded import Recorded
+from brdfdb.render import Reflector, reflectors
 from brdfdb.scene import Scene
 from brdfdb.shapes import Array
 from brdfdb.staging import make_store
@@ -24,6 +26,8 @@ from brdfdb_pipelines.scene import SceneError, load
 TIMED = 20_000  # pairs of directions of a material, drawn from those that the scene uses
 SEED = 1992
 ROUNDS = 7  # of timing
+FINER = 2  # times as wide as the picture: choices are checked at one place in each pixel of that
+EDGES = 4000  # places beside edges where candidates are compared, and as many other ones where choices are checked
 
 
 def run(
@@ -44,8 +48,8 @@ def run(
     out : Path
         Directory to write to; made if it is not there.
     width : int
-        Pixels across where candidates are compared; the whole is checked with half as many more. A recorded scene has
-        the size of its file in both.
+        Pixels across the picture where candidates are compared. The whole is checked at fresh places: `FINER` squared
+        times as many, and `EDGES` beside edges. A recorded scene has the size of its file, and no other places.
     weigh : str
         What is to be small: "time", "bytes", or "both", which is their product.
     store : Path, optional
@@ -87,8 +91,7 @@ def _run(
         make_store(store)
     with terminal.progress(counted=False, transient=True) as bar:
         bar.add_task("tracing rays", total=None)
-        # another resolution puts every ray at another place
-        view, denser = gather(scene, width), gather(scene, width + width // 2 + 1)
+        view = gather(scene, width)
     materials = reflectors(scene)
     with terminal.progress(counted=False) as bar:
         task = bar.add_task("tabulating, timing", total=2 * len(materials))
@@ -99,9 +102,13 @@ def _run(
             prices[key] = _prices(offered[key], *_pairs(view, key), weigh)
             bar.advance(task)
         task = bar.add_task("choosing", total=len(materials) + 1)
-        truths = {key: forms[0] for key, forms in offered.items()}
-        planned, checked = (Seen(scene, each, truths, materials) for each in (view, denser))
-        costs = {key: [price.cost for price in each] for key, each in prices.items()}
+        planned, check = _looks(scene, view, offered, materials)
+
+        def checked(number: int) -> Look | None:
+            bar.update(task, total=len(materials) + number)
+            return check(number)
+
+        costs = {key: np.stack([price.costs for price in each], axis=1) for key, each in prices.items()}
         chosen = choose(planned, checked, offered, costs, tick=lambda: bar.advance(task))
     forms = {key: offered[key][decision.pick.chosen].form for key, decision in chosen.items()}
     wanted = f"{Path(name).stem}, {within(scene.tolerance)}"
@@ -109,6 +116,14 @@ def _run(
         key: with_reason(form.layout, form.title, wanted) for key, form in forms.items() if form.layout is not None
     }
     built = build(store, layouts) if store is not None and layouts else {}
+    described = describe(
+        scene,
+        chosen,
+        offered,
+        prices,
+        {key: planned.even.pixels(key).size for key in offered},
+        {key: each.revision for key, each in built.items()},
+    )
     choice = Choice(
         brdfdb=version("brdfdb"),
         when=datetime.now(UTC),
@@ -116,25 +131,43 @@ def _run(
         scene=Path(name).stem,
         tolerance=scene.tolerance,
         weigh=weigh,
-        planned=(view.width, view.height),
-        checked=(denser.width, denser.height),
-        materials=describe(
-            scene,
-            chosen,
-            offered,
-            prices,
-            {key: planned.pixels(key).size for key in offered},
-            {key: each.revision for key, each in built.items()},
-        ),
+        picture=(view.width, view.height),
+        confidence=CONFIDENCE,
+        grazing_deg=GRAZING_DEG,
+        statement=statement(scene.tolerance, (view.width, view.height), described),
+        materials=described,
     )
     out.mkdir(parents=True, exist_ok=True)
     (out / "choice.json").write_text(choice.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    _draw(out / Path(name).stem, checked, offered, chosen)
+    _draw(out / Path(name).stem, planned.even, offered, chosen)
     _print(choice, built)
     if store is not None and not built:
         print("nothing to build: no table was chosen")
     print(f"{out}: choice.json, {choice.scene}.png, {choice.scene}-truth.exr and {choice.scene}-choice.exr")
     return choice
+
+
+def _looks(
+    scene: Scene, view: View, offered: Mapping[str, Sequence[Candidate]], materials: Mapping[str, Reflector]
+) -> tuple[Look, Callable[[int], Look | None]]:
+    """Return the scene where candidates are compared, and what gives it at fresh places for each round of checks."""
+    truths = {key: forms[0] for key, forms in offered.items()}
+    picture = Seen(scene, view, truths, materials)
+    if isinstance(scene.objects[0].shape, Recorded):
+        return Look(picture, None), lambda _: None
+
+    def at(places: Array) -> Seen:
+        return Seen(scene, gather_at(scene, places), truths, materials)
+
+    def beside_edges(number: int) -> Seen:
+        rng = np.random.default_rng([SEED, number, 0])
+        return at(positions.at_edges(scene, view.width, view.height, EDGES, rng))
+
+    def check(number: int) -> Look:
+        rng = np.random.default_rng([SEED, number, 1])
+        return Look(at(positions.even(FINER * view.width, FINER * view.height, rng)), beside_edges(number))
+
+    return Look(picture, beside_edges(0)), check
 
 
 def _pairs(view: View, material: str) -> tuple[Array, Array]:
@@ -153,15 +186,16 @@ def _pairs(view: View, material: str) -> tuple[Array, Array]:
 
 
 def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> list[Price]:
-    """What forms cost; the wavelengths of all are those of the scene."""
+    """Return what forms cost; the wavelengths of all are those of the scene."""
     times = cost.times([each.form for each in forms], wi, wr, most=TIMED, rounds=ROUNDS)
     prices = []
     for candidate, time in zip(forms, times, strict=True):
         form = candidate.form
         ns = time.quartiles_ns[1] * form.evaluate(wi[:1].astype(form.dtype), wr[:1].astype(form.dtype)).size
         # of the truth in the same round: what slows the machine down slows both down
-        share = float(np.median(time.seconds / times[0].seconds))
-        prices.append(Price(ns, {"time": share, "bytes": float(form.bytes), "both": share * form.bytes}[weigh]))
+        shares = time.seconds / times[0].seconds
+        costs = {"time": shares, "bytes": np.full(ROUNDS, float(form.bytes)), "both": shares * form.bytes}
+        prices.append(Price(ns, costs[weigh]))
     return prices
 
 
@@ -195,10 +229,10 @@ def _print(choice: Choice, built: Mapping[str, Built]) -> None:
         )
         for one in choice.materials
     ]
-    compared, checked = (f"{across} x {down}" for across, down in (choice.planned, choice.checked))
-    title = f"{choice.scene}: {within(choice.tolerance)}; {compared} pixels compared, {checked} checked"
+    title = f"{choice.scene}: {within(choice.tolerance)}"
     terminal.print_table(title, ("material", "choice", *numbers), rows, numbers=numbers)
     for one in choice.materials:
         print(f"  {one.material}: {one.choice.title} {one.reason}")
         if one.material in built:
             print(f"    {built[one.material].said}")
+    print(choice.statement)

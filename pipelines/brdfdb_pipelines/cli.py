@@ -171,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
         type=_up_to(MOST_WIDTH),
         default=128,
         metavar="N",
-        help="pixels where forms are compared; the whole is checked at half as many more (default: %(default)s)",
+        help="pixels across the picture; choices are checked at four times as many other places (default: %(default)s)",
     )
     choose.add_argument(
         "--weigh",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import jsonschema
@@ -13,8 +13,8 @@ import pytest
 from matplotlib.image import imread
 
 import brdfdb
+from brdfdb.candidates import Candidate
 from brdfdb.choices import Choice, Price
-from brdfdb.choose import Candidate
 from brdfdb.models import oren_nayar_gaussian_vectors
 from brdfdb_pipelines import choose, cli, terminal
 from brdfdb_pipelines.documents import schema
@@ -45,7 +45,17 @@ COSTS = {"exact": 1000.0, "printed": 900.0, "closed form": 800.0, "table": 10.0,
 
 
 def made_up_prices(forms: Sequence[Candidate], *_: object) -> list[Price]:
-    return [Price(COSTS[each.form.kind], COSTS[each.form.kind]) for each in forms]
+    """Price forms by their kinds; what asks the truth at limbs costs twice as much."""
+    costs = [COSTS[each.form.kind] * (2.0 if "limbs" in each.form.key else 1.0) for each in forms]
+    return [Price(cost, np.array([cost])) for cost in costs]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_places() -> Iterator[None]:
+    """Look at a fifth of the places beside edges: what is said of them is as true, and tests take less time."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(choose, "EDGES", choose.EDGES // 5)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +101,9 @@ def test_the_chosen_table_is_built(done: tuple[Choice, Path]) -> None:
     assert stated is not None
     assert 0.0 < stated.overall.p99 < 0.001
     assert store.summary(one.material)["error_p99"] == stated.overall.p99
-    said = "table, planned for 0.1 %, chosen for scene, within 0.5 (CIEDE2000) at every pixel; for a tolerance of 0.001"
+    said = (
+        "table, planned for 0.1 %, truth from 85°, chosen for scene, within 0.5 (CIEDE2000); for a tolerance of 0.001"
+    )
     assert store[one.material].attrs["reason"].startswith(said)
     wi, wr = np.array([[0.6, 0.0, 0.8]]), np.array([[0.0, 0.6, 0.8]])
     truth = oren_nayar_gaussian_vectors(wi, wr, rho=0.9, sigma=np.radians(40.0))
@@ -105,7 +117,7 @@ def test_truth_and_choice_are_pictures_that_differ_by_little(done: tuple[Choice,
         channels = OpenEXR.File(str(folder / "out" / f"scene-{name}.exr"), separate_channels=True).channels()
         images.append(channels["S0.560,0nm"].pixels)
     truth, chosen = images
-    assert truth.shape == (choice.checked[1], choice.checked[0])
+    assert truth.shape == (choice.picture[1], choice.picture[0])
     assert truth.max() > 0.3
     assert not np.array_equal(truth, chosen)
     # 0.5 in CIEDE2000 is 1.3 % of luminance at a lightness of 60; the rest is the limb
@@ -147,8 +159,10 @@ def test_a_recorded_scene_is_compared_and_checked_at_the_size_of_its_file(
     np.savez(tmp_path / "flat.npz", normal=normals)
     name = written(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.npz"')
     choice = choose.run(name, tmp_path / "out", width=16, tolerances=[])
-    assert choice.planned == choice.checked == (7, 5)
-    assert "at every pixel; 7 x 5 pixels compared, 7 x 5 checked" in capsys.readouterr().out
+    assert choice.picture == (7, 5)
+    assert [(one.even, one.edges) for one in choice.materials] == [(None, None)]
+    assert choice.statement.endswith("is within 0.5. The file holds no other places.")
+    assert choice.statement in capsys.readouterr().out
 
 
 def test_bytes_can_be_weighed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -160,14 +174,15 @@ def test_bytes_can_be_weighed(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert said in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("percentile", "where"), [("", "every pixel"), (", percentile = 90", "90 % of the pixels")])
+@pytest.mark.parametrize(("percentile", "where"), [("", "each of the 16"), (", percentile = 90", "90 % of each")])
 def test_what_is_printed_says_how_many_pixels_keep_to_the_tolerance(
     percentile: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     name = written(tmp_path, "ciede2000 = 0.5", f"ciede2000 = 0.5{percentile}")
     choice = choose.run(name, tmp_path / "out", width=16, tolerances=[])
     (one,) = choice.materials
-    assert f"scene: within 0.5 (CIEDE2000) at {where}" in capsys.readouterr().out
+    assert choice.statement.startswith(f"Proven: {where}")
+    assert choice.statement in capsys.readouterr().out
     assert one.whole.counted <= 0.5
     assert one.whole.counted <= one.whole.most
 
@@ -198,3 +213,57 @@ def test_an_exr_without_directions_is_one_sentence(tmp_path: Path, capsys: pytes
     name = written(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.exr"')
     assert cli.main(["choose", name, "--out", str(tmp_path / "out")]) == 2
     assert "flat.exr" in capsys.readouterr().err.strip().splitlines()[-1]
+
+
+def test_the_statement_is_about_samples_and_says_how_many(done: tuple[Choice, Path]) -> None:
+    choice, _ = done
+    (one,) = choice.materials
+    assert one.even is not None
+    assert one.edges is not None
+    # of n places without one beyond, the share is below 1 - 0.025^(1 / n) in the first round
+    for sample in (one.even, one.edges):
+        assert sample.places > 100
+        assert 1 <= sample.one_in <= 1.0 / (1.0 - 0.025 ** (1.0 / sample.places))
+    assert f"fewer than 1 in {one.even.one_in} of its places is beyond 0.5" in choice.statement
+    assert f"at {one.even.places + one.edges.places} places that were not used to choose" in choice.statement
+    assert "every pixel" not in choice.model_dump_json()
+
+
+JUDGED = """\
+lights = [{ direction = [-0.5, -1, 0.6] }]
+camera = { position = [0, -7, 1.2], target = [0, 0, 0.6], fov_deg = 24 }
+wavelengths_nm = [380, 390, 400, 410, 420, 430, 440, 450, 460, 470, 480, 490, 500, 510, 520, 530, 540, 550, 560, 570, \
+580, 590, 600, 610, 620, 630, 640, 650, 660, 670, 680, 690, 700, 710, 720, 730, 740, 750, 760, 770, 780]
+tolerance = { ciede2000 = 1.0 }
+[[objects]]
+name = "cylinder"
+material = "lightly-brushed-aluminum"
+shape = { kind = "cylinder", radius = 0.5, height = 1.2, position = [-1.3, 0.2, 0] }
+[[objects]]
+name = "clay"
+material = "rendered-sphere-40deg"
+shape = { kind = "sphere", radius = 0.6, position = [0, 0, 0.6] }
+"""
+
+
+def test_pictures_that_share_no_code_find_no_more_beyond_the_tolerance_than_is_stated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choose, "_prices", made_up_prices)
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "benchmarks"))
+    from choices import judge  # type: ignore[import-not-found]
+
+    path, told = tmp_path / "judged.toml", tmp_path / "out" / "choice.json"
+    path.write_text(JUDGED, encoding="utf-8")
+    choice = choose.run(str(path), tmp_path / "out", width=48, tolerances=[0.01])
+    keys = {one.material: one.choice.key for one in choice.materials}
+    assert keys["rendered-sphere-40deg"].endswith("-true-limbs")
+    counts = judge(path, told, widths=(40, 96), offsets=4)
+    for one in choice.materials:
+        assert one.even is not None
+        assert counts[one.material].pixels > 500
+        assert counts[one.material].beyond * one.even.one_in <= counts[one.material].pixels
+        assert counts[one.material].most <= 1.0
+    # the same without the truth at limbs is found out
+    told.write_text(told.read_text(encoding="utf-8").replace("-true-limbs", ""), encoding="utf-8")
+    assert judge(path, told, widths=(40, 96), offsets=4)["rendered-sphere-40deg"].most > 1.0

@@ -44,7 +44,7 @@ def error_of(store: Path, name: str) -> float:
 def test_a_chosen_table_states_its_error_and_where_it_comes_from(store: Path) -> None:
     material = presets()["sandpaper-220-grit"]
     planned = plan(material, np.array([550.0]), 0.1)
-    wanted = with_reason(planned, "table, planned for 10 %", "table-top, within 1 (CIEDE2000) at every pixel")
+    wanted = with_reason(planned, "table, planned for 10 %", "table-top, within 1 (CIEDE2000)")
     built = chosen.build(store, {material.name: wanted})
     table = brdfdb.open(store)[material.name]
     assert 0.0 < error_of(store, material.name) <= 0.1
@@ -57,7 +57,7 @@ def test_a_chosen_table_states_its_error_and_where_it_comes_from(store: Path) ->
         assert attributes[name] == getattr(material, name)
     assert list(attributes["assumed"]) == list(material.assumed)
     assert set(attributes["parameter_sources"].values()) == {material.source}
-    said = "table, planned for 10 %, chosen for table-top, within 1 (CIEDE2000) at every pixel; "
+    said = "table, planned for 10 %, chosen for table-top, within 1 (CIEDE2000); "
     assert attributes["reason"] == said + planned.reason
 
 
