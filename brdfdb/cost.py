@@ -43,7 +43,7 @@ def times(
     *,
     most: int = BATCH,
     rounds: int = ROUNDS,
-    clock: Callable[[], float] = time.perf_counter,
+    clock: Callable[[], float] = time.process_time,
     tick: Callable[[], None] = lambda: None,
 ) -> list[Times]:
     """Time forms in turns: what slows the machine down slows all of them down, and ratios within a round keep.
