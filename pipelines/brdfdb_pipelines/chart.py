@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 import brdfdb
 from brdfdb.albedo import material_of
-from brdfdb.chart import STEPS, TIMED, Chart, Charts, FamilyChart, Point, chart, chart_family
+from brdfdb.chart import STEPS, TIMED, chart, chart_family
+from brdfdb.charted import Chart, Charts, FamilyChart, Point
 from brdfdb.family import Family, Sweep
 from brdfdb.family_records import recorded
 from brdfdb.materials import Material
@@ -159,23 +160,33 @@ def _print(one: Chart) -> None:
             "*" if point.key in one.fronts.batch else "",
             point.key,
             point.title,
-            *map(percent, (point.l1, point.p99, point.forward, point.back, point.grazing)),
-            f"{terminal.count(point.batch.ns)} ({terminal.count(point.batch.low)}-{terminal.count(point.batch.high)})",
-            terminal.count(point.single.ns),
+            percent(point.l1),
+            scatter.tail(point),
+            *map(percent, (point.forward, point.back, point.grazing)),
+            scatter.quartiles(point.batch),
+            *map(terminal.count, (point.block.ns, point.single.ns, point.mixed.ns)),
+            scatter.against(point),
             terminal.size(point.bytes),
         )
         for point in one.points
     ]
-    numbers = ("mean error", "p99", "forward", "back", "grazing", "ns a value", "ns, one", "bytes")
+    errors = ("mean error", "p99 (95 % interval)", "forward", "back", "grazing")
+    numbers = (*errors, "ns a value", "ns, 256", "ns, one", "ns, in turn", "times as fast as its rung", "bytes")
     terminal.print_table(f"{one.material}: {one.title}", ("", "key", "form", *numbers), rows, numbers=numbers)
     points = {point.key: point for point in one.points}
     print("  worth having: " + "; ".join(_said(points[key]) for key in one.fronts.batch))
+    heads = ("variance", "ns a sample", "ms to 1 %")
+    work = tuple(f"{problem}: {head}" for problem in ("albedo", "sphere") for head in heads)
+    rows = [(sampler.title, *scatter.works(sampler)) for sampler in one.samplers]
+    terminal.print_table(f"{one.material}: samplers, noise and time", ("sampler", *work), rows, numbers=work)
 
 
 def _said(point: Point) -> str:
     off = f"{scatter.percent(point.l1)} off in the mean, p99 {scatter.percent(point.p99)}"
     error = "the truth" if point.l1 == 0.0 else off
-    return f"{point.title} ({terminal.count(point.batch.ns)} ns, {error})"
+    faster = "" if point.saving is None else f", {terminal.count(float(f'{point.saving.times:.2g}'))} times as fast as"
+    rung = f"{faster} {point.rung}" if faster else ""
+    return f"{point.title} ({terminal.count(point.batch.ns)} ns{rung}, {error})"
 
 
 def _print_family(whole: FamilyChart) -> None:
@@ -199,7 +210,7 @@ def _print_family(whole: FamilyChart) -> None:
         if where := [index for index, front in enumerate(whole.fronts) if curve.key in front]:
             print(f"  worth having: {curve.title} ({terminal.count(curve.batch.ns)} ns) {_where(whole, where)}")
     for curve in whole.curves:
-        if curve.kind in ("closed form", "approximation", "printed"):
+        if curve.kind in ("closed form", "approximation", "customary", "printed"):
             close = [index for index, error in enumerate(curve.l1) if error is not None and error <= scatter.CLOSE]
             where_close = _where(whole, close) if close else "nowhere"
             print(f"  within {scatter.percent(scatter.CLOSE)} in the mean: {curve.title} {where_close}")

@@ -17,19 +17,23 @@ from matplotlib.lines import Line2D
 from matplotlib.text import OffsetFrom
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
-from brdfdb.chart import Between, Chart, Curve, FamilyChart, Form, Point
+from brdfdb.charted import Between, Chart, Cost, Curve, FamilyChart, Form, Point, Sampler
 from brdfdb.representations import Kind
 from brdfdb_pipelines import charts, terminal
 
-WIDTH, _PLOT, _ABOVE, _BELOW, _ROW = 860.0, 270.0, 52.0, 58.0, 12.0  # points
+WIDTH, _PLOT, _ABOVE, _BELOW, _ROW = 1000.0, 270.0, 64.0, 58.0, 12.0  # points
 _LEFT, _GAP, _RIGHT = 66.0, 14.0, 12.0
-_SHARES = (0.44, 0.26, 0.30)  # of the width, of the panels
+_SHARES = (0.38, 0.15, 0.15, 0.15, 0.17)  # of the width, of the panels
 _DPI = 110
 SMALLEST = 1e-6  # errors below are drawn here: the truth, and what differs from it by rounding
 _LETTER, _LINE = 4.1, 9.0  # width and height of a letter of a label, on average
 _LEADER: dict[str, Any] = {"arrowstyle": "-", "color": charts.MUTED, "linewidth": 0.5}
 _NEAR = 10.0  # what is written further from its point has a line to it
-_COLUMNS = (18.0, 250.0, 318.0, 386.0, 454.0, 522.0, 590.0, 690.0, 770.0, 848.0)  # left end of titles, right ends
+# Left end of titles and right ends of columns, of the table of a material and of a family
+_COLUMNS = (18.0, 230.0, 280.0, 385.0, 435.0, 485.0, 540.0, 630.0, 680.0, 735.0, 800.0, 935.0, 988.0)
+_FAMILY_COLUMNS = (18.0, 250.0, 330.0, 410.0, 490.0, 580.0, 670.0, 760.0, 850.0, 988.0)
+_SAMPLER_COLUMNS = (18.0, 300.0, 390.0, 480.0, 620.0, 710.0, 800.0, 940.0)
+_BARS = 76.0  # height of the panels of samplers
 
 
 class _Look(NamedTuple):
@@ -39,8 +43,10 @@ class _Look(NamedTuple):
 
 _LOOKS: dict[Kind, _Look] = {
     "exact": _Look(charts.TRUTH, "o"),
+    "quadrature": _Look(charts.TRUTH, "P"),
     "closed form": _Look(charts.OURS, "D"),
     "approximation": _Look(charts.TEXTBOOK, "s"),
+    "customary": _Look(charts.OTHERS[2], "p"),
     "printed": _Look(charts.PRINTED, "X"),
     "other model": _Look(charts.MUTED, "v"),
     "table": _Look(charts.OTHERS[0], "^"),
@@ -73,14 +79,25 @@ def _canvas(chart: Chart | FamilyChart) -> Canvas:
 
 
 def _drawn(chart: Chart) -> Canvas:
-    height = _ABOVE + _PLOT + _BELOW + _ROW * (len(chart.points) + 2)
-    said = "Lines go up from the mean error to the 99th percentile; bars are quartiles of the time."
-    canvas = _titled(height, chart.title, f"{chart.material}, {chart.model}, {_wavelengths(chart)}. {said}")
+    table = _ABOVE + _PLOT + _BELOW
+    samplers = table + _ROW * (len(chart.points) + 3)
+    height = samplers + _ROW * (len(chart.samplers) + 3) + _BARS + 44.0
+    said = "Lines go up from the mean error to the 99th percentile, thick over its 95 % confidence interval."
+    times = "Bars are quartiles of the time."
+    if len(chart.ladder) > 1:
+        times += " Dashed: the ladder, the truth by ever coarser quadrature."
+    canvas = _titled(height, chart.title, f"{chart.material}, {chart.model}, {_wavelengths(chart)}. {said}\n{times}")
     room = WIDTH - _LEFT - _RIGHT - 2.0 * _GAP
     left = _LEFT
+
+    def of(cost: Cost) -> tuple[float, float, float]:
+        return cost.low, cost.ns, cost.high
+
     panels: tuple[tuple[str, Callable[[Point], tuple[float, float, float]], list[str]], ...] = (
-        ("ns a value, many directions at once", lambda p: (p.batch.low, p.batch.ns, p.batch.high), chart.fronts.batch),
-        ("ns a value, one direction", lambda p: (p.single.low, p.single.ns, p.single.high), chart.fronts.single),
+        ("ns a value, many directions at once", lambda p: of(p.batch), chart.fronts.batch),
+        ("256 directions", lambda p: of(p.block), []),
+        ("one direction", lambda p: of(p.single), chart.fronts.single),
+        ("64 materials in turn", lambda p: of(p.mixed), []),
         ("bytes that it reads", lambda p: (p.bytes, p.bytes, p.bytes), chart.fronts.bytes),
     )
     for number, (share, (label, cost, front)) in enumerate(zip(_SHARES, panels, strict=True)):
@@ -93,18 +110,88 @@ def _drawn(chart: Chart) -> Canvas:
         else:
             axes.tick_params(labelleft=False)
         left += share * room + _GAP
-    front_line = Line2D([], [], color=charts.OURS, linewidth=5.0, alpha=0.16, label="front")
-    _legend(canvas, {point.kind for point in chart.points}, front_line, _ABOVE + _PLOT, height)
+    lines = [Line2D([], [], color=charts.OURS, linewidth=5.0, alpha=0.16, label="front")]
+    if len(chart.ladder) > 1:
+        lines.append(Line2D([], [], color=charts.TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, label="ladder"))
+    _legend(canvas, {point.kind for point in chart.points}, lines, _ABOVE + _PLOT, height)
     fronts = {*chart.fronts.batch, *chart.fronts.single}
     rows = []
     for point in chart.points:
-        errors = (point.l1, point.p99, point.forward, point.back, point.grazing)
-        ns, low, high, one = map(terminal.count, (point.batch.ns, point.batch.low, point.batch.high, point.single.ns))
-        cells = (*map(percent, errors), f"{ns} ({low}-{high})", one, terminal.size(point.bytes))
-        rows.append((point, cells, point.key in fronts))
-    heads = ("mean error", "p99", "forward", "back", "grazing", "ns, many (quartiles)", "ns, one", "bytes")
-    _table(canvas, heads, rows, _ABOVE + _PLOT + _BELOW, height)
+        errors = (point.forward, point.back, point.grazing)
+        others = map(terminal.count, (point.block.ns, point.single.ns, point.mixed.ns))
+        cells = (percent(point.l1), tail(point), *map(percent, errors), quartiles(point.batch), *others, against(point))
+        rows.append((point, (*cells, terminal.size(point.bytes)), point.key in fronts))
+    heads = ("mean error", "p99 (95 % interval)", "forward", "back", "grazing", "ns, many (quartiles)")
+    _table(
+        canvas, _COLUMNS, (*heads, "256", "one", "in turn", "times as fast as its rung", "bytes"), rows, table, height
+    )
+    _samplers(canvas, chart, samplers, height)
     return canvas
+
+
+def tail(point: Point) -> str:
+    """The 99th percentile of the error and its confidence interval, all in percent."""
+    if point.p99 <= SMALLEST:
+        return percent(point.p99)
+    high = "" if point.p99_high is None else f"{100.0 * point.p99_high:.2g}"
+    return f"{percent(point.p99)} ({100.0 * point.p99_low:.2g}-{high})"
+
+
+def quartiles(cost: Cost) -> str:
+    """The time of a form [ns], and its quartiles."""
+    ns, low, high = map(terminal.count, (cost.ns, cost.low, cost.high))
+    return f"{ns} ({low}-{high})"
+
+
+def against(point: Point) -> str:
+    """How many times as fast a form is as the cheapest rung of the truth that is as accurate, and which that is."""
+    return "" if point.saving is None else f"{terminal.count(float(f'{point.saving.times:.2g}'))} ({point.rung})"
+
+
+_WORK_HEADS = ("variance", "ns a sample", "ms to 1 % (quartiles)")
+
+
+def works(sampler: Sampler) -> tuple[str, ...]:
+    """Variance, time and their product of a sampler: for the albedo, then for the sphere."""
+    cells: list[str] = []
+    for work in (sampler.albedo, sampler.sphere):
+        ms, low, high = (f"{value:.3g}" for value in (work.ms, work.low_ms, work.high_ms))
+        cells += [f"{work.variance:.3g}", f"{work.ns:.3g}", f"{ms} ({low}-{high})"]
+    return tuple(cells)
+
+
+def _samplers(canvas: Canvas, chart: Chart, top: float, height: float) -> None:
+    """Variance and time of samplers as a table, their product with its quartiles as bars."""
+    heads = (*(f"albedo: {head}" for head in _WORK_HEADS[:2]), _WORK_HEADS[2])
+    heads += (*(f"sphere: {head}" for head in _WORK_HEADS[:2]), _WORK_HEADS[2])
+    _row(canvas, _SAMPLER_COLUMNS, 0, ("", "samplers of the material's model", *heads), top, height, color=charts.MUTED)
+    for number, sampler in enumerate(chart.samplers, 1):
+        cells = (str(number), sampler.title, *works(sampler))
+        _row(canvas, _SAMPLER_COLUMNS, number, cells, top, height)
+    below = top + _ROW * (len(chart.samplers) + 2)
+    room = (WIDTH - _LEFT - _RIGHT - 4.0 * _GAP) / 2.0
+    for which, label in enumerate(("albedo of light from 60 degrees", "sphere under a sky and a lamp")):
+        left = _LEFT + which * (room + 4.0 * _GAP)
+        axes = canvas.add_axes((left / WIDTH, 1.0 - (below + _BARS) / height, room / WIDTH, _BARS / height))
+        values = [(sampler.albedo, sampler.sphere)[which] for sampler in chart.samplers]
+        axes.set_xscale("log")
+        for y, work in enumerate(values):
+            least = max(work.low_ms, 1e-6)
+            axes.plot([least, max(work.high_ms, least)], [y, y], color=charts.OURS, linewidth=4.0, alpha=0.4)
+            axes.plot(max(work.ms, 1e-6), y, "o", color=charts.OURS, markersize=4.5)
+        axes.set_yticks(range(len(values)), [sampler.key for sampler in chart.samplers])
+        axes.set_ylim(len(values) - 0.4, -0.6)
+        ends = [max(value, 1e-6) for work in values for value in (work.low_ms, work.high_ms)]
+        axes.set_xlim(0.6 * min(ends), 1.7 * max(ends))
+        axes.xaxis.set_major_locator(
+            LogLocator(subs=(1.0, 2.0, 5.0) if max(ends) < 50.0 * min(ends) else (1.0,), numticks=8)
+        )
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.grid(color=charts.GRID, linewidth=0.6, axis="x")
+        axes.tick_params(length=0)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.set_xlabel(f"ms to a standard deviation of 1 %: {label}")
 
 
 def _titled(height: float, title: str, said: str) -> Canvas:
@@ -131,11 +218,17 @@ def _panel(
     for key in front:  # down in error, then across: there is nothing clearly cheaper below
         here = costs[key][1], _height(points[key].l1)
         steps += [(steps[-1][0], here[1]), here] if steps else [here]
-    axes.plot(*zip(*steps, strict=True), color=charts.OURS, linewidth=5.0, alpha=0.16, zorder=1, clip_on=False)
+    if steps:
+        axes.plot(*zip(*steps, strict=True), color=charts.OURS, linewidth=5.0, alpha=0.16, zorder=1, clip_on=False)
+    if len(chart.ladder) > 1:
+        rungs = [(costs[key][1], _height(points[key].l1)) for key in chart.ladder]
+        axes.plot(*zip(*rungs, strict=True), color=charts.TRUTH, linestyle=(0, (4, 2)), linewidth=1.0, zorder=1.5)
     for key, point in points.items():
         look, (first, middle, last), y = _LOOKS[point.kind], costs[key], _height(point.l1)
         line: dict[str, Any] = {"color": look.colour, "zorder": 2, "clip_on": False}
         axes.plot([middle, middle], [y, max(y, point.p99)], linewidth=0.7, alpha=0.55, **line)
+        interval = [_height(point.p99_low), _height(point.p99_high or point.p99)]
+        axes.plot([middle, middle], interval, linewidth=2.2, alpha=0.55, solid_capstyle="butt", **line)
         if first < last:
             axes.plot([first, last], [y, y], linewidth=2.0, alpha=0.4, **line)
         size, fill = 6.5 if key in front else 4.5, look.colour if point.dtype == "float64" else "white"
@@ -253,7 +346,7 @@ def hidden(box: Box, taken: list[Box], frame: Any) -> float:
     return float(area + 100.0 * beyond)
 
 
-def _legend(canvas: Canvas, present: set[Kind], last: Line2D, top: float, height: float) -> None:
+def _legend(canvas: Canvas, present: set[Kind], lines: Sequence[Line2D], top: float, height: float) -> None:
     handles = [
         Line2D([], [], linestyle="", color=_LOOKS[k].colour, marker=_LOOKS[k].marker, markersize=5, label=k)
         for k in _LOOKS
@@ -261,7 +354,7 @@ def _legend(canvas: Canvas, present: set[Kind], last: Line2D, top: float, height
     ]
     handles.append(Line2D([], [], linestyle="", color=charts.TRUTH, marker="o", markersize=5, label="hollow: float32"))
     handles[-1].set_markerfacecolor("white")
-    handles.append(last)
+    handles += lines
     canvas.legend(
         handles=handles,
         loc="upper left",
@@ -275,22 +368,30 @@ def _legend(canvas: Canvas, present: set[Kind], last: Line2D, top: float, height
 
 
 def _table(
-    canvas: Canvas, heads: Iterable[str], rows: Iterable[tuple[Form, Iterable[str], bool]], top: float, height: float
+    canvas: Canvas,
+    columns: Sequence[float],
+    heads: Iterable[str],
+    rows: Iterable[tuple[Form, Iterable[str], bool]],
+    top: float,
+    height: float,
 ) -> None:
     """A row for each form, numbered, those that are worth having in bold."""
-
-    def row(number: int, cells: Iterable[str], **how: Any) -> None:
-        for column, (end, cell) in enumerate(zip(_COLUMNS, cells, strict=True)):
-            align = "left" if column == 1 else "right"
-            x = _COLUMNS[0] + 4.0 if column == 1 else end
-            y = 1.0 - (top + _ROW * (number + 0.5)) / height
-            if cell:
-                canvas.text(x / WIDTH, y, cell, ha=align, va="center", fontsize=7.5, **how)
-
-    row(0, ("", "", *heads), color=charts.MUTED)
+    _row(canvas, columns, 0, ("", "", *heads), top, height, color=charts.MUTED)
     for number, (form, cells, bold) in enumerate(rows, 1):
-        weight = "bold" if bold else "normal"
-        row(number, (str(number), form.title, *cells), fontweight=weight, color=_LOOKS[form.kind].colour)
+        style = {"fontweight": "bold" if bold else "normal", "color": _LOOKS[form.kind].colour}
+        _row(canvas, columns, number, (str(number), form.title, *cells), top, height, **style)
+
+
+def _row(
+    canvas: Canvas, columns: Sequence[float], number: int, cells: Iterable[str], top: float, height: float, **how: Any
+) -> None:
+    """Cells of a row: a number, a title from the left, and the others up to the ends of their columns."""
+    for column, (end, cell) in enumerate(zip(columns, cells, strict=True)):
+        align = "left" if column == 1 else "right"
+        x = columns[0] + 4.0 if column == 1 else end
+        y = 1.0 - (top + _ROW * (number + 0.5)) / height
+        if cell:
+            canvas.text(x / WIDTH, y, cell, ha=align, va="center", fontsize=7.5, **how)
 
 
 # Families
@@ -349,8 +450,10 @@ def _drawn_family(whole: FamilyChart) -> Canvas:
     bar = Line2D(
         [], [], color=charts.MUTED, linewidth=3.0, alpha=0.3, label="from the least to the most of the members"
     )
-    _legend(canvas, {form.kind for form in forms}, bar, bottom, height)
-    _table(canvas, _FAMILY_HEADS, [_family_row(whole, form) for form in forms], bottom + _BELOW, height)
+    _legend(canvas, {form.kind for form in forms}, [bar], bottom, height)
+    _table(
+        canvas, _FAMILY_COLUMNS, _FAMILY_HEADS, [_family_row(whole, form) for form in forms], bottom + _BELOW, height
+    )
     return canvas
 
 

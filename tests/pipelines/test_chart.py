@@ -15,7 +15,7 @@ import pytest
 
 from brdfdb import chart as charting
 from brdfdb import cost, family_records
-from brdfdb.chart import Between, Chart, Charts, Cost, Curve, FamilyChart, Fronts, Point
+from brdfdb.charted import Between, Chart, Charts, Cost, Curve, FamilyChart, Fronts, Point, Sampler, Saving, Work
 from brdfdb.materials import presets
 from brdfdb.representations import representations
 from brdfdb_pipelines import cli, scatter, terminal
@@ -53,8 +53,13 @@ def family_charted(folder: Path, name: str) -> FamilyChart:
 def point(key: str, l1: float, ns: float, **more: Any) -> Point:
     time = Cost(ns=ns, low=0.9 * ns, high=1.2 * ns, directions=1)
     errors = dict.fromkeys(("forward", "back", "grazing"), l1) | {"l1": l1, "p99": 5.0 * l1}
+    errors |= {"p99_low": 4.0 * l1, "p99_high": 6.0 * l1, "mixed": time, "rung": None, "saving": None}
     fixed = {"title": f"the form {key}", "kind": "table", "python": "none", "dtype": "float64", "bytes": 100}
-    return Point.model_validate({"key": key, "batch": time, "single": time, **errors, **fixed, **more})
+    costs = {"batch": time, "block": time, "single": time}
+    return Point.model_validate({"key": key, **costs, **errors, **fixed, **more})
+
+
+WORK = Work(variance=0.25, ns=40.0, low_ms=0.09, ms=0.1, high_ms=0.11)
 
 
 def made_up(*points: Point) -> Chart:
@@ -68,6 +73,8 @@ def made_up(*points: Point) -> Chart:
         directions=1,
         truth=keys[0],
         points=list(points),
+        ladder=[each.key for each in points if each.kind in ("exact", "quadrature")],
+        samplers=[Sampler(key="model", title="the model's lobe", albedo=WORK, sphere=WORK)],
         fronts=Fronts(batch=keys[:2], single=keys[:1], bytes=keys[:1]),
     )
 
@@ -169,6 +176,25 @@ def test_a_picture_names_every_point_and_the_front() -> None:
     assert "3 the form fit-float32" not in written  # there is no room: it lies on the second
     assert "4 the form off" in written  # there is
     assert "10 (9-12)" in written
+
+
+def test_a_picture_draws_the_ladder_and_says_what_a_form_saves_over_its_rung() -> None:
+    rung = point("exact-4", 0.01, 100.0, kind="quadrature")
+    fit = point("fit", 0.02, 10.0, kind="approximation", rung="exact-4", saving=Saving(low=9.0, times=10.4, high=11.0))
+    whole = made_up(POINTS[0], rung, fit)
+    written = [element.text for element in ElementTree.fromstring(scatter.svg(whole)).iter() if element.text]
+    assert "ladder" in written
+    assert "quadrature" in written
+    assert "10 (exact-4)" in written
+    assert "10 % (8-12)" in written  # the 99th percentile and its interval
+    assert "ladder" not in scatter.svg(made_up(POINTS[0]))
+
+
+def test_a_picture_shows_the_noise_and_time_of_samplers() -> None:
+    text = scatter.svg(made_up(*POINTS))
+    written = [element.text for element in ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}text")]
+    assert "the model's lobe" in written
+    assert written.count("0.1 (0.09-0.11)") == 2  # of the albedo and of the sphere
 
 
 def test_a_picture_is_the_same_every_time() -> None:
@@ -294,7 +320,7 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
     members = [f"member-{number}" for number in range(len([*itertools.product(*axes.values())]))]
     fixed = {"python": "none", "dtype": "float64", "bytes": 8, "timed": members[0]}
     better = [0.5 / (number + 1) for number in range(len(members))]
-    costs = [{"batch": time(ns), "single": time(ns)} for ns in (9.0, 1.0)]
+    costs = [{"batch": time(ns), "block": time(ns), "single": time(ns)} for ns in (9.0, 1.0)]
     forms = [{"key": "exact", "title": "the truth", "kind": "exact"}, {"key": "fit", "title": "fit", "kind": "printed"}]
     errors: list[list[float]] = [[0.0] * len(members), better]
     return FamilyChart(
@@ -318,7 +344,7 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
 def test_the_picture_of_a_family_names_every_form_beside_its_curve_and_in_the_table() -> None:
     fixed = {"key": "between", "title": "between members", "kind": "table", "python": "none", "dtype": "float64"}
     between = Between.model_validate(
-        {**fixed, "bytes": 8, "batch": time(5.0), "single": time(5.0), "l1": 0.1, "p99": 1.0}
+        {**fixed, "bytes": 8, **dict.fromkeys(("batch", "block", "single"), time(5.0)), "l1": 0.1, "p99": 1.0}
     )
     text = scatter.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
     written = [element.text for element in ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}text")]
