@@ -23,7 +23,8 @@ from brdfdb.materials import Material
 from brdfdb.plan import check_tolerance
 from brdfdb.representations import Representation, of_table
 from brdfdb.store import Store
-from brdfdb_pipelines import recipe, scatter, terminal
+from brdfdb_pipelines import recipe, scatter, swept, terminal
+from brdfdb_pipelines.panels import percent
 
 
 class _Subject(NamedTuple):
@@ -154,7 +155,6 @@ def _fits(stored: NDArray[np.float64] | None, wanted: NDArray[np.float64] | None
 
 def _print(one: Chart) -> None:
     """All points as a table, and the front in a sentence."""
-    percent = scatter.percent
     rows = [
         (
             "*" if point.key in one.fronts.batch else "",
@@ -182,7 +182,7 @@ def _print(one: Chart) -> None:
 
 
 def _said(point: Point) -> str:
-    off = f"{scatter.percent(point.l1)} off in the mean, p99 {scatter.percent(point.p99)}"
+    off = f"{percent(point.l1)} off in the mean, p99 {percent(point.p99)}"
     error = "the truth" if point.l1 == 0.0 else off
     faster = "" if point.saving is None else f", {terminal.count(float(f'{point.saving.times:.2g}'))} times as fast as"
     rung = f"{faster} {point.rung}" if faster else ""
@@ -195,10 +195,10 @@ def _print_family(whole: FamilyChart) -> None:
         rows = []
         for curve in whole.curves:
             cells = []
-            for some in scatter.along(whole, axis):
+            for some in swept.along(whole, axis):
                 chosen = 2 * sum(curve.key in whole.fronts[index] for index in some) > len(some)
-                middle = scatter.middle([curve.l1[index] for index in some])
-                cells.append("-" if middle is None else f"{'*' if chosen else ''}{scatter.percent(middle)}")
+                middle = swept.middle([curve.l1[index] for index in some])
+                cells.append("-" if middle is None else f"{'*' if chosen else ''}{percent(middle)}")
             rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
         columns = [f"{value:g}" for value in values]
         if whole.g is not None and len(whole.axes) == 1:
@@ -211,11 +211,11 @@ def _print_family(whole: FamilyChart) -> None:
             print(f"  worth having: {curve.title} ({terminal.count(curve.batch.ns)} ns) {_where(whole, where)}")
     for curve in whole.curves:
         if curve.kind in ("closed form", "approximation", "customary", "printed"):
-            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= scatter.CLOSE]
+            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= swept.CLOSE]
             where_close = _where(whole, close) if close else "nowhere"
-            print(f"  within {scatter.percent(scatter.CLOSE)} in the mean: {curve.title} {where_close}")
+            print(f"  within {percent(swept.CLOSE)} in the mean: {curve.title} {where_close}")
     if whole.between is not None:
-        off = f"{scatter.percent(whole.between.l1)} off in the mean, p99 {scatter.percent(whole.between.p99)}"
+        off = f"{percent(whole.between.l1)} off in the mean, p99 {percent(whole.between.p99)}"
         time = f"{terminal.count(whole.between.batch.ns)} ns, {terminal.count(whole.between.single.ns)} of one"
         print(f"  between members: {off}, as the family states ({time}, {terminal.size(whole.between.bytes)})")
 

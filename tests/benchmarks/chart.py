@@ -1,7 +1,7 @@
 """Pictures and table of the README's section on speed against accuracy: ``python tests/benchmarks/chart.py``.
 
-Run it in the root of the repository: it writes docs/NAME.svg and prints the tables. Times are those of the processor, but
-neighbours in the caches of a busy machine lengthen them.
+Run it in the root of the repository: it writes docs/NAME.svg and prints the tables. Times are those of the
+processor, but what shares its caches on a busy machine lengthens them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from brdfdb.charted import Chart
-from brdfdb_pipelines import chart, scatter, terminal
+from brdfdb_pipelines import chart, panels, scatter, terminal
 
 NAMES = ("clay-vase", "magnesium-oxide-ceramic", "rolled-brass", "scene-copper-sphere")
 FAMILY, RECIPE = "copper-roughness", Path("pipelines/brdfdb_pipelines/recipes/copper-roughness.toml")
@@ -24,7 +24,7 @@ def rows(one: Chart) -> list[str]:
     lines = []
     for key in one.fronts.batch:
         point = points[key]
-        errors = f"{scatter.percent(point.l1)} | {scatter.tail(point)} | {scatter.percent(point.forward)}"
+        errors = f"{panels.percent(point.l1)} | {scatter.tail(point)} | {panels.percent(point.forward)}"
         times = " | ".join(terminal.count(each.ns) for each in (point.batch, point.block, point.single, point.mixed))
         faster = scatter.against(point) or "-"
         lines.append(

@@ -18,7 +18,7 @@ from brdfdb import cost, family_records
 from brdfdb.charted import Between, Chart, Charts, Cost, Curve, FamilyChart, Fronts, Point, Sampler, Saving, Work
 from brdfdb.materials import presets
 from brdfdb.representations import representations
-from brdfdb_pipelines import cli, scatter, terminal
+from brdfdb_pipelines import cli, panels, scatter, swept, terminal
 from brdfdb_pipelines.recipe import load
 
 Captured = pytest.CaptureFixture[str]
@@ -212,7 +212,7 @@ def test_one_point_is_a_picture_too() -> None:
     [(0.0, "0"), (1e-8, "≤ 0.0001 %"), (0.000172, "0.017 %"), (0.0143, "1.4 %"), (0.237, "24 %"), (8.85, "885 %")],
 )
 def test_errors_are_written_for_people(value: float, text: str) -> None:
-    assert scatter.percent(value) == text
+    assert panels.percent(value) == text
 
 
 @pytest.mark.parametrize(("value", "text"), [(4.26, "4.26"), (999.6, "1k"), (34800.0, "34.8k"), (1.3e6, "1.3M")])
@@ -226,11 +226,11 @@ def test_labels_hide_neither_points_nor_each_other_where_there_is_room() -> None
     boxes = []
     for _ in range(4):  # four names for one point
         best = min(
-            scatter.offsets(30.0),
-            key=lambda offset: scatter.hidden(scatter.box((100.0, 50.0), offset, 30.0), taken, frame),
+            panels.offsets(30.0),
+            key=lambda offset: panels.hidden(panels.box((100.0, 50.0), offset, 30.0), taken, frame),
         )
-        boxes.append(scatter.box((100.0, 50.0), best, 30.0))
-        assert scatter.hidden(boxes[-1], taken, frame) == 0.0
+        boxes.append(panels.box((100.0, 50.0), best, 30.0))
+        assert panels.hidden(boxes[-1], taken, frame) == 0.0
         taken.append(boxes[-1])
     assert len(set(boxes)) == 4
 
@@ -358,16 +358,16 @@ def test_the_picture_of_a_family_names_every_form_beside_its_curve_and_in_the_ta
 
 def test_members_are_told_apart_along_each_parameter() -> None:
     whole = made_up_family(height=[1.0, 2.0], width=[3.0, 4.0, 5.0])
-    assert scatter.along(whole, "height") == [[0, 1, 2], [3, 4, 5]]
-    assert scatter.along(whole, "width") == [[0, 3], [1, 4], [2, 5]]
-    assert scatter.middle([0.1, None, 0.3, 0.2]) == 0.2
-    assert scatter.middle([None]) is None
+    assert swept.along(whole, "height") == [[0, 1, 2], [3, 4, 5]]
+    assert swept.along(whole, "width") == [[0, 3], [1, 4], [2, 5]]
+    assert swept.middle([0.1, None, 0.3, 0.2]) == 0.2
+    assert swept.middle([None]) is None
 
 
 def test_names_are_moved_apart_and_no_further_than_they_need() -> None:
-    assert scatter.apart([10.0, 50.0], 9.0, 100.0) == [10.0, 50.0]
-    assert scatter.apart([10.0, 12.0, 30.0], 9.0, 100.0) == [6.5, 15.5, 30.0]
-    assert scatter.apart([95.0, 99.0, 120.0], 9.0, 100.0) == [82.0, 91.0, 100.0]
+    assert swept.apart([10.0, 50.0], 9.0, 100.0) == [10.0, 50.0]
+    assert swept.apart([10.0, 12.0, 30.0], 9.0, 100.0) == [6.5, 15.5, 30.0]
+    assert swept.apart([95.0, 99.0, 120.0], 9.0, 100.0) == [82.0, 91.0, 100.0]
 
 
 def test_the_recipe_of_copper_goes_from_smooth_to_rough() -> None:
