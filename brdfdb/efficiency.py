@@ -16,7 +16,7 @@ from brdfdb.sampling import sample
 Array = NDArray[np.float64]
 
 SAMPLERS = {
-    "model": "the model's lobe and cosine, `sampling.sample`",
+    "model": "the model's own: its lobe and cosine",
     "cosine": "cosine of the polar angle",
     "uniform": "uniform over the hemisphere",
 }

@@ -214,4 +214,4 @@ def percent(value: float) -> str:
     """An error as a human reads it."""
     if value <= SMALLEST:
         return "0" if value == 0.0 else "≤ 0.0001 %"
-    return f"{100.0 * value:.2g} %" if value < 1.0 else f"{100.0 * value:.0f} %"
+    return f"{100.0 * value:.2g} %" if value < 0.995 else f"{100.0 * value:.0f} %"

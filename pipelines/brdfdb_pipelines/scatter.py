@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import io
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -80,7 +81,7 @@ def _drawn(chart: Chart) -> Canvas:
     if len(chart.ladder) > 1:
         times += " Dashed: the ladder, the truth by ever coarser quadrature."
     canvas = titled(height, chart.title, f"{chart.material}, {chart.model}, {wavelengths(chart)}. {said}\n{times}")
-    room = WIDTH - LEFT - RIGHT - 2.0 * GAP
+    room = WIDTH - LEFT - RIGHT - 4.0 * GAP
     left = LEFT
 
     def of(cost: Cost) -> tuple[float, float, float]:
@@ -126,8 +127,8 @@ def tail(point: Point) -> str:
     """The 99th percentile of the error and its confidence interval, all in percent."""
     if point.p99 <= SMALLEST:
         return percent(point.p99)
-    high = "" if point.p99_high is None else f"{100.0 * point.p99_high:.2g}"
-    return f"{percent(point.p99)} ({100.0 * point.p99_low:.2g}-{high})"
+    low, high = (percent(end).removesuffix(" %") for end in (point.p99_low, point.p99_high or math.inf))
+    return f"{percent(point.p99)} ({low}-{high})"
 
 
 def quartiles(cost: Cost) -> str:

@@ -209,7 +209,15 @@ def test_one_point_is_a_picture_too() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (1e-8, "≤ 0.0001 %"), (0.000172, "0.017 %"), (0.0143, "1.4 %"), (0.237, "24 %"), (8.85, "885 %")],
+    [
+        (0.0, "0"),
+        (1e-8, "≤ 0.0001 %"),
+        (0.000172, "0.017 %"),
+        (0.0143, "1.4 %"),
+        (0.237, "24 %"),
+        (0.997, "100 %"),
+        (8.85, "885 %"),
+    ],
 )
 def test_errors_are_written_for_people(value: float, text: str) -> None:
     assert panels.percent(value) == text
