@@ -22,11 +22,10 @@ from brdfdb.grids import (
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
 from brdfdb.materials import Material, Number
-from brdfdb.models._he_torrance_kernels import CORRECTED_LIMIT
+from brdfdb.models._he_torrance_kernels import CORRECTED_LIMIT, LIMIT
 from brdfdb.models._he_torrance_series import CONSTANTS_BYTES
 from brdfdb.models._oren_nayar_facets import NODES
 from brdfdb.models.he_torrance_1991 import with_sum
-from brdfdb.models.he_torrance_1991_limits import SIGMA_0_OVER_TAU
 from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, gaussian_rung, single_slope_mean
 from brdfdb.parameters import Floats
 from brdfdb.plan import plan
@@ -307,20 +306,8 @@ def _he_torrance(material: Material, wavelength_nm: NDArray[np.float64] | None) 
     yield form("ten-terms", "ten terms of eq. 78", "customary", python, ten, 0)
     corrected = functools.partial(with_sum, series=CORRECTED_LIMIT)
     yield form("beckmann-corrected", "Beckmann, first order in 1/g", "approximation", python, corrected, 0)
-    if (
-        SIGMA_0_OVER_TAU.low
-        <= material.parameters["sigma_0_um"] / material.parameters["tau_um"]
-        <= SIGMA_0_OVER_TAU.high
-    ):
-        name = "models.he_torrance_very_rough"
-        yield form("beckmann", "Beckmann's limit, g to infinity", "customary", name, _beckmann, 0)
-
-
-def _beckmann(
-    wi: Floats, wr: Floats, *, sigma_0_um: float, tau_um: float, n: Floats, k: Floats, a: float, **_: Any
-) -> Floats:
-    slope = sigma_0_um / tau_um
-    return models.he_torrance_very_rough_vectors(wi, wr, sigma_0_over_tau=slope, n=n, k=k, a=a)
+    limit = functools.partial(with_sum, series=LIMIT)
+    yield form("beckmann", "Beckmann's limit, g to infinity", "customary", python, limit, 0)
 
 
 _FORMS: dict[str, Callable[[Material, NDArray[np.float64] | None], Iterator[Representation]]] = {

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb import accuracy
+from brdfdb import accuracy, models
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.misprints import MISPRINTS
@@ -28,6 +28,7 @@ SINGLE = 3e-7  # l1 of float32: 1.6e-7 of rolled brass
 SWAPPED = 1e-9  # light and viewer, of the largest value: 1.6e-12
 SLOPES = 2e-6  # relative, of facets integrated: 1.1e-6 by its docstring
 SUM = 2e-12  # relative, of the whole sum: as its model
+LIMIT_OF_VERY_ROUGH = 1e-12  # relative: where exp has a large exponent
 COARSE = 0.02  # relative, of a coarser sum of eq. 78: what its coarsest rung is off
 CLOSED = 1e-3  # relative, 24 slopes less the 400 of the misprint: 4.1e-4
 SHORT = 3e-8  # l1 of ten terms where g stays below 1.3: 2.3e-8; the first one left out is g^10 / (11! 11) of the first
@@ -250,6 +251,17 @@ def test_ten_terms_hold_the_share_that_the_reference_gives() -> None:
     normal = np.array([[0.0, 0.0, 1.0]])
     share = values(forms["ten-terms"], normal, normal)[0, 1] / values(forms["sum"], normal, normal)[0, 1]
     np.testing.assert_allclose(share, float(held / he_torrance_1991.series(g, 0)), rtol=SUM)
+
+
+def test_beckmanns_limit_is_that_of_very_rough_surfaces() -> None:
+    material = presets()["magnesium-oxide-ceramic"]
+    forms, drawn = of(material)
+    wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
+    given = material.arguments(None)
+    slope = given["sigma_0_um"] / given["tau_um"]
+    optical = {name: given[name] for name in ("n", "k", "a")}
+    expected = models.he_torrance_very_rough_vectors(wi, wr, sigma_0_over_tau=slope, **optical)
+    np.testing.assert_allclose(forms["beckmann"].evaluate(wi, wr)[:, 0], expected, rtol=LIMIT_OF_VERY_ROUGH)
 
 
 def cpu_seconds(form: Representation, wi: Any, wr: Any) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb import fresnel
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
 from brdfdb.models import he_torrance_1991 as full
-from brdfdb.models._he_torrance_kernels import LIMIT
+from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991_polarised import unit_azimuth
 from brdfdb.parameters import Floats, Parameter
 
@@ -299,9 +299,20 @@ def he_torrance_aperture_vectors(
 
 
 def _very_rough(directions: Directions, slope: Floats, n: Floats, k: Floats, albedo: Floats) -> Floats:
-    # The wave number cancels in eq. (78): that at which V is v_xy^2 will do
-    features = 4.0 * slope**2, np.ones(()), slope
-    return full.evaluated(directions, (*features, n, k, albedo / np.pi), LIMIT)
+    sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
+    # Eqs (23)-(25)
+    S_over_cos_cos = shadowing(sin_i, cos_i, slope) * shadowing(sin_r, cos_r, slope)
+    # Eqs (79)-(83)
+    slope2 = slope**2 * variance(hidden(sin_i, cos_i, slope) + hidden(sin_r, cos_r, slope))
+    # Eq. (84): tan^2 of the inclination of the facet
+    v_xy2, v_z2 = full.v_squared(directions)
+    tan2 = v_xy2 / v_z2
+    # Eq. (78) with e^-b / g for its sum, b = tan^2 / (4 slope^2)
+    lobe = np.exp(-tan2 / (4.0 * slope2)) / (16.0 * np.pi * slope2)
+    # Eq. (75), at the bisecting angle
+    F2 = fresnel.unpolarised(full.cos_bisecting(directions), n, k)
+    # Eqs (71), (76) and (72)
+    return finished(F2 * lobe * (1.0 + tan2) ** 2 * S_over_cos_cos + albedo / np.pi, directions)
 
 
 def _smooth(directions: Directions, n: Floats, k: Floats) -> Floats:
