@@ -3,140 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from datetime import datetime
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb import accuracy, cost
+from brdfdb import accuracy, cost, efficiency
+from brdfdb.charted import Between, Chart, Cost, Curve, FamilyChart, Fronts, Point, Sampler, Saving, Work
 from brdfdb.family import Family, Sweep
-from brdfdb.materials import Material, Number
+from brdfdb.materials import Material
 from brdfdb.parameters import Floats
-from brdfdb.representations import SPECTRAL_TOLERANCES, Kind, Representation, of_family, representations
+from brdfdb.representations import SPECTRAL_TOLERANCES, Representation, of_family, representations
 
 DIRECTIONS = 1000  # of each band of theta_i
 SEED = 1992
-SINGLES = 101  # rounds of single evaluations, which take microseconds
-TIMED = cost.ROUNDS + SINGLES  # steps of timing, as `tick` counts them
-STEPS = 2 + TIMED  # of a chart
-
-_STRICT = ConfigDict(frozen=True, extra="forbid")
-
-
-class Cost(BaseModel):
-    """Time of an evaluation on the machine of the chart, on one thread."""
-
-    model_config = _STRICT
-
-    ns: float = Field(description="median over all rounds, of a value of f_r: one direction, one wavelength")
-    low: float = Field(description="lower quartile")
-    high: float = Field(description="upper quartile")
-    directions: int = Field(description="evaluated at once")
-
-
-class Form(BaseModel):
-    """A representation, and what it costs."""
-
-    model_config = _STRICT
-
-    key: str
-    title: str
-    kind: Kind
-    python: str = Field(description="what it is called in Python")
-    dtype: Literal["float64", "float32"]
-    bytes: int = Field(description="of the numbers that an evaluation reads")
-    batch: Cost
-    single: Cost
-
-
-class Point(Form):
-    """A representation: errors are relative to the truth, at the worst wavelength."""
-
-    l1: float = Field(description="mean of abs(f_r - truth) over that of the truth, weighted with the cosine")
-    p99: float = Field(description="99th percentile of abs(f_r - truth) / max(truth, floor)")
-    forward: float = Field(description="l1 of viewers within 45 degrees of the azimuth of the mirror direction")
-    back: float = Field(description="l1 of viewers within 45 degrees of the azimuth of the light")
-    grazing: float = Field(description="l1 where light or viewer is beyond 75 degrees")
-
-
-class Fronts(BaseModel):
-    """Keys of the points worth having, the most accurate (l1) first, each clearly cheaper than the one before.
-
-    Models that are meant to differ are not among them, nor what is further off than black would be.
-    """
-
-    model_config = _STRICT
-
-    batch: list[str]
-    single: list[str]
-    bytes: list[str]
-
-
-class Chart(BaseModel):
-    """One material."""
-
-    model_config = _STRICT
-
-    material: str
-    title: str
-    model: str
-    parameters: dict[str, Number] = Field(description="angles in degrees, under names that end in _deg")
-    wavelength_nm: list[float] | None
-    directions: int = Field(description="that errors are measured at")
-    truth: str = Field(description="key of the point that the others are compared with")
-    points: list[Point]
-    fronts: Fronts
-
-
-class Curve(Form):
-    """A representation along a family: errors as those of a point, bytes and cost those of one member."""
-
-    timed: str = Field(description="the member: of those that have this form, the one next to the middle of the family")
-    l1: list[float | None] = Field(description="of each member; null where there is no such form")
-    p99: list[float | None]
-
-
-class Between(Form):
-    """Lookups between the members of a family in a store, timed in its middle."""
-
-    l1: float = Field(description="as the family states it, over all its parameters")
-    p99: float
-
-
-class FamilyChart(BaseModel):
-    """A family: which form is right where in it."""
-
-    model_config = _STRICT
-
-    family: str
-    title: str
-    model: str
-    axes: dict[str, list[float]] = Field(description="values of each swept parameter, as in the record of a family")
-    members: list[str] = Field(description="names of the materials; the last axis runs fastest")
-    g: list[float] | None = Field(
-        description="of He-Torrance, for each member: eq. 79 along the normal, at the middle wavelength"
-    )
-    wavelength_nm: list[float] | None
-    truth: str = Field(description="key of the curve that the others are compared with")
-    curves: list[Curve]
-    between: Between | None = Field(description="null unless the family is in the store")
-    fronts: list[list[str]] = Field(
-        description="of each member, keys of the curves worth having in bulk: as of a chart, with the costs above"
-    )
-
-
-class Charts(BaseModel):
-    """Charts of materials and families, made in one go; a file holds one of them."""
-
-    model_config = _STRICT
-
-    brdfdb: str
-    when: datetime
-    machine: str
-    charts: list[Chart]
-    families: list[FamilyChart]
+BLOCK = 256  # directions of a call between one and many
+SINGLES = 21  # rounds of calls of one direction, and of `BLOCK`
+TIMED = cost.ROUNDS + 2 * SINGLES  # steps of timing, as `tick` counts them
+STEPS = 4 + TIMED  # of a chart
+SHARE, CONFIDENCE = 0.99, 0.95  # the percentile that is charted, and the confidence of its interval
 
 
 def chart(
@@ -177,7 +62,17 @@ def chart(
     drawn = accuracy.draw(material, wavelength_nm, DIRECTIONS, SEED)
     errors = _errors(forms, drawn)
     tick()
-    batch, single = _timed(forms, drawn, tick)
+    batch, block, single = _timed(forms, drawn, tick)
+    mixed = cost.mixed_times(forms, drawn.wi[drawn.above], drawn.wr[drawn.above])
+    tick()
+    middle = None if wavelength_nm is None else float(wavelength_nm[wavelength_nm.size // 2])
+    samplers = [
+        Sampler(key=key, title=efficiency.SAMPLERS[key], albedo=_work(albedo), sphere=_work(sphere))
+        for key, (albedo, sphere) in efficiency.works(material, middle).items()
+    ]
+    tick()
+    seconds = np.stack([each.seconds for each in batch], axis=1)
+    rungs = [number for number, form in enumerate(forms) if form.kind in ("exact", "quadrature") and not form.rounded]
 
     def front(costs: Floats) -> list[str]:
         return _front(forms, [error["l1"] for error in errors], costs)
@@ -191,15 +86,46 @@ def chart(
         directions=int(np.count_nonzero(drawn.above)),
         truth=forms[0].key,
         points=[
-            Point(**_described(form, together, alone), **error)
-            for form, error, together, alone in zip(forms, errors, batch, single, strict=True)
+            Point(
+                **_described(form, batch[number], block[number], single[number]),
+                **errors[number],
+                **_against(number, rungs, errors, seconds, forms),
+                mixed=_cost(mixed[number]),
+            )
+            for number, form in enumerate(forms)
         ],
+        ladder=[forms[number].key for number in sorted(rungs, key=lambda number: errors[number]["l1"])],
         fronts=Fronts(
-            batch=front(np.stack([each.seconds for each in batch], axis=1)),
+            batch=front(seconds),
             single=front(np.stack([each.seconds for each in single], axis=1)),
             bytes=front(np.array([[form.bytes for form in forms]], dtype=np.float64)),
         ),
+        samplers=samplers,
     )
+
+
+def _against(
+    number: int,
+    rungs: Sequence[int],
+    errors: Sequence[dict[str, Any]],
+    seconds: Floats,
+    forms: Sequence[Representation],
+) -> dict[str, Any]:
+    """The cheapest rung that is as accurate as a form, and the ratio of their times: fields of a `Point`."""
+    if forms[number].kind in ("exact", "quadrature"):
+        return {"rung": None, "saving": None}
+    own = errors[number]
+    as_good = [each for each in rungs if errors[each]["l1"] <= own["l1"] and errors[each]["p99"] <= own["p99"]]
+    rung = min(as_good, key=lambda each: float(np.median(seconds[:, each])))
+    ratios = seconds[:, rung] / seconds[:, number]
+    low, middle, high = (float(f"{ratio:.3g}") for ratio in np.percentile(ratios, [25.0, 50.0, 75.0]).tolist())
+    return {"rung": forms[rung].key, "saving": Saving(low=low, times=middle, high=high)}
+
+
+def _work(work: efficiency.Work) -> Work:
+    low, middle, high = np.percentile(1e3 * work.seconds_to_percent, [25.0, 50.0, 75.0]).tolist()
+    numbers = (float(np.median(work.variance)), 1e9 * float(np.median(work.seconds)), low, middle, high)
+    return Work(**dict(zip(Work.model_fields, (float(f"{n:.3g}") for n in numbers), strict=True)))
 
 
 def chart_family(
@@ -255,7 +181,7 @@ def chart_family(
     timed = [form for _, form in kept.values()]
     between = None if family is None else of_family(family)
     drawn = accuracy.draw(materials[middle], wavelength_nm, DIRECTIONS, SEED)
-    batch, single = _timed([*timed, *([between] if between else [])], drawn, tick)
+    batch, block, single = _timed([*timed, *([between] if between else [])], drawn, tick)
     seconds = np.stack([each.seconds for each in batch], axis=1)
     fronts = []
     for found in errors:
@@ -273,17 +199,19 @@ def chart_family(
         truth=timed[0].key,
         curves=[
             Curve(
-                **_described(form, together, alone),
+                **_described(form, *costs),
                 timed=sweep.members[number],
                 l1=[found[form.key]["l1"] if form.key in found else None for found in errors],
                 p99=[found[form.key]["p99"] if form.key in found else None for found in errors],
             )
-            for (number, form), together, alone in zip(kept.values(), batch, single, strict=False)
+            for (number, form), *costs in zip(kept.values(), batch, block, single, strict=False)
         ],
         between=None
         if family is None or between is None
         else Between(
-            **_described(between, batch[-1], single[-1]), l1=family.error.overall.l1, p99=family.error.overall.p99
+            **_described(between, batch[-1], block[-1], single[-1]),
+            l1=family.error.overall.l1,
+            p99=family.error.overall.p99,
         ),
         fronts=fronts,
     )
@@ -299,12 +227,13 @@ def _g(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None)
 
 def _timed(
     forms: Sequence[Representation], drawn: accuracy.Draw, tick: Callable[[], None]
-) -> tuple[list[cost.Times], list[cost.Times]]:
-    """Of many directions at once, and of one."""
+) -> tuple[list[cost.Times], list[cost.Times], list[cost.Times]]:
+    """Of many directions at once, of a block, and of one."""
     mixed = np.random.default_rng(SEED).permutation(np.flatnonzero(drawn.above))  # few of them are as mixed as all
     wi, wr = drawn.wi[mixed], drawn.wr[mixed]
     batch = cost.times(forms, wi, wr, rounds=cost.ROUNDS, tick=tick)
-    return batch, cost.times(forms, wi, wr, most=1, rounds=SINGLES, tick=tick)
+    block, single = (cost.times(forms, wi, wr, most=most, rounds=SINGLES, tick=tick) for most in (BLOCK, 1))
+    return batch, block, single
 
 
 def _front(forms: Sequence[Representation], l1: Sequence[float], costs: Floats) -> list[str]:
@@ -318,7 +247,7 @@ def _front(forms: Sequence[Representation], l1: Sequence[float], costs: Floats) 
     return [forms[rivals[index]].key for index in cost.front([l1[index] for index in rivals], costs[:, rivals])]
 
 
-def _described(form: Representation, batch: cost.Times, single: cost.Times) -> dict[str, Any]:
+def _described(form: Representation, batch: cost.Times, block: cost.Times, single: cost.Times) -> dict[str, Any]:
     """The fields of a `Form`."""
     return {
         "key": form.key,
@@ -328,6 +257,7 @@ def _described(form: Representation, batch: cost.Times, single: cost.Times) -> d
         "dtype": "float32" if form.dtype is np.float32 else "float64",
         "bytes": form.bytes,
         "batch": _cost(batch),
+        "block": _cost(block),
         "single": _cost(single),
     }
 
@@ -345,8 +275,50 @@ def _errors(forms: Sequence[Representation], drawn: accuracy.Draw) -> list[dict[
             name: float(f"{accuracy.mean_error(found, truth, np.where(some, drawn.weight, 0.0)).max():.3g}")
             for name, some in classes.items()
         }
-        rows.append({"l1": overall.l1, "p99": overall.p99, **parts})
+        low, high = _tail(accuracy.relative(found, truth, accuracy.floor_of(truth, drawn))[drawn.above])
+        rows.append({"l1": overall.l1, "p99": overall.p99, "p99_low": low, "p99_high": high, **parts})
     return rows
+
+
+def _tail(errors: Floats) -> tuple[float, float | None]:
+    """Confidence interval of the 99th percentile of errors (N, L), at the worst wavelength: two of the errors.
+
+    Directions count as independent. They are stratified in theta_i, which makes the interval wider than it need be.
+    """
+    worst = np.sort(errors[:, int(np.argmax(np.percentile(errors, 100.0 * SHARE, axis=0)))])
+    low, high = ranks(len(worst), SHARE, CONFIDENCE)
+    at = [None if rank > len(worst) else float(f"{worst[max(rank, 1) - 1]:.3g}") for rank in (low, high)]
+    return at[0] or 0.0, at[1]
+
+
+def ranks(count: int, share: float, confidence: float) -> tuple[int, int]:
+    """Return ranks, from 1, of the order statistics that enclose a quantile with a confidence, by the binomial law.
+
+    Parameters
+    ----------
+    count : int
+        Number of independent draws.
+    share : float [1]
+        Of the distribution below the quantile, in (0, 1).
+    confidence : float [1]
+        At least, in (0, 1).
+
+    Returns
+    -------
+    tuple of int
+        Rank 0 stands for no lower bound, and count + 1 for no upper one.
+    """
+    k = np.arange(count + 1)
+    log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, count + 1)))])
+    log_pmf = (
+        log_factorial[-1] - log_factorial - log_factorial[::-1] + k * np.log(share) + (count - k) * np.log1p(-share)
+    )
+    below = np.cumsum(np.exp(log_pmf))  # probability that k draws or fewer are below the quantile
+    # P(the draw of rank r > quantile) = P(fewer than r below) = below[r - 1]
+    rest = 0.5 * (1.0 - confidence)
+    low = int(np.searchsorted(below, rest, side="right"))
+    high = int(np.searchsorted(below, 1.0 - rest, side="left")) + 1
+    return low, min(high, count + 1)
 
 
 def _cost(times: cost.Times) -> Cost:

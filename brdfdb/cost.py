@@ -1,4 +1,4 @@
-"""What a form costs: its time, taken in turns with its rivals; and the front of those that are worth having."""
+"""Cost of forms: their times, taken in turns, warm or with many materials in turn; and the front worth having."""
 
 from __future__ import annotations
 
@@ -13,14 +13,21 @@ from brdfdb.parameters import Floats
 from brdfdb.representations import Representation
 
 BATCH = 100_000  # directions at once, of forms that are fast enough
-RUN_S = 0.25  # what a turn of a slower form may take
-ROUNDS = 11
+RUN_S = 0.125  # longest turn of a form [s]; slower forms get fewer directions
+ROUNDS = 7
+MIXED_ROUNDS = 5
 CHEAPER = 1.25  # times as cheap is clearly cheaper, in three of four rounds
 ALIKE = 1.1  # times the error is about the same error
 # Directions at once: steps so wide that a form, however busy the machine, is timed at the same one every time
 _STEPS = (256, 2048, 16384, BATCH)
 _VALUES = 1_000_000  # at once, at most
 _TRIES = 5  # how often a form is asked what one direction more costs
+_LEAST_S = 3e-4  # of a turn of few directions, which are repeated: the clock of the processor takes a microsecond
+MATERIALS = 64  # that take turns, of as many tables as `_COPIES_BYTES` hold
+FEW = 32  # directions of a material at once, where materials take turns
+_COPIES_BYTES = 128_000_000
+_SEED = 1992
+_CACHE_BYTES = 48_000_000  # written between rounds: more than the last cache of one processor holds
 
 
 class Times(NamedTuple):
@@ -43,10 +50,13 @@ def times(
     *,
     most: int = BATCH,
     rounds: int = ROUNDS,
-    clock: Callable[[], float] = time.perf_counter,
+    clock: Callable[[], float] = time.process_time,
     tick: Callable[[], None] = lambda: None,
 ) -> list[Times]:
     """Time forms in turns: what slows the machine down slows all of them down, and ratios within a round keep.
+
+    Times are those of the processor, which other programs on the machine do not lengthen. Few directions are evaluated
+    again and again, so that a turn lasts long enough for the clock.
 
     Parameters
     ----------
@@ -69,21 +79,75 @@ def times(
     """
     runs = []
     for form, count in zip(forms, _counts(forms, wi, wr, most, clock), strict=True):
-        runs.append((form.evaluate, *_directions(form, wi, wr, count)))
-        form.evaluate(*runs[-1][1:])  # compiled, and its memory at hand
+        light, viewer = _directions(form, wi, wr, count)
+        values = form.evaluate(light, viewer).size  # compiled, and its memory at hand
+        start = clock()
+        form.evaluate(light, viewer)
+        repeats = int(min(max(_LEAST_S / max(clock() - start, 1e-9), 1.0), 100.0))
+        runs.append((form.evaluate, light, viewer, repeats, values))
     taken = np.empty((rounds, len(runs)))
     for row in taken:
-        for number, (evaluate, light, viewer) in enumerate(runs):
-            evaluate(light[:1], viewer[:1])  # its code is in the processor's cache again: that of rivals alike is, too
+        for number, (evaluate, light, viewer, repeats, values) in enumerate(runs):
+            evaluate(light[:1], viewer[:1])  # warm the instruction cache, as for the other forms
             start = clock()
-            evaluate(light, viewer)
-            row[number] = clock() - start
+            for _ in range(repeats):
+                evaluate(light, viewer)
+            row[number] = (clock() - start) / (repeats * values)
         tick()
-    found = []
-    for (evaluate, light, viewer), seconds in zip(runs, taken.T, strict=True):
-        values = evaluate(light[:1], viewer[:1]).size * len(light)
-        found.append(Times(seconds / values, len(light)))
-    return found
+    return [Times(seconds, len(run[1])) for run, seconds in zip(runs, taken.T, strict=True)]
+
+
+def mixed_times(
+    forms: Sequence[Representation],
+    wi: Floats,
+    wr: Floats,
+    *,
+    rounds: int = MIXED_ROUNDS,
+    clock: Callable[[], float] = time.process_time,
+) -> list[Times]:
+    """Time forms as a renderer with many materials uses them: few directions of one, then of another, nothing cached.
+
+    Parameters
+    ----------
+    forms : sequence of Representation
+        To time, on one thread.
+    wi, wr : arrays of shape (N, 3)
+        Unit vectors to evaluate at, repeated or cut off as needed.
+    rounds : int
+        Number of turns of each form.
+    clock : callable
+        Gives seconds.
+
+    Returns
+    -------
+    list of Times
+        In the order of the forms, of `FEW` directions a call.
+
+    Notes
+    -----
+    In a turn, `MATERIALS` materials of the form are evaluated once each, in an order that is drawn anew. Tables are
+    copies with memory of their own, of large ones fewer than `MATERIALS`. Before a turn, more memory is written than
+    the caches hold, so that each table is read from memory.
+    """
+    rng = np.random.default_rng(_SEED)
+    evict = np.zeros(_CACHE_BYTES // 8)
+    count = FEW * MATERIALS
+    taken = np.empty((rounds, len(forms)))
+    for number, form in enumerate(forms):
+        light, viewer = _directions(form, wi, wr, count)
+        copies = 1 if form.copied is None else int(min(max(_COPIES_BYTES // form.bytes, 2), MATERIALS))
+        evaluates = [form.evaluate] if form.copied is None else [form.copied() for _ in range(copies)]
+        values = sum(evaluate(light[:FEW], viewer[:FEW]).size for evaluate in evaluates) // len(evaluates)
+        for row in range(rounds):
+            evict += 1.0
+            order = rng.permutation(max(len(evaluates), MATERIALS)) % len(evaluates)
+            evaluates[order[-1]](light[:1], viewer[:1])  # warm the instruction cache
+            start = clock()
+            for turn, which in enumerate(order[:MATERIALS].tolist()):
+                rows = slice(turn * FEW, (turn + 1) * FEW)
+                evaluates[which](light[rows], viewer[rows])
+            taken[row, number] = (clock() - start) / (MATERIALS * values)
+    return [Times(seconds, FEW) for seconds in taken.T]
 
 
 def _directions(form: Representation, wi: Floats, wr: Floats, count: int) -> tuple[Floats, Floats]:

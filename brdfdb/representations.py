@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -9,9 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb import fresnel, misprints, models, tabulate
+from brdfdb import models, tabulate
 from brdfdb.family import Family
-from brdfdb.geometry import checked_vectors, finished
 from brdfdb.grids import (
     ANISOTROPIC_AXES,
     ANISOTROPIC_HALF_DIFFERENCE_AXES,
@@ -22,18 +22,25 @@ from brdfdb.grids import (
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
 from brdfdb.materials import Material, Number
-from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
-from brdfdb.models.he_torrance_1991 import checked_surface, cos_bisecting, v_squared
-from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, single_slope_part
+from brdfdb.models._he_torrance_kernels import CORRECTED_LIMIT, LIMIT
+from brdfdb.models._he_torrance_series import CONSTANTS_BYTES
+from brdfdb.models._oren_nayar_facets import NODES
+from brdfdb.models.he_torrance_1991 import with_sum
+from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, gaussian_rung, single_slope_mean
 from brdfdb.parameters import Floats
 from brdfdb.plan import plan
 from brdfdb.tabulate import POLE_END_DEG
 
-Kind = Literal["exact", "closed form", "approximation", "printed", "other model", "table"]
+Kind = Literal["exact", "quadrature", "closed form", "approximation", "customary", "printed", "other model", "table"]
 Evaluate = Callable[[Floats, Floats], Floats]
 
 TOLERANCES = (0.1, 0.01, 0.001)
 SPECTRAL_TOLERANCES = (0.1, 0.01)  # a finer one takes ten seconds to plan
+# Rungs of the ladder below the truth: nodes of the quadrature of facets, of 16; and shares of the distance from its
+# peak up to which the sum of eq. 78 is taken, of which the number of its terms is the square
+_NODES = (8, 6, 4, 3, 2)
+_REACHES = (0.7, 0.5, 0.4, 0.3)
+_TERMS = 10  # that are customary in the sum of eq. 78
 _SLOPES = 24  # of eq. 25 over the closed forms: 2000 change the mean of f_r by 3e-5 and no value by more than 1e-3
 _WIDEST = 6.0  # standard deviations of the slope that are integrated over
 _UNFACTORED = 0.01  # the tolerance of the table that is shown with and without parts
@@ -50,21 +57,25 @@ class Representation:
     title : str
         What it is, with the equation.
     kind : str
-        "exact", "closed form", "approximation", "printed" (by a paper, where the models of this library hold another
-        form), "other model" (of the same parameters, meant to differ) or "table".
+        "exact"; "quadrature", the truth by a coarser integral or sum; "closed form"; "approximation"; "customary",
+        usual in programs and printed by no paper; "printed" by a paper, where the models of this library hold another
+        form; "other model", of the same parameters and meant to differ; or "table".
     python : str
         What it is called in Python.
     evaluate : callable
         ``evaluate(wi, wr)``: f_r [1/sr], shape (N, L), of unit vectors of shape (N, 3) and of the dtype below. The
         Dirac part of He-Torrance is no part of it: it is the same for all.
     bytes : int
-        Of the numbers that an evaluation reads: parameters and spectra, or the nodes of a table.
+        Of the numbers that an evaluation reads: parameters, spectra, and constants that kernels look up, or the nodes
+        of a table. Memory that it writes first is not counted.
     dtype : float32 or float64
         Of the vectors to give it, and of the values.
     rounded : bool
         Whether it is another form but for float32 in and out: as much work, and rounding for an error.
     layout : Layout or None
         Of a table that was tabulated here: what it takes to do so again.
+    copied : callable or None
+        Of a table: gives an evaluation that reads a copy of its numbers, as another table of this size would.
     """
 
     key: str
@@ -76,6 +87,7 @@ class Representation:
     dtype: type[np.floating[Any]] = np.float64
     rounded: bool = False
     layout: Layout | None = None
+    copied: Callable[[], Evaluate] | None = None
 
 
 def representations(
@@ -97,7 +109,8 @@ def representations(
     -------
     list of Representation
         The truth is the highest rung that there is: for Oren-Nayar the facets, integrated (`oren_nayar_gaussian`), for
-        Ward eq. 5a, for He-Torrance the sum of eq. 78, and for all others the model itself. Tables hold the truth
+        Ward eq. 5a, for He-Torrance the sum of eq. 78, and for all others the model itself. Its rungs follow it, by
+        fewer nodes or terms: the ladder that an approximation is compared with. Tables hold the truth
         where a model of this library is the truth; they are planned for the material's own model, which is as smooth.
 
     Raises
@@ -161,7 +174,9 @@ def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[R
     own = {"rho": float(values["rho"]), "sigma": float(values["sigma"])}
     bounces = bool(values.get("interreflection", True))
 
-    def form(key: str, title: str, kind: Kind, python: str, body: Callable[..., Floats], **more: Any) -> Representation:
+    def form(
+        key: str, title: str, kind: Kind, python: str, body: Callable[..., Floats], constants: int = 0, **more: Any
+    ) -> Representation:
         def evaluate(wi: Floats, wr: Floats) -> Floats:
             f_r = body(wi, wr, **own, **more)
             if "k_s" in values:  # Eq. (32)
@@ -169,19 +184,31 @@ def _oren_nayar(material: Material, _: NDArray[np.float64] | None) -> Iterator[R
                 f_r = values["k_b"] * f_r + values["k_s"] / values["e_0"] * surface
             return f_r[:, np.newaxis]
 
-        return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more)))
+        return Representation(key, title, kind, f"models.{python}", evaluate, 8 * (2 + len(more) + constants))
 
-    truth = models.oren_nayar_gaussian_vectors if bounces else _by_parts("facets", None)
-    facets = form("facets", "facets integrated, eqs 8-20 and 47", "exact", "oren_nayar_gaussian", truth)
-    yield from (facets, _single(facets))
-    averaged = "oren_nayar_single_slope over slopes"
-    closed = _by_parts("closed", "closed" if bounces else None)
+    for nodes in (NODES, *_NODES):
+        finest = nodes == NODES
+        facets = form(
+            "facets" if finest else f"facets-{nodes}",
+            "facets integrated, eqs 8-20 and 47" if finest else f"facets, {nodes} nodes of {NODES}",
+            "exact" if finest else "quadrature",
+            "oren_nayar_gaussian" if finest else "oren_nayar_1994_surfaces.gaussian_rung",
+            functools.partial(gaussian_rung, nodes=nodes, bounce=bounces),
+            2 * (NODES if finest else NODES + nodes),
+        )
+        yield facets
+        if finest:
+            yield _single(facets)
+    averaged = "oren_nayar_1994_surfaces.single_slope_mean"
+    closed = functools.partial(_over_slopes, bounce=bounces)
     equations = "eqs 45 and 49" if bounces else "eq. 45"
-    yield form("closed-forms", f"closed forms of B.2, {equations}", "closed form", averaged, closed)
+    yield form("closed-forms", f"closed forms of B.2, {equations}", "closed form", averaged, closed, 3 * _SLOPES)
     if bounces:
-        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", averaged, _by_parts("facets", "closed"))
-        exact = _by_parts("closed", "facets")
-        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", averaged, exact)
+        both = 3 * _SLOPES + 2 * NODES
+        own_bounce = _mixed("direct", functools.partial(_over_slopes, lit=False))
+        yield form("bounce-49", "facets, but eq. 49 for the bounce", "printed", averaged, own_bounce, both)
+        own_direct = _mixed("interreflected", functools.partial(_over_slopes, bounce=False))
+        yield form("direct-45", "facets, but eq. 45 for direct light", "closed form", averaged, own_direct, both)
     fit = models.oren_nayar_vectors
     whole = form("fit", "functional fit, eqs 27-29", "approximation", "oren_nayar", fit, interreflection=bounces)
     yield from (whole, _single(whole))
@@ -209,25 +236,29 @@ def _smooth(wi: Floats, wr: Floats, *, rho: float, **_: float) -> Floats:
     return models.lambert_vectors(wi, wr, rho=rho)
 
 
-def _by_parts(direct: str, bounce: str | None) -> Callable[..., Floats]:
-    """Direct light and second bounce, each by the "facets" or by the "closed" forms; None: no bounce."""
-    ways = {"facets": gaussian_part, "closed": _over_slopes}
+def _mixed(facets: PartName, other: Callable[..., Floats]) -> Callable[..., Floats]:
+    """One part of the facets, and the other one by a form of its own."""
 
     def evaluate(wi: Floats, wr: Floats, **own: float) -> Floats:
-        f_r = ways[direct](wi, wr, **own, part="direct")
-        return f_r if bounce is None else f_r + ways[bounce](wi, wr, **own, part="interreflected")
+        return gaussian_part(wi, wr, **own, part=facets) + other(wi, wr, **own)
 
     return evaluate
 
 
-def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float, part: PartName) -> Floats:
+def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float, lit: bool = True, bounce: bool = True) -> Floats:
     """The closed forms of appendix B.2, eqs 45 and 49, averaged over slopes with the weights of eqs 25 and 26."""
+    theta_a, weight = _slopes(sigma)
+    return single_slope_mean(wi, wr, rho=rho, theta_a=theta_a, weight=weight, lit=lit, bounce=bounce)
+
+
+@functools.cache
+def _slopes(sigma: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return slopes [rad] and their weights [1], which add up to 1."""
     x, w = np.polynomial.legendre.leggauss(_SLOPES)
-    top = min(np.pi / 2, _WIDEST * max(sigma, 1e-9))  # a flat surface: all slopes are 0
-    theta_a = (x + 1.0) * top / 2.0
-    weight = w * np.exp(-(theta_a**2) / (2.0 * max(sigma, 1e-9) ** 2)) * np.sin(theta_a)
-    weight /= weight.sum()
-    return single_slope_part(wi[:, np.newaxis], wr[:, np.newaxis], rho=rho, theta_a=theta_a, part=part) @ weight
+    deviation = max(sigma, 1e-9)  # a flat surface: all slopes are 0
+    theta_a = (x + 1.0) * min(np.pi / 2, _WIDEST * deviation) / 2.0
+    weight = w * np.exp(-(theta_a**2) / (2.0 * deviation**2)) * np.sin(theta_a)
+    return theta_a, weight / weight.sum()
 
 
 # Ward 1992
@@ -255,62 +286,28 @@ def _ward(material: Material, _: NDArray[np.float64] | None) -> Iterator[Represe
 
 def _he_torrance(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Representation]:
     double, single = _of_itself(material, wavelength_nm, "sum", "the sum of eq. 78, whole")
-    yield double
-    mirror = material.parameters["sigma_0_um"] == 0.0
-    yield single if mirror else replace(single, title="the sum of eq. 78, float32, half of its table", rounded=False)
-    arguments = material.arguments(wavelength_nm)
-    size = _bytes(arguments)
-    if mirror:  # no sum to shorten
+    size = double.bytes
+    if material.parameters["sigma_0_um"] == 0.0:  # a mirror has no sum to shorten
+        yield from (double, single)
         return
-    printed = {misprint.key: misprint.as_printed for misprint in misprints.MISPRINTS}
-    ten = _eq_71(arguments, printed["ten-terms"])
-    yield Representation("ten-terms", "ten terms of eq. 78", "printed", "misprints.MISPRINTS", ten, size)
-    corrected = _eq_71(arguments, _beckmann_corrected)
-    title = "Beckmann, first order in 1/g"
-    yield Representation("beckmann-corrected", title, "approximation", "representations", corrected, size)
-    slope = arguments["sigma_0_um"] / arguments["tau_um"]
-    optical = {name: arguments[name] for name in ("n", "k", "a")}
+    yield from (replace(each, bytes=size + CONSTANTS_BYTES) for each in (double, single))
 
-    def beckmann(wi: Floats, wr: Floats) -> Floats:
-        return models.he_torrance_very_rough_vectors(
-            wi[:, np.newaxis], wr[:, np.newaxis], sigma_0_over_tau=slope, **optical
-        )
+    def form(
+        key: str, title: str, kind: Kind, python: str, vectors: Callable[..., Floats], more: int
+    ) -> Representation:
+        return Representation(key, title, kind, python, material.brdf_at(wavelength_nm, vectors), size + more)
 
-    if 1e-6 <= slope <= 1e6:
-        name = "models.he_torrance_very_rough"
-        yield Representation("beckmann", "Beckmann's limit, g to infinity", "approximation", name, beckmann, size)
-
-
-def _eq_71(arguments: dict[str, Any], total: Callable[[Floats, Floats], Floats]) -> Evaluate:
-    """He-Torrance with another sum in eq. 78: ``total(g, V)``, shapes (N, L); what no wavelength changes comes once."""
-    a = arguments["a"]
-    surface = checked_surface(**{name: value for name, value in arguments.items() if name != "a"})
-    height, correlation, slope = surface.features
-
-    def evaluate(wi: Floats, wr: Floats) -> Floats:
-        directions = checked_vectors(wi[:, np.newaxis], wr[:, np.newaxis])
-        sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
-        # Eqs (23)-(25)
-        S_over_cos_cos = shadowing(sin_i, cos_i, slope) * shadowing(sin_r, cos_r, slope)
-        v_xy2, v_z2 = v_squared(directions)
-        # Eqs (79)-(83)
-        g = height * v_z2 * variance(hidden(sin_i, cos_i, slope) + hidden(sin_r, cos_r, slope))
-        # Eq. (78)
-        D = correlation / 4.0 * total(g, correlation * v_xy2)
-        # Eq. (76), whose dot products cancel
-        G = (v_xy2 + v_z2) ** 2 / v_z2
-        # Eq. (75), at the bisecting angle
-        F2 = fresnel.unpolarised(cos_bisecting(directions), surface.n, surface.k)
-        # Eqs (71) and (72)
-        return finished((F2 * G * S_over_cos_cos * D + a) / np.pi, directions)
-
-    return evaluate
-
-
-def _beckmann_corrected(g: Floats, V: Floats) -> Floats:
-    """The limit of the sum of eq. 78 for g -> infinity and the first term beyond it, b = V / g; nothing below 0."""
-    b = V / g
-    return np.asarray(np.exp(-b) / g * np.maximum(1.0 + (b * b / 2.0 - 2.0 * b + 1.0) / g, 0.0))
+    python = "models.he_torrance_1991.with_sum"
+    for reach in _REACHES:
+        vectors = functools.partial(with_sum, reach=reach)
+        title = f"the sum of eq. 78, {round(100.0 * reach**2)} % of its terms"
+        yield form(f"sum-{round(100.0 * reach**2)}", title, "quadrature", python, vectors, CONSTANTS_BYTES)
+    ten = functools.partial(with_sum, series=_TERMS)
+    yield form("ten-terms", "ten terms of eq. 78", "customary", python, ten, 0)
+    corrected = functools.partial(with_sum, series=CORRECTED_LIMIT)
+    yield form("beckmann-corrected", "Beckmann, first order in 1/g", "approximation", python, corrected, 0)
+    limit = functools.partial(with_sum, series=LIMIT)
+    yield form("beckmann", "Beckmann's limit, g to infinity", "customary", python, limit, 0)
 
 
 _FORMS: dict[str, Callable[[Material, NDArray[np.float64] | None], Iterator[Representation]]] = {
@@ -388,9 +385,12 @@ def of_table(table: Table, key: str, title: str) -> Representation:
     def evaluate(wi: Floats, wr: Floats) -> Floats:
         return table.lookup_vectors(wi, wr).reshape(len(wi), count)
 
+    def copied() -> Evaluate:
+        return of_table(replace(table, values=table.values.copy()), key, title).evaluate
+
     arrays = (table.values, *table.axes_deg.values(), table.spectra, table.uniform)
     size = sum(each.nbytes for each in arrays if each is not None)
-    return Representation(key, title, "table", "Table.lookup_vectors", evaluate, size)
+    return Representation(key, title, "table", "Table.lookup_vectors", evaluate, size, copied=copied)
 
 
 def _plain_grid(material: Material, *, halves: bool) -> Grid:

@@ -32,8 +32,3 @@ def test_forms_that_differ_from_another_in_rounding_alone_are_not_offered(name: 
     assert rounded
     assert not rounded & set(offered)
     assert all(form.dtype is np.float64 for form in offered.values())
-
-
-def test_he_torrances_float32_is_offered_as_it_takes_half_the_work() -> None:
-    offered = {each.form.key for each in candidates(presets()["scene-copper-sphere"], np.array([550.0]), ())}
-    assert {"sum", "sum-float32"} <= offered

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from brdfdb import chart as charting
 from brdfdb import cost
 from brdfdb.accuracy import Draw, classes, draw, mean_error
-from brdfdb.chart import STEPS, Chart, FamilyChart, chart, chart_family
+from brdfdb.chart import STEPS, chart, chart_family, ranks
+from brdfdb.charted import Chart, FamilyChart
 from brdfdb.family import Sweep
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.places import BANDS_DEG
-from brdfdb.representations import representations
+from brdfdb.representations import Kind, representations
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +66,10 @@ def test_errors_are_the_same_in_every_run(brass: Chart, monkeypatch: pytest.Monk
     monkeypatch.setattr(cost, "ROUNDS", 1)
     monkeypatch.setattr(charting, "SINGLES", 1)
     again = chart(presets()["rolled-brass"], None, (0.1,))
-    timed = {"batch", "single"}
+    timed = {"batch", "block", "single", "mixed", "rung", "saving"}
     assert [p.model_dump(exclude=timed) for p in again.points] == [p.model_dump(exclude=timed) for p in brass.points]
+    noises = [[(s.albedo.variance, s.sphere.variance) for s in each.samplers] for each in (again, brass)]
+    assert noises[0] == noises[1]
 
 
 def test_more_forms_can_be_charted_and_steps_are_counted() -> None:
@@ -72,6 +78,77 @@ def test_more_forms_can_be_charted_and_steps_are_counted() -> None:
     found = chart(material, np.array([550.0]), (), also=also, tick=lambda: ticks.append(None))
     assert [point.key for point in found.points] == ["sum", "sum-float32", "lambert"]
     assert len(ticks) == STEPS
+
+
+def test_every_form_is_timed_at_three_sizes_of_call_and_with_many_materials_in_turn(brass: Chart) -> None:
+    for point in brass.points:
+        assert (point.batch.directions, point.block.directions, point.single.directions) == (cost.BATCH, 256, 1)
+        assert point.mixed.directions == cost.FEW
+        assert point.batch.ns < point.block.ns < point.single.ns
+        assert point.batch.ns < point.mixed.ns
+
+
+def test_the_ladder_leads_from_the_truth_to_its_coarsest_rung() -> None:
+    found = chart(presets()["magnesium-oxide-ceramic"], np.array([500.0]), ())
+    points = {point.key: point for point in found.points}
+    assert found.ladder[0] == found.truth
+    assert {*found.ladder} == {key for key, p in points.items() if p.kind in ("exact", "quadrature")} - {"sum-float32"}
+    assert [points[key].l1 for key in found.ladder] == sorted(points[key].l1 for key in found.ladder)
+    costs = [points[key].batch.ns for key in found.ladder]
+    assert costs[0] == max(costs)
+
+
+KINDS: tuple[Kind, ...] = ("exact", "quadrature", "quadrature", "table")
+
+
+def test_a_form_is_compared_with_the_cheapest_rung_that_is_as_accurate() -> None:
+    rungs = [{"l1": 0.0, "p99": 0.0}, {"l1": 0.01, "p99": 0.1}, {"l1": 0.02, "p99": 0.2}]
+    form = {"l1": 0.015, "p99": 0.5}  # the last rung is less accurate in the mean
+    forms = representations(presets()["rolled-brass"], None, ())[:4]
+    forms = [replace(each, kind=kind) for each, kind in zip(forms, KINDS, strict=True)]
+    seconds = np.array([[100.0, 50.0, 10.0, 5.0], [200.0, 120.0, 20.0, 10.0], [100.0, 50.0, 10.0, 5.0]])
+    found = charting._against(3, [0, 1, 2], [*rungs, form], seconds, forms)
+    assert found["rung"] == forms[1].key
+    assert found["saving"].model_dump() == {"low": 10.0, "times": 10.0, "high": 11.0}
+    assert charting._against(1, [0, 1, 2], [*rungs, form], seconds, forms) == {"rung": None, "saving": None}
+
+
+@pytest.mark.parametrize("count", [60, 500, 9000])
+def test_ranks_enclose_the_quantile_with_the_confidence_of_the_binomial_law(count: int) -> None:
+    low, high = ranks(count, 0.99, 0.95)
+    below = binom(count, 0.99)  # how many draws are below the quantile; that of rank r is above it if fewer than r are
+    assert below.cdf(low - 1) <= 0.025 < below.cdf(low)
+    if high <= count:
+        assert below.cdf(high - 1) >= 0.975 > below.cdf(high - 2)
+    else:
+        assert count == 60  # too few to give an upper bound
+
+
+def test_the_interval_of_p99_holds_it_for_95_of_100_draws() -> None:
+    rng = np.random.default_rng(5)
+    inside = 0
+    for _ in range(400):
+        low, high = charting._tail(rng.exponential(size=(1000, 1)))
+        assert high is not None
+        inside += low <= np.log(100.0) <= high  # the 99th percentile of the exponential law
+    assert inside >= 368  # of a binomial law of 0.95, fewer has a probability of 0.4 %
+
+
+def test_the_interval_is_that_of_the_worst_wavelength(brass: Chart) -> None:
+    errors = np.random.default_rng(6).exponential(size=(1000, 1))
+    assert charting._tail(np.hstack([errors, 3.0 * errors])) == charting._tail(3.0 * errors)
+    for point in brass.points[1:]:
+        assert point.p99_high is not None
+        assert 0.0 < point.p99_low <= point.p99 <= point.p99_high
+
+
+def test_samplers_of_a_chart_are_those_of_the_model(brass: Chart) -> None:
+    samplers = {sampler.key: sampler for sampler in brass.samplers}
+    assert set(samplers) == {"model", "cosine", "uniform"}
+    own = samplers["model"]
+    for other in ("cosine", "uniform"):  # of a lobe that is 0.05 and 0.16 wide
+        assert own.albedo.variance < 0.05 * samplers[other].albedo.variance
+        assert own.sphere.ms < 0.5 * samplers[other].sphere.ms
 
 
 def test_classes_are_told_by_azimuth_and_grazing() -> None:
@@ -183,4 +260,4 @@ def test_a_form_that_some_members_lack_is_timed_where_it_is(monkeypatch: pytest.
     assert curves["ten-terms"].timed == names[0]
     assert curves["ten-terms"].l1[1] is None
     assert "ten-terms" not in found.fronts[1]
-    assert len(ticks) == len(materials) + cost.ROUNDS + charting.SINGLES
+    assert len(ticks) == len(materials) + cost.ROUNDS + 2 * charting.SINGLES

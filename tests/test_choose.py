@@ -21,7 +21,15 @@ COARSE = [float(wavelength) for wavelength in range(420, 681, 20)]
 WIDTH, DENSER = 48, 73
 
 # Made-up costs of a wavelength: more for what is nearer the truth, so that there is always something cheaper
-COSTS = {"exact": 100.0, "printed": 60.0, "closed form": 50.0, "approximation": 10.0, "table": 5.0}
+COSTS = {
+    "exact": 100.0,
+    "quadrature": 70.0,
+    "customary": 65.0,
+    "printed": 60.0,
+    "closed form": 50.0,
+    "approximation": 10.0,
+    "table": 5.0,
+}
 
 
 def made_up_costs(offered: dict[str, list[Candidate]]) -> dict[str, Floats]:

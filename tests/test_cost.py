@@ -11,7 +11,8 @@ import pytest
 
 from brdfdb import cost
 from brdfdb.cost import CHEAPER, front, times
-from brdfdb.representations import Representation
+from brdfdb.materials import presets
+from brdfdb.representations import Representation, representations
 
 WI = np.tile([0.6, 0.0, 0.8], (10, 1))
 
@@ -83,6 +84,53 @@ def test_one_direction_is_one_direction() -> None:
     (one,) = machine.times(machine.form("a", 1.0), most=1, rounds=2)
     assert one.directions == 1
     assert {count for _, count in machine.calls} == {1}
+
+
+def test_short_calls_are_repeated_until_the_clock_can_tell() -> None:
+    machine = Machine()
+    (short,) = machine.times(machine.form("a", 1e4), most=1, rounds=1)  # 10 us
+    assert len(machine.calls) > 20
+    np.testing.assert_allclose(short.quartiles_ns, 1e4)
+
+
+def test_materials_in_turn_read_memory_of_their_own() -> None:
+    machine, copies = Machine(), []
+
+    def copied() -> Any:
+        copies.append(len(copies))
+        return machine.form(f"copy {copies[-1]}", 10.0).evaluate
+
+    table = replace(machine.form("a", 1.0), copied=copied)
+    found, plain = cost.mixed_times([table, machine.form("b", 20.0)], WI, WI, rounds=3, clock=lambda: machine.now)
+    np.testing.assert_allclose(found.quartiles_ns, 10.0)
+    np.testing.assert_allclose(plain.quartiles_ns, 20.0)
+    assert found.directions == cost.FEW
+    assert len(copies) == cost.MATERIALS
+    turns = [key for key, count in machine.calls if key.startswith("copy") and count == cost.FEW][cost.MATERIALS :]
+    first, second = turns[: cost.MATERIALS], turns[cost.MATERIALS : 2 * cost.MATERIALS]
+    assert sorted(first) == sorted(second) == sorted(f"copy {number}" for number in copies)
+    assert first != second  # the order is drawn anew
+
+
+def test_large_tables_are_copied_as_often_as_memory_allows() -> None:
+    machine, copies = Machine(), []
+
+    def copied() -> Any:
+        copies.append(1)
+        return machine.form("copy", 10.0).evaluate
+
+    table = replace(machine.form("a", 1.0), bytes=cost._COPIES_BYTES // 4, copied=copied)
+    cost.mixed_times([table], WI, WI, rounds=1, clock=lambda: machine.now)
+    assert len(copies) == 4
+
+
+def test_a_copy_of_a_table_has_the_same_values_in_other_memory() -> None:
+    forms = {form.key: form for form in representations(presets()["rolled-brass"], None, (0.1,))}
+    table = forms["table-10"]
+    assert table.copied is not None
+    np.testing.assert_array_equal(table.copied()(WI, WI), table.evaluate(WI, WI))
+    assert table.copied() is not table.copied()
+    assert all((form.copied is None) == (form.kind != "table") for form in forms.values())
 
 
 def test_forms_take_turns() -> None:

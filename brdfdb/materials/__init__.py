@@ -281,13 +281,17 @@ class Material(BaseModel):
         n, k = refractive_index(self.refractive_index, wavelength)
         return {**self.parameters, "wavelength_nm": wavelength, "n": n, "k": k}
 
-    def brdf_at(self, wavelength_nm: NDArray[np.float64] | None) -> Callable[[Floats, Floats], Floats]:
-        """f_r of the model as a function of directions alone: spectra are looked up here, and not at every call.
+    def brdf_at(
+        self, wavelength_nm: NDArray[np.float64] | None, vectors: Callable[..., Floats] | None = None
+    ) -> Callable[[Floats, Floats], Floats]:
+        """Return f_r of the model as a function of directions alone, with the spectra looked up once.
 
         Parameters
         ----------
         wavelength_nm : array of shape (L,) [nm], or None
             For spectral models, and only for them.
+        vectors : callable, optional
+            Takes the arguments of the model and stands for it, such as an approximation.
 
         Returns
         -------
@@ -299,15 +303,15 @@ class Material(BaseModel):
         ValueError
             If the refractive index is not known at one of the wavelengths.
         """
-        vectors, together = self.spec.vectors, self.arguments(wavelength_nm)
+        f_r, together = vectors or self.spec.vectors, self.arguments(wavelength_nm)
         if wavelength_nm is None:
-            return lambda wi, wr: vectors(wi, wr, **together)[:, np.newaxis]
+            return lambda wi, wr: f_r(wi, wr, **together)[:, np.newaxis]
         each = _each(together)
 
         def brdf(wi: Floats, wr: Floats) -> Floats:
-            if len(wi) < _MANY:
-                return vectors(wi[:, np.newaxis], wr[:, np.newaxis], **together)
-            return np.stack([vectors(wi, wr, **arguments) for arguments in each], axis=-1)
+            if len(each) > 1 and len(wi) < _MANY:
+                return f_r(wi[:, np.newaxis], wr[:, np.newaxis], **together)
+            return np.stack([f_r(wi, wr, **arguments) for arguments in each], axis=-1)
 
         return brdf
 

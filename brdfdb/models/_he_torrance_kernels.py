@@ -27,6 +27,10 @@ _X_MAX = 30.0  # where erfc(x) and exp(-x^2) have long been 0
 _INVERSE_SQRT_PI = 0.5641895835477563
 WORTH_THE_TABLE = 16  # values in a row
 
+# How the sum of eq. 78 is computed: whole, its limit for g -> infinity, that with the first term beyond it, or, where
+# the number is positive, so many of its first terms
+WHOLE, LIMIT, CORRECTED_LIMIT = 0, -1, -2
+
 
 @kernel
 def _shadowing_and_hidden(sin_theta: float, cos_theta: float, slope: float) -> tuple[float, float]:
@@ -100,14 +104,48 @@ def _roughness(
 
 
 @loop
+def _first_terms(
+    terms: int, g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64], power: NDArray[np.float64]
+) -> None:
+    """The first terms of the sum of eq. 78 over g, m outermost; power is written over."""
+    count = total.shape[0]
+    for j in range(count):
+        total[j] = 0.0
+        power[j] = exp(-g[j])
+    for m in range(1, terms + 1):
+        inverse, following = 1.0 / m, 1.0 / (m + 1.0)
+        for j in range(count):
+            total[j] += inverse * power[j] * exp(-V[j] * inverse)
+            power[j] *= g[j] * following
+
+
+@loop
+def _limit(corrected: bool, g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64]) -> None:
+    """The limit of the sum of eq. 78 over g for g -> infinity, e^-b / g^2, b = V / g; corrected: to first order in 1/g.
+
+    The correction is held above 0: it belongs to large g.
+    """
+    for j in range(total.shape[0]):
+        inverse = 1.0 / g[j]
+        b = V[j] * inverse
+        beyond = 1.0 + (b * (0.5 * b - 2.0) + 1.0) * inverse if corrected else 1.0
+        total[j] = exp(-b) * inverse * inverse * (beyond if beyond > 0.0 else 0.0)
+
+
+@loop
 def _evaluate(
     geometry: NDArray[np.float64],
     surface: NDArray[np.float64],
+    series: int,
+    reach: float,
     f_r: NDArray[np.float64],
     work: NDArray[np.float64],
     index: NDArray[np.int64],
 ) -> None:
-    """f_r of at most BLOCK pairs of directions; geometry and surface hold the rows named below."""
+    """f_r of at most BLOCK pairs of directions, with the sum of eq. 78 as `series` says: one of the three, or terms.
+
+    reach is that of `log_series`, for the whole sum. geometry and surface hold the rows named below.
+    """
     cos_i, cos_r, v_xy2 = geometry[1], geometry[3], geometry[4]
     correlation, n, k, uniform = surface[1], surface[3], surface[4], surface[5]
     count = f_r.shape[0]
@@ -117,12 +155,18 @@ def _evaluate(
         g[j] = g_over_vz2[j] * (cos_i[j] + cos_r[j]) ** 2
         V[j] = correlation[j] * v_xy2[j]
     # Eq. (78)
-    log_series(g, V, f_r, work[4:], index)
+    if series == WHOLE:
+        log_series(g, V, reach, f_r, work[4:], index)
+        for j in range(count):
+            f_r[j] = exp(f_r[j])
+    elif series > 0:
+        _first_terms(series, g, V, f_r, work[4, :count])
+    else:
+        _limit(series == CORRECTED_LIMIT, g, V, f_r)
     for j in range(count):
         v2 = v_xy2[j] + (cos_i[j] + cos_r[j]) ** 2
         # Eqs (71) and (76)
-        pair = correlation[j] * (0.25 / np.pi) * shadow[j] * g_over_vz2[j] * v2 * v2
-        f_r[j] = pair * exp(f_r[j])
+        f_r[j] *= correlation[j] * (0.25 / np.pi) * shadow[j] * g_over_vz2[j] * v2 * v2
     if n[0] > 0.0:
         for j in range(count):
             # Eq. (75), at the bisecting angle
@@ -145,7 +189,9 @@ def specular_rows(scalars: NDArray[np.float64], rho_s: NDArray[np.float64]) -> N
 
 
 @kernel
-def scattered(features: NDArray[np.float64], surface: NDArray[np.float64], f_r: NDArray[np.float64]) -> None:
+def scattered(
+    features: NDArray[np.float64], surface: NDArray[np.float64], series: int, reach: float, f_r: NDArray[np.float64]
+) -> None:
     """Pairs of directions one by one: features of shape (5, N) as in `_evaluate`, surface (6, 1) or (6, N)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, geometry, width = np.empty((6, BLOCK)), np.empty((5, BLOCK)), surface.shape[1]
@@ -157,11 +203,11 @@ def scattered(features: NDArray[np.float64], surface: NDArray[np.float64], f_r: 
         for each in range(6):
             for j in range(count):
                 lanes[each, j] = surface[each, min(start + j, width - 1)]
-        _evaluate(geometry, lanes, f_r[start : start + count], work, index)
+        _evaluate(geometry, lanes, series, reach, f_r[start : start + count], work, index)
 
 
 @loop
-def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], f_r: Floats) -> None:
+def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], series: int, reach: float, f_r: Floats) -> None:
     """As `scattered`, of unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
@@ -182,16 +228,16 @@ def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], f_r: Floats
             # Eq. (84): k_r - k_i is the sum of our directions
             v_x, v_y = np.float64(i[3 * j]) + r[3 * j], np.float64(i[3 * j + 1]) + r[3 * j + 1]
             geometry[4, j] = v_x * v_x + v_y * v_y
-        _evaluate(geometry, lanes, values[:count], work, index)
+        _evaluate(geometry, lanes, series, reach, values[:count], work, index)
         for j in range(count):
             f[j] = values[j] * (0.0 if i[3 * j + 2] < 0.0 or r[3 * j + 2] < 0.0 else 1.0)  # nan stays nan
 
 
 @kernel
-def vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
+def vector_rows(w_i: Floats, w_r: Floats, series: int, reach: float, scalars: NDArray[np.float64], f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         surface = scalars[row].reshape(6, 1)
-        _vectors(w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)], surface, f_r[row])
+        _vectors(w_i[min(row, w_i.shape[0] - 1)], w_r[min(row, w_r.shape[0] - 1)], surface, series, reach, f_r[row])
 
 
 @kernel
@@ -244,7 +290,7 @@ def angle_rows(
                 g_row[i] = g
             for start in range(0, length, BLOCK):
                 stop = min(start + BLOCK, length)
-                log_series(g_row[: stop - start], V[start:stop], log_D[start:stop], work, index)
+                log_series(g_row[: stop - start], V[start:stop], 1.0, log_D[start:stop], work, index)
         # Eqs (71) and (76)
         pair = correlation * (0.25 / np.pi) * shadow[lane] * g_over_vz2[lane]
         for j in range(length):

@@ -17,6 +17,7 @@ ROWS_OF_WORK, GROUPS = 13, 5  # of BLOCK numbers each, for `log_series`
 _SUM_BELOW = 40.0  # a summand that peaks at smaller m is summed term by term, at larger m by the trapezoid rule
 _TERMS = 96  # at most: m* + 7.2 sqrt(m*) + 7
 _LOG_FACTORIAL_TIMES_M = np.array([0.0] + [math.lgamma(m + 1.0) + math.log(m) for m in range(1, _TERMS)])
+CONSTANTS_BYTES = _LOG_FACTORIAL_TIMES_M.nbytes  # that `log_series` reads
 _G_MIN, _V_MIN, _V_MAX = 1e-290, 1e-300, 1e30  # beyond, the sum is its limit: the first term, V = 0, or 0
 # The trapezoid rule in ln(m): nodes _STEP standard deviations of the summand apart, less where the summand is skew, as
 # it is for small m*; they reach _REACH deviations to both sides of the peak, more into the left tail
@@ -75,13 +76,16 @@ def _exponent_at_peak(u: float) -> float:
 def log_series(
     g: NDArray[np.float64],
     V: NDArray[np.float64],
+    reach: float,
     log_sum: NDArray[np.float64],
     work: NDArray[np.float64],
     index: NDArray[np.int64],
 ) -> None:
     """log_sum = ln of `diffraction_series` of g and V, of at most BLOCK values each.
 
-    work, of shape (ROWS_OF_WORK, BLOCK), and index, (GROUPS, BLOCK), are written over.
+    reach, in (0, 1], is the share of the distance from the peak up to which terms are summed; the steps of the
+    trapezoid rule are as much wider, so that the number of its nodes goes with the square. 1 is the model. work, of
+    shape (ROWS_OF_WORK, BLOCK), and index, (GROUPS, BLOCK), are written over.
     """
     count = log_sum.shape[0]
     log_g, u, m_star = work[0], work[1], work[2]
@@ -103,9 +107,9 @@ def log_series(
         if members.shape[0] == 0:
             continue
         if group < 3:
-            _term_by_term(g, V, log_g, u, m_star, members, log_sum, rest)
+            _term_by_term(g, V, log_g, u, m_star, members, reach, log_sum, rest)
         else:
-            _trapezoid(g, V, log_g, u, m_star, members, group == 4, log_sum, rest)
+            _trapezoid(g, V, log_g, u, m_star, members, group == 4, reach, log_sum, rest)
 
 
 @loop
@@ -116,6 +120,7 @@ def _term_by_term(
     u: NDArray[np.float64],
     m_star: NDArray[np.float64],
     index: NDArray[np.int64],
+    reach: float,
     log_sum: NDArray[np.float64],
     work: NDArray[np.float64],
 ) -> None:
@@ -125,8 +130,8 @@ def _term_by_term(
     for i in range(count):
         at = index[i]
         m = m_star[at]
-        deviation = math.sqrt(m / (1.0 + u[at]))
-        lowest, highest = min(lowest, m - 7.0 * deviation), max(highest, m + 7.2 * deviation + 7.0)
+        deviation = reach * math.sqrt(m / (1.0 + u[at]))
+        lowest, highest = min(lowest, m - 7.0 * deviation), max(highest, m + 7.2 * deviation + 7.0 * reach)
         V[i], log_g[i] = min(all_V[at], _V_MAX), all_log_g[at]
         # The largest term, roughly: it is taken out of the exponentials, which then neither overflow nor underflow
         near = max(1.0, np.floor(m + 0.5))
@@ -149,6 +154,7 @@ def _trapezoid(
     all_m_star: NDArray[np.float64],
     index: NDArray[np.int64],
     close: bool,
+    reach: float,
     log_sum: NDArray[np.float64],
     work: NDArray[np.float64],
 ) -> None:
@@ -168,9 +174,10 @@ def _trapezoid(
         a[i] = 0.5 * m_star[i] * all_u[at]
         b[i] = min(all_V[at], _V_MAX) * m_inverse[i] - a[i]  # m* times miss
         deviations = math.sqrt(m_star[i] * (1.0 + all_u[at]))  # 1 / deviation in t
-        h = _STEP - _STEP_SKEW / deviations
+        h = _STEP / reach - _STEP_SKEW / deviations
         step[i] = h / deviations
-        right, left = max(right, _REACH / h), max(left, (_REACH + _LEFT_SKEW / deviations) / h)
+        right = max(right, reach * _REACH / h)
+        left = max(left, reach * (_REACH + reach * _LEFT_SKEW / deviations) / h)
         total[i] = 0.0
     for side in range(2):
         sign = 1.0 if side == 0 else -1.0
@@ -218,7 +225,7 @@ def _series(g: NDArray[np.float64], V: NDArray[np.float64], log_sum: NDArray[np.
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     for start in range(0, log_sum.shape[0], BLOCK):
         stop = min(start + BLOCK, log_sum.shape[0])
-        log_series(g[start:stop], V[start:stop], log_sum[start:stop], work, index)
+        log_series(g[start:stop], V[start:stop], 1.0, log_sum[start:stop], work, index)
 
 
 def diffraction_series(g: Floats, V: Floats) -> Floats:

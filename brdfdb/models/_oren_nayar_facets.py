@@ -9,6 +9,7 @@ second bounce over rho^2 E_0 cos(theta_i) / pi.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -22,12 +23,17 @@ _TINY = 1e-300  # guards 0 / 0 and nothing else: what it is added to or compared
 _SMOOTH = 1e-30  # [rad] smaller deviations of the slope change nothing, at 90 degrees either
 _X_MAX = 6.0  # theta_a / sigma: of the weight exp(-x^2 / 2) x, beyond is 1.5e-8
 
-# Gauss-Legendre on [0, 1], for pieces of a ray of slopes and for panels of azimuths
-_NODES = 16
-_X, _W = (np.polynomial.legendre.leggauss(_NODES)[0] + 1.0) / 2.0, np.polynomial.legendre.leggauss(_NODES)[1] / 2.0
+NODES = 16  # of Gauss-Legendre quadrature, for pieces of a ray of slopes and for panels of azimuths; at most
 _PANEL = 1.6  # in units of arsinh(azimuth / distance to the nearest singularity)
 _PANELS = 24  # of a piece of azimuths: enough for tan(theta) = 1.6e16
-_RAYS = 4 * _PANELS * _NODES
+_RAYS = 4 * _PANELS * NODES
+
+
+@functools.cache
+def _gauss_legendre(nodes: int) -> NDArray[np.float64]:
+    """Return nodes and weights [1] of Gauss-Legendre quadrature on [0, 1], shape (2, nodes)."""
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    return np.stack([(x + 1.0) / 2.0, w / 2.0])
 
 
 @kernel
@@ -147,6 +153,8 @@ def _add_azimuths(
     at_tie: bool,
     sigma: float,
     x_max: float,
+    x: NDArray[np.float64],
+    w: NDArray[np.float64],
     rays: NDArray[np.float64],
     count: int,
 ) -> int:
@@ -167,8 +175,8 @@ def _add_azimuths(
     reach = math.asinh(0.5 * width / distance)
     panels = min(1 + int(reach / _PANEL), _PANELS)
     for panel in range(panels):
-        for node in range(_NODES):
-            e_y = exp((panel + _X[node]) * (reach / panels))
+        for node in range(x.shape[0]):
+            e_y = exp((panel + x[node]) * (reach / panels))
             step = distance * 0.5 * (e_y - 1.0 / e_y)
             from_low = width - step if at_tie else step
             from_high = beyond + step if at_tie else beyond + (width - step)
@@ -176,7 +184,7 @@ def _add_azimuths(
             high = max(low, t_high * _sin_cos(min(from_high, rest + from_low))[0])
             rays[0, count], rays[1, count] = low, high
             rays[2, count], rays[3, count] = _critical(high, sigma, x_max), _critical(low, sigma, x_max)
-            rays[4, count] = _W[node] * (reach / panels) * distance * 0.5 * (e_y + 1.0 / e_y)
+            rays[4, count] = w[node] * (reach / panels) * distance * 0.5 * (e_y + 1.0 / e_y)
             count += 1
     return count
 
@@ -189,7 +197,15 @@ def _weight(x: float, S: float) -> float:
 
 @kernel
 def _add_slopes(
-    sign: float, sigma: float, x_max: float, lit: bool, bounce: bool, rays: NDArray[np.float64], count: int
+    sign: float,
+    sigma: float,
+    x_max: float,
+    nodes: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    lit: bool,
+    bounce: bool,
+    rays: NDArray[np.float64],
+    count: int,
 ) -> tuple[float, float]:
     """Light of all slopes along the first `count` of `rays`, with their weights: direct if `lit`, reflected twice if
     `bounce`; 0 of what is not asked for.
@@ -202,8 +218,8 @@ def _add_slopes(
     direct, bounced = rays[5], rays[6]
     direct[:count] = 0.0
     bounced[:count] = 0.0
-    for node in range(_NODES):
-        g, w = _X[node], _W[node]
+    for node in range(nodes.shape[0]):
+        g, w = nodes[node], weights[node]
         # nothing hidden: both facets are lit and seen whole, or face away
         for j in range(count):
             x = g * first[j]
@@ -246,13 +262,13 @@ def _add_slopes(
 
 
 @kernel
-def _normalisation(sigma: float, x_max: float) -> float:
+def _normalisation(sigma: float, x_max: float, nodes: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
     """1 / c of eq. (26), over slope alone."""
     total = 0.0
     for panel in range(2):
-        for node in range(_NODES):
-            x = 0.5 * (panel + _X[node]) * x_max
-            total += 0.5 * x_max * _W[node] * _weight(x, _sin_cos(sigma * x)[0])
+        for node in range(nodes.shape[0]):
+            x = 0.5 * (panel + nodes[node]) * x_max
+            total += 0.5 * x_max * weights[node] * _weight(x, _sin_cos(sigma * x)[0])
     return total
 
 
@@ -263,16 +279,19 @@ def _gaussian(
     cos_dphi: float,
     sin_dphi: float,
     sigma: float,
+    x_max: float,
+    x: NDArray[np.float64],
+    w: NDArray[np.float64],
     lit: bool,
     bounce: bool,
     rays: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Eq. (8) with eqs (10) to (20), for the tangents of the polar angles: direct and twice reflected light."""
+    """Eq. (8) with eqs (10) to (20), for the tangents of the polar angles: direct and twice reflected light.
+
+    The weight of eq. (26) is not normalised. x and w are the nodes and weights of the quadrature.
+    """
     if math.isnan(t_i + t_r + cos_dphi + sin_dphi):
         return math.nan, math.nan
-    if sigma < _SMOOTH:
-        return 1.0, 0.0
-    x_max = min(0.5 * np.pi / sigma, _X_MAX)
     t_small, t_large, sin_dphi = min(t_i, t_r), max(t_i, t_r), abs(sin_dphi)
     direct = bounced = 0.0
     # half a turn of azimuths, which a cavity's other facet completes: where the two slopes have the same sign, and the
@@ -286,34 +305,60 @@ def _gaussian(
         count = int(np.int64(0))  # of the literal 0 all that takes it would be compiled once more
         for at_tie in (False, True):
             if far > 0.0:
-                count = _add_azimuths(t_small, t_large, far, near, rest, at_tie, sigma, x_max, rays, count)
+                count = _add_azimuths(t_small, t_large, far, near, rest, at_tie, sigma, x_max, x, w, rays, count)
             if near > 0.0:
-                count = _add_azimuths(t_large, t_small, near, far, rest, at_tie, sigma, x_max, rays, count)
-        one, two = _add_slopes(sign, sigma, x_max, lit, bounce, rays, count)
+                count = _add_azimuths(t_large, t_small, near, far, rest, at_tie, sigma, x_max, x, w, rays, count)
+        one, two = _add_slopes(sign, sigma, x_max, x, w, lit, bounce, rays, count)
         direct += one
         bounced += two
-    scale = 0.5 / (np.pi * _normalisation(sigma, x_max))
-    return scale * direct, scale * bounced
+    return direct, bounced
 
 
 @kernel
 def _gaussian_loop(
-    features: NDArray[np.float64], lit: bool, bounce: bool, direct: NDArray[np.float64], bounced: NDArray[np.float64]
+    features: NDArray[np.float64],
+    quadrature: NDArray[np.float64],
+    finest: NDArray[np.float64],
+    lit: bool,
+    bounce: bool,
+    direct: NDArray[np.float64],
+    bounced: NDArray[np.float64],
 ) -> None:
     rays = np.empty((7, _RAYS))
+    last = x_max = scale = math.nan
     for j in range(direct.size):
         f = features[:, j]
-        direct[j], bounced[j] = _gaussian(f[0], f[1], f[2], f[3], f[4], lit, bounce, rays)
+        sigma = f[4]
+        if sigma != last:
+            x_max = min(0.5 * np.pi / sigma, _X_MAX)
+            scale = 0.5 / (np.pi * _normalisation(sigma, x_max, finest[0], finest[1]))
+            last = sigma
+        if sigma < _SMOOTH:
+            nothing = 0.0 * (f[0] + f[1] + f[2] + f[3])  # nan goes through
+            direct[j], bounced[j] = 1.0 + nothing, nothing
+            continue
+        one, two = _gaussian(f[0], f[1], f[2], f[3], sigma, x_max, quadrature[0], quadrature[1], lit, bounce, rays)
+        direct[j], bounced[j] = scale * one, scale * two
 
 
-def gaussian(*features: Floats, lit: bool = True, bounce: bool = True) -> tuple[Floats, Floats]:
-    """Direct and twice reflected light of Gaussian slopes, for tan(theta_i), tan(theta_r), cos and sin of the azimuths'
-    difference, and sigma [rad]; what is not asked for, by `lit` or `bounce`, is not computed."""
+def gaussian(*features: Floats, lit: bool = True, bounce: bool = True, nodes: int = NODES) -> tuple[Floats, Floats]:
+    """Return direct and twice reflected light [1] of facets with Gaussian slopes, as radiances over those of the head.
+
+    Parameters
+    ----------
+    *features : arrays
+        tan(theta_i), tan(theta_r), cosine and sine of the difference of azimuths, and sigma [rad]; they broadcast.
+    lit, bounce : bool
+        Whether direct light, and light reflected twice, is computed.
+    nodes : int
+        Of the quadrature in each piece of a ray of slopes and each panel of azimuths, in [1, NODES]. NODES is the
+        model; fewer make a coarser and faster integral of the same integrand.
+    """
     shape = np.broadcast_shapes(*(np.shape(each) for each in features))
     columns = np.empty((len(features), int(np.prod(shape))))
     for column, each in zip(columns, features, strict=True):
         column[:] = np.broadcast_to(each, shape).ravel()
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     with np.errstate(all="ignore"):  # as `elementwise`: nan goes through
-        _gaussian_loop(columns, lit, bounce, direct, bounced)
+        _gaussian_loop(columns, _gauss_legendre(nodes), _gauss_legendre(NODES), lit, bounce, direct, bounced)
     return direct.reshape(shape), bounced.reshape(shape)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb import fresnel
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
 from brdfdb.models._he_torrance_kernels import (
+    WHOLE,
     WORTH_THE_TABLE,
     angle_rows,
     difference_of_sines,
@@ -149,21 +150,50 @@ def he_torrance_vectors(
 
 
 def _f_r(directions: Directions, surface: Surface, albedo: Floats) -> Floats:
-    return _evaluated(directions, (*surface.features, surface.n, surface.k, albedo / np.pi))
+    return evaluated(directions, (*surface.features, surface.n, surface.k, albedo / np.pi))
+
+
+def with_sum(
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    series: int = WHOLE,
+    reach: float = 1.0,
+    wavelength_nm: ArrayLike,
+    sigma_0_um: ArrayLike,
+    tau_um: ArrayLike,
+    n: ArrayLike,
+    k: ArrayLike,
+    a: ArrayLike = 0.0,
+) -> Floats:
+    """Return f_r [1/sr] of `he_torrance_vectors` with another sum in eq. 78: see `evaluated`."""
+    surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
+    features = (*surface.features, surface.n, surface.k, A.check(a) / np.pi)
+    return evaluated(checked_vectors(wi, wr), features, series, reach)
 
 
 def directional_diffuse(directions: Directions, surface: Surface) -> Floats:
     """f_r [1/sr] of the directional diffuse part, eq. 71, over |F|^2: what the roughness does, in any polarisation."""
-    return _evaluated(directions, (*surface.features, _NO_FRESNEL, _NO_FRESNEL, _NO_FRESNEL))
+    return evaluated(directions, (*surface.features, _NO_FRESNEL, _NO_FRESNEL, _NO_FRESNEL))
 
 
-def _evaluated(directions: Directions, surface: Sequence[Floats]) -> Floats:
+def evaluated(directions: Directions, surface: Sequence[Floats], series: int = WHOLE, reach: float = 1.0) -> Floats:
+    """Return f_r [1/sr] of eqs 71 and 72, with the sum of eq. 78 as `series` of `_he_torrance_kernels` says.
+
+    `reach`, in (0, 1], is that of `log_series`: less than 1 is a coarser sum. `surface` holds `Surface.features`, n, k
+    and the uniform part [1/sr]; they broadcast with the directions.
+    """
     uniform = all(np.size(each) == 1 for each in surface)
     if isinstance(directions, Vectors) and uniform:
-        return by_rows_of_vectors(vector_rows, directions, surface)
+
+        def rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
+            vector_rows(w_i, w_r, series, reach, scalars, values)
+
+        return by_rows_of_vectors(rows, directions, surface)
     shape = np.broadcast_shapes(*(np.shape(each) for each in (*directions.given, *surface)))
     pair = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
-    if shape and shape[-1] > 1 and all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in (*pair, *surface)):
+    by_azimuth = all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in (*pair, *surface))
+    if series == WHOLE and reach == 1.0 and shape and shape[-1] > 1 and by_azimuth:
         terms = TERMS_OF_FLOAT32 if directions.dtype == np.float32 else TERMS
         table = series_table(terms) if shape[-1] >= WORTH_THE_TABLE else np.empty((1, 1, 1, terms))
 
@@ -182,7 +212,7 @@ def _evaluated(directions: Directions, surface: Sequence[Floats]) -> Floats:
         constants[i] = np.reshape(each, ()) if uniform else each
     values: NDArray[np.float64] = np.empty(shape)
     if values.size:
-        scattered(features.reshape(5, -1), constants.reshape(6, -1), values.reshape(-1))
+        scattered(features.reshape(5, -1), constants.reshape(6, -1), series, reach, values.reshape(-1))
     return finished(values, directions)
 
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from brdfdb._elementary import arcsin
-from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
-from brdfdb.models._oren_nayar_facets import bounce_of_cavity, direct_of_cavity, gaussian
+from brdfdb.models._oren_nayar_facets import NODES, bounce_of_cavity, direct_of_cavity, gaussian
+from brdfdb.models._oren_nayar_single_slope import bounce_of_slope, direct_of_slope, over_slopes
 from brdfdb.models.oren_nayar_1994 import RHO, SIGMA, Parts
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
@@ -19,8 +17,6 @@ THETA_A = Parameter("theta_a", "θ_a", "rad", 0.0, np.pi / 2, "slope of the face
 PHI_A = Parameter("phi_a", "φ_a", "rad", 0.0, np.pi, "azimuth of the facets' normals, and half a turn from it")
 
 PartName = Literal["direct", "interreflected"]  # a field of `Parts`
-
-_TINY = 1e-300  # guards 0 / 0 and nothing else
 
 # Measured at rho = 1 over theta_a: the albedo reaches 1.0625 (theta_a of 41 degrees, theta_i of 89.999) and exceeds 1
 # from 74 degrees on; it is the weights of eq. 44 that do it: the integrals of eqs 23 and 46 stay below 1
@@ -30,71 +26,6 @@ _SINGLE_SLOPE_EXCESS: dict[str, float | str] = {
     "citation": "Oren and Nayar 1994, eqs 44, 45 and 49: near grazing and with an albedo near 1 the closed forms "
     "reflect up to 6 % more than they receive, for slopes below 60 degrees",
 }
-
-
-@kernel
-def _hidden(cot: float) -> tuple[float, float]:
-    """pi/2 - phi_c and cos(phi_c), for cot = 1 / (tan(theta_a) tan(theta))."""
-    # Eq. (39)
-    cos = min(cot, 1.0)
-    sin = math.sqrt((1.0 - cos) * (1.0 + cos))
-    small = arcsin(min(cos, sin))
-    return (small if cos < sin else np.pi / 2 - small), cos
-
-
-@kernel
-def _arc_less_chord(rest: float) -> float:
-    """(2 x - sin(2 x)) / pi of A_1 and of eq. (49), for x = pi/2 - phi_c."""
-    y = 2.0 * rest
-    if y > 1.0:
-        return (y - math.sin(y)) / np.pi
-    u = y * y
-    series = 1.0 - u / 110.0 * (1.0 - u / 156.0 * (1.0 - u / 210.0))
-    return y * u / 6.0 * (1.0 - u / 20.0 * (1.0 - u / 42.0 * (1.0 - u / 72.0 * series))) / np.pi
-
-
-@kernel
-def _coefficients(tan_i: float, tan_r: float, S: float, C: float) -> tuple[float, float, float]:
-    """A_1 tan(beta), A_3, and 1 - Z: Z is what -cos(phi_r - phi_i) multiplies in eq. (49).
-
-    In the mirror half plane Z is A_1 tan(beta) + A_2 of eq. (45), too, and 1 - Z what is left of the direct light: near
-    the horizon no difference may make it.
-    """
-    a, b = S * max(tan_i, tan_r) / C, S * min(tan_i, tan_r) / C  # tan(theta_a) tan(alpha), tan(theta_a) tan(beta)
-    rest_a, cos_a = _hidden(1.0 / max(a, _TINY))
-    rest_b, cos_b = _hidden(1.0 / max(b, _TINY))
-    sin_a, sin_b = math.sqrt((1.0 - cos_a) * (1.0 + cos_a)), math.sqrt((1.0 - cos_b) * (1.0 + cos_b))
-    # Eq. (45), A_1 tan(beta)
-    both_open = 0.5 * a * b * _arc_less_chord(rest_a)
-    A_1 = b * 2.0 * sin_a / np.pi + both_open
-    # Eq. (45), A_3, where phi_c^i + phi_c^r > pi/2
-    A_3 = 0.0
-    if rest_a + rest_b < np.pi / 2:
-        roots = math.sqrt((b - 1.0) * (b + 1.0)) - (1.0 + b * b) / (math.sqrt((a - 1.0) * (a + 1.0)) + math.hypot(a, b))
-        A_3 = max(0.0, (rest_a + rest_b - np.pi / 2 + roots) / np.pi)
-    # Eq. (49)
-    sines = (cos_b - cos_a) * (cos_b + cos_a) / (sin_a + sin_b + _TINY)  # sin(phi_c^alpha) - sin(phi_c^beta)
-    rest_Z = (rest_b - b * sines) * 2.0 / np.pi - both_open
-    return A_1, A_3, rest_Z
-
-
-@kernel
-def _single_slope_direct(tan_i: float, tan_r: float, cos_dphi: float, one_less_cos: float, S: float, C: float) -> float:
-    A_1, A_3, rest_Z = _coefficients(tan_i, tan_r, S, C)
-    # Eq. (45); one_less_cos is 1 - abs(cos_dphi)
-    in_plane = 1.0 + cos_dphi * A_1 if cos_dphi >= 0.0 else one_less_cos - cos_dphi * rest_Z
-    return max(0.0, C * (in_plane + one_less_cos * A_3))
-
-
-@kernel
-def _single_slope_bounce(tan_i: float, tan_r: float, cos_dphi: float, one_less_cos: float, S: float, C: float) -> float:
-    rest_Z = _coefficients(tan_i, tan_r, S, C)[2]
-    # Eq. (49)
-    bracket = one_less_cos + cos_dphi * rest_Z if cos_dphi >= 0.0 else 1.0 - cos_dphi * (1.0 - rest_Z)
-    return max(0.0, C * S * S / (1.0 + C) * bracket)
-
-
-_evaluate_direct, _evaluate_bounce = elementwise(_single_slope_direct), elementwise(_single_slope_bounce)
 
 
 def oren_nayar_unidirectional(
@@ -333,23 +264,37 @@ def oren_nayar_single_slope_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: 
     return _parts(*_single_slope(checked_vectors(wi, wr), rho, theta_a))
 
 
-def single_slope_part(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike, part: PartName) -> Floats:
-    """One part of `oren_nayar_single_slope_parts_vectors`, without the work of the other."""
-    return _part(part, *_single_slope(checked_vectors(wi, wr), rho, theta_a, part))
+def single_slope_mean(
+    wi: ArrayLike,
+    wr: ArrayLike,
+    *,
+    rho: ArrayLike,
+    theta_a: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    lit: bool = True,
+    bounce: bool = True,
+) -> Floats:
+    """Return the mean f_r [1/sr] of `oren_nayar_single_slope_vectors` over slopes `theta_a` [rad] of these weights.
+
+    Direct light if `lit`, the second bounce if `bounce`. Slopes and weights have the shape (S,), the vectors (N, 3).
+    """
+    directions, albedo = checked_vectors(wi, wr), RHO.check(rho)
+    direct, bounced = over_slopes(*_features(directions), theta_a, weight, lit=lit, bounce=bounce)
+    return _total(*_scaled(direct, bounced, albedo, directions))
 
 
-def _single_slope(
-    directions: Directions, rho: ArrayLike, theta_a: ArrayLike, only: PartName | None = None
-) -> tuple[Floats, Floats, Directions]:
-    """Both parts, or only one, and then 0 for the other."""
+def _single_slope(directions: Directions, rho: ArrayLike, theta_a: ArrayLike) -> tuple[Floats, Floats, Directions]:
+    """Return both parts of the closed forms."""
     albedo, slope = RHO.check(rho), THETA_A.check(theta_a)
+    facet = *_features(directions), np.sin(slope), np.cos(slope)
+    return _scaled(direct_of_slope(*facet), bounce_of_slope(*facet), albedo, directions)
+
+
+def _features(directions: Directions) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return tan(theta_i), tan(theta_r), cos(phi_r - phi_i) and 1 - abs of that."""
     cos_dphi = directions.cos_dphi
     one_less_cos = directions.sin_dphi**2 / (1.0 + np.abs(cos_dphi))
-    tangents = directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r
-    facet = *tangents, cos_dphi, one_less_cos, np.sin(slope), np.cos(slope)
-    direct = np.zeros(()) if only == "interreflected" else _evaluate_direct(*facet)
-    bounce = np.zeros(()) if only == "direct" else _evaluate_bounce(*facet)
-    return _scaled(direct, bounce, albedo, directions)
+    return directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r, cos_dphi, one_less_cos
 
 
 def oren_nayar_gaussian(
@@ -457,14 +402,26 @@ def gaussian_part(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayL
     return _part(part, *_gaussian(checked_vectors(wi, wr), rho, sigma, part))
 
 
+def gaussian_rung(
+    wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, nodes: int, bounce: bool = True
+) -> Floats:
+    """Return f_r [1/sr] of `oren_nayar_gaussian_vectors` with a coarser quadrature of `nodes` nodes, in [1, 16].
+
+    Without `bounce`, direct light alone.
+    """
+    only: PartName | None = None if bounce else "direct"
+    direct, bounced, directions = _gaussian(checked_vectors(wi, wr), rho, sigma, only, nodes)
+    return finished(direct + bounced if bounce else direct, directions)
+
+
 def _gaussian(
-    directions: Directions, rho: ArrayLike, sigma: ArrayLike, only: PartName | None = None
+    directions: Directions, rho: ArrayLike, sigma: ArrayLike, only: PartName | None = None, nodes: int = NODES
 ) -> tuple[Floats, Floats, Directions]:
     """Both parts, or only one, and then nothing of use for the other."""
     albedo, deviation = RHO.check(rho), SIGMA.check(sigma)
     tangents = directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r
     features = *tangents, directions.cos_dphi, directions.sin_dphi, deviation
-    direct, bounce = gaussian(*features, lit=only != "interreflected", bounce=only != "direct")
+    direct, bounce = gaussian(*features, lit=only != "interreflected", bounce=only != "direct", nodes=nodes)
     return _scaled(direct, bounce, albedo, directions)
 
 
@@ -483,7 +440,7 @@ UNIDIRECTIONAL_SPEC = ModelSpec(
 )
 SINGLE_SLOPE_SPEC = ModelSpec(
     name="oren_nayar_single_slope",
-    version=1,
+    version=2,
     title="Oren-Nayar, one slope in all azimuths",
     equation="eqs 45, 49",
     reference="orennayar1994",

@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 
 import brdfdb
 from brdfdb.albedo import material_of
-from brdfdb.chart import STEPS, TIMED, Chart, Charts, FamilyChart, Point, chart, chart_family
+from brdfdb.chart import STEPS, TIMED, chart, chart_family
+from brdfdb.charted import Chart, Charts, FamilyChart, Point
 from brdfdb.family import Family, Sweep
 from brdfdb.family_records import recorded
 from brdfdb.materials import Material
 from brdfdb.plan import check_tolerance
 from brdfdb.representations import Representation, of_table
 from brdfdb.store import Store
-from brdfdb_pipelines import recipe, scatter, terminal
+from brdfdb_pipelines import recipe, scatter, swept, terminal
+from brdfdb_pipelines.panels import percent
 
 
 class _Subject(NamedTuple):
@@ -153,29 +155,38 @@ def _fits(stored: NDArray[np.float64] | None, wanted: NDArray[np.float64] | None
 
 def _print(one: Chart) -> None:
     """All points as a table, and the front in a sentence."""
-    percent = scatter.percent
     rows = [
         (
             "*" if point.key in one.fronts.batch else "",
             point.key,
             point.title,
-            *map(percent, (point.l1, point.p99, point.forward, point.back, point.grazing)),
-            f"{terminal.count(point.batch.ns)} ({terminal.count(point.batch.low)}-{terminal.count(point.batch.high)})",
-            terminal.count(point.single.ns),
+            percent(point.l1),
+            scatter.tail(point),
+            *map(percent, (point.forward, point.back, point.grazing)),
+            scatter.quartiles(point.batch),
+            *map(terminal.count, (point.block.ns, point.single.ns, point.mixed.ns)),
+            scatter.against(point),
             terminal.size(point.bytes),
         )
         for point in one.points
     ]
-    numbers = ("mean error", "p99", "forward", "back", "grazing", "ns a value", "ns, one", "bytes")
+    errors = ("mean error", "p99 (95 % interval)", "forward", "back", "grazing")
+    numbers = (*errors, "ns a value", "ns, 256", "ns, one", "ns, in turn", "times as fast as its rung", "bytes")
     terminal.print_table(f"{one.material}: {one.title}", ("", "key", "form", *numbers), rows, numbers=numbers)
     points = {point.key: point for point in one.points}
     print("  worth having: " + "; ".join(_said(points[key]) for key in one.fronts.batch))
+    heads = ("variance", "ns a sample", "ms to 1 %")
+    work = tuple(f"{problem}: {head}" for problem in ("albedo", "sphere") for head in heads)
+    rows = [(sampler.title, *scatter.works(sampler)) for sampler in one.samplers]
+    terminal.print_table(f"{one.material}: samplers, noise and time", ("sampler", *work), rows, numbers=work)
 
 
 def _said(point: Point) -> str:
-    off = f"{scatter.percent(point.l1)} off in the mean, p99 {scatter.percent(point.p99)}"
+    off = f"{percent(point.l1)} off in the mean, p99 {percent(point.p99)}"
     error = "the truth" if point.l1 == 0.0 else off
-    return f"{point.title} ({terminal.count(point.batch.ns)} ns, {error})"
+    faster = "" if point.saving is None else f", {terminal.count(float(f'{point.saving.times:.2g}'))} times as fast as"
+    rung = f"{faster} {point.rung}" if faster else ""
+    return f"{point.title} ({terminal.count(point.batch.ns)} ns{rung}, {error})"
 
 
 def _print_family(whole: FamilyChart) -> None:
@@ -184,10 +195,10 @@ def _print_family(whole: FamilyChart) -> None:
         rows = []
         for curve in whole.curves:
             cells = []
-            for some in scatter.along(whole, axis):
+            for some in swept.along(whole, axis):
                 chosen = 2 * sum(curve.key in whole.fronts[index] for index in some) > len(some)
-                middle = scatter.middle([curve.l1[index] for index in some])
-                cells.append("-" if middle is None else f"{'*' if chosen else ''}{scatter.percent(middle)}")
+                middle = swept.middle([curve.l1[index] for index in some])
+                cells.append("-" if middle is None else f"{'*' if chosen else ''}{percent(middle)}")
             rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
         columns = [f"{value:g}" for value in values]
         if whole.g is not None and len(whole.axes) == 1:
@@ -199,12 +210,12 @@ def _print_family(whole: FamilyChart) -> None:
         if where := [index for index, front in enumerate(whole.fronts) if curve.key in front]:
             print(f"  worth having: {curve.title} ({terminal.count(curve.batch.ns)} ns) {_where(whole, where)}")
     for curve in whole.curves:
-        if curve.kind in ("closed form", "approximation", "printed"):
-            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= scatter.CLOSE]
+        if curve.kind in ("closed form", "approximation", "customary", "printed"):
+            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= swept.CLOSE]
             where_close = _where(whole, close) if close else "nowhere"
-            print(f"  within {scatter.percent(scatter.CLOSE)} in the mean: {curve.title} {where_close}")
+            print(f"  within {percent(swept.CLOSE)} in the mean: {curve.title} {where_close}")
     if whole.between is not None:
-        off = f"{scatter.percent(whole.between.l1)} off in the mean, p99 {scatter.percent(whole.between.p99)}"
+        off = f"{percent(whole.between.l1)} off in the mean, p99 {percent(whole.between.p99)}"
         time = f"{terminal.count(whole.between.batch.ns)} ns, {terminal.count(whole.between.single.ns)} of one"
         print(f"  between members: {off}, as the family states ({time}, {terminal.size(whole.between.bytes)})")
 

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from brdfdb.audit import AuditReport
-from brdfdb.chart import Charts
+from brdfdb.charted import Charts
 from brdfdb.choices import Choice
 from brdfdb.family import FamilyRecord
 from brdfdb.materials import Material

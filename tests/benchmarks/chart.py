@@ -1,6 +1,7 @@
 """Pictures and table of the README's section on speed against accuracy: ``python tests/benchmarks/chart.py``.
 
-Run it on an idle machine, in the root of the repository: it writes docs/NAME.svg and prints the table.
+Run it in the root of the repository: it writes docs/NAME.svg and prints the tables. Times are those of the
+processor, but what shares its caches on a busy machine lengthens them.
 """
 
 from __future__ import annotations
@@ -9,26 +10,32 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from brdfdb.chart import Chart
-from brdfdb_pipelines import chart, scatter, terminal
+from brdfdb.charted import Chart
+from brdfdb_pipelines import chart, panels, scatter, terminal
 
-NAMES = ("wall-plaster", "rolled-brass", "scene-copper-sphere")
+NAMES = ("clay-vase", "magnesium-oxide-ceramic", "rolled-brass", "scene-copper-sphere")
 FAMILY, RECIPE = "copper-roughness", Path("pipelines/brdfdb_pipelines/recipes/copper-roughness.toml")
 PICTURES = Path("docs")
 
 
 def rows(one: Chart) -> list[str]:
-    """The front, each with what it saves over the truth."""
+    """Return rows of the front, each with what it saves over the rung of the truth that is as accurate."""
     points = {point.key: point for point in one.points}
-    truth = points[one.truth].batch.ns
     lines = []
     for key in one.fronts.batch:
         point = points[key]
-        errors = f"{scatter.percent(point.l1)} | {scatter.percent(point.p99)} | {scatter.percent(point.forward)}"
-        faster = float(f"{truth / point.batch.ns:.2g}")
-        time = f"{terminal.count(point.batch.ns)} | {terminal.count(faster)}"
-        lines.append(f"| {one.material} | {point.title} | {errors} | {time} | {terminal.size(point.bytes)} |")
+        errors = f"{panels.percent(point.l1)} | {scatter.tail(point)} | {panels.percent(point.forward)}"
+        times = " | ".join(terminal.count(each.ns) for each in (point.batch, point.block, point.single, point.mixed))
+        faster = scatter.against(point) or "-"
+        lines.append(
+            f"| {one.material} | {point.title} | {errors} | {times} | {faster} | {terminal.size(point.bytes)} |"
+        )
     return lines
+
+
+def noise(one: Chart) -> list[str]:
+    """Return rows of the samplers."""
+    return [f"| {one.material} | {each.title} | {' | '.join(scatter.works(each))} |" for each in one.samplers]
 
 
 if __name__ == "__main__":
@@ -38,6 +45,9 @@ if __name__ == "__main__":
         chart.run((FAMILY,), Path(folder), recipe_file=RECIPE)
         for name in (*NAMES, FAMILY):
             shutil.copy(Path(folder, f"{name}.svg"), PICTURES)
-    print("| material | form | mean error | p99 | forward | ns a value | times as fast | bytes |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("| material | form | mean error | p99 | forward | ns, many | 256 | one | in turn | over its rung | bytes |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
     print("\n".join(line for one in found.charts for line in rows(one)))
+    print("| material | sampler | albedo: variance | ns | ms to 1 % | sphere: variance | ns | ms to 1 % |")
+    print("|---|---|---|---|---|---|---|---|")
+    print("\n".join(line for one in found.charts for line in noise(one)))

@@ -14,7 +14,7 @@ from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
 from brdfdb.models._oren_nayar_facets import gaussian
-from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, single_slope_part
+from brdfdb.models.oren_nayar_1994_surfaces import PartName, gaussian_part, gaussian_rung, single_slope_mean
 from brdfdb.reference import fujii_2013, mp, oren_nayar_1994, portsmouth_2025, torrance_sparrow_1967
 
 PAPER_VALUES = Path(__file__).parents[1] / "paper_values"
@@ -314,8 +314,6 @@ def test_a_part_alone_is_that_of_both_without_the_work_of_the_other(part: PartNa
     wi, wr = (unit_vector(rng.uniform(0.0, HALF_PI, 500), rng.uniform(0.0, 7.0, 500)) for _ in range(2))
     both = models.oren_nayar_gaussian_parts_vectors(wi, wr, rho=0.8, sigma=0.6)
     np.testing.assert_array_equal(gaussian_part(wi, wr, rho=0.8, sigma=0.6, part=part), getattr(both, part))
-    both = models.oren_nayar_single_slope_parts_vectors(wi, wr, rho=0.8, theta_a=0.6)
-    np.testing.assert_array_equal(single_slope_part(wi, wr, rho=0.8, theta_a=0.6, part=part), getattr(both, part))
     cosines = np.cos(np.linspace(0.0, np.pi, 9))
     lit, bounce = part == "direct", part == "interreflected"
     direct, bounced = gaussian(
@@ -323,6 +321,32 @@ def test_a_part_alone_is_that_of_both_without_the_work_of_the_other(part: PartNa
     )
     assert np.all((bounced if lit else direct) == 0.0)
     assert np.all((direct if lit else bounced) > 0.0)
+
+
+@pytest.mark.parametrize(("lit", "bounce"), [(True, True), (True, False), (False, True)])
+def test_the_mean_over_slopes_is_that_of_the_closed_forms(lit: bool, bounce: bool) -> None:
+    rng = np.random.default_rng(12)
+    wi, wr = (unit_vector(rng.uniform(0.0, HALF_PI, 700), rng.uniform(0.0, 7.0, 700)) for _ in range(2))
+    wi[0], wr[1], wr[2] = (0.6, 0.0, -0.8), np.nan, wi[2]  # below the horizon, nan, exact backscatter
+    slopes, weight = np.array([0.0, 0.2, 0.9, HALF_PI]), np.array([0.1, 0.4, 0.3, 0.2])
+    parts = models.oren_nayar_single_slope_parts_vectors(wi[:, None], wr[:, None], rho=0.8, theta_a=slopes)
+    expected = (lit * parts.direct + bounce * parts.interreflected) @ weight
+    mean = single_slope_mean(wi, wr, rho=0.8, theta_a=slopes, weight=weight, lit=lit, bounce=bounce)
+    assert mean[0] == 0.0
+    assert np.isnan(mean[1])
+    np.testing.assert_allclose(mean, expected, rtol=TWIN_PARTS)
+
+
+@pytest.mark.parametrize(("sigma", "worst"), [(0.0, 1e-15), (0.17, 0.002), (0.5, 2e-5), (1.2, 1e-5)])
+def test_a_quadrature_of_half_the_nodes_is_close_and_the_whole_one_is_the_model(sigma: float, worst: float) -> None:
+    rng = np.random.default_rng(13)
+    wi, wr = (unit_vector(rng.uniform(0.0, 1.5, 300), rng.uniform(0.0, 7.0, 300)) for _ in range(2))
+    whole = models.oren_nayar_gaussian_vectors(wi, wr, rho=0.8, sigma=sigma)
+    np.testing.assert_array_equal(gaussian_rung(wi, wr, rho=0.8, sigma=sigma, nodes=16), whole)
+    half = gaussian_rung(wi, wr, rho=0.8, sigma=sigma, nodes=8)
+    np.testing.assert_allclose(half, whole, rtol=worst)
+    direct = models.oren_nayar_gaussian_parts_vectors(wi, wr, rho=0.8, sigma=sigma).direct
+    np.testing.assert_array_equal(gaussian_rung(wi, wr, rho=0.8, sigma=sigma, nodes=16, bounce=False), direct)
 
 
 def test_single_slope_is_the_mean_of_parallel_cavities_in_the_plane_of_incidence_and_across_it() -> None:

@@ -15,10 +15,10 @@ import pytest
 
 from brdfdb import chart as charting
 from brdfdb import cost, family_records
-from brdfdb.chart import Between, Chart, Charts, Cost, Curve, FamilyChart, Fronts, Point
+from brdfdb.charted import Between, Chart, Charts, Cost, Curve, FamilyChart, Fronts, Point, Sampler, Saving, Work
 from brdfdb.materials import presets
 from brdfdb.representations import representations
-from brdfdb_pipelines import cli, scatter, terminal
+from brdfdb_pipelines import cli, panels, scatter, swept, terminal
 from brdfdb_pipelines.recipe import load
 
 Captured = pytest.CaptureFixture[str]
@@ -53,8 +53,13 @@ def family_charted(folder: Path, name: str) -> FamilyChart:
 def point(key: str, l1: float, ns: float, **more: Any) -> Point:
     time = Cost(ns=ns, low=0.9 * ns, high=1.2 * ns, directions=1)
     errors = dict.fromkeys(("forward", "back", "grazing"), l1) | {"l1": l1, "p99": 5.0 * l1}
+    errors |= {"p99_low": 4.0 * l1, "p99_high": 6.0 * l1, "mixed": time, "rung": None, "saving": None}
     fixed = {"title": f"the form {key}", "kind": "table", "python": "none", "dtype": "float64", "bytes": 100}
-    return Point.model_validate({"key": key, "batch": time, "single": time, **errors, **fixed, **more})
+    costs = {"batch": time, "block": time, "single": time}
+    return Point.model_validate({"key": key, **costs, **errors, **fixed, **more})
+
+
+WORK = Work(variance=0.25, ns=40.0, low_ms=0.09, ms=0.1, high_ms=0.11)
 
 
 def made_up(*points: Point) -> Chart:
@@ -68,6 +73,8 @@ def made_up(*points: Point) -> Chart:
         directions=1,
         truth=keys[0],
         points=list(points),
+        ladder=[each.key for each in points if each.kind in ("exact", "quadrature")],
+        samplers=[Sampler(key="model", title="the model's lobe", albedo=WORK, sphere=WORK)],
         fronts=Fronts(batch=keys[:2], single=keys[:1], bytes=keys[:1]),
     )
 
@@ -171,6 +178,25 @@ def test_a_picture_names_every_point_and_the_front() -> None:
     assert "10 (9-12)" in written
 
 
+def test_a_picture_draws_the_ladder_and_says_what_a_form_saves_over_its_rung() -> None:
+    rung = point("exact-4", 0.01, 100.0, kind="quadrature")
+    fit = point("fit", 0.02, 10.0, kind="approximation", rung="exact-4", saving=Saving(low=9.0, times=10.4, high=11.0))
+    whole = made_up(POINTS[0], rung, fit)
+    written = [element.text for element in ElementTree.fromstring(scatter.svg(whole)).iter() if element.text]
+    assert "ladder" in written
+    assert "quadrature" in written
+    assert "10 (exact-4)" in written
+    assert "10 % (8-12)" in written  # the 99th percentile and its interval
+    assert "ladder" not in scatter.svg(made_up(POINTS[0]))
+
+
+def test_a_picture_shows_the_noise_and_time_of_samplers() -> None:
+    text = scatter.svg(made_up(*POINTS))
+    written = [element.text for element in ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}text")]
+    assert "the model's lobe" in written
+    assert written.count("0.1 (0.09-0.11)") == 2  # of the albedo and of the sphere
+
+
 def test_a_picture_is_the_same_every_time() -> None:
     assert scatter.svg(made_up(*POINTS)) == scatter.svg(made_up(*POINTS))
     assert scatter.png(made_up(*POINTS)) == scatter.png(made_up(*POINTS))
@@ -183,10 +209,18 @@ def test_one_point_is_a_picture_too() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (1e-8, "≤ 0.0001 %"), (0.000172, "0.017 %"), (0.0143, "1.4 %"), (0.237, "24 %"), (8.85, "885 %")],
+    [
+        (0.0, "0"),
+        (1e-8, "≤ 0.0001 %"),
+        (0.000172, "0.017 %"),
+        (0.0143, "1.4 %"),
+        (0.237, "24 %"),
+        (0.997, "100 %"),
+        (8.85, "885 %"),
+    ],
 )
 def test_errors_are_written_for_people(value: float, text: str) -> None:
-    assert scatter.percent(value) == text
+    assert panels.percent(value) == text
 
 
 @pytest.mark.parametrize(("value", "text"), [(4.26, "4.26"), (999.6, "1k"), (34800.0, "34.8k"), (1.3e6, "1.3M")])
@@ -200,11 +234,11 @@ def test_labels_hide_neither_points_nor_each_other_where_there_is_room() -> None
     boxes = []
     for _ in range(4):  # four names for one point
         best = min(
-            scatter.offsets(30.0),
-            key=lambda offset: scatter.hidden(scatter.box((100.0, 50.0), offset, 30.0), taken, frame),
+            panels.offsets(30.0),
+            key=lambda offset: panels.hidden(panels.box((100.0, 50.0), offset, 30.0), taken, frame),
         )
-        boxes.append(scatter.box((100.0, 50.0), best, 30.0))
-        assert scatter.hidden(boxes[-1], taken, frame) == 0.0
+        boxes.append(panels.box((100.0, 50.0), best, 30.0))
+        assert panels.hidden(boxes[-1], taken, frame) == 0.0
         taken.append(boxes[-1])
     assert len(set(boxes)) == 4
 
@@ -294,7 +328,7 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
     members = [f"member-{number}" for number in range(len([*itertools.product(*axes.values())]))]
     fixed = {"python": "none", "dtype": "float64", "bytes": 8, "timed": members[0]}
     better = [0.5 / (number + 1) for number in range(len(members))]
-    costs = [{"batch": time(ns), "single": time(ns)} for ns in (9.0, 1.0)]
+    costs = [{"batch": time(ns), "block": time(ns), "single": time(ns)} for ns in (9.0, 1.0)]
     forms = [{"key": "exact", "title": "the truth", "kind": "exact"}, {"key": "fit", "title": "fit", "kind": "printed"}]
     errors: list[list[float]] = [[0.0] * len(members), better]
     return FamilyChart(
@@ -318,7 +352,7 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
 def test_the_picture_of_a_family_names_every_form_beside_its_curve_and_in_the_table() -> None:
     fixed = {"key": "between", "title": "between members", "kind": "table", "python": "none", "dtype": "float64"}
     between = Between.model_validate(
-        {**fixed, "bytes": 8, "batch": time(5.0), "single": time(5.0), "l1": 0.1, "p99": 1.0}
+        {**fixed, "bytes": 8, **dict.fromkeys(("batch", "block", "single"), time(5.0)), "l1": 0.1, "p99": 1.0}
     )
     text = scatter.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
     written = [element.text for element in ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}text")]
@@ -332,16 +366,16 @@ def test_the_picture_of_a_family_names_every_form_beside_its_curve_and_in_the_ta
 
 def test_members_are_told_apart_along_each_parameter() -> None:
     whole = made_up_family(height=[1.0, 2.0], width=[3.0, 4.0, 5.0])
-    assert scatter.along(whole, "height") == [[0, 1, 2], [3, 4, 5]]
-    assert scatter.along(whole, "width") == [[0, 3], [1, 4], [2, 5]]
-    assert scatter.middle([0.1, None, 0.3, 0.2]) == 0.2
-    assert scatter.middle([None]) is None
+    assert swept.along(whole, "height") == [[0, 1, 2], [3, 4, 5]]
+    assert swept.along(whole, "width") == [[0, 3], [1, 4], [2, 5]]
+    assert swept.middle([0.1, None, 0.3, 0.2]) == 0.2
+    assert swept.middle([None]) is None
 
 
 def test_names_are_moved_apart_and_no_further_than_they_need() -> None:
-    assert scatter.apart([10.0, 50.0], 9.0, 100.0) == [10.0, 50.0]
-    assert scatter.apart([10.0, 12.0, 30.0], 9.0, 100.0) == [6.5, 15.5, 30.0]
-    assert scatter.apart([95.0, 99.0, 120.0], 9.0, 100.0) == [82.0, 91.0, 100.0]
+    assert swept.apart([10.0, 50.0], 9.0, 100.0) == [10.0, 50.0]
+    assert swept.apart([10.0, 12.0, 30.0], 9.0, 100.0) == [6.5, 15.5, 30.0]
+    assert swept.apart([95.0, 99.0, 120.0], 9.0, 100.0) == [82.0, 91.0, 100.0]
 
 
 def test_the_recipe_of_copper_goes_from_smooth_to_rough() -> None:
