@@ -35,7 +35,8 @@ class KnownExcess(BaseModel):
     """A published set of constants that reflects more than it receives, with the place that says so.
 
     `max_albedo` is the largest directional albedo that the published parameters give, Dirac part included;
-    `from_theta_i_deg` [degree] is the angle of incidence above which it exceeds 1.
+    `from_theta_i_deg` [degree] is the angle of incidence above which it exceeds 1. `independent_of` says of each value
+    that was assumed why the excess does not rest on it. Audits believe the built-in materials alone.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -43,6 +44,7 @@ class KnownExcess(BaseModel):
     max_albedo: float = Field(gt=1.0, allow_inf_nan=False)
     from_theta_i_deg: float = Field(ge=0.0, le=90.0)
     citation: Text
+    independent_of: dict[str, Text] = {}
 
 
 class Material(BaseModel):
