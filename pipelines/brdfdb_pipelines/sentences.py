@@ -10,10 +10,10 @@ _NAMES |= {"max": "maximum", "floor": "floor"}
 
 def of_nodes(nodes: Nodes) -> str:
     """Return what the nodes of a table, its refractive index and its uniform part are, against those of its model."""
-    share = "" if nodes.compared == nodes.count else f" compared of {nodes.count}"
-    said = [f"{nodes.compared - nodes.wrong} of {nodes.compared} stored values{share} are the model's"]
+    part = "" if nodes.compared == nodes.count else f", of the {nodes.count} in the table,"
+    said = [f"all {nodes.compared} stored values that were compared{part} are the model's"]
     if nodes.wrong:
-        said = [f"{nodes.wrong} of {nodes.compared} stored values{share} are not the model's"]
+        said = [f"{nodes.wrong} of {nodes.compared} stored values{part} are not the model's"]
         if nodes.expected is not None:
             stored = "a value that is not finite" if nodes.stored is None else f"{nodes.stored:.4g}"
             said[0] += f", such as {stored} for {nodes.expected:.4g}"

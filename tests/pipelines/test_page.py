@@ -107,7 +107,7 @@ def test_every_material_figure_and_statement_is_there(document: Document, report
             assert statement.seen in words
     drawings = sum(len(each.panels) for each in (*report.atlas, *report.gallery))
     drawings += sum(len(each.table_error.maps) for each in report.materials)
-    drawings += 3 * 2 + 5  # grey: model and table, furnace; spectral: the model alone, uniform light, the bound, too
+    drawings += 4 * 2 + 5  # grey: model and table, furnace; spectral: the model alone, uniform light, the bound, too
     assert sum(tag == "svg" for tag, _ in document.elements) == drawings
 
 
@@ -124,6 +124,7 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
     assert "Energy of the model: loses. Reflects" in words
     assert "Energy of the table: passes. As the model." in words
     assert "Reciprocity: passes. Asymmetry up to 3·10⁻¹³, of 1·10⁻¹¹ allowed." in words
+    assert "Nodes: passes. All 360 stored values that were compared, of the 720 in the table, are the model's." in words
     assert "Smoothness: passes. Jumps by 0.0001 of f_r across delta_phi = 180°, of 0.01 allowed." in words
     assert "Sampling: passes. The smallest p of 3 lights is below 0.001." in words
     assert "Validity: at the edge. Of 2 limits that its paper states 1 inside, 1 at the edge." in words
