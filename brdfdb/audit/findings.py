@@ -228,7 +228,7 @@ class Disagreement(BaseModel):
     wavelength_nm: float | None = Field(description="null: the table is grey")
     stated: float
     fresh: float | None = Field(description="null: not finite")
-    times: float = Field(description="the larger over the smaller")
+    times: float | None = Field(description="the larger over the smaller; null: not finite")
 
 
 class TableError(BaseModel):

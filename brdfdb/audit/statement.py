@@ -83,7 +83,7 @@ def contradictions(error: Error, wavelengths: int) -> list[str]:
 
 def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> list[Disagreement]:
     """Return what fresh directions contradict of a statement that does not contradict itself, the worst first."""
-    return sorted(_disagreements(error, pairs, wavelength_nm), key=lambda each: -each.times)
+    return sorted(_disagreements(error, pairs, wavelength_nm), key=_severity, reverse=True)
 
 
 def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
@@ -205,14 +205,19 @@ def _percentile(values: Floats, quantile: float) -> float:
     return float(np.percentile(np.where(np.isfinite(values), values, np.inf), 100.0 * quantile, method="lower"))
 
 
+def _severity(each: Disagreement) -> float:
+    return np.inf if each.times is None else each.times
+
+
 def _disagreement(name: Statistic, band: _Band, nm: float | None, stated: float, fresh: float) -> Disagreement:
-    low, high = sorted((max(stated, EXACT), max(fresh, EXACT))) if name != "floor" else sorted((stated, fresh))
-    times = high / low if low > 0.0 else np.inf
+    least = 0.0 if name == "floor" else EXACT
+    low, high = sorted((max(stated, least), max(fresh, least)))
+    times = high / low if np.isfinite(fresh) and low > 0.0 else np.inf
     return Disagreement(
         statistic=name,
         theta_i_deg=band.name,
         wavelength_nm=nm,
         stated=stated,
         fresh=float(f"{fresh:.3g}") if np.isfinite(fresh) else None,
-        times=float(f"{min(times, 1e300):.3g}"),
+        times=float(f"{times:.3g}") if np.isfinite(times) else None,
     )
