@@ -34,7 +34,7 @@ LIKE = {
     "grooves in a mirror": "the model in a mirror, -phi for phi",
     "grooves turned by 90 degrees": "the model turned by 90 degrees",
 }
-SOUND = 12
+SOUND = 6
 
 
 def findings(table: Table) -> tuple[Nodes, TableError]:
