@@ -39,7 +39,7 @@ def planted() -> int:
 
 def sound(count: int, seed: int) -> int:
     """Print the false alarms among random sound materials, and return how many there are."""
-    alarms = 0
+    alarms = number = 0
     for number, (words, table) in enumerate(materials(count, seed), 1):
         found = audit(table)
         if found.verdict != "passes":
@@ -47,7 +47,7 @@ def sound(count: int, seed: int) -> int:
             print(f"ALARM {words}: {'; '.join(reasons_of(found))}", flush=True)
         if number % 20 == 0:
             print(f"{number} sound materials, {alarms} false alarms", flush=True)
-    print(f"{alarms} false alarms among {count} sound materials", flush=True)
+    print(f"{alarms} false alarms among {number} sound materials", flush=True)
     return alarms
 
 
