@@ -48,20 +48,22 @@ class TableAlbedo(NamedTuple):
         return np.asarray(np.einsum("tpw,p->tw", self.albedo, weights))
 
 
-def directional_albedo(table: Table) -> TableAlbedo:
-    """Integral of f_r cos theta_r over the hemisphere, as the table gives f_r between its nodes.
+def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAlbedo:
+    """Integrate f_r cos theta_r over the hemisphere [1], as the table gives f_r between its nodes.
 
     Parameters
     ----------
     table : Table
         Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the model.
+    theta_i_deg : array (theta_i,) [degree], optional
+        The lights, in [0, 90].
 
     Returns
     -------
     TableAlbedo
-        At the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and every 30 degrees of
-        phi_i; at nodes and `THETA_I_DEG`, but not 90 degrees, if a planner chose the nodes: the attribute ``reason``
-        says so.
+        By default at the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and every 30
+        degrees of phi_i; at nodes and `THETA_I_DEG`, but not 90 degrees, if a planner chose the nodes: the attribute
+        ``reason`` says so.
 
     Notes
     -----
@@ -70,7 +72,7 @@ def directional_albedo(table: Table) -> TableAlbedo:
     quadrature of `brdfdb.quadrature`, which follows the lobe of the model, to `QUADRATURE_TOLERANCE`.
     """
     if not linear_in_angles(table):
-        return _integrated(table, material_of(table))
+        return _integrated(table, material_of(table), THETA_I_DEG if theta_i_deg is None else theta_i_deg)
     nodes = table.axes_deg["theta_i"]
     theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
     if table.anisotropic:
@@ -83,8 +85,10 @@ def directional_albedo(table: Table) -> TableAlbedo:
         phi_weights = 2.0 * _trapezoid_weights(radians(table.axes_deg["delta_phi"]))  # the other half by symmetry
         brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
         albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)[:, np.newaxis]
-    if table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
+    lights = theta_i_deg
+    if lights is None and table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
         lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
+    if lights is not None:
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
         nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
     return TableAlbedo(nodes, phi_i, np.asarray(albedo), np.zeros(nodes.size))
@@ -130,20 +134,20 @@ def wavelengths_of(table: Table) -> int:
     return 1 if table.wavelength_nm is None else table.wavelength_nm.size
 
 
-def _integrated(table: Table, material: Material) -> TableAlbedo:
+def _integrated(table: Table, material: Material, theta_i_deg: Axis) -> TableAlbedo:
     """The albedo by quadrature of lookups, at all wavelengths at once."""
     width = wavelengths_of(table)
     phi_i_deg = np.zeros(1)
     if table.anisotropic:
         phi_i_deg = np.arange(0.0, 360.0 / table.grid.copies + 1.0, _PHI_I_STEP_DEG)
-    albedo, error = np.empty((THETA_I_DEG.size, phi_i_deg.size, width)), np.empty((THETA_I_DEG.size, phi_i_deg.size))
+    albedo, error = np.empty((theta_i_deg.size, phi_i_deg.size, width)), np.empty((theta_i_deg.size, phi_i_deg.size))
     arguments = material.arguments(table.wavelength_nm)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return table.lookup_vectors(wi, wr).reshape(*wr.shape[:-1], width)
 
     for t, p in np.ndindex(*error.shape):
-        theta_i = float(radians(THETA_I_DEG[t]))
+        theta_i = float(radians(theta_i_deg[t]))
         albedo[t, p], error[t, p] = reflected_share(
             brdf,
             theta_i,
@@ -154,7 +158,7 @@ def _integrated(table: Table, material: Material) -> TableAlbedo:
             width=width,
             mirrored=not table.anisotropic,
         )
-    return TableAlbedo(THETA_I_DEG, phi_i_deg, albedo, error.max(axis=1))
+    return TableAlbedo(theta_i_deg, phi_i_deg, albedo, error.max(axis=1))
 
 
 def _trapezoid_weights(nodes: Axis) -> Axis:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from brdfdb.materials import Number
+from brdfdb.materials.provenance import Number
 from brdfdb.representations import Kind
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")

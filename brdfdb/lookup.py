@@ -51,6 +51,9 @@ class Table(Described):
         The part of f_r that is the same in all directions, which is not in `values`.
     digest : str
         sha256 of the manifest of the revision; empty of a table that was not read from a store.
+    n, k : array (L,) [1] or None
+        Refractive index and extinction coefficient that the store says the table was computed with. Lookups do not
+        read them.
     """
 
     name: str
@@ -65,6 +68,8 @@ class Table(Described):
     spectra: NDArray[np.float64] | None = field(default=None, repr=False)
     uniform: NDArray[np.float64] | None = field(default=None, repr=False)
     digest: str = ""
+    n: Axis | None = field(default=None, repr=False)
+    k: Axis | None = field(default=None, repr=False)
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
@@ -344,4 +349,6 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         interpolation=Interpolation(**how),
         spectra=arrays.get("spectra"),
         uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),
+        n=arrays.get("n"),
+        k=arrays.get("k"),
     )

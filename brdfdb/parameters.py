@@ -75,8 +75,8 @@ class ModelSpec:
     `specular`, where there is a Dirac part, is ``f(theta_i, *, parameters)`` of the parameters named in
     `specular_parameters`. `spectral` models take ``wavelength_nm, n, k`` beside their own parameters.
     `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees.
-    `known_excess`, for a model whose equations as published reflect more than they receive, says how much at most, from
-    which angle on and where that is known, in the keys of `brdfdb.materials.KnownExcess`.
+    `excess`, for a model whose equations as published can reflect more than they receive, says why, how much and where:
+    an explanation for audits, which excuses nothing.
     `lobe_axes` names the two parameters that make the model anisotropic when they differ; `anisotropic`, of models that
     are so in another way, says of their parameters whether they make it so.
     `uniform`, if there is one, names the parameter that over pi is a part of the value, the same in all directions.
@@ -101,7 +101,7 @@ class ModelSpec:
     anisotropic: Callable[[Mapping[str, Any]], bool] | None = None
     lobe: Callable[..., Lobe] | None = None
     uniform: str | None = None
-    known_excess: Mapping[str, float | str] | None = None
+    excess: str = ""
     lossless: Callable[[Mapping[str, Any]], dict[str, float]] | None = None
 
     def parameter(self, name: str) -> Parameter:

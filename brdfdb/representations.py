@@ -21,7 +21,8 @@ from brdfdb.grids import (
 )
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
-from brdfdb.materials import Material, Number
+from brdfdb.materials import Material
+from brdfdb.materials.provenance import Number
 from brdfdb.models._he_torrance_kernels import CORRECTED_LIMIT, LIMIT
 from brdfdb.models._he_torrance_series import CONSTANTS_BYTES
 from brdfdb.models._oren_nayar_facets import NODES

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brdfdb.materials import Material, Number, presets
+from brdfdb.materials import Material, presets
+from brdfdb.materials.provenance import Number
 from brdfdb.quadrature import directional_albedo
 from brdfdb.reference import oren_nayar_1994
 

@@ -23,6 +23,7 @@ from brdfdb.grids import Grid
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
 from brdfdb.materials import Material, presets
+from brdfdb.materials.provenance import KnownExcess
 from brdfdb.models import MODELS
 from brdfdb.tabulate import tabulate
 
@@ -328,7 +329,9 @@ def test_the_dirac_part_counts_as_light_that_leaves() -> None:
     found = audit(replace(table, specular=mirror))
     assert verdicts(found) == {"energy": "violates"}
     assert found.energy.table.max_albedo == pytest.approx(1.1, rel=1e-6)
-    assert found.energy.table.max_at_theta_i_deg == found.energy.table.exceeds_1_from_theta_i_deg == THETA[3]
+    assert found.energy.table.max_at_theta_i_deg == THETA[3] == 60.0
+    # 0.9 at 30 degrees, 1.1 at 60, and linear between them
+    assert found.energy.table.exceeds_1_from_theta_i_deg == pytest.approx(45.0, abs=0.002)
     assert found.energy.table.specular[3] == [pytest.approx(0.4, rel=1e-6)]
 
 
@@ -337,7 +340,7 @@ def test_the_wavelength_of_the_largest_albedo_is_named() -> None:
     brdf = np.repeat(table.brdf[..., np.newaxis], 3, axis=-1)
     brdf[..., 1] *= np.float32(1.5)
     spectral = replace(table, wavelength_nm=WAVELENGTHS, values=brdf)
-    found = table_energy_of(spectral, {})
+    found = table_energy_of(spectral, None)
     assert (found.max_at_wavelength_nm, found.wavelength_nm) == (500.0, WAVELENGTHS.tolist())
     assert found.albedo[0] == pytest.approx([0.5, 0.75, 0.5], rel=1e-6)
 
@@ -368,8 +371,8 @@ def test_a_model_that_is_not_reciprocal_is_caught(monkeypatch: pytest.MonkeyPatc
 # What is known
 
 
-def known(max_albedo: float, from_theta_i_deg: float) -> dict[str, Any]:
-    return {"max_albedo": max_albedo, "from_theta_i_deg": from_theta_i_deg, "citation": "Somebody 1991, p. 3"}
+def known(max_albedo: float, from_theta_i_deg: float) -> KnownExcess:
+    return KnownExcess(max_albedo=max_albedo, from_theta_i_deg=from_theta_i_deg, citation="Somebody 1991, p. 3")
 
 
 @pytest.mark.parametrize(
@@ -387,17 +390,19 @@ def known(max_albedo: float, from_theta_i_deg: float) -> dict[str, Any]:
         ),
         (known(1.04, 60.0), "violates", "reflects 1.05 of what arrives at 80 degrees"),
         (known(1.06, 60.1), "violates", "reflects 1.05 of what arrives at 80 degrees"),
-        ({}, "violates", "reflects 1.05 of what arrives at 80 degrees"),
+        (None, "violates", "reflects 1.05 of what arrives at 80 degrees"),
     ],
 )
 def test_an_excess_is_known_up_to_its_albedo_and_from_its_angle_on(
-    excess: dict[str, Any], verdict: str, reason: str
+    excess: KnownExcess | None, verdict: str, reason: str
 ) -> None:
     table = lambert(0.5)
     mirror = np.array([0.1, 0.1, 0.1, 0.51, 0.55, 0.5], dtype=np.float32)
     found = table_energy_of(replace(table, specular=mirror), excess)
     assert (found.verdict, found.reason) == (verdict, reason)
-    assert (found.exceeds_1_from_theta_i_deg, found.max_at_theta_i_deg) == (60.0, 80.0)
+    assert found.max_at_theta_i_deg == 80.0
+    # 0.6 at 30 degrees, 1.01 at 60, and linear between them
+    assert found.exceeds_1_from_theta_i_deg == pytest.approx(30.0 + 30.0 * 0.4 / 0.41, abs=0.002)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -406,19 +411,11 @@ def test_no_excess_is_known_to_be_infinite(value: float) -> None:
     assert table_energy_of(table, known(1e300, 0.0)).verdict == "violates"
 
 
-def test_a_known_excess_excuses_nothing_else() -> None:
-    table = node(lambert(0.5), -1.0)
-    found = audit(replace(table, attrs={**table.attrs, "known_excess": known(1.2, 0.0)}))
-    assert (found.verdict, found.energy.table.verdict) == ("violates", "passes")
-
-
-@pytest.mark.parametrize("excess", [{}, known(1.2, 0.0)], ids=["of the model", "of the material"])
-def test_an_excess_is_known_of_the_model_not_of_a_table_that_exceeds_1_where_it_does_not(
-    excess: dict[str, Any],
-) -> None:
+@pytest.mark.parametrize("accept", [False, True])
+def test_an_excess_is_accepted_of_the_model_not_of_a_table_that_exceeds_1_where_it_does_not(accept: bool) -> None:
     table = tabulated(material("oren_nayar", {"rho": 0.98, "sigma_deg": 40}), fine(2.0))
     bright = table.brdf * np.float32(1.02 / np.max(directional_albedo(table).albedo))
-    found = audit(replace(table, values=bright, attrs={**table.attrs, "known_excess": excess}))
+    found = audit(replace(table, values=bright), accept_excess=accept)
     assert found.energy.model.exceeds_1_from_theta_i_deg is None
     assert (found.energy.table.max_albedo, found.energy.table.verdict) == (pytest.approx(1.02, rel=1e-6), "violates")
 
@@ -441,19 +438,36 @@ def test_the_published_magnesium_oxide_is_a_known_excess() -> None:
     assert found.energy.table.exceeds_1_from_theta_i_deg == pytest.approx(54.0, abs=1.0)
 
 
-# Directional albedo at 89 degrees with rho = 1, interreflection included: table of the known excess of eqs 27 and 28
+# Directional albedo at 89 degrees with rho = 1, interreflection included: ERRATA of eqs 27 and 28
 @pytest.mark.parametrize(("sigma_deg", "albedo"), [(10, 1.031), (20, 1.042), (30, 1.012)])
-def test_oren_nayar_with_rho_1_is_a_known_excess_of_the_model(sigma_deg: float, albedo: float) -> None:
-    found = audit(tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": sigma_deg}), fine(2.0)))
-    assert verdicts(found) == {"energy": "known published excess"}
-    assert ": Oren and Nayar 1994, eqs 27, 28 and 30" in found.energy.table.reason
+def test_oren_nayar_with_rho_1_violates_unless_it_is_accepted(sigma_deg: float, albedo: float) -> None:
+    table = tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": sigma_deg}), fine(2.0))
+    found = audit(table)
+    assert (found.verdict, verdicts(found)) == ("violates", {"energy": "violates"})
+    assert "; this model does so by itself for such parameters: up to 1.0" in found.energy.model.reason
+    assert "(Oren and Nayar 1994, eqs 27, 28 and 30: " in found.energy.model.reason
+    accepted = audit(table, accept_excess=True)
+    assert (accepted.verdict, accepted.energy.verdict) == ("accepted excess", "accepted excess")
+    assert "this model does so by itself" in accepted.energy.reason
     assert found.energy.table.albedo[-2] == [pytest.approx(albedo, abs=0.002)]
 
 
-def test_what_a_material_says_of_its_excess_comes_before_its_model() -> None:
-    parameters = {"rho": 1.0, "sigma_deg": 20}
-    found = audit(tabulated(material("oren_nayar", parameters, known_excess=known(1.01, 50.0)), fine(2.0)))
-    assert verdicts(found) == {"energy": "violates"}
+def test_what_a_recipe_says_of_an_excess_is_repeated_and_excuses_nothing() -> None:
+    ward = {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": 1.0, "alpha_y": 0.001}
+    claim = {"max_albedo": 2.0, "from_theta_i_deg": 0.0, "citation": "I say so"}
+    table = tabulated(material("ward_half_vector", ward, known_excess=claim), ANISOTROPIC)
+    found = audit(table)
+    assert (found.verdict, found.energy.verdict) == ("violates", "violates")
+    assert found.energy.reason.endswith("; its recipe excuses it, which counts for nothing: I say so")
+
+
+def test_what_is_accepted_excuses_nothing_but_the_energy_of_the_model() -> None:
+    table = node(tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": 20}), fine(5.0)), -1.0)
+    found = audit(table, accept_excess=True)
+    assert (found.verdict, found.energy.model.verdict, found.values.positivity) == (
+        *("violates", "accepted excess"),
+        "violates",
+    )
 
 
 def test_oren_nayar_with_rho_1_conserves_energy_on_a_rough_surface() -> None:
@@ -466,11 +480,11 @@ def test_oren_nayar_with_rho_1_conserves_energy_on_a_rough_surface() -> None:
 
 def test_the_report_names_the_violations_and_nothing_else() -> None:
     good, bad = lambert(0.5), node(lambert(0.5), -1.0)
-    excused = tabulated(material("minnaert", {"k": 0.9, "rho": 1.0}), ISOTROPIC)
+    excused = tabulated(presets()["blue-plastic"], ISOTROPIC, np.array([460.0]))
     named = {"good": good, "bad": bad, "excused": excused}
     audits = [audit(replace(table, name=name)) for name, table in named.items()]
     document = written(audits)
-    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 3, ["bad"])
+    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 4, ["bad"])
     assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]
     assert AuditReport.model_validate(document) == report(audits, **ABOUT)
 
@@ -478,7 +492,7 @@ def test_the_report_names_the_violations_and_nothing_else() -> None:
 def test_an_empty_report_is_a_report() -> None:
     about = {"store": "a store", "brdfdb": version("brdfdb"), "when": "2026-11-21T00:00:00Z"}
     empty: dict[str, list[Any]] = {"materials": [], "atlas": [], "gallery": [], "damaged": [], "violations": []}
-    assert written([]) == {"format": "brdfdb-audit", "version": 3, **about, **empty}
+    assert written([]) == {"format": "brdfdb-audit", "version": 4, **about, **empty}
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from brdfdb.audit.reciprocity import LOOKUP_RECIPROCITY_TOLERANCE
 from brdfdb.audit.table_energy import _band_means, table_energy_of
 from brdfdb.layout import Interpolation, Layout
 from brdfdb.lookup import Table
+from brdfdb.materials.provenance import KnownExcess
 from brdfdb.tabulate import tabulate
 from tests.test_albedo import KINDS, planned, table_of
 from tests.test_audit import ISOTROPIC, known, material, verdicts, written
@@ -176,7 +177,7 @@ def test_a_stated_error_that_nobody_can_ask_for_is_no_excuse(ideal: Table) -> No
     ("excess", "verdict"),
     [(known(1.2, 0.0), "known published excess"), (known(1.05, 0.0), "violates"), (known(1.2, 60.0), "violates")],
 )
-def test_what_is_known_is_compared_as_1_is(ideal: Table, excess: dict[str, Any], verdict: str) -> None:
+def test_what_is_known_is_compared_as_1_is(ideal: Table, excess: KnownExcess, verdict: str) -> None:
     assert table_energy_of(scaled(ideal, 1.1), excess).verdict == verdict
 
 

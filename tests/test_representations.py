@@ -11,7 +11,8 @@ import pytest
 
 from brdfdb import accuracy, models
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.materials import Assumption, Material, presets
+from brdfdb.materials import Material, presets
+from brdfdb.materials.provenance import Assumption
 from brdfdb.misprints import MISPRINTS
 from brdfdb.models import oren_nayar_1994_surfaces
 from brdfdb.models._oren_nayar_facets import NODES

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.figure import Figure, Map, Numbers
 
-Verdict = Literal["passes", "known published excess", "violates"]
+Verdict = Literal["passes", "known published excess", "accepted excess", "violates"]
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
@@ -58,7 +58,7 @@ class TableEnergy(BaseModel):
     max_albedo: float | None = Field(description="null: not finite")
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
-    exceeds_1_from_theta_i_deg: float | None
+    exceeds_1_from_theta_i_deg: float | None = Field(description="to 0.001 degrees")
     exceeds_1_beyond_error_from_theta_i_deg: float | None = Field(
         description="where neither the stated error nor that of the integration explains it"
     )
@@ -110,7 +110,23 @@ class Values(BaseModel):
     finiteness: Verdict
 
 
-EnergyVerdict = Literal["conserves", "loses", "known published excess", "violates"]
+class Nodes(BaseModel):
+    """The numbers that a table stores, beside those that its model gives at the same nodes."""
+
+    model_config = _STRICT
+
+    compared: int = Field(description="of the stored numbers; of large tables those of some rows of the first axis")
+    count: int = Field(description="of the stored numbers")
+    wrong: int = Field(description="of those compared, by more than rounding")
+    stored: float | None = Field(description="the number that is furthest off; null: none is, or it is not finite")
+    expected: float | None = Field(description="what the model gives in its place")
+    beside: list[str] = Field(
+        description="a sentence each on n, k and the uniform part, where they are not those of entry and parameters"
+    )
+    verdict: Verdict
+
+
+EnergyVerdict = Literal["conserves", "loses", "known published excess", "accepted excess", "violates"]
 Standing = Literal["inside", "at the edge", "outside", "unknown"]
 
 
@@ -155,7 +171,7 @@ class ModelEnergy(BaseModel):
     max_albedo: float | None = Field(description="null: not finite")
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
-    exceeds_1_from_theta_i_deg: float | None
+    exceeds_1_from_theta_i_deg: float | None = Field(description="to 0.001 degrees")
     furnace: Furnace | None = Field(description="null: the model has no lossless parameters")
     bound_on_a: UniformBound | None = Field(description="null: not a He-Torrance material")
     verdict: EnergyVerdict
@@ -176,7 +192,8 @@ class Energy(BaseModel):
 class Jump(BaseModel):
     """How far f_r jumps across a seam, relative to its value there, or to the floor of the error of a table.
 
-    A slope is no jump: the value on either side is that of the line through two points next to the seam.
+    It is the crossing that jumps most for what is allowed there. A slope is no jump: the value on either side is that
+    of the line through two points next to the seam.
     """
 
     model_config = _STRICT
@@ -185,7 +202,7 @@ class Jump(BaseModel):
     crossings: int
     largest: float
     where: str = Field(description="of the largest: the directions in degrees, and the wavelength")
-    tolerance: float
+    tolerance: float = Field(description="there; of a table the error that it states of the band of theta_i")
 
 
 class Smoothness(BaseModel):
@@ -196,6 +213,22 @@ class Smoothness(BaseModel):
     model: list[Jump]
     table: list[Jump]
     verdict: Verdict
+
+
+Statistic = Literal["l1", "median", "p95", "p99", "max", "floor"]
+
+
+class Disagreement(BaseModel):
+    """One number of the error that a table states, which chance does not reconcile with fresh directions."""
+
+    model_config = _STRICT
+
+    statistic: Statistic
+    theta_i_deg: tuple[float, float] = Field(description="ends of the band; 0 and 90: of all directions")
+    wavelength_nm: float | None = Field(description="null: the table is grey")
+    stated: float
+    fresh: float | None = Field(description="null: not finite")
+    times: float | None = Field(description="the larger over the smaller; null: not finite")
 
 
 class TableError(BaseModel):
@@ -210,6 +243,14 @@ class TableError(BaseModel):
         "part, or not finite"
     )
     directions: int
+    contradictions: list[str] = Field(description="what of the statement contradicts itself, a sentence each")
+    disagreements: int = Field(description="numbers of the statement that fresh directions contradict")
+    worst: list[Disagreement] = Field(description="of these, of each statistic the one that is furthest off")
+    bias: float | None = Field(
+        description="signed: integral of (table - model) cos theta_r over that of the model, mean of all directions at "
+        "the wavelength where it is largest; null: not finite"
+    )
+    likeness: str = Field(description="what the table agrees with much better than with its model; empty: nothing")
     maps: list[Map] = Field(description="relative error over theta_i and theta_r, negative back towards the light")
     verdict: Verdict
 
@@ -265,6 +306,7 @@ class MaterialAudit(BaseModel):
     energy: Energy
     reciprocity: Reciprocity
     values: Values
+    nodes: Nodes
     smoothness: Smoothness
     table_error: TableError
     sampling: Sampling
@@ -278,7 +320,7 @@ class AuditReport(BaseModel):
     model_config = _STRICT
 
     format: Literal["brdfdb-audit"] = "brdfdb-audit"
-    version: Literal[3] = 3
+    version: Literal[4] = 4
     store: str = Field(description="its directory")
     brdfdb: str = Field(description="version of the library")
     when: datetime
@@ -286,4 +328,6 @@ class AuditReport(BaseModel):
     atlas: list[Figure] = Field(description="where methods fail: forms of the models against high-precision values")
     gallery: list[Figure] = Field(description="the figures of the papers, computed")
     damaged: list[str] = Field(description="a sentence on each table that is damaged, and was not audited")
-    violations: list[str] = Field(description="names of the materials that violate something not known as published")
+    violations: list[str] = Field(
+        description="names of the materials that violate something that is neither known as published nor accepted"
+    )

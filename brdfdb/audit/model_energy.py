@@ -7,13 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of
 from brdfdb.audit.findings import EnergyVerdict, Furnace, ModelEnergy, UniformBound
-from brdfdb.audit.known import DIGITS, ENERGY_TOLERANCE, known_limit
 from brdfdb.energy import a_max
 from brdfdb.figure import numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.materials import Material
+from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
 from brdfdb.quadrature import spectral_albedo
 
@@ -30,8 +31,6 @@ ROUNDS, FLAT = 4, 1e-6
 # alone takes more from every model of single scattering
 LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
 GAIN = 1e-4  # beyond 1, of a lossless model, that is worth saying
-# Excesses of models that have a pole at the horizon are known up to this angle [degree], where they were measured
-POLE_KNOWN_UP_TO_DEG = 89.5
 _ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])  # azimuths of a light over a lobe with two axes: the rest is the same
 _TURN_DEG = np.arange(0.0, 360.0, 60.0)
 
@@ -55,15 +54,29 @@ class _Reflected(NamedTuple):
     error: Floats
 
 
-def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mapping[str, Any]) -> ModelEnergy:
-    """The energy of a model at the parameters of a material, at wavelengths [nm] if it is spectral."""
+def model_energy_of(
+    material: Material,
+    wavelength_nm: Axis | None,
+    known: KnownExcess | None,
+    claim: str = "",
+    *,
+    accept_excess: bool = False,
+) -> ModelEnergy:
+    """Return the energy of a model at the parameters of a material, at wavelengths [nm] if it is spectral.
+
+    `known` is the excess that is known as published. `claim` is what a recipe says of an excess: it is repeated, and
+    excuses nothing. With `accept_excess` one that is not known is accepted.
+    """
     arguments = material.arguments(wavelength_nm)
     lights = _lights(material)
     furnace = _furnace(material, arguments, wavelength_nm, lights)
     lights, found = _refined(material, arguments, lights, _reflected(material, arguments, lights))
     theta, wavelength = _worst(found.largest)
-    verdict, reason = _verdict(material, lights, found, furnace, known)
-    exceeding = lights.theta_i_deg[np.any(found.largest - found.error > 1.0 + ENERGY_TOLERANCE, axis=1)]
+    first = _first_above_1(material, arguments, lights, found)
+    verdict, reason = _verdict(lights, found, furnace, known)
+    if verdict == "violates" and first is not None:
+        reason += _explained(material, found, first, known, claim)
+        verdict = "accepted excess" if accept_excess and np.isfinite(found.largest).all() else verdict
     return ModelEnergy(
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
@@ -74,7 +87,7 @@ def model_energy_of(material: Material, wavelength_nm: Axis | None, known: Mappi
         max_albedo=_finite(found.largest[theta, wavelength]),
         max_at_theta_i_deg=float(lights.theta_i_deg[theta]),
         max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
-        exceeds_1_from_theta_i_deg=float(exceeding[0]) if exceeding.size else None,
+        exceeds_1_from_theta_i_deg=first,
         furnace=furnace,
         bound_on_a=_bound(material, arguments, lights, found) if material.model == "he_torrance" else None,
         verdict=verdict,
@@ -101,6 +114,38 @@ def _refined(
     return lights, found
 
 
+def _first_above_1(
+    material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected
+) -> float | None:
+    """From which angle [degree] on more than 1 is reflected: where the albedo crosses 1 between two lights."""
+
+    def excess(of: _Reflected) -> Axis:
+        return np.asarray(np.max(of.largest - of.error, axis=1) - 1.0 - ENERGY_TOLERANCE)
+
+    at = excess(found)
+    if not np.any(at > 0.0):
+        return None
+    first = int(np.argmax(at > 0.0))
+    if first == 0 or not np.isfinite(at[first - 1]):
+        return float(lights.theta_i_deg[first])
+
+    def between(theta_i_deg: float) -> float:
+        return float(excess(_reflected(material, arguments, _Lights(np.array([theta_i_deg]), np.zeros(1))))[0])
+
+    return crossing(between, *lights.theta_i_deg[first - 1 : first + 1].tolist())
+
+
+def _explained(material: Material, found: _Reflected, first: float, known: KnownExcess | None, claim: str) -> str:
+    """What is said of an excess that is not known as published: whose it is, and what excuses nothing."""
+    most = float(np.max(np.where(np.isfinite(found.largest), found.largest, -np.inf)))
+    said = f"; this model does so by itself for such parameters: up to {most:.4g}, from {first:.4g} degrees"
+    if material.spec.excess:
+        said += f" ({material.spec.excess})"
+    if known is not None:
+        return f"{said}; published are {known.max_albedo:.4g}, from {known.from_theta_i_deg:.4g} degrees"
+    return f"{said}; its recipe excuses it, which counts for nothing: {claim}" if claim else said
+
+
 def _worst(albedo: Floats) -> tuple[int, int]:
     """Where the largest is, or what is not finite; of many angles where it is the same the first: rounding differs."""
     ranked = np.where(np.isfinite(albedo), np.round(albedo, 12), np.inf)
@@ -113,21 +158,20 @@ def _finite(value: float) -> float | None:
 
 
 def _verdict(
-    material: Material, lights: _Lights, found: _Reflected, furnace: Furnace | None, known: Mapping[str, Any]
+    lights: _Lights, found: _Reflected, furnace: Furnace | None, known: KnownExcess | None
 ) -> tuple[EnergyVerdict, str]:
     theta_i_deg, certain = lights.theta_i_deg, found.largest - found.error
     if not np.isfinite(certain).all():
         broken = theta_i_deg[~np.isfinite(certain).all(axis=1)]
         return "violates", f"the model reflects no finite share of what arrives at {broken[0]:g} degrees"
     if np.any(certain > 1.0 + ENERGY_TOLERANCE):
-        limit = known_limit(known, theta_i_deg) + ENERGY_TOLERANCE
-        if known and material.spec.grazing_pole:
-            limit = np.where(theta_i_deg > POLE_KNOWN_UP_TO_DEG, np.inf, limit)
-        beyond = np.max(certain, axis=1) - limit
-        if known and np.all(beyond <= 0.0):
-            worst, _ = _worst(found.largest)
+        beyond = np.max(certain, axis=1) - limit_of(known, theta_i_deg) - ENERGY_TOLERANCE
+        worst, _ = _worst(found.largest)
+        if known is None or np.all(beyond <= 0.0):
             share = f"{found.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
-            return "known published excess", f"reflects {share}: {known['citation']}"
+            if known is not None:
+                return "known published excess", f"reflects {share}: {known.citation}"
+            return "violates", f"the model reflects {share}"
         worst = int(np.argmax(beyond))
         share = f"{found.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
         return "violates", f"the model reflects {share}"

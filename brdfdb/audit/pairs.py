@@ -11,7 +11,7 @@ from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
-SEED = 1994  # not that of the build: its directions have been looked at
+SEED = 1967  # not that of a build or a planner: their directions have been looked at
 # Of each band of theta_i, half of them in the lobe; of more than _FEW wavelengths, which vary alike, fewer
 DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb._elementary import COS_HORIZON
 from brdfdb.albedo import wavelengths_of
 from brdfdb.audit.findings import Asymmetry, Reciprocity
 from brdfdb.audit.pairs import Pairs
@@ -16,7 +17,8 @@ from brdfdb.parameters import Floats
 MODEL_RECIPROCITY_TOLERANCE = 1e-11
 # float32 rounds two values that differ by that to the same number or to neighbours, 6e-8 apart: measured 0
 TABLE_RECIPROCITY_TOLERANCE = 1e-6
-# Sums of the same numbers in another order, of f_r with the offset of its logarithm: measured 1.6e-14
+# Sums of the same numbers in another order, of f_r with the offset of its logarithm: measured 1.6e-14. Where the pole
+# at the horizon is taken out, the offset is divided by the cosines as f_r is
 LOOKUP_RECIPROCITY_TOLERANCE = 5e-14
 _TINY = 1e-270  # 1/sr; smaller values carry too few digits
 
@@ -24,7 +26,9 @@ _TINY = 1e-270  # 1/sr; smaller values carry too few digits
 def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
     """Random pairs, pairs in the lobe, and all pairs of nodes."""
     above, in_lobe = pairs.drawn.above, pairs.drawn.in_lobe
-    offset = table.interpolation.offset  # of f_r far below it, rounding alone is left
+    how = table.interpolation
+    mu = np.maximum(pairs.drawn.wi[:, 2:] * pairs.drawn.wr[:, 2:], COS_HORIZON**2)
+    offset = how.offset / mu**how.power  # of f_r far below it, rounding alone is left
     looked_up = (pairs.table + offset, pairs.table_exchanged + offset, _interpolant_tolerance(table.grid))
     model = (pairs.model, pairs.model_exchanged, MODEL_RECIPROCITY_TOLERANCE)
     found = Reciprocity(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from brdfdb import accuracy
 from brdfdb.albedo import wavelengths_of
 from brdfdb.audit.findings import Jump, Smoothness
 from brdfdb.audit.pairs import Pairs
+from brdfdb.error import Error
 from brdfdb.geometry import degrees, directions_from_half_difference, radians, spherical_angles, unit_vector
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
@@ -19,8 +21,8 @@ from brdfdb.parameters import Floats
 
 # Rounding of directions, times how steep a lobe is, measured 1e-12; the table of He-Torrance's sum is to 1e-11
 MODEL_TOLERANCE = 2e-11
-# Nodes that stand for one direction, at a pole or both ends of a turn, are rounded to float32 one by one; a table may
-# jump there by the error that it states, up to this
+# Nodes that stand for one direction, at a pole or both ends of a turn, are rounded to float32 one by one. A table may
+# jump there by the error that it states of the band, up to this
 TABLE_TOLERANCE, _MOST_ERROR = 1e-6, 0.5
 _STEP = 1e-9  # [rad]
 _BESIDE = _STEP * np.array([-2.0, -1.0, 1.0, 2.0])
@@ -53,7 +55,11 @@ class _Seam(NamedTuple):
 
 
 def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
-    """Of the model at all wavelengths of a table, and of the table, which may jump by the error that it states."""
+    """Return the jumps of the model at all wavelengths of a table, and of the table.
+
+    A table may jump by the 99th percentile of the error that it states of the band of theta_i and the wavelength. A
+    seam near the horizon of the viewer is judged by the band of the viewer, as if light and viewer were exchanged.
+    """
     wavelengths = table.wavelength_nm
 
     def model(wi: Array, wr: Array) -> Floats:
@@ -63,14 +69,28 @@ def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
         return table.lookup_vectors(wi, wr).reshape(len(wi), wavelengths_of(table))
 
     floor = accuracy.floor_of(pairs.model, pairs.drawn) + _TINY  # far below it tables may be anything, as they may err
-    stated = 0.0 if table.error is None else table.error.overall.p99
-    tolerance = max(TABLE_TOLERANCE, min(stated, _MOST_ERROR))
     tiny = np.full_like(floor, _TINY)
-    of_model = [_jump(seam, model, wavelengths, tiny, MODEL_TOLERANCE) for seam in _crossed(_of_model())]
+    of_model = [_jump(seam, model, wavelengths, tiny, _rounding) for seam in _crossed(_of_model())]
     of_model.append(_between_methods(material, wavelengths, tiny))
-    of_table = [_jump(seam, looked_up, wavelengths, floor, tolerance) for seam in _crossed(_of_table(table))]
+    of_table = [
+        _jump(seam, looked_up, wavelengths, floor, partial(_stated, table.error)) for seam in _crossed(_of_table(table))
+    ]
     good = all(jump.largest <= jump.tolerance for jump in (*of_model, *of_table))
     return Smoothness(model=of_model, table=of_table, verdict="passes" if good else "violates")
+
+
+def _rounding(*_: Array) -> Floats:
+    return np.full((1, 1), MODEL_TOLERANCE)
+
+
+def _stated(error: Error | None, wi: Array, wr: Array) -> Floats:
+    """The jumps that a table states for pairs of directions, shape (N, L)."""
+    if error is None:
+        return np.full((1, 1), TABLE_TOLERANCE)
+    theta, _ = spherical_angles(np.stack([wi, wr]))
+    band = np.searchsorted(error.theta_i_deg, degrees(np.max(theta, axis=0)), side="right") - 1
+    p99 = np.array(error.p99)[np.clip(band, 0, len(error.p99) - 1)]
+    return np.asarray(np.clip(p99, TABLE_TOLERANCE, _MOST_ERROR))
 
 
 def _of_model() -> Iterator[_Seam]:
@@ -133,7 +153,7 @@ def _crossed(seams: Iterable[_Seam]) -> Iterator[_Seam]:
             yield seam._replace(at=seam.at[above])
 
 
-def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: Floats, tolerance: float) -> Jump:
+def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: Floats, allowed: Function) -> Jump:
     beside = np.repeat(seam.at[np.newaxis], _BESIDE.size, axis=0)
     beside[..., seam.moved] += _BESIDE[:, np.newaxis]
     wi, wr = (w.reshape(-1, 3) for w in _directions(beside, seam.half_difference))
@@ -141,7 +161,8 @@ def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: F
     with np.errstate(invalid="ignore"):  # of what is not finite
         sides = 2.0 * below - far_below, 2.0 * above - far_above
     relative = _relative(*sides, floor)
-    return _largest(seam.name, relative, _directions(seam.at, seam.half_difference), wavelength_nm, tolerance)
+    at = _directions(seam.at, seam.half_difference)
+    return _largest(seam.name, relative, at, wavelength_nm, allowed(*at))
 
 
 def _between_methods(material: Material, wavelength_nm: Array | None, floor: Floats) -> Jump:
@@ -154,7 +175,7 @@ def _between_methods(material: Material, wavelength_nm: Array | None, floor: Flo
     )
     at = unit_vector(theta_i, 0.0).reshape(-1, 3), unit_vector(theta_r, phi_r).reshape(-1, 3)
     relative = _relative(rows, single, floor)
-    return _largest("values in rows and one by one", relative, at, wavelength_nm, MODEL_TOLERANCE)
+    return _largest("values in rows and one by one", relative, at, wavelength_nm, _rounding())
 
 
 def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
@@ -165,14 +186,16 @@ def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
 
 
 def _largest(
-    seam: str, relative: Floats, at: tuple[Array, Array], wavelength_nm: Array | None, tolerance: float
+    seam: str, relative: Floats, at: tuple[Array, Array], wavelength_nm: Array | None, allowed: Floats
 ) -> Jump:
-    row, column = np.unravel_index(int(np.argmax(relative)), relative.shape)
+    """The jump that is largest of what is allowed there."""
+    allowed = np.broadcast_to(allowed, relative.shape)
+    row, column = np.unravel_index(int(np.argmax(relative / allowed)), relative.shape)
     where = _where(*(w[row] for w in at))
     if wavelength_nm is not None:
         where += f", {wavelength_nm[column]:g} nm"
     largest = float(f"{relative[row, column]:.3g}")
-    return Jump(seam=seam, crossings=len(relative), largest=largest, where=where, tolerance=tolerance)
+    return Jump(seam=seam, crossings=len(relative), largest=largest, where=where, tolerance=float(allowed[row, column]))
 
 
 def _where(wi: Array, wr: Array) -> str:

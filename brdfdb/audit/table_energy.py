@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.albedo import QUADRATURE_TOLERANCE, directional_albedo, hemispherical_albedo
+from brdfdb.audit.excess import DIGITS, crossing, limit_of
 from brdfdb.audit.findings import Bands, TableEnergy, Verdict
-from brdfdb.audit.known import DIGITS, known_limit
 from brdfdb.error import Error
 from brdfdb.figure import numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.grids import Axis
 from brdfdb.lookup import Table
+from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
 
 # More cannot be asked of a planner: a table that states more is judged as if it stated this
@@ -52,7 +52,12 @@ class _Judge(NamedTuple):
         return np.asarray(np.any(both, axis=1))
 
 
-def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
+def table_energy_of(
+    table: Table,
+    known: KnownExcess | None,
+    excused: Literal["known published excess", "accepted excess"] = "known published excess",
+) -> TableEnergy:
+    """Return the energy of a table; `excused` is the verdict on one that exceeds 1, and its model, as is known."""
     found = directional_albedo(table)
     theta_i, integration, diffuse = found.theta_i_deg, found.error, found.albedo.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
@@ -62,8 +67,8 @@ def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
     largest = float(finite[worst_theta, worst_wavelength])
     judge = _judge(table, theta_i, _known(diffuse))
     certain = _known(albedo - np.minimum(integration, QUADRATURE_TOLERANCE)[:, np.newaxis])
-    one = known_limit({}, theta_i)
-    exceeding = theta_i[np.any(finite > one[:, np.newaxis], axis=1)]
+    one = limit_of(None, theta_i)
+    first = _first_above_1(table, theta_i, np.max(finite, axis=1) - one)
     unexplained = theta_i[judge.unexplained(certain, one)]
     bands = None if table.error is None else _bands(table.error, judge.explained(one), judge.excess(certain, one))
     verdict: Verdict
@@ -71,9 +76,11 @@ def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
     if unexplained.size == 0:
         verdict = "passes"
         why = "its integration has" if bands is None else "the table states"
-        reason = f"{reason}, within the error that {why}" if exceeding.size else ""
-    elif known and np.isfinite(largest) and not np.any(judge.unexplained(certain, known_limit(known, theta_i))):
-        verdict, reason = "known published excess", f"{reason}: {known['citation']}"
+        reason = f"{reason}, within the error that {why}" if first is not None else ""
+    elif (
+        known is not None and np.isfinite(largest) and not np.any(judge.unexplained(certain, limit_of(known, theta_i)))
+    ):
+        verdict, reason = excused, f"{reason}: {known.citation}"
     else:
         verdict = "violates"
         if bands is not None:
@@ -89,11 +96,27 @@ def table_energy_of(table: Table, known: Mapping[str, Any]) -> TableEnergy:
         max_albedo=largest if np.isfinite(largest) else None,
         max_at_theta_i_deg=float(theta_i[worst_theta]),
         max_at_wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength]),
-        exceeds_1_from_theta_i_deg=float(exceeding[0]) if exceeding.size else None,
+        exceeds_1_from_theta_i_deg=first,
         exceeds_1_beyond_error_from_theta_i_deg=float(unexplained[0]) if unexplained.size else None,
         verdict=verdict,
         reason=reason,
     )
+
+
+def _first_above_1(table: Table, theta_i_deg: Axis, excess: Axis) -> float | None:
+    """From which angle [degree] on a table reflects more than 1, between the angles where its albedo is known."""
+    if not np.any(excess > 0.0):
+        return None
+    first = int(np.argmax(excess > 0.0))
+    if first == 0 or not np.isfinite(excess[first - 1 : first + 1]).all():
+        return float(theta_i_deg[first])
+
+    def between(angle: float) -> float:
+        at = np.array([angle])
+        diffuse = directional_albedo(table, at).albedo.max(axis=1)
+        return float(np.max(diffuse + _specular(table, at, diffuse.shape)) - limit_of(None, at)[0])
+
+    return crossing(between, *theta_i_deg[first - 1 : first + 1].tolist())
 
 
 def _share(albedo: float) -> str:

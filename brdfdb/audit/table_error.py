@@ -5,18 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from brdfdb import accuracy
-from brdfdb.audit.findings import TableError
+from brdfdb.albedo import wavelengths_of
+from brdfdb.audit.findings import Disagreement, TableError, Verdict
+from brdfdb.audit.likeness import bias_of, likeness_of
 from brdfdb.audit.pairs import SEED, Pairs, representative_nm
+from brdfdb.audit.statement import contradictions, disagreements
 from brdfdb.figure import Map, rows
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 
-# The 99th percentile at fresh directions over the stated one; of the tables of the default recipe at most 1.11
-WORST_OF_STATED = 1.5
-# A table may state that it is exact; float32 is to 6e-8, and offsets of logarithms take digits
-EXACT = 1e-6
 # Of the Dirac part, which is stored as float32: measured 6e-8
 SPECULAR_TOLERANCE = 1e-6
 _STEP_DEG = 3.0  # of the maps
@@ -26,21 +25,33 @@ LEAST, _MOST = 1e-6, 1.0  # what is less is drawn as the least: zeros have no co
 _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90.0}
 
 
-def table_error_of(table: Table, material: Material, pairs: Pairs) -> TableError:
-    """Against what the table states, and as maps at the wavelength in the middle of those of the table."""
+def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Verdict = "passes") -> TableError:
+    """Hold a table against what it states of its error, and draw the error at the middle of its wavelengths.
+
+    `nodes` is the verdict on its nodes: what is wrong with a table is looked for where that, or its error, violates.
+    """
     with np.errstate(invalid="ignore"):  # of what is not finite
         fresh = accuracy.compare(pairs.table, pairs.model, pairs.drawn, SEED).overall.p99
-    stated = None if table.error is None else table.error.overall.p99
+    contradicts: list[str] = []
+    disagree: list[Disagreement] = []
+    if table.error is not None:
+        contradicts = contradictions(table.error, wavelengths_of(table))
+        disagree = [] if contradicts else disagreements(table.error, pairs, table.wavelength_nm)
     specular = _specular_error(table, material)
-    good = stated is None or fresh <= WORST_OF_STATED * max(stated, EXACT)  # nan is not
-    good = good and (specular is None or specular <= SPECULAR_TOLERANCE)
+    mirrors = specular is None or specular <= SPECULAR_TOLERANCE  # nan is not
+    good = mirrors and not contradicts and not disagree
     floor = accuracy.floor_of(pairs.model, pairs.drawn)
     middle = floor[[floor.size // 2]]
     return TableError(
-        stated_p99=stated,
+        stated_p99=None if table.error is None else table.error.overall.p99,
         fresh_p99=fresh if np.isfinite(fresh) else None,
         specular=None if specular is None or not np.isfinite(specular) else specular,
         directions=int(np.count_nonzero(pairs.drawn.above)),
+        contradictions=contradicts,
+        disagreements=len(disagree),
+        worst=list({each.statistic: each for each in reversed(disagree)}.values())[::-1],
+        bias=bias_of(pairs),
+        likeness="" if good and nodes == "passes" else likeness_of(table, material, pairs),
         maps=[_map(table, material, middle, *plane) for plane in _PLANES.items()],
         verdict="passes" if good else "violates",
     )

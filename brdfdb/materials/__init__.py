@@ -7,7 +7,6 @@ One TOML file a paper, one table a material. In the files an angle is written in
 from __future__ import annotations
 
 import tomllib
-import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -17,7 +16,6 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import (
-    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -29,82 +27,17 @@ from pydantic import (
 from pydantic_core import ErrorDetails
 
 from brdfdb.geometry import degrees, radians
+from brdfdb.materials.provenance import Assumption, KnownExcess, Number, Text, Words
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 from brdfdb.spectra import refractive_index
 
 MOST_NAME = 128  # characters: file systems take 255 bytes
-
-
-def _printable(text: str) -> str:
-    """Return a text without control characters; a terminal would obey them."""
-    wrong = next(
-        (letter for letter in text if unicodedata.category(letter) in _CONTROLS and letter not in "\n\t"), None
-    )
-    if wrong is not None:
-        raise ValueError(f"{text[:40]!r} holds the control character {wrong!r}")
-    return text
-
-
-_CONTROLS = ("Cc", "Cf", "Cs")
 _SOURCED = ("refractive_index", "wavelengths_nm")  # what may have a source of its own, besides parameters
-Words = Annotated[str, AfterValidator(_printable)]
-Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
-Number = float | bool
 
 # Directions from which on a call each is faster than one for all wavelengths: they are one row of the kernel then. One
 # call and a call each of copper at 8 wavelengths: 278 and 637 ns a value at 256 directions, 293 and 204 at 16384
 _MANY = 2000
-
-
-class KnownExcess(BaseModel):
-    """A published set of constants that reflects more than it receives, with the place that says so.
-
-    `max_albedo` is the largest directional albedo that the published parameters give, Dirac part included;
-    `from_theta_i_deg` [degree] is the angle of incidence above which it exceeds 1.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    max_albedo: float = Field(gt=1.0, allow_inf_nan=False)
-    from_theta_i_deg: float = Field(ge=0.0, le=90.0)
-    citation: Text
-
-
-class Alternative(BaseModel):
-    """Other values that the paper allows for an assumption, and the largest directional albedo [1] that they give."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    parameters: dict[str, Number | str] = Field(min_length=1)
-    max_albedo: float = Field(ge=0.0, allow_inf_nan=False)
-
-
-class Assumption(BaseModel):
-    """A value that the paper does not print: why it was chosen, and what depends on the choice.
-
-    `max_albedo` [1] is the largest directional albedo of the material as it is, Dirac part included, and is given where
-    `alternatives` are: the two together say how far the verdict on energy rests on the choice.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    why: Text
-    max_albedo: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
-    alternatives: tuple[Alternative, ...] = ()
-
-    @model_validator(mode="after")
-    def _check_compared(self) -> Assumption:
-        if (self.max_albedo is None) != (not self.alternatives):
-            raise ValueError("assumed: max_albedo and alternatives are given together, or neither")
-        return self
-
-    @property
-    def decides(self) -> bool | None:
-        """Whether an alternative moves the largest albedo across 1; None where no alternative is recorded."""
-        if self.max_albedo is None:
-            return None
-        return any((each.max_albedo > 1.0) != (self.max_albedo > 1.0) for each in self.alternatives)
 
 
 class Material(BaseModel):

@@ -80,12 +80,10 @@ def _f_r(directions: Directions, k: ArrayLike, rho: ArrayLike) -> Floats:
 
 
 # Of k = 0 and rho = 1 at 89.5 degrees: 1 / cos, 114.6
-_KNOWN_EXCESS: dict[str, float | str] = {
-    "max_albedo": 114.6,
-    "from_theta_i_deg": 0.0,
-    "citation": "Oren and Nayar 1994, section 1: as printed, Minnaert's law reflects 1 at normal incidence and, for k "
-    "below 1, more the further the light is from it, cos(theta_i)^(k - 1), without bound",
-}
+_EXCESS = (
+    "Oren and Nayar 1994, section 1: as printed, Minnaert's law reflects 1 at normal incidence and, for k "
+    "below 1, more the further the light is from it, cos(theta_i)^(k - 1), without bound"
+)
 
 SPEC = ModelSpec(
     name="minnaert",
@@ -97,6 +95,6 @@ SPEC = ModelSpec(
     evaluate=minnaert,
     vectors=minnaert_vectors,
     grazing_pole=True,
-    known_excess=_KNOWN_EXCESS,
+    excess=_EXCESS,
     lossless=white,
 )

@@ -34,12 +34,10 @@ _NO_AZIMUTH = 1e-300  # smaller products of two sines: an azimuth means nothing
 
 # Measured at rho = 1 over sigma: the albedo reaches 1.0510 (sigma of 17 degrees) and exceeds 1 from 50 degrees on,
 # the qualitative model 1.015 or, with an offset of 0.57, 1.044
-_KNOWN_EXCESS: dict[str, float | str] = {
-    "max_albedo": 1.052,
-    "from_theta_i_deg": 45.0,
-    "citation": "Oren and Nayar 1994, eqs 27, 28 and 30: near grazing and with an albedo near 1 the fit reflects up to "
-    "5 % more than it receives, for sigma below 40 degrees",
-}
+_EXCESS = (
+    "Oren and Nayar 1994, eqs 27, 28 and 30: near grazing and with an albedo near 1 the fit reflects up to "
+    "5 % more than it receives, for sigma below 40 degrees"
+)
 
 
 @kernel
@@ -417,7 +415,7 @@ SPEC = ModelSpec(
     evaluate=oren_nayar,
     vectors=oren_nayar_vectors,
     grazing_pole=True,
-    known_excess=_KNOWN_EXCESS,
+    excess=_EXCESS,
     lossless=white,
 )
 QUALITATIVE_SPEC = ModelSpec(
@@ -430,6 +428,6 @@ QUALITATIVE_SPEC = ModelSpec(
     evaluate=oren_nayar_qualitative,
     vectors=oren_nayar_qualitative_vectors,
     grazing_pole=True,
-    known_excess=_KNOWN_EXCESS,
+    excess=_EXCESS,
     lossless=white,
 )

@@ -136,11 +136,7 @@ def lobe(
 
 
 # The sum of those of the two models, at rho = k_b = k_s = e_0 = 1
-_KNOWN_EXCESS: dict[str, float | str] = {
-    "max_albedo": 21.2,
-    "from_theta_i_deg": 0.0,
-    "citation": "Oren and Nayar 1994, eq. 32: a fitted sum of two radiances, of which that of eq. 31 is not normalised",
-}
+_EXCESS = "Oren and Nayar 1994, eq. 32: a fitted sum of two radiances, of which that of eq. 31 is not normalised"
 
 SPEC = ModelSpec(
     name="oren_nayar_body_surface",
@@ -153,5 +149,5 @@ SPEC = ModelSpec(
     vectors=oren_nayar_body_surface_vectors,
     grazing_pole=True,
     lobe=lobe,
-    known_excess=_KNOWN_EXCESS,
+    excess=_EXCESS,
 )

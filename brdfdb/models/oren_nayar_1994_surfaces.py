@@ -20,12 +20,10 @@ PartName = Literal["direct", "interreflected"]  # a field of `Parts`
 
 # Measured at rho = 1 over theta_a: the albedo reaches 1.0625 (theta_a of 41 degrees, theta_i of 89.999) and exceeds 1
 # from 74 degrees on; it is the weights of eq. 44 that do it: the integrals of eqs 23 and 46 stay below 1
-_SINGLE_SLOPE_EXCESS: dict[str, float | str] = {
-    "max_albedo": 1.07,
-    "from_theta_i_deg": 70.0,
-    "citation": "Oren and Nayar 1994, eqs 44, 45 and 49: near grazing and with an albedo near 1 the closed forms "
-    "reflect up to 6 % more than they receive, for slopes below 60 degrees",
-}
+_SINGLE_SLOPE_EXCESS = (
+    "Oren and Nayar 1994, eqs 44, 45 and 49: near grazing and with an albedo near 1 the closed forms "
+    "reflect up to 6 % more than they receive, for slopes below 60 degrees"
+)
 
 
 def oren_nayar_unidirectional(
@@ -448,7 +446,7 @@ SINGLE_SLOPE_SPEC = ModelSpec(
     evaluate=oren_nayar_single_slope,
     vectors=oren_nayar_single_slope_vectors,
     grazing_pole=True,
-    known_excess=_SINGLE_SLOPE_EXCESS,
+    excess=_SINGLE_SLOPE_EXCESS,
     lossless=white,
 )
 GAUSSIAN_SPEC = ModelSpec(

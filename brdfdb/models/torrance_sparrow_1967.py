@@ -133,12 +133,10 @@ def lobe(cos_i: Floats, *, sigma: ArrayLike, **_: ArrayLike) -> Lobe:
 
 # Measured with F = 1 over sigma and theta_i: 20.14 at sigma of 90 degrees and theta_i of 89.99; above 1, near normal
 # incidence too, from sigma of 12 degrees on
-KNOWN_EXCESS: dict[str, float | str] = {
-    "max_albedo": 20.2,
-    "from_theta_i_deg": 0.0,
-    "citation": "Oren and Nayar 1994, eq. 31: the lobe has the height 1 at any sigma and is not normalised; the factor "
-    "k_s of eq. 32 is fitted",
-}
+_EXCESS = (
+    "Oren and Nayar 1994, eq. 31: the lobe has the height 1 at any sigma and is not normalised; the factor "
+    "k_s of eq. 32 is fitted"
+)
 
 SPEC = ModelSpec(
     name="torrance_sparrow",
@@ -151,5 +149,5 @@ SPEC = ModelSpec(
     vectors=torrance_sparrow_vectors,
     grazing_pole=True,
     lobe=lobe,
-    known_excess=KNOWN_EXCESS,
+    excess=_EXCESS,
 )

@@ -145,16 +145,8 @@ def ward_half_vector_vectors(
 _GRAZING = (
     "Ward 1992, section 4.2: the normalisation holds for alpha up to about 0.2; rougher lobes reflect more than they "
 )
-_KNOWN_EXCESS: dict[str, float | str] = {
-    "max_albedo": 1.08,
-    "from_theta_i_deg": 89.0,
-    "citation": _GRAZING + "receive near grazing, measured 1.073 at 89.5 degrees",
-}
-_HALF_VECTOR_KNOWN_EXCESS: dict[str, float | str] = {
-    "max_albedo": 2.1,
-    "from_theta_i_deg": 87.5,
-    "citation": _GRAZING + "receive near grazing, measured 2.07 at 89.5 degrees",
-}
+_EXCESS = _GRAZING + "receive near grazing, measured 1.073 at 89.5 degrees"
+_HALF_VECTOR_EXCESS = _GRAZING + "receive near grazing, measured 2.07 at 89.5 degrees"
 
 SPEC = ModelSpec(
     name="ward",
@@ -169,7 +161,7 @@ SPEC = ModelSpec(
     lobe_axes=("alpha_x", "alpha_y"),
     uniform="rho_d",
     lobe=lobe,
-    known_excess=_KNOWN_EXCESS,
+    excess=_EXCESS,
     lossless=lossless,
 )
 HALF_VECTOR_SPEC = ModelSpec(
@@ -185,6 +177,6 @@ HALF_VECTOR_SPEC = ModelSpec(
     lobe_axes=("alpha_x", "alpha_y"),
     uniform="rho_d",
     lobe=wide_lobe,
-    known_excess=_HALF_VECTOR_KNOWN_EXCESS,
+    excess=_HALF_VECTOR_EXCESS,
     lossless=lossless,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from datetime import UTC, datetime
@@ -18,7 +18,7 @@ from brdfdb.audit import AuditReport, MaterialAudit, audit, report
 from brdfdb.audit.findings import Asymmetry
 from brdfdb.gallery import GALLERY
 from brdfdb.store import StoreError
-from brdfdb_pipelines import page, terminal, workers
+from brdfdb_pipelines import page, sentences, terminal, workers
 
 Task = Callable[[], Any]
 
@@ -30,7 +30,15 @@ class Section(NamedTuple):
     plots: list[page.Plot]
 
 
-def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: bool = True) -> AuditReport:
+def run(
+    root: Path,
+    names: list[str],
+    report_path: Path,
+    *,
+    jobs: int,
+    figures: bool = True,
+    allow: Sequence[str] = (),
+) -> AuditReport:
     """Audit the named materials of a store, or all of them.
 
     Parameters
@@ -46,6 +54,8 @@ def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: 
         How many processes work at it; 1: this one.
     figures : bool
         Compute the atlas and the gallery, too.
+    allow : sequence of str
+        Materials whose models may reflect more than they receive: that is accepted, and shown as such.
 
     Raises
     ------
@@ -57,10 +67,12 @@ def run(root: Path, names: list[str], report_path: Path, *, jobs: int, figures: 
     """
     store = brdfdb.open(root)
     materials = list(dict.fromkeys(names)) or list(store)
-    for name in names:
+    for name in (*names, *allow):
         store.head(name)
+    if unused := [name for name in allow if name not in materials]:
+        raise ValueError(f"--allow: {unused[0]} is not among the materials to audit, {', '.join(materials)}")
     _check_path(report_path)
-    tasks: dict[str, Task] = {name: partial(_audited, root, name) for name in materials}
+    tasks: dict[str, Task] = {name: partial(_audited, root, name, name in allow) for name in materials}
     drawn = [*ATLAS, *GALLERY] if figures else []
     tasks |= {f"figure {key}": partial(_drawn, key) for key in drawn}
     done: dict[str, Any] = {}
@@ -121,12 +133,12 @@ def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
                 future.cancel()
 
 
-def _audited(root: Path, name: str) -> Section | StoreError:
+def _audited(root: Path, name: str, accept_excess: bool) -> Section | StoreError:
     """One material; or what is wrong with its files, which is no reason to leave the others."""
     store = brdfdb.open(root)
     try:
         store.verify(name)
-        found = audit(store[name])
+        found = audit(store[name], accept_excess=accept_excess)
     except StoreError as error:
         return error
     except (ValueError, KeyError) as error:  # whole files, of something that is no table of ours
@@ -162,10 +174,13 @@ def _print(root: Path, found: AuditReport, report_path: Path) -> None:
             f"{losing} are of models that lose light even where nothing absorbs it: the report says how much, and where"
         )
     known = sum(a.verdict == "known published excess" for a in audits)
+    accepted = sum(a.verdict == "accepted excess" for a in audits)
+    allowed = f"{accepted} exceed 1 as --allow accepts, " if accepted else ""
     page_path = report_path.with_suffix(".html")
     print(
-        f"{len(audits)} audited: {len(audits) - known - len(found.violations)} pass, {known} exceed 1 as their "
-        f"published parameters are known to, {len(found.violations)} violate; page {page_path}, data {report_path}"
+        f"{len(audits)} audited: {len(audits) - known - accepted - len(found.violations)} pass, {known} exceed 1 as "
+        f"their published parameters are known to, {allowed}{len(found.violations)} violate; page {page_path}, "
+        f"data {report_path}"
     )
 
 
@@ -192,7 +207,8 @@ def _largest(*found: Asymmetry | None) -> float:
 
 def _reasons(a: MaterialAudit) -> list[str]:
     """A sentence for each finding that is not a pass, or is one only because of the error that the table states."""
-    energy = a.energy.reason if a.energy.verdict in ("known published excess", "violates") else a.energy.table.reason
+    exceeds = a.energy.verdict not in ("conserves", "loses")
+    energy = a.energy.reason if exceeds else a.energy.table.reason
     reasons = [energy] if energy else []
     reasons += ["not reciprocal"] if a.reciprocity.verdict == "violates" else []
     reasons += [f"{a.values.negative} negative values"] if a.values.negative else []
@@ -200,13 +216,19 @@ def _reasons(a: MaterialAudit) -> list[str]:
     for what, jumps in (("model", a.smoothness.model), ("table", a.smoothness.table)):
         worst = max(jumps, key=lambda jump: jump.largest / jump.tolerance)
         if worst.largest > worst.tolerance:
-            reasons.append(f"the {what} jumps by {worst.largest:.2g} at a seam, {worst.seam}: {worst.where}")
+            reasons.append(
+                f"the {what} jumps by {worst.largest:.2g} at a seam, {worst.tolerance:.2g} allowed, {worst.seam}: "
+                f"{worst.where}"
+            )
+    if a.nodes.verdict == "violates":
+        reasons.append(sentences.of_nodes(a.nodes))
     error = a.table_error
     if error.verdict == "violates":
         fresh = "not finite" if error.fresh_p99 is None else terminal.error(error.fresh_p99)
         mirror = "" if error.specular is None else f"; its mirror part is off by up to {error.specular:.2g}"
         states = "none" if error.stated_p99 is None else terminal.error(error.stated_p99)
         reasons.append(f"its error (p99) is {fresh}, the table states {states}{mirror}")
+    reasons += sentences.of_error(error)
     if a.sampling.verdict == "violates":
         reasons.append("samples of the model do not have the density or the albedo that they should")
     return reasons

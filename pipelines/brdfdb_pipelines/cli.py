@@ -111,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--json", action="store_true", help="print progress as JSON, an object a line")
 
     audit = command(
-        "audit", _audit, "Audit what tables and models conserve, where they jump or err; exit 1 on a new violation."
+        "audit", _audit, "Audit what tables and models conserve, where they jump or err; exit 1 on a violation."
     )
     audit.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
     audit.add_argument(
@@ -126,6 +126,14 @@ def _parser() -> argparse.ArgumentParser:
         default=len(os.sched_getaffinity(0)),
         metavar="N",
         help="processes (default: %(default)s)",
+    )
+    audit.add_argument(
+        "--allow",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="materials whose models may reflect more than they receive: accepted, and shown as such",
     )
     audit.add_argument("--no-figures", action="store_true", help="neither stability atlas nor gallery, as with names")
 
@@ -389,6 +397,7 @@ def _audit(options: argparse.Namespace) -> int:
             options.report or default,
             jobs=options.jobs,
             figures=not (options.names or options.no_figures),
+            allow=options.allow,
         )
     except KeyboardInterrupt:
         print("brdfdb: interrupted; no report was written, an earlier one is as it was", file=sys.stderr)

@@ -14,7 +14,7 @@ from brdfdb.audit import AuditReport, MaterialAudit
 from brdfdb.audit.findings import Asymmetry, Furnace
 from brdfdb.audit.model_energy import LOSSLESS
 from brdfdb.figure import Curve, Figure, Map, Numbers, Panel
-from brdfdb_pipelines import charts
+from brdfdb_pipelines import charts, sentences
 
 Level = Literal["good", "calm", "note", "bad"]
 
@@ -35,6 +35,7 @@ _LEVELS: dict[str, Level] = {
     "outside": "note",
     "gains": "note",
     "known published excess": "note",
+    "accepted excess": "note",
     "violates": "bad",
 }
 _MARKS = dict.fromkeys(_LEVELS, "✓") | {
@@ -44,10 +45,12 @@ _MARKS = dict.fromkeys(_LEVELS, "✓") | {
     "outside": "!",
     "gains": "!",
     "known published excess": "!",
+    "accepted excess": "!",
     "violates": "✕",
 }
 _WORST_FIRST = (
     "violates",
+    "accepted excess",
     "known published excess",
     "loses",
     "outside",
@@ -162,7 +165,7 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
     environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": _rank}
     rows = [_row(a) for a in report.materials]
     rows.sort(key=lambda row: (_rank(row.audit.verdict), _rank(row.audit.energy.verdict), row.audit.material))
-    words = ("conserves", "loses", "known published excess", "violates")
+    words = ("conserves", "loses", "known published excess", "accepted excess", "violates")
     counts = [(word, sum(a.energy.verdict == word for a in report.materials)) for word in words]
     if plots is None:
         subjects: list[MaterialAudit | Figure] = [*report.materials, *report.atlas, *report.gallery]
@@ -229,8 +232,9 @@ def _cells(a: MaterialAudit) -> list[Cell]:
     asymmetry = max(each.max for _, each in _reciprocity(a))
     jump = max((jump.largest for jump in (*a.smoothness.model, *a.smoothness.table)), default=0.0)
     error, p = a.table_error, [p for p in a.sampling.chi_square_p if p is not None]
-    wrong = a.values.negative + a.values.not_finite
-    values = "violates" if "violates" in (a.values.positivity, a.values.finiteness) else "passes"
+    wrong = a.values.negative + a.values.not_finite + a.nodes.wrong
+    of_values = (a.values.positivity, a.values.finiteness, a.nodes.verdict)
+    values = "violates" if "violates" in of_values else "passes"
     stated = "" if error.stated_p99 is None else f" of {number(error.stated_p99, 2)}"
     fresh = "not finite" if error.fresh_p99 is None else number(error.fresh_p99, 2)
     error_word = "unknown" if error.stated_p99 is None and error.verdict == "passes" else error.verdict
@@ -244,7 +248,7 @@ def _cells(a: MaterialAudit) -> list[Cell]:
         ),
         _furnace(model.furnace),
         Cell(a.reciprocity.verdict, number(asymmetry, 2), asymmetry),
-        Cell(values, f"{wrong} bad" if wrong else "all good", wrong),
+        Cell(values, f"{wrong} bad" if wrong else "all good" if values == "passes" else "bad", wrong),
         Cell(a.smoothness.verdict, number(jump, 2), jump),
         Cell(
             error_word,
@@ -293,8 +297,9 @@ def _findings(a: MaterialAudit) -> list[Finding]:
     fresh = "no error can be measured"
     if error.fresh_p99 is not None:
         fresh = f"99 of 100 fresh values within {number(error.fresh_p99)}"
+    bias = "" if error.bias is None else f", on average by {number(error.bias, 2)} of the model"
     mirror = "" if error.specular is None else f"; the mirror part is within {number(error.specular)} of the model's"
-    erroneous = f"{fresh}; the table {stated}{mirror}"
+    erroneous = "; ".join([f"{fresh}{bias}; the table {stated}{mirror}", *sentences.of_error(error)])
     p = min((p for p in s.chi_square_p if p is not None), default=None)
     sampled = (
         "no bins to compare" if p is None else f"the smallest p of {len(s.theta_i_deg)} lights is {probability(p)}"
@@ -313,6 +318,7 @@ def _findings(a: MaterialAudit) -> list[Finding]:
         ("Reciprocity", a.reciprocity.verdict, asymmetric),
         ("Positivity", v.positivity, negative),
         ("Finiteness", v.finiteness, finite),
+        ("Nodes", a.nodes.verdict, sentences.of_nodes(a.nodes)),
         ("Smoothness", a.smoothness.verdict, jumped),
         ("Table error", error.verdict, erroneous),
         ("Sampling", s.verdict, sampled),

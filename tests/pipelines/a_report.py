@@ -17,6 +17,7 @@ from brdfdb.audit.findings import (
     Limit,
     MaterialAudit,
     ModelEnergy,
+    Nodes,
     Reciprocity,
     Sampling,
     Smoothness,
@@ -150,13 +151,24 @@ def material(
             positivity="passes",
             finiteness="passes",
         ),
+        nodes=Nodes(compared=360, count=720, wrong=0, stored=None, expected=None, beside=[], verdict="passes"),
         smoothness=Smoothness(
             model=[Jump(seam="alpha = 45°", crossings=9, largest=2e-7, where="45°, 45°", tolerance=1e-5)],
             table=[Jump(seam="delta_phi = 180°", crossings=9, largest=1e-4, where="theta_i 80°", tolerance=1e-2)],
             verdict="passes",
         ),
         table_error=TableError(
-            stated_p99=0.0093, fresh_p99=0.0091, specular=None, directions=9, maps=[error_map()], verdict="passes"
+            stated_p99=0.0093,
+            fresh_p99=0.0091,
+            specular=None,
+            directions=9,
+            contradictions=[],
+            disagreements=0,
+            worst=[],
+            bias=-0.002,
+            likeness="",
+            maps=[error_map()],
+            verdict="passes",
         ),
         sampling=Sampling(
             samples=100_000,
@@ -203,6 +215,7 @@ def whole() -> AuditReport:
         material("brass"),
         material("paint", "loses", 0.4),
         material("oxide", "known published excess", 0.9, spectral=True),
+        material("gold", "accepted excess", 1.1),
         material(ODD, "violates", 1.3),
     ]
     atlas = [

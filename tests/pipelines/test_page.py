@@ -108,7 +108,7 @@ def test_every_material_figure_and_statement_is_there(document: Document, report
             assert statement.threshold_from is None or f"Threshold from {statement.threshold_from}." in words
     drawings = sum(len(each.panels) for each in (*report.atlas, *report.gallery))
     drawings += sum(len(each.table_error.maps) for each in report.materials)
-    drawings += 3 * 2 + 5  # grey: model and table, furnace; spectral: the model alone, uniform light, the bound, too
+    drawings += 4 * 2 + 5  # grey: model and table, furnace; spectral: the model alone, uniform light, the bound, too
     assert sum(tag == "svg" for tag, _ in document.elements) == drawings
 
 
@@ -125,6 +125,7 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
     assert "Energy of the model: loses. Reflects" in words
     assert "Energy of the table: passes. As the model." in words
     assert "Reciprocity: passes. Asymmetry up to 3·10⁻¹³, of 1·10⁻¹¹ allowed." in words
+    assert "Nodes: passes. All 360 stored values that were compared, of the 720 in the table, are the model's." in words
     assert "Smoothness: passes. Jumps by 0.0001 of f_r across delta_phi = 180°, of 0.01 allowed." in words
     assert "Sampling: passes. The smallest p of 3 lights is below 0.001." in words
     assert "Validity: at the edge. Of 2 limits that its paper states 1 inside, 1 at the edge." in words
@@ -132,7 +133,7 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
 
 def test_violations_come_first_then_known_excess_then_losses(html: str) -> None:
     rows = re.findall(r'<th scope="row"><a href="#([^"]+)">', html)
-    assert rows == [page.anchor(name) for name in (ODD, "oxide", "paint", "brass")]
+    assert rows == [page.anchor(name) for name in (ODD, "gold", "oxide", "paint", "brass")]
 
 
 def test_names_with_markup_in_them_stay_names(html: str, document: Document) -> None:

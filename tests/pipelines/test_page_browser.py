@@ -116,10 +116,10 @@ def test_the_page_works_in_a_browser_at_any_width(browser: str, tmp_path: Path, 
         assert each["content"] <= each["width"]
         assert each["opened"] <= each["width"]
         assert (each["seen"], each["fetched"]) == ([], [])
-        assert each["first"] == [ODD, "oxide", "paint", "brass"]
-        assert (each["named"], each["direction"]) == ([ODD, "brass", "oxide", "paint"], "ascending")
-        assert (each["reversed"], each["turned"]) == (["paint", "oxide", "brass", ODD], "descending")
-        assert each["numbers"] == ["paint", "brass", "oxide", ODD]  # by the albedo of the model
+        assert each["first"] == [ODD, "gold", "oxide", "paint", "brass"]
+        assert (each["named"], each["direction"]) == ([ODD, "brass", "gold", "oxide", "paint"], "ascending")
+        assert (each["reversed"], each["turned"]) == (["paint", "oxide", "gold", "brass", ODD], "descending")
+        assert each["numbers"] == ["paint", "brass", "oxide", "gold", ODD]  # by the albedo of the model
         assert each["filtered"] == ["oxide"]
         assert each["open"] == ["m-brass"]
         assert ET.fromstring(each["saved"]).tag == "{http://www.w3.org/2000/svg}svg"

@@ -2,7 +2,8 @@
 
 const LEVELS = {
   passes: "good", conserves: "good", inside: "good", loses: "calm", "at the edge": "calm", unknown: "calm",
-  outside: "note", gains: "note", "known published excess": "note", violates: "bad", damaged: "bad",
+  outside: "note", gains: "note", "known published excess": "note", "accepted excess": "note",
+  violates: "bad", damaged: "bad",
 };
 
 /** An element with properties and children, which are elements or text. */

@@ -4,7 +4,7 @@ import { chip, element, percent, short } from "./dom.js";
 import { nearest } from "./series.js";
 
 const aside = document.getElementById("facts");
-const FINDINGS = { energy: "energy", reciprocity: "reciprocity", smoothness: "smoothness", table_error: "stated error", sampling: "sampling" };
+const FINDINGS = { energy: "energy", reciprocity: "reciprocity", nodes: "stored values", smoothness: "smoothness", table_error: "stated error", sampling: "sampling" };
 
 /** Fill the side with what the service says of a material. */
 export function show(info) {

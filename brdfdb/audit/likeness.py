@@ -1,0 +1,86 @@
+"""A name for what is wrong with a table: a change of its model that the table agrees with much better.
+
+The signed error decides nothing alone, since a coarse table is bright or dark by itself. It tells a wrong scale, a
+wrong side and a wrong axis apart once a table is known to be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from brdfdb import accuracy
+from brdfdb.audit.pairs import Pairs, representative_nm
+from brdfdb.geometry import radians, spherical_angles, unit_vector
+from brdfdb.lookup import Table
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+
+DIRECTIONS = 3000  # at which changed models are evaluated
+MUCH_BETTER = 0.5  # of the mean error that is left without the change
+_TURNS_DEG = range(15, 180, 15)  # half a turn is the same for a lobe with two axes
+_SCALE = 0.01  # a scale that differs from 1 by less is not worth a name
+
+Directions = tuple[Floats, Floats]
+
+
+def bias_of(pairs: Pairs) -> float | None:
+    """Return the signed mean error [1] at the wavelength where it is largest: by how much a table reflects more."""
+    weight = pairs.drawn.weight
+    whole = weight @ pairs.model
+    with np.errstate(invalid="ignore"):
+        signed = np.divide(weight @ (pairs.table - pairs.model), whole, out=np.zeros_like(whole), where=whole > 0.0)
+    largest = float(signed[np.argmax(np.abs(signed))])
+    return float(f"{largest:.3g}") if np.isfinite(largest) else None
+
+
+def likeness_of(table: Table, material: Material, pairs: Pairs) -> str:
+    """Return what a table agrees with at least twice as well as with its model, in words; empty if with nothing."""
+    some = np.flatnonzero(pairs.drawn.above)[:: max(len(pairs.drawn.wi) // DIRECTIONS, 1)]
+    middle = pairs.table.shape[1] // 2
+    wavelength = representative_nm(table)
+    at = None if wavelength is None else np.array([wavelength])
+    found, truth, weight = pairs.table[some, middle], pairs.model[some, middle], pairs.drawn.weight[some]
+    if not np.isfinite(found).all():
+        return ""
+    light, viewer = pairs.drawn.wi[some], pairs.drawn.wr[some]
+    left = {"": weight @ np.abs(found - truth)}
+    scale = float(weight @ found / (weight @ truth)) if weight @ truth > 0.0 else 1.0
+    if abs(scale - 1.0) > _SCALE:
+        left[f"the model times {scale:.3g}"] = weight @ np.abs(found - scale * truth)
+    for name, changed in _changes(material.anisotropic):
+        model = accuracy.model_values(material, at, *changed(light, viewer))[:, 0]
+        left[name] = weight @ np.abs(found - model)
+    best = min(left, key=lambda name: left[name])
+    return best if left[best] < MUCH_BETTER * left[""] else ""
+
+
+def _changes(anisotropic: bool) -> Iterator[tuple[str, Callable[[Floats, Floats], Directions]]]:
+    yield "the model with light and viewer exchanged", lambda wi, wr: (wr, wi)
+    yield "the model seen from the other side, delta_phi of 180 degrees for 0", lambda wi, wr: (wi, _turned(wr, 180.0))
+    yield "the model with theta counted from the horizon", lambda wi, wr: (_upended(wi), _upended(wr))
+    if not anisotropic:
+        return
+    yield "the model in a mirror, -phi for phi", lambda wi, wr: (_mirrored(wi), _mirrored(wr))
+    for angle in _TURNS_DEG:
+        yield (
+            f"the model turned by {angle} degrees",
+            lambda wi, wr, by=float(angle): (_turned(wi, by), _turned(wr, by)),  # type: ignore[misc]
+        )
+
+
+def _turned(w: Floats, degrees: float) -> Floats:
+    """Unit vectors turned about the normal."""
+    cos, sin = np.cos(radians(degrees)), np.sin(radians(degrees))
+    return np.stack([cos * w[:, 0] - sin * w[:, 1], sin * w[:, 0] + cos * w[:, 1], w[:, 2]], axis=-1)
+
+
+def _mirrored(w: Floats) -> Floats:
+    return np.asarray(w * np.array([1.0, -1.0, 1.0]))
+
+
+def _upended(w: Floats) -> Floats:
+    """Unit vectors whose polar angles are what is left of theirs to 90 degrees."""
+    theta, phi = spherical_angles(w)
+    return unit_vector(np.clip(np.pi / 2.0 - theta, 0.0, np.pi / 2.0 - 1e-9), phi)

@@ -1,0 +1,109 @@
+"""The numbers that a table stores, against those that its model gives at the same nodes; and its refractive indices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from brdfdb.accuracy import FLOOR
+from brdfdb.audit.findings import Nodes
+from brdfdb.layout import Layout
+from brdfdb.lookup import Table
+from brdfdb.materials import Material
+from brdfdb.tabulate import block, rounded
+
+# Values of the model that are computed for the comparison. A table with more nodes is compared at some rows of its
+# first axis, evenly spread from the first to the last. A value of the facets' integral takes 30 us, others 0.2 us
+MOST_VALUES, _SLOW = 1 << 20, {"oren_nayar_gaussian": 1 << 15}
+# Numbers are the same but for rounding: to the bits that are stored, and of float64 sums on another processor,
+# relative to the largest number of the table
+_ROUNDING = 1e-11
+# n, k and the uniform part are stored as float64, and computed from the same package or parameter
+SAME = 1e-9
+
+
+def nodes_of(table: Table, material: Material) -> Nodes:
+    """Return how many stored numbers are those of the model, and the one that is furthest off.
+
+    Raises
+    ------
+    ValueError
+        If the table is not laid out as one of its material can be.
+    """
+    bits = int(table.attrs.get("bits", 23))
+    layout = Layout(
+        material,
+        table.grid,
+        table.wavelength_nm,
+        table.interpolation,
+        table.spectra,
+        bits,
+        table.attrs.get("reason", ""),
+    )
+    if layout.shape != table.values.shape:
+        raise ValueError(f"{layout.variable}: shape {table.values.shape} is not {layout.shape}, that of its axes")
+    rows, wrong, worst = 0, 0, (0.0, 0.0, 0.0)
+    for some in _rows(layout):
+        stored, expected = table.values[some].astype(np.float64), block(layout, some).astype(np.float64)
+        rows += some.stop - some.start
+        off, allowed = np.abs(stored - expected), 2.0**-bits * np.abs(expected)
+        off = np.where(np.isfinite(off) | (stored == expected), off, np.inf)
+        excess = off - allowed * (1.0 + _ROUNDING) - _ROUNDING * np.max(np.abs(expected))
+        beyond = (excess > 0.0) | (rounded(table.values[some], bits) != table.values[some])
+        wrong += int(np.count_nonzero(beyond))
+        if beyond.any() and (largest := float(np.max(excess, where=beyond, initial=-np.inf))) > worst[0]:
+            at = np.unravel_index(int(np.argmax(np.where(beyond, excess, -np.inf))), excess.shape)
+            worst = largest, float(stored[at]), float(expected[at])
+    beside = [*_refraction(table, material), *_uniform(table, layout)]
+    return Nodes(
+        compared=rows * (table.values.size // table.values.shape[0]),
+        count=table.values.size,
+        wrong=wrong,
+        stored=_finite(worst[1]) if wrong else None,
+        expected=_finite(worst[2]) if wrong else None,
+        beside=beside,
+        verdict="violates" if wrong or beside else "passes",
+    )
+
+
+def _rows(layout: Layout) -> Iterator[slice]:
+    """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
+    wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
+    most = _SLOW.get(layout.material.model, MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
+    if most >= layout.shape[0]:
+        yield from layout.blocks
+        return
+    for row in np.unique(np.linspace(0, layout.shape[0] - 1, max(most, 2)).round().astype(int)):
+        yield slice(int(row), int(row) + 1)
+
+
+def _refraction(table: Table, material: Material) -> Iterator[str]:
+    """Yield a sentence on each of n and k that is not that of the entry; tables in memory may store neither."""
+    arguments = material.arguments(table.wavelength_nm)
+    for name, stored in (("n", table.n), ("k", table.k)):
+        if stored is None or table.wavelength_nm is None:
+            continue
+        expected = np.asarray(arguments[name])
+        scale = np.hypot(arguments["n"], arguments["k"])
+        if stored.shape != expected.shape:
+            raise ValueError(f"{name}: shape {stored.shape} is not {expected.shape}, that of the wavelengths")
+        off = np.where(np.isfinite(stored), np.abs(stored - expected), np.inf) / scale
+        if np.any(off > SAME):
+            worst = int(np.argmax(off))
+            yield (
+                f"{name} is stored as {stored[worst]:.5g} at {table.wavelength_nm[worst]:g} nm, where "
+                f"{material.refractive_index} has {expected[worst]:.5g}"
+            )
+
+
+def _uniform(table: Table, layout: Layout) -> Iterator[str]:
+    """Yield a sentence on the part of f_r [1/sr] that is the same in all directions, if it is not the parameter's."""
+    expected = 0.0 if layout.uniform is None else float(layout.uniform[0])
+    stored = np.zeros(1) if table.uniform is None else table.uniform
+    if not np.all(np.abs(stored - expected) <= SAME * max(expected, FLOOR / np.pi)):
+        yield f"the uniform part is stored as {float(np.ravel(stored)[0]):.5g} 1/sr, the parameters make {expected:.5g}"
+
+
+def _finite(value: float) -> float | None:
+    return float(f"{value:.6g}") if np.isfinite(value) else None

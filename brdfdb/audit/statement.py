@@ -1,0 +1,224 @@
+"""The error that a table states, held against itself and against the error at directions drawn afresh.
+
+Both are samples of one population if the table is the one that was measured. A percentile of the first sample is then
+exceeded by a number of values of the second that follows the beta-binomial distribution, whatever the errors are
+distributed like: the count is too large, or too small, where its probability is below `CHANCE`. A maximum is judged in
+the same way, as the highest order statistic: not by how far it is exceeded, which has no bound, but by how often.
+Ratios of integrals, l1 and the floor, are judged by standard errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb import accuracy
+from brdfdb.accuracy import Draw
+from brdfdb.audit.findings import Disagreement, Statistic
+from brdfdb.audit.pairs import Pairs
+from brdfdb.error import Error, Overall
+from brdfdb.grids import Axis
+from brdfdb.parameters import Floats
+from brdfdb.places import BANDS_DEG
+
+# Probability of each test to fail a sound table. A table of 41 wavelengths takes 3000 of them: one in 300 000 such
+# tables fails by chance
+CHANCE = 1e-9
+# Standard errors of the difference of two ratios. A ratio that is too large because few rare directions were drawn has
+# a standard error about as large as itself, so that it takes 49 of them
+STANDARD_ERRORS = 7.0
+# A floor that is stated above this share of the fresh one may rest on a rare direction
+SHORT = 0.5
+# A table may state that it is exact: float32 is to 6e-8, and offsets of logarithms take digits
+EXACT = 1e-6
+DIGITS = 1.1e-2  # relative: a statement has three digits, and so has the floor of its relative errors
+LEAST_DIRECTIONS = 500  # of a band: a statement that rests on fewer is judged as if it rested on so many
+QUANTILES: dict[Statistic, float] = {"median": 0.5, "p95": 0.95, "p99": 0.99, "max": 1.0}
+NAMES: tuple[Statistic, ...] = ("l1", *QUANTILES)
+
+Counts = NDArray[np.int64]
+
+
+class _Band(NamedTuple):
+    """Directions of a band of theta_i, or of all: fresh ones, and how many the statement rests on."""
+
+    name: tuple[float, float]
+    chosen: NDArray[np.bool_]
+    drawn: int
+    stated: int
+
+
+def contradictions(error: Error, wavelengths: int) -> list[str]:
+    """Return a sentence for each thing that cannot be true of any table that a statement is about."""
+    bands = BANDS_DEG.size - 1
+    shape = (bands, wavelengths)
+    tables = {name: getattr(error, name) for name in NAMES}
+    shapes = {name: {len(row) for row in rows} | {-len(rows)} for name, rows in tables.items()}
+    if not np.array_equal(error.theta_i_deg, BANDS_DEG) or len(error.floor) != wavelengths:
+        return [f"it is not about {bands} bands of theta_i and {wavelengths} wavelengths"]
+    if any(each != {wavelengths, -bands} for each in shapes.values()):
+        return [f"it is not about {bands} bands of theta_i and {wavelengths} wavelengths"]
+    arrays = {name: np.array(rows, dtype=np.float64).reshape(shape) for name, rows in tables.items()}
+    overall = {name: float(getattr(error.overall, name)) for name in Overall.model_fields}
+    numbers = [*arrays.values(), np.array(error.floor), np.array([*overall.values()])]
+    if not all(np.all(np.isfinite(each) & (each >= 0.0)) for each in numbers):
+        return ["not all of its numbers are finite and at least 0"]
+    found = []
+    ordered = [arrays[name] for name in QUANTILES]
+    if any(np.any(low > high) for low, high in pairwise(ordered)):
+        found.append("a percentile is above a higher one")
+    for name, of_bands in arrays.items():
+        # a percentile, or a mean, of all bands is between those of the bands, at each wavelength
+        high = float(of_bands.max())
+        low = high if name == "max" else float(of_bands.min(axis=0).max())
+        if not low * (1.0 - DIGITS) <= overall[name] <= high * (1.0 + DIGITS):
+            found.append(
+                f"its overall {name} of {overall[name]:.3g} is not between those of its bands, {low:.3g} to {high:.3g}"
+            )
+    return found
+
+
+def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> list[Disagreement]:
+    """Return what fresh directions contradict of a statement that does not contradict itself, the worst first."""
+    return sorted(_disagreements(error, pairs, wavelength_nm), key=_severity, reverse=True)
+
+
+def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
+    drawn, floor = pairs.drawn, np.array(error.floor)  # that of another draw would be another by some percent
+    with np.errstate(invalid="ignore"):
+        relative = accuracy.relative(pairs.table, pairs.model, floor)
+    nm = [None] * floor.size if wavelength_nm is None else wavelength_nm.tolist()
+    bands = list(_bands(error, drawn))
+    for number, band in enumerate(bands):
+        whole = number == len(bands) - 1
+        for name, quantile in QUANTILES.items():
+            stated = (
+                np.full(floor.size, error.overall.__dict__[name]) if whole else np.array(getattr(error, name)[number])
+            )
+            least, most = limits(band.stated, int(np.count_nonzero(band.chosen)), quantile)
+            of_band = relative[band.chosen]
+            above = _exceeding(of_band, np.maximum(stated, EXACT) * (1.0 + DIGITS))
+            around = _exceeding(of_band, stated * (1.0 - DIGITS))
+            # the whole is stated at the worst wavelength, and need not be as bad at the others
+            too_good = np.zeros(floor.size, dtype=bool) if whole else (around <= least) & (stated > EXACT)
+            for w in np.flatnonzero((above >= most) | too_good):
+                fresh = _percentile(of_band[:, w], quantile)
+                yield _disagreement(name, band, nm[w], float(stated[w]), fresh)
+        stated = np.full(floor.size, error.overall.l1) if whole else np.array(error.l1[number])
+        ratio, off = _ratio(np.abs(pairs.table - pairs.model), pairs.model, drawn.weight, band)
+        more = ratio - stated * (1.0 + DIGITS) > STANDARD_ERRORS * off + EXACT
+        rare = np.zeros(floor.size) if whole else _rare(np.array(error.max[number]), pairs.model, drawn.weight, band)
+        less = (ratio + STANDARD_ERRORS * off + EXACT + rare < stated * (1.0 - DIGITS)) & (not whole)
+        more |= ~np.isfinite(ratio)
+        for w in np.flatnonzero(more | less):
+            yield _disagreement("l1", band, nm[w], float(stated[w]), float(ratio[w]))
+    yield from _of_floor(floor, pairs, bands[-1], nm)
+
+
+def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None]) -> Iterator[Disagreement]:
+    """The floor is a share of the mean reflectance over uniform directions: an integral over the same draws."""
+    values = accuracy.FLOOR / np.pi * pairs.drawn.weight[:, np.newaxis] * pairs.model
+    fresh = values.mean(axis=0)
+    off = STANDARD_ERRORS * values.std(axis=0) / np.sqrt(band.drawn) * np.sqrt(1.0 + band.drawn / band.stated)
+    wrong = (fresh - stated * (1.0 + DIGITS) > off) | (fresh + off < SHORT * stated)
+    for w in np.flatnonzero(wrong):
+        yield _disagreement("floor", band, nm[w], float(stated[w]), float(fresh[w]))
+
+
+def _bands(error: Error, drawn: Draw) -> Iterator[_Band]:
+    """Each band of theta_i, then all of them; a draw has the same share of directions in each as another."""
+    share = error.directions / max(int(np.count_nonzero(drawn.above)), 1)
+    for number, name in enumerate(zip(BANDS_DEG[:-1].tolist(), BANDS_DEG[1:].tolist(), strict=True)):
+        here = drawn.band == number
+        chosen = drawn.above & here
+        stated = max(int(share * np.count_nonzero(chosen)), LEAST_DIRECTIONS)
+        yield _Band(name, chosen, int(np.count_nonzero(here)), stated)
+    yield _Band((0.0, 90.0), drawn.above, len(drawn.band), max(error.directions, LEAST_DIRECTIONS))
+
+
+def limits(stated: int, fresh: int, quantile: float) -> tuple[int, int]:
+    """Return which counts of `fresh` values above a quantile of `stated` others are too small, and too large.
+
+    A count of at most the first, -1 if none is, or of at least the second, has a probability below `CHANCE`. The
+    quantile is between two order statistics: each limit is that of the one that makes it wider.
+    """
+    rank = int(quantile * (stated - 1)) + 1
+    lower = np.cumsum(_probabilities(stated, fresh, min(rank + 1, stated)))
+    upper = np.cumsum(_probabilities(stated, fresh, rank)[::-1])[::-1]  # of at least so many
+    least = int(np.count_nonzero(lower <= CHANCE)) - 1
+    return least if quantile < 1.0 else -1, int(np.count_nonzero(upper > CHANCE))
+
+
+def _probabilities(stated: int, fresh: int, rank: int) -> Floats:
+    """Return the probability that 0, 1, ..., `fresh` values are above the `rank`-th smallest of `stated` others."""
+    log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1.0, stated + fresh + 1.0)))])
+    above = np.arange(fresh + 1)
+    # of all orders in which the values can lie, those with so many of the fresh ones above
+    orders = _choose(log_factorial, fresh - above + rank - 1, rank - 1) + _choose(
+        log_factorial, above + stated - rank, stated - rank
+    )
+    return np.asarray(np.exp(orders - _choose(log_factorial, np.array(stated + fresh), stated)))
+
+
+def _choose(log_factorial: Floats, n: Counts, k: int) -> Floats:
+    return np.asarray(log_factorial[n] - log_factorial[k] - log_factorial[n - k])
+
+
+def _exceeding(values: Floats, limit: Floats) -> Counts:
+    """How many values are above a limit, or not finite."""
+    return np.asarray(np.count_nonzero(~(values <= limit), axis=0))
+
+
+def _ratio(wrong: Floats, whole: Floats, weight: Floats, band: _Band) -> tuple[Floats, Floats]:
+    """The ratio of two integrals over a band, and the standard error of its difference from that of a statement."""
+    rows = band.chosen
+    weights = weight[rows, np.newaxis]
+    above, below = weights * wrong[rows], weights * whole[rows]
+    total = below.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.where(total > 0.0, above.sum(axis=0) / total, 0.0)
+        influence = (above - ratio * below) / np.where(total > 0.0, total, 1.0)
+        off = np.sqrt(np.sum(influence**2, axis=0) * (1.0 + np.count_nonzero(rows) / band.stated))
+    return ratio, np.where(np.isfinite(off), off, 0.0)
+
+
+def _rare(largest: Floats, whole: Floats, weight: Floats, band: _Band) -> Floats:
+    """How much of a stated l1 can come of directions so rare that none like them is among the fresh ones.
+
+    So many of them that the fresh ones would have missed all with the probability `CHANCE`, each with the largest error
+    that is stated and the largest weight that was met.
+    """
+    fresh = int(np.count_nonzero(band.chosen))
+    if fresh == 0:
+        return np.zeros(largest.size)
+    count = np.log(CHANCE) / np.log(band.stated / (band.stated + fresh))
+    share = weight[band.chosen, np.newaxis] * whole[band.chosen]
+    mean = share.mean(axis=0)
+    largest_share = np.divide(share.max(axis=0), mean, out=np.ones(mean.size), where=mean > 0.0)
+    return np.asarray(count * largest * largest_share / band.stated)
+
+
+def _percentile(values: Floats, quantile: float) -> float:
+    return float(np.percentile(np.where(np.isfinite(values), values, np.inf), 100.0 * quantile, method="lower"))
+
+
+def _severity(each: Disagreement) -> float:
+    return np.inf if each.times is None else each.times
+
+
+def _disagreement(name: Statistic, band: _Band, nm: float | None, stated: float, fresh: float) -> Disagreement:
+    least = 0.0 if name == "floor" else EXACT
+    low, high = sorted((max(stated, least), max(fresh, least)))
+    times = high / low if np.isfinite(fresh) and low > 0.0 else np.inf
+    return Disagreement(
+        statistic=name,
+        theta_i_deg=band.name,
+        wavelength_nm=nm,
+        stated=stated,
+        fresh=float(f"{fresh:.3g}") if np.isfinite(fresh) else None,
+        times=float(f"{times:.3g}") if np.isfinite(times) else None,
+    )

@@ -1,0 +1,76 @@
+"""Statements about the values of a material: texts, assumptions, and excesses that are known as published."""
+
+from __future__ import annotations
+
+import unicodedata
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+_CONTROLS = ("Cc", "Cf", "Cs")
+
+
+def _printable(text: str) -> str:
+    """Return a text without control characters; a terminal would obey them."""
+    wrong = next(
+        (letter for letter in text if unicodedata.category(letter) in _CONTROLS and letter not in "\n\t"), None
+    )
+    if wrong is not None:
+        raise ValueError(f"{text[:40]!r} holds the control character {wrong!r}")
+    return text
+
+
+Words = Annotated[str, AfterValidator(_printable)]
+Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
+Number = float | bool
+
+
+class KnownExcess(BaseModel):
+    """A published set of constants that reflects more than it receives, with the place that says so.
+
+    `max_albedo` is the largest directional albedo that the published parameters give, Dirac part included;
+    `from_theta_i_deg` [degree] is the angle of incidence above which it exceeds 1. Audits believe the built-in
+    materials alone.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    max_albedo: float = Field(gt=1.0, allow_inf_nan=False)
+    from_theta_i_deg: float = Field(ge=0.0, le=90.0)
+    citation: Text
+
+
+class Alternative(BaseModel):
+    """Other values that the paper allows for an assumption, and the largest directional albedo [1] that they give."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    parameters: dict[str, Number | str] = Field(min_length=1)
+    max_albedo: float = Field(ge=0.0, allow_inf_nan=False)
+
+
+class Assumption(BaseModel):
+    """A value that the paper does not print: why it was chosen, and what depends on the choice.
+
+    `max_albedo` [1] is the largest directional albedo of the material as it is, Dirac part included, and is given where
+    `alternatives` are: the two together say how far the verdict on energy rests on the choice.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    why: Text
+    max_albedo: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
+    alternatives: tuple[Alternative, ...] = ()
+
+    @model_validator(mode="after")
+    def _check_compared(self) -> Assumption:
+        if (self.max_albedo is None) != (not self.alternatives):
+            raise ValueError("assumed: max_albedo and alternatives are given together, or neither")
+        return self
+
+    @property
+    def decides(self) -> bool | None:
+        """Whether an alternative moves the largest albedo across 1; None where no alternative is recorded."""
+        if self.max_albedo is None:
+            return None
+        return any((each.max_albedo > 1.0) != (self.max_albedo > 1.0) for each in self.alternatives)
