@@ -205,10 +205,11 @@ def _with_surface(number: int, sample: str) -> Figure:
 
 
 def _sum_by_hand(material: Material, theta_i_deg: float, theta_r_deg: float) -> float:
-    """Return f_r [1/sr] of eq. 32 in the plane of incidence, with k_b = 1, by hand."""
+    """Return f_r [1/sr] of eq. 32 in the plane of incidence, with k_b = 1 and E_0 = pi, by hand."""
     printed = material.file_parameters()
     body = by_hand.fit(theta_i_deg, theta_r_deg, float(printed["rho"]), float(printed["sigma_deg"])).direct
-    return body + float(printed["k_s"]) * by_hand.surface(theta_i_deg, theta_r_deg, float(printed["sigma_deg"]))
+    surface = by_hand.surface(theta_i_deg, theta_r_deg, float(printed["sigma_deg"]))
+    return body + float(printed["k_s"]) * surface / np.pi
 
 
 def _approaching(number: int, sums: list[Floats], material: Material) -> Statement:
@@ -223,7 +224,7 @@ def _approaching(number: int, sums: list[Floats], material: Material) -> Stateme
         holds=all(bool(np.all(np.diff(line) > 0.0)) for line in last)
         and bool(np.allclose(grows, expected, rtol=EXACT)),
         threshold_from="the paper's words: increase, at every degree; a closed form, eqs 27, 31 and 32 with the "
-        "numbers of the caption",
+        "numbers of the caption and E_0 = π",
     )
 
 
@@ -252,7 +253,7 @@ def _foam(sums: list[Floats], bodies: list[Floats], material: Material) -> State
         f"that along the normal it is {listed(over_normal, '.4f')}, by hand {listed(expected, '.4f')}.",
         holds=forward[-1] > 1.0 and max(alone) <= 1.0 and bool(np.allclose(over_normal, expected, rtol=EXACT)),
         threshold_from="the paper's words: an increase, where the body has none; a closed form, eqs 27, 31 and 32 with "
-        "k_s/k_b = 0.019",
+        "k_s/k_b = 0.019 and E_0 = π",
     )
 
 
