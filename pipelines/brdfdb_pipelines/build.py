@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections import deque
 from collections.abc import Callable
@@ -14,17 +13,13 @@ from typing import Any
 
 from brdfdb.family import FamilyRecord, Sweep
 from brdfdb.family_records import recorded, write_family
-from brdfdb.layout import Layout, digest
 from brdfdb.manifest import Entry, StoreError, read_manifest
-from brdfdb.revisions import Standing, standing
 from brdfdb.staging import (
     Block,
     BusyError,
     Lock,
-    directory_of,
     discard,
     make_store,
-    planned,
     point_to,
     prepare,
     publish,
@@ -36,6 +31,7 @@ from brdfdb.staging import (
 from brdfdb_pipelines import resources, terminal, workers
 from brdfdb_pipelines.recipe import Job, Recipe, load
 from brdfdb_pipelines.report import Bars, Event, Lines, Tally
+from brdfdb_pipelines.survey import Survey, head_of, survey
 from brdfdb_pipelines.workers import Workers
 
 _LOOK_S = 2.0  # between looks at workers that say nothing
@@ -68,54 +64,6 @@ class Built:
     stored_bytes: int
     why: str = ""
     shape: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class Survey:
-    """What a look at the store, and the planner, say about a job: how it stands, and the layout that is missing."""
-
-    standing: Standing
-    head: str
-    layout: str = ""
-    shape: tuple[int, ...] = ()
-    block_values: tuple[int, ...] = ()
-    task_bytes: int = 0  # memory that a task takes
-    disk_bytes: int = 0  # that are still to be written, at most
-
-    @property
-    def size(self) -> int:
-        """Values to compute."""
-        return sum(self.block_values)
-
-
-def survey(root: str, job: Job) -> Survey:
-    """Look at what the store has for a job, and lay out what is missing: a task for a worker."""
-    store, name, request = Path(root), job.material.name, job.request
-    head = _head(store, name)
-    found = standing(store, name, request)
-    if found.state != "missing":
-        return Survey(found, head)
-    text = planned(store, name, request)
-    if text is None:
-        text = json.dumps(job.layout().document())
-        try:
-            with Lock(store, name, wait=False):
-                prepare(store, name, request, text)
-        except BusyError:
-            pass  # another build is at it, and most likely does all there is to do
-    layout = Layout.from_document(json.loads(text))
-    rest = layout.size // layout.shape[0]
-    values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
-    staged = resources.stored_bytes([directory_of(store, name, digest(request)) / "table"])
-    disk = max(0, resources.table_bytes(layout) - staged)
-    return Survey(found, head, text, tuple(layout.shape), values, resources.task_bytes(layout), disk)
-
-
-def _head(root: Path, name: str) -> str:
-    try:
-        return (root / "materials" / name / "HEAD.json").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
 
 
 @dataclass(eq=False)
@@ -360,7 +308,7 @@ class _Builder:
             self.waiting.append(table)
             return False
         self.open.append(table)
-        if _head(self.root, name) != table.survey.head:  # another build published meanwhile
+        if head_of(self.root, name) != table.survey.head:  # another build published meanwhile
             table.survey = survey(str(self.root), job)
         found = table.survey.standing
         if found.state == "missing":

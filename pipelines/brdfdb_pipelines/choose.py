@@ -18,7 +18,7 @@ from brdfdb.recorded import Recorded
 from brdfdb.render import Reflector, reflectors
 from brdfdb.scene import Scene
 from brdfdb.shapes import Array
-from brdfdb.staging import make_store
+from brdfdb.staging import make_store, remove_begun
 from brdfdb_pipelines import terminal
 from brdfdb_pipelines.chosen import Built, build, with_reason
 from brdfdb_pipelines.scene import SceneError, load
@@ -70,10 +70,14 @@ def run(
     StoreError
         If the store cannot be written, or is something else: before any work.
     """
-    scene = load(name)
+    scene, made = load(name), False
     try:
+        check_feasible(scene.tolerance)  # before minutes of work, as the store
+        made = store is not None and make_store(store)
         return _run(scene, name, out, width, weigh, store, tolerances)
     except ValueError as error:
+        if made and store is not None:
+            remove_begun(store)
         raise SceneError(f"{name}: {error}") from None
 
 
@@ -86,9 +90,6 @@ def _run(
     store: Path | None,
     tolerances: Sequence[float] | None,
 ) -> Choice:
-    check_feasible(scene.tolerance)  # before minutes of work, as the store
-    if store is not None:
-        make_store(store)
     with terminal.progress(counted=False, transient=True) as bar:
         bar.add_task("tracing rays", total=None)
         view = gather(scene, width)

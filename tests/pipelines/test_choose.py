@@ -208,11 +208,13 @@ def test_what_is_printed_says_how_many_pixels_keep_to_the_tolerance(
 def test_what_is_wrong_is_one_sentence(
     old: str, new: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["choose", written(tmp_path, old, new), "--width", "16", "--out", str(tmp_path / "out")]) == 2
+    out, store = ("--out", str(tmp_path / "out")), ("--build", str(tmp_path / "store"))
+    assert cli.main(["choose", written(tmp_path, old, new), "--width", "16", *out, *store]) == 2
     last = capsys.readouterr().err.strip().splitlines()[-1]
     assert said in last
     assert "Traceback" not in last
     assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "store").exists()
 
 
 def test_an_exr_without_directions_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
