@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
 import re
+import stat
 import uuid
 from collections.abc import Mapping
 from pathlib import Path
@@ -45,6 +47,8 @@ class Summary(TypedDict):
 class Manifest(TypedDict):
     """The files of a revision, by their path inside it; nothing else belongs there."""
 
+    material: str
+    revision: str
     summary: Summary
     files: dict[str, Entry]
 
@@ -123,9 +127,17 @@ def unsealed(data: bytes, where: str, file: str) -> dict[str, Any]:
         raise StoreError(f"{where} is damaged: {file} is not JSON: {error}") from error
 
 
+def regular_bytes(path: str | Path) -> bytes:
+    """Return the bytes of a regular file; OSError if it is none. A pipe would wait for its writer for good."""
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "Not a regular file", str(path))
+        return file.read()
+
+
 def _bytes_of(path: Path, where: str) -> bytes:
     try:
-        return path.read_bytes()
+        return regular_bytes(path)
     except FileNotFoundError:
         raise StoreError(f"{where} is damaged: {path.name} is missing") from None
     except OSError as error:
@@ -166,7 +178,7 @@ def read_head(material: Path) -> Head | None:
     """Return the pointer in the directory of a material; None without one; StoreError if it is damaged."""
     path = material / "HEAD.json"
     try:
-        return head_from(path, path.read_bytes())
+        return head_from(path, regular_bytes(path))
     except FileNotFoundError:
         return None
     except OSError as error:
@@ -206,7 +218,7 @@ def read_manifest(group: Path, digest: str | None) -> tuple[Manifest, str]:
     Raises
     ------
     StoreError
-        If it is missing, changed, or another one than the one with that digest.
+        If it is missing, changed, that of another revision, or another one than the one with that digest.
     """
     where, path = f"{group.parent.name} {group.name}", manifest_of(group)
     data = _bytes_of(path, where)
@@ -214,7 +226,9 @@ def read_manifest(group: Path, digest: str | None) -> tuple[Manifest, str]:
     found = hashlib.sha256(data).hexdigest()
     if digest not in (None, found):
         raise StoreError(f"{where} is damaged: {path.name} is not the one whose digest was recorded")
-    _check_fields(manifest, {"summary": dict, "files": dict}, where, path.name)
+    _check_fields(manifest, {"material": str, "revision": str, "summary": dict, "files": dict}, where, path.name)
+    if (manifest["material"], manifest["revision"]) != (group.parent.name, group.name):
+        raise StoreError(f"{where} is damaged: {path.name} is that of {manifest['material']} {manifest['revision']}")
     _check_fields(manifest["summary"], _SUMMARY, where, path.name)
     for entry in manifest["files"].values():
         _check_fields(entry, {"size": int, "sha256": str}, where, path.name)

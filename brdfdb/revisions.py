@@ -239,7 +239,8 @@ def _collect_material(
     try:
         current = store.path(material.name)
         others = [group for group in whole if group != current]
-        kept = {current, *others[max(0, len(others) - (keep - 1)) :], *(group for group in others if group in stay)}
+        # what a snapshot names stays, damaged or not: half of it may be all that is left
+        kept = {current, *others[max(0, len(others) - (keep - 1)) :], *stay}
     except UnknownMaterialError:  # nothing but what crashes left behind
         current = material
     except StoreError:

@@ -390,12 +390,12 @@ def publish(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) ->
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "bytes": stored,
         }
-        manifest: Manifest = {"summary": summary, "files": dict(files)}
         for directory, _, _ in os.walk(table, topdown=False):
             sync_directory(Path(directory))
         material.mkdir(exist_ok=True)
         sync_directory(material.parent)
         revision = f"r{newest(material) + 1:06d}"
+        manifest: Manifest = {"material": name, "revision": revision, "summary": summary, "files": dict(files)}
         write_sealed(manifest_of(material / revision), manifest, staging)
         table.rename(material / revision)
         sync_directory(material)

@@ -39,6 +39,7 @@ from brdfdb.manifest import (
     read_manifest,
     read_sealed,
     read_snapshot,
+    regular_bytes,
     unsealed,
     whole_revisions,
 )
@@ -410,8 +411,7 @@ class Store(Mapping[str, "Table"]):
             at = os.stat(path)
             seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
             if known is None or known.seen != seen:
-                with open(path, "rb") as handle:
-                    head = head_from(Path(path), handle.read())
+                head = head_from(Path(path), regular_bytes(path))
                 known = self._pointers[name] = _Pointer(seen, self.root / "materials" / name, head)
         except (FileNotFoundError, NotADirectoryError):
             return None

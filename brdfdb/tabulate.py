@@ -191,9 +191,8 @@ def frame(layout: Layout) -> xr.Dataset:
     if layout.uniform is not None:
         variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])
     if spec.specular is not None:
-        given = "theta_i" in grid.axes and not layout.reason
-        name = "theta_i" if given else "specular_theta_i"
-        theta_i_deg = grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
+        theta_i_deg = specular_nodes(layout)
+        name = "specular_theta_i" if theta_i_deg is SPECULAR_THETA_DEG else "theta_i"
         coordinates[name] = _coordinate(name, theta_i_deg)
         theta_i = radians(theta_i_deg)
         variables["specular_reflectance"] = (
@@ -214,6 +213,12 @@ def frame(layout: Layout) -> xr.Dataset:
         | how
         | {"reconstruction": _reconstruction(layout), "reason": layout.reason},
     )
+
+
+def specular_nodes(layout: Layout) -> Axis:
+    """Return the angles of incidence [degree] at which the Dirac part of a table is stored."""
+    given = "theta_i" in layout.grid.axes and not layout.reason
+    return layout.grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
 
 
 def _coordinate(name: str, nodes: Axis) -> tuple[str, Axis, dict[str, str]]:

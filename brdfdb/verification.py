@@ -120,6 +120,11 @@ def _others(store: Store, current: Path, head: Head) -> list[Finding]:
                 found.append(Finding(name, f"{error} (not the current revision)", _other_repair(store.root, group)))
             continue
         found += _strange(name, group, digest)
+    for revision in head["manifests"]:
+        group = current.with_name(revision)
+        if not group.is_dir() and manifest_of(group).is_file():  # a collection removes the manifest first
+            sentence = f"{name} {revision} is damaged: its directory is missing (not the current revision)"
+            found.append(Finding(name, sentence, _other_repair(store.root, group)))
     return found
 
 

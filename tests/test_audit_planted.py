@@ -19,8 +19,14 @@ from brdfdb.audit.nodes import nodes_of
 from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.reciprocity import reciprocity_of
 from brdfdb.audit.smoothness import smoothness_of
+from brdfdb.audit.statement import contradictions
 from brdfdb.audit.table_error import table_error_of
+from brdfdb.audit.values import values_of
+from brdfdb.grids import Grid
+from brdfdb.layout import Layout
 from brdfdb.lookup import Table
+from brdfdb.materials import presets
+from brdfdb.tabulate import tabulate
 from tests.benchmarks.planted_tables import PLANTED, brass, clay, copper, grooves
 from tests.benchmarks.sound_materials import materials
 from tests.test_albedo import planned
@@ -132,3 +138,46 @@ def test_no_sound_table_is_named(number: int) -> None:
 @cache
 def sound() -> list[tuple[str, Table]]:
     return list(materials(SOUND, seed=2))
+
+
+def test_a_dirac_part_that_is_missing_or_has_other_nodes_is_named() -> None:
+    table = copper()
+    assert table.specular is not None
+    assert nodes_of(replace(table, specular=None), material_of(table)).beside == [
+        "the Dirac part of the model is not stored"
+    ]
+    ends = np.array([0, len(table.specular) - 1])
+    fewer = replace(table, specular=table.specular[ends], specular_theta_deg=np.array([0.0, 90.0]))
+    (said,) = nodes_of(fewer, material_of(table)).beside
+    assert said.startswith("the Dirac part is stored at 2 angles that are not the ")
+
+
+def test_a_planned_table_that_states_no_error_is_named() -> None:
+    table = clay()
+    attrs = {key: value for key, value in table.attrs.items() if key != "error"} | {"request": {"tolerance": 0.05}}
+    assert nodes_of(replace(table, attrs=attrs), material_of(table)).beside == [
+        "no error is stated, though a tolerance of 0.05 was asked for"
+    ]
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), -1.0])
+def test_limits_in_places_that_are_no_numbers_contradict_themselves(wrong: float) -> None:
+    error = copper().error
+    assert error is not None
+    assert error.places is not None
+    assert contradictions(error, len(error.floor)) == []
+    rows = [[wrong] * len(row) for row in error.places.alongside]
+    other = error.model_copy(update={"places": error.places.model_copy(update={"alongside": rows})})
+    (said,) = contradictions(other, len(error.floor))
+    assert said.startswith("its limits in places and between wavelengths are not numbers")
+
+
+def test_nodes_below_the_horizon_may_be_negative_and_lookups_may_not() -> None:
+    layout = Layout(presets()["foam"], Grid({"theta_h": [0, 45, 90], "theta_d": [0, 45, 90], "phi_d": [0, 45, 90]}))
+    table = Table.of(layout, tabulate(layout)["brdf"].values)
+    numbers = np.array(table.values)
+    numbers[-1, -1] = -1.0
+    table, looked_up = replace(table, values=numbers), np.ones((3, 1))
+    assert table.values_are_brdf
+    assert values_of(table, looked_up).positivity == "passes"
+    assert values_of(table, -looked_up).positivity == "violates"

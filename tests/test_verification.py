@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import pytest
 import xarray as xr
 
 import brdfdb
-from brdfdb import chunks, staging, verification
+from brdfdb import chunks, snapshots, staging, verification
 from brdfdb.grids import Grid
 from brdfdb.layout import Layout, digest
 from brdfdb.manifest import StoreError, manifest_of, sealed, unsealed
@@ -213,3 +215,40 @@ def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch)
     brdfdb.open(root).verify("white")
     (found,) = findings(root)
     assert found.startswith("white r000004 is damaged: chunk 2 of brdf cannot be decoded: ")
+
+
+def test_a_revision_of_another_material_is_not_adopted(root: Path) -> None:
+    publish_dataset(root, "black", lambert(0.125))
+    white, black = root / "materials" / "white", root / "materials" / "black"
+    shutil.copytree(black / "r000001", white / "r000009")
+    shutil.copyfile(manifest_of(black / "r000001"), manifest_of(white / "r000009"))
+    (white / "HEAD.json").unlink()
+    (found,) = findings(root)
+    assert "`brdfdb rollback white r000003`" in found
+    said = r"^white r000009 is damaged: r000009\.MANIFEST\.json is that of black r000001$"
+    with pytest.raises(StoreError, match=said):
+        rollback(root, "white", "r000009")
+    rollback(root, "white", "r000003")
+    assert rho(root) == 0.75
+
+
+def test_a_revision_without_its_directory_is_named_and_stays_while_a_snapshot_names_it(root: Path) -> None:
+    rollback(root, "white", "r000001")
+    snapshots.create(root, "paper")
+    rollback(root, "white", "r000003")
+    shutil.rmtree(root / "materials" / "white" / "r000001")
+    (found,) = findings(root)
+    assert found.startswith("white r000001 is damaged: its directory is missing (not the current revision); copy it")
+    collect(root, 1)
+    assert manifest_of(root / "materials" / "white" / "r000001").is_file()
+    snapshots.remove(root, "paper")
+    collect(root, 1)
+    assert findings(root) == []
+
+
+def test_a_pointer_that_is_a_pipe_is_damage_and_does_not_hang(root: Path) -> None:
+    path = root / "materials" / "white" / "HEAD.json"
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(StoreError, match=r"^white is damaged: HEAD\.json cannot be read: Not a regular file$"):
+        brdfdb.open(root)["white"]

@@ -11,7 +11,7 @@ from brdfdb.audit.findings import Nodes
 from brdfdb.layout import Layout
 from brdfdb.lookup import Table
 from brdfdb.materials import Material
-from brdfdb.tabulate import block, rounded
+from brdfdb.tabulate import block, rounded, specular_nodes
 
 # Values of the model that are computed for the comparison. A table with more nodes is compared at some rows of its
 # first axis, evenly spread from the first to the last. A value of the facets' integral takes 30 us, others 0.2 us
@@ -55,7 +55,7 @@ def nodes_of(table: Table, material: Material) -> Nodes:
         if beyond.any() and (largest := float(np.max(excess, where=beyond, initial=-np.inf))) > worst[0]:
             at = np.unravel_index(int(np.argmax(np.where(beyond, excess, -np.inf))), excess.shape)
             worst = largest, float(stored[at]), float(expected[at])
-    beside = [*_refraction(table, material), *_uniform(table, layout)]
+    beside = [*_refraction(table, material), *_uniform(table, layout), *_dirac(table, layout), *_unstated(table)]
     return Nodes(
         compared=rows * (table.values.size // table.values.shape[0]),
         count=table.values.size,
@@ -103,6 +103,27 @@ def _uniform(table: Table, layout: Layout) -> Iterator[str]:
     stored = np.zeros(1) if table.uniform is None else table.uniform
     if not np.all(np.abs(stored - expected) <= SAME * max(expected, FLOOR / np.pi)):
         yield f"the uniform part is stored as {float(np.ravel(stored)[0]):.5g} 1/sr, the parameters make {expected:.5g}"
+
+
+def _dirac(table: Table, layout: Layout) -> Iterator[str]:
+    """Yield a sentence on a Dirac part that is missing, or whose nodes are not those of the layout."""
+    if layout.material.spec.specular is None:
+        return
+    if table.specular is None:
+        yield "the Dirac part of the model is not stored"
+        return
+    nodes = table.axes_deg.get("theta_i") if table.specular_theta_deg is None else table.specular_theta_deg
+    expected = specular_nodes(layout)
+    if nodes is None or not np.array_equal(nodes, expected):
+        count = 0 if nodes is None else len(nodes)
+        yield f"the Dirac part is stored at {count} angles that are not the {len(expected)} of its layout"
+
+
+def _unstated(table: Table) -> Iterator[str]:
+    """Yield a sentence on an error that is not stated, though the table was asked for to a tolerance."""
+    tolerance = (table.attrs.get("request") or {}).get("tolerance")
+    if table.error is None and tolerance is not None:
+        yield f"no error is stated, though a tolerance of {tolerance:g} was asked for"
 
 
 def _finite(value: float) -> float | None:

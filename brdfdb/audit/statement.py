@@ -23,7 +23,7 @@ from brdfdb.audit.pairs import Pairs
 from brdfdb.error import Error, Overall
 from brdfdb.grids import Axis
 from brdfdb.parameters import Floats
-from brdfdb.places import BANDS_DEG
+from brdfdb.places import BANDS, BANDS_DEG, RINGS
 
 # Probability of each test to fail a sound table. A table of 41 wavelengths takes 3000 of them: one in 300 000 such
 # tables fails by chance
@@ -67,6 +67,8 @@ def contradictions(error: Error, wavelengths: int) -> list[str]:
     numbers = [*arrays.values(), np.array(error.floor), np.array([*overall.values()])]
     if not all(np.all(np.isfinite(each) & (each >= 0.0)) for each in numbers):
         return ["not all of its numbers are finite and at least 0"]
+    if not _whole(error, wavelengths):
+        return ["its limits in places and between wavelengths are not numbers of at least 0 for each of them"]
     found = []
     ordered = [arrays[name] for name in QUANTILES]
     if any(np.any(low > high) for low, high in pairwise(ordered)):
@@ -80,6 +82,26 @@ def contradictions(error: Error, wavelengths: int) -> list[str]:
                 f"its overall {name} of {overall[name]:.3g} is not between those of its bands, {low:.3g} to {high:.3g}"
             )
     return found
+
+
+def _whole(error: Error, wavelengths: int) -> bool:
+    """Return whether the limits in places and between wavelengths are complete, finite and at least 0."""
+    parts = [] if error.places is None else [(error.places, wavelengths)]
+    tables: list[tuple[list[list[float]], int, int]] = []
+    if error.between is not None:
+        tables.append((error.between.bands, BANDS, wavelengths - 1))
+        parts += [] if error.between.places is None else [(error.between.places, wavelengths - 1)]
+    for places, columns in parts:
+        tables += [
+            (places.alongside, BANDS, columns),
+            (places.one_grazing, RINGS, columns),
+            (places.both_grazing, RINGS, columns),
+        ]
+    return all(
+        len(rows) == count
+        and all(len(row) == columns and np.all(np.isfinite(row)) and min(row, default=0.0) >= 0.0 for row in rows)
+        for rows, count, columns in tables
+    )
 
 
 def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> list[Disagreement]:
