@@ -228,7 +228,7 @@ def _g(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None)
 def _timed(
     forms: Sequence[Representation], drawn: accuracy.Draw, tick: Callable[[], None]
 ) -> tuple[list[cost.Times], list[cost.Times], list[cost.Times]]:
-    """Of many directions at once, of a block, and of one."""
+    """Return the costs of calls with many directions, with a block of them, and with one."""
     mixed = np.random.default_rng(SEED).permutation(np.flatnonzero(drawn.above))  # few of them are as mixed as all
     wi, wr = drawn.wi[mixed], drawn.wr[mixed]
     batch = cost.times(forms, wi, wr, rounds=cost.ROUNDS, tick=tick)

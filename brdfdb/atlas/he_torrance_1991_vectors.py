@@ -1,4 +1,4 @@
-"""Where forms of He et al. 1991 fail: names and units, polarisation, vectors, and what the parts add up to."""
+"""Places where forms of He et al. 1991 fail: names and units, polarisation, vectors, sums of the parts."""
 
 from __future__ import annotations
 

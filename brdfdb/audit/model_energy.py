@@ -117,7 +117,7 @@ def _refined(
 def _first_above_1(
     material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected
 ) -> float | None:
-    """From which angle [degree] on more than 1 is reflected: where the albedo crosses 1 between two lights."""
+    """Return the angle [degree] above which an albedo exceeds 1: its crossing of 1 between two lights."""
 
     def excess(of: _Reflected) -> Axis:
         return np.asarray(np.max(of.largest - of.error, axis=1) - 1.0 - ENERGY_TOLERANCE)
@@ -136,7 +136,7 @@ def _first_above_1(
 
 
 def _explained(material: Material, found: _Reflected, first: float, known: KnownExcess | None, claim: str) -> str:
-    """What is said of an excess that is not known as published: whose it is, and what excuses nothing."""
+    """Return a sentence on an excess that is not known as published: its origin, and what does not excuse it."""
     most = float(np.max(np.where(np.isfinite(found.largest), found.largest, -np.inf)))
     said = f"; this model does so by itself for such parameters: up to {most:.4g}, from {first:.4g} degrees"
     if material.spec.excess:

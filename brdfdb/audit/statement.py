@@ -191,7 +191,7 @@ def _choose(log_factorial: Floats, n: Counts, k: int) -> Floats:
 
 
 def _exceeding(values: Floats, limit: Floats) -> Counts:
-    """How many values are above a limit, or not finite."""
+    """Return the number of values above a limit or not finite."""
     return np.asarray(np.count_nonzero(~(values <= limit), axis=0))
 
 
@@ -209,7 +209,7 @@ def _ratio(wrong: Floats, whole: Floats, weight: Floats, band: _Band) -> tuple[F
 
 
 def _rare(largest: Floats, whole: Floats, weight: Floats, band: _Band) -> Floats:
-    """How much of a stated l1 can come of directions so rare that none like them is among the fresh ones.
+    """Return the share of a stated l1 that directions too rare for the fresh draw can explain.
 
     So many of them that the fresh ones would have missed all with the probability `CHANCE`, each with the largest error
     that is stated and the largest weight that was met.

@@ -104,7 +104,7 @@ def table_energy_of(
 
 
 def _first_above_1(table: Table, theta_i_deg: Axis, excess: Axis) -> float | None:
-    """From which angle [degree] on a table reflects more than 1, between the angles where its albedo is known."""
+    """Return the angle [degree] above which a table reflects more than 1, between angles of known albedo."""
     if not np.any(excess > 0.0):
         return None
     first = int(np.argmax(excess > 0.0))

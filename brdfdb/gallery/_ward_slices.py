@@ -47,7 +47,7 @@ def diffuse(material: Material) -> float:
 
 
 def half_width_deg(material: Material, phi: float) -> float:
-    """Where the lobe of light along the normal has fallen to half its peak."""
+    """Return the angle at which the lobe of light along the normal has fallen to half its peak."""
     viewers_deg = np.linspace(0.0, 60.0, 6001)
     lobe = slice_of(material, 0.0, phi, viewers_deg) - diffuse(material)
     return float(viewers_deg[np.argmax(lobe < 0.5 * lobe[0])])

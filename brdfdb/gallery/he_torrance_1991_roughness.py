@@ -175,7 +175,7 @@ LONG_NM = 1e7  # at this wavelength e^-g is 1, and rho_s over |F|^2 is S
 
 
 class _Seen(NamedTuple):
-    """What light and a viewer in the mirror direction reach of a surface."""
+    """Shadowing and effective roughness of a surface, for light and a viewer in the mirror direction."""
 
     shadowing: Floats  # S
     roughness: Floats  # sigma / sigma_0

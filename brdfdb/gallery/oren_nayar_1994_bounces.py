@@ -1,4 +1,4 @@
-"""What Oren and Nayar 1994 leave out or approximate: bounces after the second, eq. 44 between planes, eq. 48."""
+"""Figures of what Oren and Nayar 1994 leave out or approximate: later bounces, eq. 44 between planes, eq. 48."""
 
 from __future__ import annotations
 
