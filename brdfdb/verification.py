@@ -31,7 +31,7 @@ _BUILD_ANEW = "`brdfdb build` with its recipe makes it anew, then `brdfdb gc --d
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong with a material, a family or a snapshot, and which command repairs it."""
+    """Damage of a material, a family or a snapshot, and the command that repairs it."""
 
     name: str
     sentence: str

@@ -70,7 +70,7 @@ class Assumption(BaseModel):
 
     @property
     def decides(self) -> bool | None:
-        """Whether an alternative moves the largest albedo across 1; None where no alternative is recorded."""
+        """Return True if an alternative moves the largest albedo across 1; None where no alternative is recorded."""
         if self.max_albedo is None:
             return None
         return any((each.max_albedo > 1.0) != (self.max_albedo > 1.0) for each in self.alternatives)

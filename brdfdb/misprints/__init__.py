@@ -1,4 +1,4 @@
-"""What the three papers print wrong, ambiguously or unsafely: each printed form beside the right one, and nothing else.
+"""Misprints, ambiguities and unsafe forms of the three papers: each beside the right form, and nothing else.
 
 The models hold the right forms only. The printed ones stand here, literal and short, for the atlas that sets the two
 side by side and for the chart of their costs; no other module of the library knows them. Angles are radians, lengths of

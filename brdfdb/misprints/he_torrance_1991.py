@@ -1,4 +1,4 @@
-"""What He, Torrance, Sillion and Greenberg 1991 print wrong, and what is right."""
+"""Misprints of He, Torrance, Sillion and Greenberg 1991, each beside the right form."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Oren and Nayar 1994 print wrong, and what is right."""
+"""Misprints of Oren and Nayar 1994, each beside the right form."""
 
 from __future__ import annotations
 

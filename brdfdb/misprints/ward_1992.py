@@ -1,4 +1,4 @@
-"""What Ward 1992 prints wrong, and what is right."""
+"""Misprints of Ward 1992, each beside the right form."""
 
 from __future__ import annotations
 

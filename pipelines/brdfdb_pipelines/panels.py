@@ -1,4 +1,4 @@
-"""What pictures of charts share: looks of forms, axes of errors and costs, labels, legends and tables."""
+"""Common parts of the pictures of charts: looks of forms, axes of errors and costs, labels, legends, tables."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def cost_axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
 
 
 class Label(NamedTuple):
-    """What is written beside a point: in full where there is room, else what has to be."""
+    """Text beside a point: in full where there is room, else its least form."""
 
     least: str
     full: str
@@ -132,7 +132,7 @@ Box = tuple[float, float, float, float]
 
 
 def offsets(width: float) -> list[tuple[float, float]]:
-    """Where the left end of a text may be, in points from its point: beside it first, then further out."""
+    """Return positions for the left end of a text, in points from its point: the nearest first."""
     found = []
     for far in (0.0, 8.0, 16.0, 26.0):
         found += [(6.0, far), (6.0, -far), (-6.0 - width, far), (-6.0 - width, -far)]
@@ -141,7 +141,7 @@ def offsets(width: float) -> list[tuple[float, float]]:
 
 
 def box(here: Any, offset: tuple[float, float], width: float) -> Box:
-    """What a text covers whose left end is at an offset from its point."""
+    """Return the box that a text covers if its left end is at an offset from its point."""
     x, y = here[0] + offset[0], here[1] + offset[1]
     return x, y - LINE / 2.0, x + width, y + LINE / 2.0
 
