@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING, Any, overload
 if TYPE_CHECKING:
     import os
 
-    from brdfdb.remote import RemoteStore
-    from brdfdb.store import Store
+    from brdfdb.materials import presets
+    from brdfdb.store.http_client import RemoteStore
+    from brdfdb.store.reader import Store
 
-__all__ = ["open"]
+    __version__: str
+
+__all__ = ["__version__", "open", "presets"]
 
 
 @overload
@@ -39,41 +42,35 @@ def open(root: str | os.PathLike[str], *, snapshot: str | None = None) -> Store 
 
     Raises
     ------
-    brdfdb.store.StoreError
+    brdfdb.store.reader.StoreError
         If there is no store at `root`, or one of another format version; if it has no such snapshot; if no service
         answers there.
     ValueError
         If a snapshot is named beside an address: a service serves the one that it was started with.
     """
     if isinstance(root, str) and root.startswith(("http://", "https://")):
-        from brdfdb.remote import RemoteStore
+        from brdfdb.store.http_client import RemoteStore
 
         if snapshot is not None:
             raise ValueError(f"snapshot: {snapshot!r} of a service is chosen there, by `brdfdb serve --snapshot`")
         return RemoteStore(root)
-    from brdfdb.store import Store
+    from brdfdb.store.reader import Store
 
     return Store(root, snapshot=snapshot)
 
 
-_LOADED_WHEN_USED = (
-    *("atlas", "audit", "chart", "energy", "exr", "family", "fresnel", "gallery", "geometry", "grids", "lookup"),
-    *(
-        "materials",
-        "misprints",
-        "models",
-        "quadrature",
-        "remote",
-        "representations",
-        "roughness",
-        "sampling",
-        "spectra",
-    ),
-    *("store", "tabulate"),
+# Rooms that are imported when they are first used; their modules are imported by name
+_ROOMS = (
+    *("atlas", "audit", "formats", "forms", "fresnel", "gallery", "geometry", "integrals", "materials", "misprints"),
+    *("models", "roughness", "scenes", "spectra", "store", "tables"),
 )
 
 
 def __getattr__(name: str) -> Any:
-    if name in _LOADED_WHEN_USED:
+    if name in _ROOMS:
         return importlib.import_module(f"brdfdb.{name}")
+    if name == "presets":
+        return importlib.import_module("brdfdb.materials").presets
+    if name == "__version__":
+        return importlib.import_module("importlib.metadata").version("brdfdb")
     raise AttributeError(f"module 'brdfdb' has no attribute {name!r}")

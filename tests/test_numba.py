@@ -107,9 +107,9 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert run(f"import json, sys, brdfdb; print(json.dumps([m for m in {HEAVY} if m in sys.modules]))") == []
 
 
-def test_submodules_load_when_they_are_used() -> None:
-    program = "import json, brdfdb; print(json.dumps([brdfdb.models.__name__, brdfdb.sampling.__name__]))"
-    assert run(program) == ["brdfdb.models", "brdfdb.sampling"]
+def test_rooms_and_presets_load_when_they_are_used() -> None:
+    program = "import json, brdfdb; print(json.dumps([brdfdb.models.__name__, len(brdfdb.presets())]))"
+    assert run(program) == ["brdfdb.models", 59]
 
 
 def test_importing_the_models_loads_numba_and_no_other() -> None:

@@ -18,8 +18,8 @@ import orjson
 import uvicorn
 
 import brdfdb
-from brdfdb_api.protocol import BoundedProtocol
-from brdfdb_api.settings import Settings
+from brdfdb_api.http.protocol import BoundedProtocol
+from brdfdb_api.serving.settings import Settings
 
 PAUSE_S = 1.0  # before a worker is replaced
 GRACE_S = 10  # for requests that are being answered when the server is told to stop
@@ -46,7 +46,7 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
 
     Raises
     ------
-    brdfdb.store.StoreError
+    brdfdb.store.reader.StoreError
         If there is no store at `store_dir`, or no such snapshot in it.
     ValueError
         If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.figure import Curve, Panel, Role, curve_of
 from brdfdb.geometry import radians
-from brdfdb.quadrature import directional_albedo
+from brdfdb.integrals.quadrature import directional_albedo
 
 Array = NDArray[np.float64]
 

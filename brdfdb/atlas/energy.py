@@ -23,9 +23,9 @@ from brdfdb.atlas._albedos import (
     onset_deg,
     panel,
 )
-from brdfdb.energy import he_torrance_a_max
 from brdfdb.figure import Figure, Panel, Statement
 from brdfdb.geometry import radians
+from brdfdb.integrals.uniform_bound import he_torrance_a_max
 from brdfdb.materials import presets
 from brdfdb.models import he_torrance_specular
 from brdfdb.reference import he_torrance_1991

@@ -22,8 +22,8 @@ from brdfdb.atlas._albedos import (
 from brdfdb.atlas._errors import lobe
 from brdfdb.figure import Figure, Panel, Role, Statement
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.sampling import ward_sample
 from brdfdb.reference import mp
-from brdfdb.sampling import ward_sample
 
 _WARD_FORMS: tuple[tuple[str, str, Role], ...] = (
     ("ward", "eq. 5a", "ours"),

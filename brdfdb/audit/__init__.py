@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from datetime import datetime
 from importlib.metadata import version
 
-from brdfdb.albedo import linear_in_angles, material_of
 from brdfdb.audit.energy import energy_of
 from brdfdb.audit.findings import AuditReport, MaterialAudit, Verdict
 from brdfdb.audit.nodes import nodes_of
@@ -18,7 +17,8 @@ from brdfdb.audit.table_error import table_error_of
 from brdfdb.audit.validity import validity_of
 from brdfdb.audit.values import values_of
 from brdfdb.figure import Figure
-from brdfdb.lookup import Table
+from brdfdb.tables.albedo import linear_in_angles, material_of
+from brdfdb.tables.table import Table
 
 __all__ = ["AuditReport", "MaterialAudit", "audit", "report"]
 

@@ -8,9 +8,9 @@ from brdfdb.audit.excess import ANGLE_TOLERANCE_DEG, published_excess
 from brdfdb.audit.findings import Energy, EnergyVerdict, ModelEnergy
 from brdfdb.audit.model_energy import TOLERANCE, model_energy_of
 from brdfdb.audit.table_energy import table_energy_of
-from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.materials.provenance import KnownExcess
+from brdfdb.tables.table import Table
 
 _SEVERITY: tuple[EnergyVerdict, ...] = (
     "conserves",

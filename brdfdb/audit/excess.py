@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from brdfdb.grids import Axis
 from brdfdb.materials import Material, presets
 from brdfdb.materials.provenance import KnownExcess
+from brdfdb.tables.grids import Axis
 
 # A sum of float32 values: an ideal diffuser, albedo 1, measures 1 + 1.2e-7
 ENERGY_TOLERANCE = 1e-6

@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from brdfdb import accuracy
 from brdfdb.audit.pairs import Pairs, representative_nm
 from brdfdb.geometry import radians, spherical_angles, unit_vector
-from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
+from brdfdb.tables import error_measurement
+from brdfdb.tables.table import Table
 
 DIRECTIONS = 3000  # at which changed models are evaluated
 MUCH_BETTER = 0.5  # of the mean error that is left without the change
@@ -50,7 +50,7 @@ def likeness_of(table: Table, material: Material, pairs: Pairs) -> str:
     if abs(scale - 1.0) > _SCALE:
         left[f"the model times {scale:.3g}"] = weight @ np.abs(found - scale * truth)
     for name, changed in _changes(material.anisotropic):
-        model = accuracy.model_values(material, at, *changed(light, viewer))[:, 0]
+        model = error_measurement.model_values(material, at, *changed(light, viewer))[:, 0]
         left[name] = weight @ np.abs(found - model)
     best = min(left, key=lambda name: left[name])
     return best if left[best] < MUCH_BETTER * left[""] else ""

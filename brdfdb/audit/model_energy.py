@@ -9,14 +9,14 @@ import numpy as np
 
 from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of
 from brdfdb.audit.findings import EnergyVerdict, Furnace, ModelEnergy, UniformBound
-from brdfdb.energy import a_max
 from brdfdb.figure import numbers, rows
 from brdfdb.geometry import radians
-from brdfdb.grids import Axis
+from brdfdb.integrals.quadrature import spectral_albedo
+from brdfdb.integrals.uniform_bound import a_max
 from brdfdb.materials import Material
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
-from brdfdb.quadrature import spectral_albedo
+from brdfdb.tables.grids import Axis
 
 TOLERANCE = 1e-6  # absolute, of each albedo
 MOST_PANELS = 1000  # where the quadrature of one light gives up

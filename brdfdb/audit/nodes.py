@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from brdfdb.accuracy import FLOOR
 from brdfdb.audit.findings import Nodes
-from brdfdb.layout import Layout
-from brdfdb.lookup import Table
 from brdfdb.materials import Material
-from brdfdb.tabulate import block, rounded, specular_nodes
+from brdfdb.tables.error_measurement import FLOOR
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import block, rounded, specular_nodes
 
 # Values of the model that are computed for the comparison. A table with more nodes is compared at some rows of its
 # first axis, evenly spread from the first to the last. A value of the facets' integral takes 30 us, others 0.2 us

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from brdfdb import accuracy
-from brdfdb.accuracy import Draw
-from brdfdb.albedo import wavelengths_of
-from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
+from brdfdb.tables import error_measurement
+from brdfdb.tables.albedo import wavelengths_of
+from brdfdb.tables.error_measurement import Draw
+from brdfdb.tables.table import Table
 
 SEED = 1967  # not that of a build or a planner: their directions have been looked at
 # Of each band of theta_i, half of them in the lobe; of more than _FEW wavelengths, which vary alike, fewer
@@ -29,11 +29,13 @@ class Pairs(NamedTuple):
 def pairs_of(table: Table, material: Material) -> Pairs:
     """Look up, and evaluate the model, at all wavelengths of a table."""
     count = DIRECTIONS if wavelengths_of(table) <= _FEW else _FEWER_DIRECTIONS
-    drawn = accuracy.draw(material, table.wavelength_nm, count, SEED)
+    drawn = error_measurement.draw(material, table.wavelength_nm, count, SEED)
     shape = (len(drawn.wi), wavelengths_of(table))
     both = ((drawn.wi, drawn.wr), (drawn.wr, drawn.wi))
     looked_up = (table.lookup_vectors(*each).reshape(shape) for each in both)
-    return Pairs(drawn, *looked_up, *(accuracy.model_values(material, table.wavelength_nm, *each) for each in both))
+    return Pairs(
+        drawn, *looked_up, *(error_measurement.model_values(material, table.wavelength_nm, *each) for each in both)
+    )
 
 
 def representative_nm(table: Table) -> float | None:

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
-from brdfdb.albedo import wavelengths_of
 from brdfdb.audit.findings import Asymmetry, Reciprocity
 from brdfdb.audit.pairs import Pairs
-from brdfdb.grids import Grid
-from brdfdb.lookup import Table
 from brdfdb.parameters import Floats
+from brdfdb.tables.albedo import wavelengths_of
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.table import Table
 
 # The models are reciprocal; what is left is rounding, worst where exp(-V) has a large exponent: measured 3e-13
 MODEL_RECIPROCITY_TOLERANCE = 1e-11

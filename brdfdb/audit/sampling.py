@@ -13,11 +13,11 @@ from brdfdb.audit.findings import Sampling
 from brdfdb.audit.pairs import SEED, representative_nm
 from brdfdb.figure import numbers
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.lookup import Table
+from brdfdb.integrals.quadrature import directional_albedo
+from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
 from brdfdb.materials import Material
 from brdfdb.parameters import Lobe, ModelSpec
-from brdfdb.quadrature import directional_albedo
-from brdfdb.sampling import lobe_of, mixture_density, sample
+from brdfdb.tables.table import Table
 
 SAMPLES = 100_000  # of each light
 _FEWER = {"oren_nayar_gaussian": 4000}  # integrals, of 30 us a value

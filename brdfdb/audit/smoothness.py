@@ -9,15 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb import accuracy
-from brdfdb.albedo import wavelengths_of
 from brdfdb.audit.findings import Jump, Smoothness
 from brdfdb.audit.pairs import Pairs
-from brdfdb.error import Error
 from brdfdb.geometry import degrees, directions_from_half_difference, radians, spherical_angles, unit_vector
-from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
+from brdfdb.tables import error_measurement
+from brdfdb.tables.albedo import wavelengths_of
+from brdfdb.tables.stated_error import Error
+from brdfdb.tables.table import Table
 
 # Rounding of directions, times how steep a lobe is, measured 1e-12; the table of He-Torrance's sum is to 1e-11
 MODEL_TOLERANCE = 2e-11
@@ -63,12 +63,14 @@ def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
     wavelengths = table.wavelength_nm
 
     def model(wi: Array, wr: Array) -> Floats:
-        return accuracy.model_values(material, wavelengths, wi, wr)
+        return error_measurement.model_values(material, wavelengths, wi, wr)
 
     def looked_up(wi: Array, wr: Array) -> Floats:
         return table.lookup_vectors(wi, wr).reshape(len(wi), wavelengths_of(table))
 
-    floor = accuracy.floor_of(pairs.model, pairs.drawn) + _TINY  # far below it tables may be anything, as they may err
+    floor = (
+        error_measurement.floor_of(pairs.model, pairs.drawn) + _TINY
+    )  # far below it tables may be anything, as they may err
     tiny = np.full_like(floor, _TINY)
     of_model = [_jump(seam, model, wavelengths, tiny, _rounding) for seam in _crossed(_of_model())]
     of_model.append(_between_methods(material, wavelengths, tiny))

@@ -16,14 +16,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb import accuracy
-from brdfdb.accuracy import Draw
 from brdfdb.audit.findings import Disagreement, Statistic
 from brdfdb.audit.pairs import Pairs
-from brdfdb.error import Error, Overall
-from brdfdb.grids import Axis
 from brdfdb.parameters import Floats
-from brdfdb.places import BANDS, BANDS_DEG, RINGS
+from brdfdb.tables import error_measurement
+from brdfdb.tables.error_measurement import Draw
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.places import BANDS, BANDS_DEG, RINGS
+from brdfdb.tables.stated_error import Error, Overall
 
 # Probability of each test to fail a sound table. A table of 41 wavelengths takes 3000 of them: one in 300 000 such
 # tables fails by chance
@@ -112,7 +112,7 @@ def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> lis
 def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
     drawn, floor = pairs.drawn, np.array(error.floor)  # that of another draw would be another by some percent
     with np.errstate(invalid="ignore"):
-        relative = accuracy.relative(pairs.table, pairs.model, floor)
+        relative = error_measurement.relative(pairs.table, pairs.model, floor)
     nm = [None] * floor.size if wavelength_nm is None else wavelength_nm.tolist()
     bands = list(_bands(error, drawn))
     for number, band in enumerate(bands):
@@ -143,7 +143,7 @@ def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> It
 
 def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None]) -> Iterator[Disagreement]:
     """The floor is a share of the mean reflectance over uniform directions: an integral over the same draws."""
-    values = accuracy.FLOOR / np.pi * pairs.drawn.weight[:, np.newaxis] * pairs.model
+    values = error_measurement.FLOOR / np.pi * pairs.drawn.weight[:, np.newaxis] * pairs.model
     fresh = values.mean(axis=0)
     off = STANDARD_ERRORS * values.std(axis=0) / np.sqrt(band.drawn) * np.sqrt(1.0 + band.drawn / band.stated)
     wrong = (fresh - stated * (1.0 + DIGITS) > off) | (fresh + off < SHORT * stated)

@@ -7,16 +7,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.albedo import QUADRATURE_TOLERANCE, directional_albedo, hemispherical_albedo
 from brdfdb.audit.excess import DIGITS, crossing, limit_of
 from brdfdb.audit.findings import Bands, TableEnergy, Verdict
-from brdfdb.error import Error
 from brdfdb.figure import numbers, rows
 from brdfdb.geometry import radians
-from brdfdb.grids import Axis
-from brdfdb.lookup import Table
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
+from brdfdb.tables.albedo import QUADRATURE_TOLERANCE, directional_albedo, hemispherical_albedo
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.stated_error import Error
+from brdfdb.tables.table import Table
 
 # More cannot be asked of a planner: a table that states more is judged as if it stated this
 MOST_ERROR = 0.5

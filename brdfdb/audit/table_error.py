@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from brdfdb import accuracy
-from brdfdb.albedo import wavelengths_of
 from brdfdb.audit.findings import Disagreement, TableError, Verdict
 from brdfdb.audit.likeness import bias_of, likeness_of
 from brdfdb.audit.pairs import SEED, Pairs, representative_nm
 from brdfdb.audit.statement import contradictions, disagreements
 from brdfdb.figure import Map, rows
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.lookup import Table
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
+from brdfdb.tables import error_measurement
+from brdfdb.tables.albedo import wavelengths_of
+from brdfdb.tables.table import Table
 
 # Of the Dirac part, which is stored as float32: measured 6e-8
 SPECULAR_TOLERANCE = 1e-6
@@ -31,7 +31,7 @@ def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Verdic
     `nodes` is the verdict on its nodes: what is wrong with a table is looked for where that, or its error, violates.
     """
     with np.errstate(invalid="ignore"):  # of what is not finite
-        fresh = accuracy.compare(pairs.table, pairs.model, pairs.drawn, SEED).overall.p99
+        fresh = error_measurement.compare(pairs.table, pairs.model, pairs.drawn, SEED).overall.p99
     contradicts: list[str] = []
     disagree: list[Disagreement] = []
     if table.error is not None:
@@ -40,7 +40,7 @@ def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Verdic
     specular = _specular_error(table, material)
     mirrors = specular is None or specular <= SPECULAR_TOLERANCE  # nan is not
     good = mirrors and not contradicts and not disagree
-    floor = accuracy.floor_of(pairs.model, pairs.drawn)
+    floor = error_measurement.floor_of(pairs.model, pairs.drawn)
     middle = floor[[floor.size // 2]]
     return TableError(
         stated_p99=None if table.error is None else table.error.overall.p99,
@@ -78,9 +78,11 @@ def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_
     wr = unit_vector(-radians(theta_r_deg), radians(delta_phi_deg))
     wi, wr = (np.reshape(w, (-1, 3)) for w in np.broadcast_arrays(wi, wr))
     found = table.lookup_vectors(wi, wr, wavelength)
-    truth = accuracy.model_values(material, None if wavelength is None else np.array([wavelength]), wi, wr)[:, 0]
+    truth = error_measurement.model_values(material, None if wavelength is None else np.array([wavelength]), wi, wr)[
+        :, 0
+    ]
     with np.errstate(invalid="ignore"):
-        error = accuracy.relative(found, truth, floor).reshape(theta_i_deg.size, -1)
+        error = error_measurement.relative(found, truth, floor).reshape(theta_i_deg.size, -1)
     return Map(
         title=f"Error {title}" if wavelength is None else f"Error {title}, {wavelength:g} nm",
         x_label="theta_r [degrees], negative back towards the light",

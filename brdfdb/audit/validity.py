@@ -12,8 +12,8 @@ import numpy as np
 
 from brdfdb.audit.findings import Limit, Standing, Validity
 from brdfdb.geometry import degrees
-from brdfdb.grids import Axis
 from brdfdb.materials import Material
+from brdfdb.tables.grids import Axis
 
 _MUCH = 10.0
 _WARD_ALPHA, _MUCH_GREATER = 0.2, 2.0  # "not much greater" is less than twice

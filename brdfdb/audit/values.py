@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from brdfdb.audit.findings import Values
-from brdfdb.lookup import Table
 from brdfdb.parameters import Floats
+from brdfdb.tables.table import Table
 
 
 def values_of(table: Table, looked_up: Floats | None) -> Values:

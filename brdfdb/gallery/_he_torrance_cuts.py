@@ -9,10 +9,10 @@ import numpy as np
 
 from brdfdb.figure import Curve, Panel, curve_of
 from brdfdb.geometry import degrees, radians
+from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.materials import presets
 from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_smooth, he_torrance_specular
 from brdfdb.parameters import Floats
-from brdfdb.quadrature import directional_albedo
 
 CONE_SR = np.pi / 1024.0  # of light and receiver, "in the experiments" of section 4
 HALF_ANGLE_DEG = float(degrees(np.arcsin(np.sqrt(CONE_SR / np.pi))))  # of a cone

@@ -25,8 +25,8 @@ from brdfdb.gallery._ward_slices import (
 )
 from brdfdb.gallery.ward_1992_forms import forms, lobes
 from brdfdb.geometry import HALF_PI, degrees, radians, unit_vector
+from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.materials import Material, presets
-from brdfdb.quadrature import directional_albedo
 
 _CAMERA_DEG, _LIGHT_DEG = 35.0, 75.0  # above the equator of the sphere
 _WHITE = 0.2  # of the brightest point: the diffuse part is seen, too

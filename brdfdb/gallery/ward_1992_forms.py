@@ -24,9 +24,9 @@ from brdfdb.gallery._ward_slices import (
     slice_of,
 )
 from brdfdb.geometry import radians
+from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
-from brdfdb.quadrature import directional_albedo
 
 _LOBES_DEG = (30.0, 60.0)
 _FORMS_DEG = (30.0, 60.0)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Panel, Picture, Statement, curve_of, listed, rows
 from brdfdb.geometry import HALF_PI, radians, unit_vector
+from brdfdb.integrals.quadrature import directional_albedo
+from brdfdb.integrals.sampling import ward_sample
 from brdfdb.materials import presets
 from brdfdb.models import ward_vectors
-from brdfdb.quadrature import directional_albedo
-from brdfdb.sampling import ward_sample
 
 Array = NDArray[np.float64]
 

@@ -256,7 +256,7 @@ class Material(BaseModel):
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
     ) -> Floats:
-        """f_r of the model itself, where `brdfdb.lookup.Table.lookup` gives that of its table.
+        """f_r of the model itself, where `brdfdb.tables.table.Table.lookup` gives that of its table.
 
         Parameters
         ----------

@@ -8,9 +8,9 @@ import numpy as np
 
 from brdfdb import models
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.quadrature import directional_albedo
+from brdfdb.integrals.sampling import ward_sample
 from brdfdb.misprints._entry import WARD, Form, Misprint, at
-from brdfdb.quadrature import directional_albedo
-from brdfdb.sampling import ward_sample
 
 
 def _slope_without_arctan(u1: Any, u2: Any, *, alpha_x: Any, alpha_y: Any) -> Any:

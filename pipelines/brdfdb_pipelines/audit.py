@@ -17,8 +17,8 @@ from brdfdb.atlas import ATLAS
 from brdfdb.audit import AuditReport, MaterialAudit, audit, report
 from brdfdb.audit.findings import Asymmetry
 from brdfdb.gallery import GALLERY
-from brdfdb.store import StoreError
-from brdfdb_pipelines import page, sentences, terminal, workers
+from brdfdb.store.reader import StoreError
+from brdfdb_pipelines import audit_page, audit_sentences, terminal, workers
 
 Task = Callable[[], Any]
 
@@ -27,7 +27,7 @@ class Section(NamedTuple):
     """What a task found, drawn for the page."""
 
     subject: Any
-    plots: list[page.Plot]
+    plots: list[audit_page.Plot]
 
 
 def run(
@@ -94,9 +94,9 @@ def run(
         damaged=damaged,
     )
     report_path.write_text(found.model_dump_json() + "\n", encoding="utf-8")
-    plots = {page.key_of(each.subject): each.plots for each in done.values() if isinstance(each, Section)}
+    plots = {audit_page.key_of(each.subject): each.plots for each in done.values() if isinstance(each, Section)}
     page_path = report_path.with_suffix(".html")
-    page_path.write_text(page.render(found, plots), encoding="utf-8")
+    page_path.write_text(audit_page.render(found, plots), encoding="utf-8")
     _print(root, found, report_path)
     if damaged:
         raise StoreError("; ".join(damaged))
@@ -143,12 +143,12 @@ def _audited(root: Path, name: str, accept_excess: bool) -> Section | StoreError
         return error
     except (ValueError, KeyError) as error:  # whole files, of something that is no table of ours
         return StoreError(f"{name} cannot be audited: {error}")
-    return Section(found, page.plots_of(found))
+    return Section(found, audit_page.plots_of(found))
 
 
 def _drawn(key: str) -> Section:
     figure = (ATLAS.get(key) or GALLERY[key])()
-    return Section(figure, page.plots_of(figure))
+    return Section(figure, audit_page.plots_of(figure))
 
 
 def _print(root: Path, found: AuditReport, report_path: Path) -> None:
@@ -221,14 +221,14 @@ def _reasons(a: MaterialAudit) -> list[str]:
                 f"{worst.where}"
             )
     if a.nodes.verdict == "violates":
-        reasons.append(sentences.of_nodes(a.nodes))
+        reasons.append(audit_sentences.of_nodes(a.nodes))
     error = a.table_error
     if error.verdict == "violates":
         fresh = "not finite" if error.fresh_p99 is None else terminal.error(error.fresh_p99)
         mirror = "" if error.specular is None else f"; its mirror part is off by up to {error.specular:.2g}"
         states = "none" if error.stated_p99 is None else terminal.error(error.stated_p99)
         reasons.append(f"its error (p99) is {fresh}, the table states {states}{mirror}")
-    reasons += sentences.of_error(error)
+    reasons += audit_sentences.of_error(error)
     if a.sampling.verdict == "violates":
         reasons.append("samples of the model do not have the density or the albedo that they should")
     return reasons

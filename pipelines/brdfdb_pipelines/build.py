@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from brdfdb.family import FamilyRecord, Sweep
-from brdfdb.family_records import recorded, write_family
-from brdfdb.manifest import Entry, StoreError, read_manifest
-from brdfdb.staging import (
+from brdfdb.store.family import FamilyRecord, Sweep
+from brdfdb.store.family_records import recorded, write_family
+from brdfdb.store.manifest import Entry, StoreError, read_manifest
+from brdfdb.store.staging import (
     Block,
     BusyError,
     Lock,
@@ -28,10 +28,10 @@ from brdfdb.staging import (
     write_frame,
     writing,
 )
-from brdfdb_pipelines import resources, terminal, workers
-from brdfdb_pipelines.recipe import Job, Recipe, load
-from brdfdb_pipelines.report import Bars, Event, Lines, Tally
-from brdfdb_pipelines.survey import Survey, head_of, survey
+from brdfdb_pipelines import build_resources, terminal, workers
+from brdfdb_pipelines.build_progress import Bars, Event, Lines, Tally
+from brdfdb_pipelines.build_survey import Survey, head_of, survey
+from brdfdb_pipelines.recipe_file import Job, Recipe, load
 from brdfdb_pipelines.workers import Workers
 
 _LOOK_S = 2.0  # between looks at workers that say nothing
@@ -218,7 +218,7 @@ class _Builder:
         for job in self.jobs:
             if job.tolerance is not None:
                 wavelengths = 1 if job.wavelength_nm is None else job.wavelength_nm.size
-                self._claim(f"planning {job.material.name}", resources.plan_bytes(wavelengths, job.tolerance))
+                self._claim(f"planning {job.material.name}", build_resources.plan_bytes(wavelengths, job.tolerance))
         jobs = deque(self.jobs)
         while jobs or self.running:
             while jobs and self._room:
@@ -235,14 +235,14 @@ class _Builder:
         self.task_bytes = 1
         for table in missing:
             self._claim(f"a block of {table.name}", table.survey.task_bytes)
-        resources.check_disk(sum(table.survey.disk_bytes for table in missing), self.root)
+        build_resources.check_disk(sum(table.survey.disk_bytes for table in missing), self.root)
         self.tally = Tally(sum(table.survey.size for table in missing))
         self.report({"event": "planned", "tables": len(missing), "values": self.tally.total})
 
     def _claim(self, what: str, need: int) -> None:
         """Count the memory [byte] of a task among those that run side by side; refuse one that alone takes too much."""
         self.task_bytes = max(self.task_bytes, need)
-        resources.check_memory(what, need, self.memory)
+        build_resources.check_memory(what, need, self.memory)
 
     def _surveyed(self, job: Job, found: Survey) -> None:
         name = job.material.name
@@ -427,7 +427,7 @@ def run(
     recipe = load(recipe_path)
     start = time.perf_counter()
     if memory is None and scheduler is None:
-        memory = resources.machine_memory()
+        memory = build_resources.machine_memory()
     at: AbstractContextManager[Workers] = (
         workers.cluster(scheduler) if scheduler else (workers.processes if processes else workers.threads)(jobs)
     )

@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 import brdfdb
-from brdfdb.albedo import material_of
-from brdfdb.chart import STEPS, TIMED, chart, chart_family
-from brdfdb.charted import Chart, Charts, FamilyChart, Point
-from brdfdb.family import Family, Sweep
-from brdfdb.family_records import recorded
+from brdfdb.forms.catalogue import Representation, of_table
+from brdfdb.forms.tradeoff import STEPS, TIMED, chart, chart_family
+from brdfdb.forms.tradeoff_document import Chart, Charts, FamilyChart, Point
 from brdfdb.materials import Material
-from brdfdb.plan import check_tolerance
-from brdfdb.representations import Representation, of_table
-from brdfdb.store import Store
-from brdfdb_pipelines import recipe, scatter, swept, terminal
-from brdfdb_pipelines.panels import percent
+from brdfdb.store.family import Family, Sweep
+from brdfdb.store.family_records import recorded
+from brdfdb.store.reader import Store
+from brdfdb.tables.albedo import material_of
+from brdfdb.tables.planner import check_tolerance
+from brdfdb_pipelines import family_plot, recipe_file, terminal, tradeoff_plot
+from brdfdb_pipelines.plot_panels import percent
 
 
 class _Subject(NamedTuple):
@@ -49,7 +49,7 @@ def run(
     out: Path,
     *,
     store: Path | None = None,
-    recipe_file: Path | None = None,
+    recipe_path: Path | None = None,
     tolerances: Sequence[float] | None = None,
 ) -> Charts:
     """Chart materials and families, and write of each ``NAME.json``, ``NAME.svg`` and ``NAME.png``.
@@ -62,10 +62,10 @@ def run(
         Directory to write to; made if it is not there.
     store : Path, optional
         Its tables are charted beside the planned ones, and its families' lookups; it need not exist.
-    recipe_file : Path, optional
+    recipe_path : Path, optional
         A recipe that defines materials or families, and the wavelengths of spectral ones.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.representations`.
+        Of planned tables: see `brdfdb.forms.catalogue`.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def run(
     """
     for tolerance in tolerances or ():
         check_tolerance(tolerance)
-    subjects = _subjects(names, store, recipe_file)
+    subjects = _subjects(names, store, recipe_path)
     found: list[Chart] = []
     families: list[FamilyChart] = []
     with terminal.progress(counted=False) as bar:
@@ -111,12 +111,12 @@ def run(
 def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
     """A chart as data and as pictures; the names of materials have no dots."""
     stem.with_suffix(".json").write_text(document.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    stem.with_suffix(".svg").write_text(scatter.svg(drawn), encoding="utf-8")
-    stem.with_suffix(".png").write_bytes(scatter.png(drawn))
+    stem.with_suffix(".svg").write_text(tradeoff_plot.svg(drawn), encoding="utf-8")
+    stem.with_suffix(".png").write_bytes(tradeoff_plot.png(drawn))
 
 
-def _subjects(names: Sequence[str], root: Path | None, recipe_file: Path | None) -> list[_Subject | _Family]:
-    asked = recipe.load(recipe_file)
+def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None) -> list[_Subject | _Family]:
+    asked = recipe_file.load(recipe_path)
     listed = asked.jobs()
     jobs, sweeps = {job.material.name: job for job in listed}, {sweep.name: sweep for sweep in asked.sweeps(listed)}
     store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None
@@ -140,7 +140,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_file: Path | None)
             subjects.append(_Family(family.record, materials, family.wavelength_nm, family))
             continue
         else:
-            known = "the recipe" if recipe_file else "the built-in ones; `brdfdb list --presets` names them"
+            known = "the recipe" if recipe_path else "the built-in ones; `brdfdb list --presets` names them"
             raise ValueError(f"{name}: no such material or family, neither in the store nor among {known}")
         if table is not None and _fits(table.wavelength_nm, subject.wavelength_nm):
             title = f"table of the store, {terminal.error(table.error.overall.p99 if table.error else None)}"
@@ -161,11 +161,11 @@ def _print(one: Chart) -> None:
             point.key,
             point.title,
             percent(point.l1),
-            scatter.tail(point),
+            tradeoff_plot.tail(point),
             *map(percent, (point.forward, point.back, point.grazing)),
-            scatter.quartiles(point.batch),
+            tradeoff_plot.quartiles(point.batch),
             *map(terminal.count, (point.block.ns, point.single.ns, point.mixed.ns)),
-            scatter.against(point),
+            tradeoff_plot.against(point),
             terminal.size(point.bytes),
         )
         for point in one.points
@@ -177,7 +177,7 @@ def _print(one: Chart) -> None:
     print("  worth having: " + "; ".join(_said(points[key]) for key in one.fronts.batch))
     heads = ("variance", "ns a sample", "ms to 1 %")
     work = tuple(f"{problem}: {head}" for problem in ("albedo", "sphere") for head in heads)
-    rows = [(sampler.title, *scatter.works(sampler)) for sampler in one.samplers]
+    rows = [(sampler.title, *tradeoff_plot.works(sampler)) for sampler in one.samplers]
     terminal.print_table(f"{one.material}: samplers, noise and time", ("sampler", *work), rows, numbers=work)
 
 
@@ -195,9 +195,9 @@ def _print_family(whole: FamilyChart) -> None:
         rows = []
         for curve in whole.curves:
             cells = []
-            for some in swept.along(whole, axis):
+            for some in family_plot.along(whole, axis):
                 chosen = 2 * sum(curve.key in whole.fronts[index] for index in some) > len(some)
-                middle = swept.middle([curve.l1[index] for index in some])
+                middle = family_plot.middle([curve.l1[index] for index in some])
                 cells.append("-" if middle is None else f"{'*' if chosen else ''}{percent(middle)}")
             rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
         columns = [f"{value:g}" for value in values]
@@ -211,9 +211,9 @@ def _print_family(whole: FamilyChart) -> None:
             print(f"  worth having: {curve.title} ({terminal.count(curve.batch.ns)} ns) {_where(whole, where)}")
     for curve in whole.curves:
         if curve.kind in ("closed form", "approximation", "customary", "printed"):
-            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= swept.CLOSE]
+            close = [index for index, error in enumerate(curve.l1) if error is not None and error <= family_plot.CLOSE]
             where_close = _where(whole, close) if close else "nowhere"
-            print(f"  within {percent(swept.CLOSE)} in the mean: {curve.title} {where_close}")
+            print(f"  within {percent(family_plot.CLOSE)} in the mean: {curve.title} {where_close}")
     if whole.between is not None:
         off = f"{percent(whole.between.l1)} off in the mean, p99 {percent(whole.between.p99)}"
         time = f"{terminal.count(whole.between.batch.ns)} ns, {terminal.count(whole.between.single.ns)} of one"

@@ -9,19 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from brdfdb import cost, picture, positions
-from brdfdb.candidates import Candidate, candidates
-from brdfdb.choices import Choice, Price, Weigh, describe, statement, within
-from brdfdb.choose import CONFIDENCE, GRAZING_DEG, Decision, Look, Seen, check_feasible, choose
-from brdfdb.gather import View, gather, gather_at
-from brdfdb.recorded import Recorded
-from brdfdb.render import Reflector, reflectors
-from brdfdb.scene import Scene
-from brdfdb.shapes import Array
-from brdfdb.staging import make_store, remove_begun
+from brdfdb.forms import timing
+from brdfdb.scenes import image, sample_positions
+from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Look, Seen, check_feasible, choose
+from brdfdb.scenes.choice_document import Choice, Price, Weigh, describe, statement, within
+from brdfdb.scenes.gbuffer import View, gather, gather_at
+from brdfdb.scenes.offered_forms import Candidate, candidates
+from brdfdb.scenes.recorded_directions import Recorded
+from brdfdb.scenes.renderer import Reflector, reflectors
+from brdfdb.scenes.scene import Scene
+from brdfdb.scenes.shapes import Array
+from brdfdb.store.staging import make_store, remove_begun
 from brdfdb_pipelines import terminal
-from brdfdb_pipelines.chosen import Built, build, with_reason
-from brdfdb_pipelines.scene import SceneError, load
+from brdfdb_pipelines.choice_publication import Built, build, with_reason
+from brdfdb_pipelines.scene_file import SceneError, load
 
 TIMED = 20_000  # pairs of directions of a material, drawn from those that the scene uses
 SEED = 1992
@@ -56,7 +57,7 @@ def run(
         Where chosen tables are published, under the names of their materials, each with its error; made if it is not
         there.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.choose.candidates`.
+        Of planned tables: see `brdfdb.scenes.choice.candidates`.
 
     Returns
     -------
@@ -162,11 +163,11 @@ def _looks(
 
     def beside_edges(number: int) -> Seen:
         rng = np.random.default_rng([SEED, number, 0])
-        return at(positions.at_edges(scene, view.width, view.height, EDGES, rng))
+        return at(sample_positions.at_edges(scene, view.width, view.height, EDGES, rng))
 
     def check(number: int) -> Look:
         rng = np.random.default_rng([SEED, number, 1])
-        return Look(at(positions.even(FINER * view.width, FINER * view.height, rng)), beside_edges(number))
+        return Look(at(sample_positions.even(FINER * view.width, FINER * view.height, rng)), beside_edges(number))
 
     return Look(picture, beside_edges(0)), check
 
@@ -188,7 +189,7 @@ def _pairs(view: View, material: str) -> tuple[Array, Array]:
 
 def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> list[Price]:
     """Return what forms cost; the wavelengths of all are those of the scene."""
-    times = cost.times([each.form for each in forms], wi, wr, most=TIMED, rounds=ROUNDS)
+    times = timing.times([each.form for each in forms], wi, wr, most=TIMED, rounds=ROUNDS)
     prices = []
     for candidate, time in zip(forms, times, strict=True):
         form = candidate.form
@@ -202,16 +203,16 @@ def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> l
 
 def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]) -> None:
     """The comparison as a picture; truth and choice as spectral EXR."""
-    from brdfdb_pipelines import comparison  # which loads matplotlib
+    from brdfdb_pipelines import choice_picture
 
     picks = {key: decision.pick for key, decision in chosen.items()}
     choice = seen.picture({key: offered[key][one.chosen] for key, one in picks.items()})
     lesser = {key: offered[key][one.cheaper] for key, one in picks.items() if one.cheaper is not None}
     best = {key: offered[key][one.chosen] for key, one in picks.items() if one.cheaper is None}
-    for image, suffix in ((seen.truth, "truth"), (choice, "choice")):
-        picture.write_exr(stem.with_name(f"{stem.name}-{suffix}.exr"), seen.scene, image)
+    for picture, suffix in ((seen.truth, "truth"), (choice, "choice")):
+        image.write_exr(stem.with_name(f"{stem.name}-{suffix}.exr"), seen.scene, picture)
     cheaper = seen.picture({**best, **lesser}) if lesser else None
-    stem.with_name(f"{stem.name}.png").write_bytes(comparison.png(seen, choice, cheaper))
+    stem.with_name(f"{stem.name}.png").write_bytes(choice_picture.png(seen, choice, cheaper))
 
 
 def _print(choice: Choice, built: Mapping[str, Built]) -> None:

@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _is_users(error: Exception) -> bool:
     """Whether an error is about what the user gave, not about this program."""
-    from brdfdb.store import StoreError, UnknownMaterialError
+    from brdfdb.store.reader import StoreError, UnknownMaterialError
 
     return isinstance(
         error, StoreError | UnknownMaterialError | ValueError | OSError | MemoryError | ModuleNotFoundError
@@ -408,7 +408,7 @@ def _audit(options: argparse.Namespace) -> int:
 def _chart(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import chart
 
-    chart.run(options.names, options.out, store=options.store, recipe_file=options.recipe, tolerances=options.tolerance)
+    chart.run(options.names, options.out, store=options.store, recipe_path=options.recipe, tolerances=options.tolerance)
     return 0
 
 

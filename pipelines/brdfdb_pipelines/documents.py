@@ -13,13 +13,13 @@ from typing import Any
 from pydantic import BaseModel
 
 from brdfdb.audit import AuditReport
-from brdfdb.charted import Charts
-from brdfdb.choices import Choice
-from brdfdb.family import FamilyRecord
+from brdfdb.forms.tradeoff_document import Charts
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
-from brdfdb.scene import Scene
-from brdfdb_pipelines.recipe import Recipe
+from brdfdb.scenes.choice_document import Choice
+from brdfdb.scenes.scene import Scene
+from brdfdb.store.family import FamilyRecord
+from brdfdb_pipelines.recipe_file import Recipe
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "audit": AuditReport,

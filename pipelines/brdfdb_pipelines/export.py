@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import brdfdb
-from brdfdb import exr
+from brdfdb.formats import exr
 from brdfdb_pipelines import terminal
 
 

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import brdfdb
-from brdfdb.manifest import StoreError
-from brdfdb_pipelines import families, terminal
+from brdfdb.store.manifest import StoreError
+from brdfdb_pipelines import family_listing, terminal
 
 if TYPE_CHECKING:
-    from brdfdb.error import Error
-    from brdfdb.family import Family
-    from brdfdb.lookup import Table
+    from brdfdb.store.family import Family
+    from brdfdb.tables.stated_error import Error
+    from brdfdb.tables.table import Table
 
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
@@ -38,7 +38,7 @@ def list_store(root: Path, *, snapshot: str | None = None) -> None:
         rows,
         numbers=("error (p99)",),
     )
-    damaged += families.print_list(store)
+    damaged += family_listing.print_list(store)
     if damaged:
         raise StoreError("; ".join(damaged))
 
@@ -54,11 +54,11 @@ def list_presets() -> None:
 def show(root: Path, name: str, *, snapshot: str | None = None) -> None:
     """Print what a store, or a snapshot of it, knows of a material or a family."""
     store = brdfdb.open(root, snapshot=snapshot)
-    if families.is_family(store, name):
+    if family_listing.is_family(store, name):
         family = store.family(name)
-        families.show(family)
+        family_listing.show(family)
         _print_error(family.error)
-        families.show_worst(family)
+        family_listing.show_worst(family)
         return
     table = store[name]
     attributes = table.attrs
@@ -141,7 +141,7 @@ def _interpolation(table: Table) -> str:
 
 def _print_error(error: Error | None) -> None:
     """Print the error that is stated: overall, and by bands and places at the wavelength where it is largest."""
-    from brdfdb.places import RINGS_DEG
+    from brdfdb.tables.places import RINGS_DEG
 
     if error is None:
         print("  error       not measured")
@@ -176,8 +176,8 @@ def _print_albedo(table: Table) -> None:
     """Directional albedo of the table at a few angles: the first, the middle and the last wavelength."""
     import numpy as np
 
-    from brdfdb.albedo import directional_albedo
     from brdfdb.geometry import radians
+    from brdfdb.tables.albedo import directional_albedo
 
     found = directional_albedo(table)
     diffuse = found.mean
@@ -218,7 +218,7 @@ def lookup(
     import numpy as np
 
     from brdfdb.geometry import radians
-    from brdfdb.grids import ANISOTROPIC_AXES
+    from brdfdb.tables.grids import ANISOTROPIC_AXES
 
     for angle, value in zip(ANISOTROPIC_AXES, angles_deg, strict=True):
         if not math.isfinite(value):
@@ -228,10 +228,10 @@ def lookup(
     store = brdfdb.open(root, snapshot=snapshot)
     source: Table | Family
     point: dict[str, Any] = {}
-    if families.is_family(store, name):
+    if family_listing.is_family(store, name):
         source = store.family(name)
-        written = families.written(source, settings)
-        point = families.in_units_of_the_model(source, written)
+        written = family_listing.written(source, settings)
+        point = family_listing.in_units_of_the_model(source, written)
         head: dict[str, Any] = {"family": name, "parameters": written}
         dirac = source.record.specular_error is not None
     else:

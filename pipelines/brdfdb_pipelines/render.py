@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from brdfdb import picture
-from brdfdb.gather import gather
-from brdfdb.recorded import Recorded
-from brdfdb.render import reflectors, render
+from brdfdb.scenes import image
+from brdfdb.scenes.gbuffer import gather
+from brdfdb.scenes.recorded_directions import Recorded
+from brdfdb.scenes.renderer import reflectors, render
 from brdfdb_pipelines import terminal
-from brdfdb_pipelines.scene import SceneError, load
+from brdfdb_pipelines.scene_file import SceneError, load
 
 WIDTH = 256  # pixels, where none are asked for
 
@@ -30,7 +30,7 @@ def run(name: str, directory: Path, *, width: int | None = None, across: int | N
         radiance = render(scene, view, materials=materials, progress=lambda: bar.advance(task))
     directory.mkdir(parents=True, exist_ok=True)
     stem = directory / Path(name).stem
-    for write, suffix in ((picture.write_png, ".png"), (picture.write_exr, ".exr")):
+    for write, suffix in ((image.write_png, ".png"), (image.write_exr, ".exr")):
         write(stem.with_name(stem.name + suffix), scene, radiance)
     points = sum(len(each.at) for each in view.points)
     print(f"{stem}.png and {stem.name}.exr: {view.width} x {view.height} pixels, {points} points")

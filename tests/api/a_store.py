@@ -15,15 +15,15 @@ import httpx
 import numpy as np
 import uvicorn
 
-from brdfdb.accuracy import measure
-from brdfdb.grids import Grid
-from brdfdb.layout import Layout
 from brdfdb.materials import Material
-from brdfdb.staging import publish_dataset
-from brdfdb.store import Store
-from brdfdb.tabulate import tabulate
-from brdfdb_api.app import create_app
-from brdfdb_api.settings import Settings
+from brdfdb.store.reader import Store
+from brdfdb.store.staging import publish_dataset
+from brdfdb.tables.error_measurement import measure
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
+from brdfdb_api.http.app import create_app
+from brdfdb_api.serving.settings import Settings
 
 PROBLEM = "application/problem+json"
 NPY = "application/x-npy"

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from brdfdb.store import Store
+from brdfdb.store.reader import Store
 from brdfdb_pipelines import cli
 from tests.api.a_store import TURNED, Client, client_of, publish, serving
 from tests.api.chromium import SECONDS, Chromium

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.albedo import material_of
 from brdfdb.spectra import srgb_weights, xyz_weights
-from brdfdb.store import Store
+from brdfdb.store.reader import Store
+from brdfdb.tables.albedo import material_of
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, npy, read_npy
 
 FOIL, FELT, TILE, METAL = (

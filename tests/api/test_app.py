@@ -12,10 +12,10 @@ import jsonschema
 import pytest
 
 import brdfdb_api
-from brdfdb.store import StoreError
-from brdfdb_api.app import create_app, openapi_json
+from brdfdb.store.reader import StoreError
+from brdfdb_api.http.app import create_app, openapi_json
 from brdfdb_api.server import serve
-from brdfdb_api.settings import Settings
+from brdfdb_api.serving.settings import Settings
 from tests.api.a_store import Client
 
 OPENAPI = Path(__file__).parents[2] / "api" / "openapi.json"
@@ -72,7 +72,7 @@ def test_an_origin_that_no_page_has_is_refused(origin: str) -> None:
 
 def test_openapi_document_is_the_reviewed_one() -> None:
     assert json.loads(openapi_json()) == json.loads(OPENAPI.read_text()), (
-        "the HTTP interface changed; review it, then: python -m brdfdb_api.app > api/openapi.json"
+        "the HTTP interface changed; review it, then: python -m brdfdb_api.http.app > api/openapi.json"
     )
 
 

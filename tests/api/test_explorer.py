@@ -12,9 +12,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from brdfdb_api import pages
-from brdfdb_api.app import create_app
-from brdfdb_api.settings import Settings
+from brdfdb_api.http import pages
+from brdfdb_api.http.app import create_app
+from brdfdb_api.serving.settings import Settings
 
 FOLDER = Path(pages.__file__).with_name("explorer")
 NAMES = sorted(path.name for path in FOLDER.iterdir())

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb_api.shelf import COLOURED_BYTES
+from brdfdb_api.serving.shelf import COLOURED_BYTES
 from tests.api.a_store import serving
 from tests.api.chromium import Chromium, chosen, copied, curve, milliseconds, shown
 

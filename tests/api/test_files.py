@@ -12,9 +12,9 @@ import pytest
 import xarray as xr
 from zarr.storage import ZipStore
 
-from brdfdb import snapshots
-from brdfdb.revisions import collect
-from brdfdb.store import Store
+from brdfdb.store import snapshots
+from brdfdb.store.reader import Store
+from brdfdb.store.revisions import collect
 from tests.api.a_store import Client, client_of, publish, serving
 
 FOIL = "/v1/materials/copper-foil"

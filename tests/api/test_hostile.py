@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.grids import Grid
-from brdfdb.layout import Layout
 from brdfdb.materials import Material
-from brdfdb.staging import publish_dataset
-from brdfdb.tabulate import tabulate
-from brdfdb_api.protocol import HEAD_BYTES
+from brdfdb.store.staging import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
+from brdfdb_api.http.protocol import HEAD_BYTES
 
 GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 LOOKUP = "/v1/materials/white/lookup"

@@ -14,10 +14,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from brdfdb.lookup import Table
-from brdfdb.store import Store
-from brdfdb_api.app import create_app
-from brdfdb_api.settings import Settings
+from brdfdb.store.reader import Store
+from brdfdb.tables.table import Table
+from brdfdb_api.http.app import create_app
+from brdfdb_api.serving.settings import Settings
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, npy, read_npy
 
 FOIL = "/v1/materials/copper-foil/lookup"

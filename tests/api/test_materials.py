@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.store import Store
-from brdfdb_api.app import create_app
-from brdfdb_api.settings import Settings
-from brdfdb_api.shelf import Shelf
+from brdfdb.store.reader import Store
+from brdfdb_api.http.app import create_app
+from brdfdb_api.serving.settings import Settings
+from brdfdb_api.serving.shelf import Shelf
 from tests.api.a_store import VISIBLE_NM, Client, client_of, publish
 
 FOIL = "/v1/materials/copper-foil"

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb import remote
 from brdfdb.geometry import unit_vector
-from brdfdb.store import Store, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.store import http_client
+from brdfdb.store.reader import Store, StoreError, UnknownMaterialError, UnknownRevisionError
 from tests.api.a_store import angles, publish, same, serving
 
 KEPT = ("white-tile", "r000001")
@@ -162,7 +162,7 @@ def test_a_dataset_is_that_of_the_directory(root: Path, address: str) -> None:
 
 
 def test_a_dataset_without_what_reads_it(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(remote, "find_spec", lambda _: None)
+    monkeypatch.setattr(http_client, "find_spec", lambda _: None)
     with pytest.raises(StoreError, match=r"needs fsspec and aiohttp: pip install 'brdfdb\[http\]'$"):
         brdfdb.open(address).dataset("grey-felt")
 

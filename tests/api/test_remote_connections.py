@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb import remote
-from brdfdb.store import StoreError
+from brdfdb.store import http_client
+from brdfdb.store.reader import StoreError
 from tests.api.a_store import angles, npy, same, serving
 
 
@@ -44,12 +44,12 @@ def test_a_server_that_is_not_there(tmp_path: Path) -> None:
 )
 def test_an_address_that_is_none(url: str) -> None:
     with pytest.raises(ValueError, match=r"^url: '.*' is not an address"):
-        remote.RemoteStore(url)
+        http_client.RemoteStore(url)
 
 
 def test_an_address_that_no_name_service_takes() -> None:
     with pytest.raises(StoreError, match=r"^no answer from http://a\.\.b: "):
-        remote.RemoteStore("http://a..b")
+        http_client.RemoteStore("http://a..b")
 
 
 @pytest.mark.parametrize(("scheme", "port"), [("http", 80), ("https", 443)])
@@ -62,21 +62,21 @@ def test_an_address_of_ipv6_without_a_port(scheme: str, port: int, monkeypatch: 
 
     monkeypatch.setattr(socket, "create_connection", refuse)
     with pytest.raises(StoreError, match=r"nobody$"):
-        remote.RemoteStore(f"{scheme}://[::1]/brdf/")
+        http_client.RemoteStore(f"{scheme}://[::1]/brdf/")
     assert asked == [("::1", port)]
 
 
 @pytest.mark.parametrize("timeout_s", [0.0, -1.0, np.inf, np.nan])
 def test_a_time_that_no_socket_waits(timeout_s: float) -> None:
     with pytest.raises(ValueError, match=r"^timeout_s: \S+ is outside \(0, 9\.\d+e\+09\] s$"):
-        remote.RemoteStore("http://127.0.0.1:1", timeout_s)
+        http_client.RemoteStore("http://127.0.0.1:1", timeout_s)
 
 
 def test_a_service_that_does_not_answer_in_time() -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(StoreError, match=f"^no answer from {url}: timed out$"):
-            remote.RemoteStore(url, timeout_s=0.05)
+            http_client.RemoteStore(url, timeout_s=0.05)
 
 
 @contextmanager
@@ -117,14 +117,14 @@ FAR_TOO_LARGE = bytes(16_000_000)  # more than sockets keep: it cannot be sent t
 
 def test_a_connection_that_was_closed_in_between_is_made_anew() -> None:
     with answering(READY, READY) as (url, asked):
-        assert len(remote.RemoteStore(url)) == 3
+        assert len(http_client.RemoteStore(url)) == 3
     assert len(asked) == 2
     assert all(b"Accept-Encoding: identity" in request for request in asked)
 
 
 def test_it_is_made_anew_once() -> None:
     with answering(READY, b"") as (url, asked):
-        there = remote.RemoteStore(url)
+        there = http_client.RemoteStore(url)
         with pytest.raises(StoreError, match=f"^no answer from {url}: "):
             len(there)
     assert len(asked) == 2
@@ -132,14 +132,14 @@ def test_it_is_made_anew_once() -> None:
 
 def test_a_new_connection_that_breaks_is_not_tried_again() -> None:
     with answering(b"") as (url, asked), pytest.raises(StoreError, match=f"^no answer from {url}: "):
-        remote.RemoteStore(url)
+        http_client.RemoteStore(url)
     assert len(asked) == 1
 
 
 def test_an_answer_in_chunks() -> None:
     chunks = b'4\r\n{"ma\r\nb\r\nterials":3}\r\n0\r\n\r\n'
     with answering(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n" + chunks) as (url, _):
-        assert remote.Service(url).document("/readyz") == {"materials": 3}
+        assert http_client.Service(url).document("/readyz") == {"materials": 3}
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_an_answer_in_chunks() -> None:
 )
 def test_something_else_at_the_address(found: bytes, said: str) -> None:
     with answering(found) as (url, _), pytest.raises(StoreError, match=said):
-        remote.RemoteStore(url)
+        http_client.RemoteStore(url)
 
 
 NUMBERS = npy(np.zeros((3, 2)))
@@ -184,7 +184,7 @@ NUMBERS = npy(np.zeros((3, 2)))
 def test_something_else_than_the_array_asked_for(content: bytes) -> None:
     said = "^http://[^ ]+ is no service of brdfdb$"
     with answering(answer(content)) as (url, _), pytest.raises(StoreError, match=said):
-        remote.Service(url).array("/v1", (3, 2))
+        http_client.Service(url).array("/v1", (3, 2))
 
 
 @pytest.mark.parametrize("status", ["301 Moved Permanently", "302 Found", "307 Temporary Redirect", "308 Permanent"])
@@ -192,7 +192,7 @@ def test_a_redirect_is_told_and_not_followed(status: str) -> None:
     moved = answer(PAGE, status, "Location: https://there.example/brdf/v1?a=1")
     for body in (None, {"theta_i": 0}):
         with answering(moved) as (url, _), pytest.raises(StoreError) as raised:
-            remote.Service(f"{url}/brdf/").document("/v1?a=1", body)
+            http_client.Service(f"{url}/brdf/").document("/v1?a=1", body)
         where = "https://there.example/brdf/v1; open the address that the service itself has"
         assert str(raised.value) == f"{url}/brdf redirects /v1 to {where}"
 
@@ -202,21 +202,21 @@ def test_a_redirect_is_told_and_not_followed(status: str) -> None:
 
 def test_a_body_that_is_refused_before_it_was_read() -> None:
     with answering(TOO_LARGE, READY, TOO_LARGE, READY) as (url, asked):
-        there = remote.Service(url)
+        there = http_client.Service(url)
         for _ in range(2):  # the second time, the connection is one that was closed in between
             with pytest.raises(
                 StoreError, match=f"^{url} answered 413 Request Entity Too Large, and does not say why$"
             ):
-                there.content("/v1", FAR_TOO_LARGE, remote.NPY)
+                there.content("/v1", FAR_TOO_LARGE, http_client.NPY)
             assert there.document("/readyz") == {"materials": 3}
     assert [request[:4] for request in asked] == [b"POST", b"GET ", b"POST", b"GET "]
 
 
 def test_a_connection_on_which_a_body_was_not_sent_whole_is_not_used_again() -> None:
     with answering(answer(PAGE, "413"), READY, close=False) as (url, asked):
-        there = remote.Service(url, timeout_s=1.0)
+        there = http_client.Service(url, timeout_s=1.0)
         with pytest.raises(StoreError, match=f"^{url} answered 413, and does not say why$"):
-            there.content("/v1", FAR_TOO_LARGE, remote.NPY)
+            there.content("/v1", FAR_TOO_LARGE, http_client.NPY)
         assert there.document("/readyz") == {"materials": 3}
     assert len(asked) == 2
 

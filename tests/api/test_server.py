@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pytest
 
-from brdfdb_api.protocol import HEAD_BYTES
+from brdfdb_api.http.protocol import HEAD_BYTES
 from tests.api.a_store import publish
 
 README = Path(__file__).parents[2] / "README.md"

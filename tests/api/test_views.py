@@ -11,11 +11,11 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from brdfdb import exr
-from brdfdb.albedo import directional_albedo
+from brdfdb.formats import exr
 from brdfdb.geometry import directions_from_half_difference
 from brdfdb.spectra import srgb_weights
-from brdfdb.store import Store
+from brdfdb.store.reader import Store
+from brdfdb.tables.albedo import directional_albedo
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, publish, read_npy
 
 FOIL, FELT, TILE, METAL = (

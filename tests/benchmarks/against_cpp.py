@@ -40,7 +40,7 @@ DIRECTIONS = 1_000_000
 SUMMED_DIRECTIONS = 50_000  # of He-Torrance, where each is a sum
 AGREEMENT = 1e-8  # of values, relative; those below TINY are 0
 TINY = 1e-30
-ROWS = 2  # of theta_i at a time, as brdfdb.tabulate cuts a grid of this size
+ROWS = 2  # of theta_i at a time, as brdfdb.tables.tabulation cuts a grid of this size
 LIGHT_STEP = 6  # of the tables of He-Torrance every sixth row is computed: a rate, sooner
 
 THETA, PHI = np.deg2rad(np.linspace(0.0, 89.5, 90)), np.deg2rad(np.linspace(0.0, 180.0, 180))
@@ -287,7 +287,7 @@ def he_torrance(cpp: Cpp, directions: Vectors, rounds: int, seconds: float) -> I
 
 
 def by_slabs(material: Material, axes: list[NDArray[Any]], spectrum: list[dict[str, Any]]) -> None:
-    """A table as brdfdb.tabulate fills it, one wavelength and a few rows a call."""
+    """A table as brdfdb.tables.tabulation fills it, one wavelength and a few rows a call."""
     lights, viewers, turned = axes
     for start in range(0, lights.size, ROWS):
         light, viewer, delta_phi = np.ix_(lights[start : start + ROWS], viewers, turned)

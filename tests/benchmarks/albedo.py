@@ -17,9 +17,9 @@ import numpy as np
 
 from brdfdb.audit.model_energy import TOLERANCE
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.quadrature import spectral_albedo
+from brdfdb.integrals.sampling import sample
 from brdfdb.materials import Material, presets
-from brdfdb.quadrature import spectral_albedo
-from brdfdb.sampling import sample
 from brdfdb_pipelines import terminal
 
 THETA_I_DEG = (10.0, 45.0, 75.0, 85.0)

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from plain import plain_recipe
 
-from brdfdb.chunks import encoded
-from brdfdb.layout import Layout
-from brdfdb.tabulate import block
+from brdfdb.store.codec import encoded
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import block
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.workers import Workers
 

@@ -10,8 +10,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from brdfdb.charted import Chart
-from brdfdb_pipelines import chart, panels, scatter, terminal
+from brdfdb.forms.tradeoff_document import Chart
+from brdfdb_pipelines import chart, plot_panels, terminal, tradeoff_plot
 
 NAMES = ("clay-vase", "magnesium-oxide-ceramic", "rolled-brass", "scene-copper-sphere")
 FAMILY, RECIPE = "copper-roughness", Path("pipelines/brdfdb_pipelines/recipes/copper-roughness.toml")
@@ -24,9 +24,9 @@ def rows(one: Chart) -> list[str]:
     lines = []
     for key in one.fronts.batch:
         point = points[key]
-        errors = f"{panels.percent(point.l1)} | {scatter.tail(point)} | {panels.percent(point.forward)}"
+        errors = f"{plot_panels.percent(point.l1)} | {tradeoff_plot.tail(point)} | {plot_panels.percent(point.forward)}"
         times = " | ".join(terminal.count(each.ns) for each in (point.batch, point.block, point.single, point.mixed))
-        faster = scatter.against(point) or "-"
+        faster = tradeoff_plot.against(point) or "-"
         lines.append(
             f"| {one.material} | {point.title} | {errors} | {times} | {faster} | {terminal.size(point.bytes)} |"
         )
@@ -35,14 +35,14 @@ def rows(one: Chart) -> list[str]:
 
 def noise(one: Chart) -> list[str]:
     """Return rows of the samplers."""
-    return [f"| {one.material} | {each.title} | {' | '.join(scatter.works(each))} |" for each in one.samplers]
+    return [f"| {one.material} | {each.title} | {' | '.join(tradeoff_plot.works(each))} |" for each in one.samplers]
 
 
 if __name__ == "__main__":
     PICTURES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         found = chart.run(NAMES, Path(folder))
-        chart.run((FAMILY,), Path(folder), recipe_file=RECIPE)
+        chart.run((FAMILY,), Path(folder), recipe_path=RECIPE)
         for name in (*NAMES, FAMILY):
             shutil.copy(Path(folder, f"{name}.svg"), PICTURES)
     print("| material | form | mean error | p99 | forward | ns, many | 256 | one | in turn | over its rung | bytes |")

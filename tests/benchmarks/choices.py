@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from brdfdb.forms.catalogue import representations
+from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.materials import Material, presets
-from brdfdb.quadrature import spectral_albedo
-from brdfdb.representations import representations
 
 Array = NDArray[np.float64]
 WIDTHS, QUICK_WIDTHS = (100, 128, 200, 512), (100, 200)

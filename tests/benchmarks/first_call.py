@@ -24,8 +24,7 @@ def evaluate_all() -> None:
     start = time.perf_counter()
     import numpy as np
 
-    from brdfdb import tabulate  # noqa: F401  # what a build imports: not a part of the first call
-    from brdfdb_pipelines.recipe import load
+    from brdfdb_pipelines.recipe_file import load
 
     imported = time.perf_counter()
     theta, phi = np.array([0.1, 0.8]), np.array([0.0, 1.0, 3.0])

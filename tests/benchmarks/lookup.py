@@ -18,9 +18,9 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.grids import Grid
-from brdfdb.layout import PLAIN, Interpolation
-from brdfdb.lookup import Table
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import PLAIN, Interpolation
+from brdfdb.tables.table import Table
 
 REPEATS = 9
 RNG = np.random.default_rng(1992)

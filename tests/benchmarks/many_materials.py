@@ -15,7 +15,7 @@ from pathlib import Path
 
 import brdfdb
 from brdfdb_pipelines.build import build
-from brdfdb_pipelines.recipe import Recipe
+from brdfdb_pipelines.recipe_file import Recipe
 from brdfdb_pipelines.workers import threads
 
 SMALL = {"theta_i_deg": [0.0, 45.0, 80.0], "theta_r_deg": [0.0, 45.0, 80.0]}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from brdfdb_pipelines.recipe import Recipe, load
+from brdfdb_pipelines.recipe_file import Recipe, load
 
 
 def _theta(stop: int, step: int) -> list[dict[str, float] | float]:

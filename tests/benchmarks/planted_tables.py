@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from brdfdb.audit import MaterialAudit
-from brdfdb.error import Overall
-from brdfdb.grids import Grid
-from brdfdb.layout import Layout
-from brdfdb.lookup import Table
 from brdfdb.materials import Material, presets
-from brdfdb.plan import plan
-from brdfdb_pipelines.sentences import of_error, of_nodes
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.planner import plan
+from brdfdb.tables.stated_error import Overall
+from brdfdb.tables.table import Table
+from brdfdb_pipelines.audit_sentences import of_error, of_nodes
 from tests.benchmarks.sound_materials import built
 
 WAVELENGTHS = np.linspace(420.0, 680.0, 5)

@@ -26,12 +26,12 @@ from rich.console import Console
 from rich.table import Table
 from service import as_npy, points, served
 
-from brdfdb.grids import Grid
-from brdfdb.layout import Layout
 from brdfdb.materials import Material
-from brdfdb.revisions import collect
-from brdfdb.staging import publish_dataset
-from brdfdb.tabulate import tabulate
+from brdfdb.store.revisions import collect
+from brdfdb.store.staging import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
 
 GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 NAME = "changing"

@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from brdfdb import accuracy
-from brdfdb.grids import Grid
-from brdfdb.layout import Layout
-from brdfdb.lookup import Table, table_from
+from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
-from brdfdb.plan import plan
-from brdfdb.quadrature import spectral_albedo
-from brdfdb.tabulate import tabulate
+from brdfdb.tables import error_measurement
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.planner import plan
+from brdfdb.tables.table import Table, table_from
+from brdfdb.tables.tabulation import tabulate
 
 DIRECTIONS = 1500  # of a band, for the stated error; of the integral of the facets fewer
 _SLOW = {"oren_nayar_gaussian": 600}
@@ -39,7 +39,7 @@ def built(layout: Layout, count: int = DIRECTIONS) -> Table:
     dataset = tabulate(layout)
     values = dataset[layout.variable].values
     count = _SLOW.get(layout.material.model, count)
-    error = accuracy.measure(layout, lambda rows: values[rows], count=count)
+    error = error_measurement.measure(layout, lambda rows: values[rows], count=count)
     arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
     attrs = {**dataset.attrs, "error": error.model_dump(mode="json")}
     return table_from(layout.material.name, "r000001", arrays, attrs)

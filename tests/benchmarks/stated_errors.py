@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import brdfdb
-from brdfdb import accuracy, tabulate
-from brdfdb.albedo import material_of
-from brdfdb.lookup import Table
 from brdfdb.materials import Material
-from brdfdb.plan import plan
-from brdfdb_pipelines.recipe import load
+from brdfdb.tables import error_measurement, tabulation
+from brdfdb.tables.albedo import material_of
+from brdfdb.tables.planner import plan
+from brdfdb.tables.table import Table
+from brdfdb_pipelines.recipe_file import load
 
 PROMISED = 0.98
 QUICK = ("clay-vase", "foam", "rolled-brass", "scene-copper-sphere")
@@ -66,8 +66,8 @@ def made(names: Any, wavelengths: list[float] | None) -> Any:
         if wavelengths and wavelength_nm is not None and material.wavelengths_nm is None:
             wavelength_nm = np.array(wavelengths)
         layout = plan(material, wavelength_nm, 0.01)
-        values = np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
-        error = accuracy.measure(layout, lambda rows, values=values: values[rows])
+        values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
+        error = error_measurement.measure(layout, lambda rows, values=values: values[rows])
         yield replace(Table.of(layout, values), attrs={"error": error.model_dump(mode="json"), "of": material})
 
 
@@ -95,7 +95,7 @@ def shares_of(table: Table, material: Material) -> dict[str, float]:
 def share(table: Table, material: Material, wi: Array, wr: Array, wavelength_nm: Array | None) -> float:
     """Return the share of values that are as near to the model as stated; the least of all wavelengths."""
     found = table.lookup_vectors(wi, wr, wavelength_nm, with_error=True)
-    truth = accuracy.model_values(material, wavelength_nm, wi, wr).reshape(found.brdf.shape)
+    truth = error_measurement.model_values(material, wavelength_nm, wi, wr).reshape(found.brdf.shape)
     held = np.abs(found.brdf - truth) <= found.error + ROUNDING * truth
     return float(held.reshape(len(wi), -1).mean(axis=0).min())
 

@@ -16,11 +16,11 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb import accuracy, tabulate
-from brdfdb.layout import Layout
 from brdfdb.materials import Material
-from brdfdb.plan import plan
-from brdfdb_pipelines.recipe import load
+from brdfdb.tables import error_measurement, tabulation
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.planner import plan
+from brdfdb_pipelines.recipe_file import load
 
 FRESH, AGREEMENT, TIMES_SMALLER = 20261121, 0.2, 20.0
 NARROW = 0.1
@@ -39,9 +39,9 @@ def main(tolerance: float, names: list[str]) -> int:
         start = time.perf_counter()
         layout = plan(material, wavelength_nm, tolerance)
         seconds = time.perf_counter() - start
-        values = np.concatenate([tabulate.block(layout, rows) for rows in layout.blocks])
-        stated = accuracy.measure(layout, lambda rows, values=values: values[rows]).overall.p99
-        fresh = accuracy.measure(layout, lambda rows, values=values: values[rows], seed=FRESH).overall.p99
+        values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
+        stated = error_measurement.measure(layout, lambda rows, values=values: values[rows]).overall.p99
+        fresh = error_measurement.measure(layout, lambda rows, values=values: values[rows], seed=FRESH).overall.p99
         nodes = math.prod(layout.grid.shape)
         width = lobe_width(material, wavelength_nm)
         ratio = uniform_nodes(layout, fresh) / nodes if width <= NARROW and fresh > 0.0 else math.nan
@@ -73,14 +73,14 @@ def lobe_width(material: Material, wavelength_nm: NDArray[np.float64] | None) ->
 def uniform_nodes(layout: Layout, error: float) -> int:
     """Nodes of the uniform grid whose multilinear interpolation has the same 99th percentile of the error."""
     wavelength_nm = None if layout.wavelength_nm is None else layout.wavelength_nm[[0, layout.wavelength_nm.size // 2]]
-    drawn = accuracy.draw(layout.material, wavelength_nm, DRAWS, FRESH)
-    truth = accuracy.model_values(layout.material, wavelength_nm, drawn.wi, drawn.wr)
-    floor = accuracy.floor_of(truth, drawn)
+    drawn = error_measurement.draw(layout.material, wavelength_nm, DRAWS, FRESH)
+    truth = error_measurement.model_values(layout.material, wavelength_nm, drawn.wi, drawn.wr)
+    floor = error_measurement.floor_of(truth, drawn)
     count = 8
     while True:
         found = uniform_lookup(layout.material, wavelength_nm, drawn, count)
         if (
-            np.percentile(accuracy.relative(found, truth, floor)[drawn.above], 99, axis=0).max() <= error
+            np.percentile(error_measurement.relative(found, truth, floor)[drawn.above], 99, axis=0).max() <= error
             or count > 3000
         ):
             turns = 4 * count - 3 if layout.grid.anisotropic else 2 * count - 1
@@ -89,7 +89,7 @@ def uniform_nodes(layout: Layout, error: float) -> int:
 
 
 def uniform_lookup(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, drawn: accuracy.Draw, count: int
+    material: Material, wavelength_nm: NDArray[np.float64] | None, drawn: error_measurement.Draw, count: int
 ) -> Array:
     """Multilinear interpolation on `count` nodes a quarter turn, without the table: the model at the nodes around."""
     theta = [np.arccos(np.clip(w[:, 2], -1.0, 1.0)) for w in (drawn.wi, drawn.wr)]

@@ -11,7 +11,7 @@ from collections import defaultdict
 
 from plain import plain_recipe
 
-from brdfdb.tabulate import tabulate
+from brdfdb.tables.tabulation import tabulate
 
 
 def main(wanted: list[str]) -> None:

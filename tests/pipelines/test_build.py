@@ -18,14 +18,15 @@ import pytest
 import xarray as xr
 
 import brdfdb
-from brdfdb import layout as layouts
-from brdfdb import manifest, tabulate
-from brdfdb.layout import Layout, digest
-from brdfdb.staging import Lock
-from brdfdb.store import Store, StoreError
-from brdfdb_pipelines import cli, resources
+from brdfdb.store import manifest
+from brdfdb.store.reader import Store, StoreError
+from brdfdb.store.staging import Lock
+from brdfdb.tables import layout as layouts
+from brdfdb.tables import tabulation
+from brdfdb.tables.layout import Layout, digest
+from brdfdb_pipelines import build_resources, cli
 from brdfdb_pipelines.build import Built, build
-from brdfdb_pipelines.recipe import Job, Recipe, RecipeError, load
+from brdfdb_pipelines.recipe_file import Job, Recipe, RecipeError, load
 from brdfdb_pipelines.workers import Workers
 
 Captured = pytest.CaptureFixture[str]
@@ -54,14 +55,14 @@ def chunks(store: Store, name: str) -> dict[str, bytes]:
 
 def failing(monkeypatch: pytest.MonkeyPatch, name: str, error: BaseException) -> None:
     """Let the tabulation of one material fail."""
-    block = tabulate.block
+    block = tabulation.block
 
     def fail(layout: Layout, rows: slice) -> Any:
         if layout.material.name == name:
             raise error
         return block(layout, rows)
 
-    monkeypatch.setattr(tabulate, "block", fail)
+    monkeypatch.setattr(tabulation, "block", fail)
 
 
 def changed(recipe: Path, to: Path) -> Path:
@@ -103,7 +104,7 @@ def test_what_was_built_is_told_in_the_order_of_the_recipe(recipe: Path, tmp_pat
 def test_tables_are_those_of_tabulate_with_the_request_beside_them(recipe: Path, built: Path) -> None:
     store = brdfdb.open(built)
     for job in load(recipe).jobs():
-        expected = tabulate.tabulate(job.layout())
+        expected = tabulation.tabulate(job.layout())
         request = json.loads(json.dumps(job.request))
         with store.dataset(job.material.name) as found:
             of_build = {"request": request, "request_sha256": digest(request), "error": found.attrs["error"]}
@@ -192,7 +193,7 @@ def test_what_was_current_before_is_made_current_again_and_not_computed(
     shutil.copytree(built, root)
     other = changed(recipe, tmp_path / "other.toml")
     build(load(other), root, OneByOne())
-    monkeypatch.setattr(tabulate, "block", lambda *_: pytest.fail("computed again"))
+    monkeypatch.setattr(tabulation, "block", lambda *_: pytest.fail("computed again"))
     assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
     out, _ = capsys.readouterr()
     assert "grid changed; r000001 is current again" in out
@@ -344,7 +345,7 @@ def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
         return write(path, data, temporary)
 
     with monkeypatch.context() as patch:
-        for user in ("brdfdb.staging.write_file", "brdfdb.manifest.write_file"):
+        for user in ("brdfdb.store.staging.write_file", "brdfdb.store.manifest.write_file"):
             patch.setattr(user, fill)
         assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "1"]) == 2
     out, err = capsys.readouterr()
@@ -366,7 +367,7 @@ def test_a_second_build_of_a_material_waits_and_then_has_nothing_to_do(
     recipe: Path, tmp_path: Path, names: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     began, go, computed = threading.Event(), threading.Event(), []
-    block = tabulate.block
+    block = tabulation.block
 
     def slow(layout: Layout, rows: slice) -> Any:
         computed.append(layout.material.name)
@@ -375,7 +376,7 @@ def test_a_second_build_of_a_material_waits_and_then_has_nothing_to_do(
             assert go.wait(30)
         return block(layout, rows)
 
-    monkeypatch.setattr(tabulate, "block", slow)
+    monkeypatch.setattr(tabulation, "block", slow)
     with ThreadPoolExecutor(2) as executor, ThreadPoolExecutor(1) as other:
         first = other.submit(build, load(recipe), tmp_path, executor)
         assert began.wait(30)
@@ -439,7 +440,7 @@ def test_json_lines_tell_all_and_nothing_else_is_on_stdout(
 def test_memory_bounds_the_tasks_in_flight(recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(layouts, "_BLOCK_VALUES", 50)
     most, now, guard = 0, 0, threading.Lock()
-    block = tabulate.block
+    block = tabulation.block
 
     def counted(layout: Layout, rows: slice) -> Any:
         nonlocal most, now
@@ -452,8 +453,8 @@ def test_memory_bounds_the_tasks_in_flight(recipe: Path, tmp_path: Path, monkeyp
             now -= 1
         return values
 
-    monkeypatch.setattr(tabulate, "block", counted)
-    most_bytes = max(resources.task_bytes(job.layout()) for job in load(recipe).jobs())
+    monkeypatch.setattr(tabulation, "block", counted)
+    most_bytes = max(build_resources.task_bytes(job.layout()) for job in load(recipe).jobs())
     with ThreadPoolExecutor(8) as executor:
         build(load(recipe), tmp_path, Workers(executor, lambda: 8), memory=3 * most_bytes + 100_000)
     assert 2 <= most <= 3

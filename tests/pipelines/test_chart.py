@@ -13,13 +13,26 @@ from xml.etree import ElementTree
 import jsonschema
 import pytest
 
-from brdfdb import chart as charting
-from brdfdb import cost, family_records
-from brdfdb.charted import Between, Chart, Charts, Cost, Curve, FamilyChart, Fronts, Point, Sampler, Saving, Work
+from brdfdb.forms import timing
+from brdfdb.forms import tradeoff as charting
+from brdfdb.forms.catalogue import representations
+from brdfdb.forms.tradeoff_document import (
+    Between,
+    Chart,
+    Charts,
+    Cost,
+    Curve,
+    FamilyChart,
+    Fronts,
+    Point,
+    Sampler,
+    Saving,
+    Work,
+)
 from brdfdb.materials import presets
-from brdfdb.representations import representations
-from brdfdb_pipelines import cli, panels, scatter, swept, terminal
-from brdfdb_pipelines.recipe import load
+from brdfdb.store import family_records
+from brdfdb_pipelines import cli, family_plot, plot_panels, terminal, tradeoff_plot
+from brdfdb_pipelines.recipe_file import load
 
 Captured = pytest.CaptureFixture[str]
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "chart.schema.json"
@@ -111,7 +124,7 @@ def test_the_command_writes_the_data_and_a_picture_of_each(tmp_path: Path, capsy
 def test_a_table_of_the_store_is_charted_beside_the_planned_ones(
     built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cost, "ROUNDS", 1)
+    monkeypatch.setattr(timing, "ROUNDS", 1)
     assert run("rolled-brass", "mirror", "--store", built, "--tolerance", 0.2, "--out", tmp_path) == 0
     brass, mirror = charted(tmp_path, "rolled-brass"), charted(tmp_path, "mirror")
     stored = {each.key: each for each in brass.points}["table-stored"]
@@ -122,7 +135,7 @@ def test_a_table_of_the_store_is_charted_beside_the_planned_ones(
 
 
 def test_materials_of_a_recipe_can_be_charted(recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cost, "ROUNDS", 1)
+    monkeypatch.setattr(timing, "ROUNDS", 1)
     none = tmp_path / "none"
     assert run("mirror", "--recipe", recipe, "--tolerance", 0.2, "--out", tmp_path, "--store", none) == 0
     mirror = charted(tmp_path, "mirror")
@@ -152,7 +165,7 @@ def test_another_run_leaves_the_charts_of_others_as_they_were(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     monkeypatch.setattr(charting, "SINGLES", 1)
-    monkeypatch.setattr(cost, "ROUNDS", 1)
+    monkeypatch.setattr(timing, "ROUNDS", 1)
     given = ("--store", tmp_path / "none", "--out", tmp_path, "--tolerance", 0.2)
     assert run("rolled-brass", *given) == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -164,7 +177,7 @@ def test_another_run_leaves_the_charts_of_others_as_they_were(
 
 
 def test_a_picture_names_every_point_and_the_front() -> None:
-    text = scatter.svg(made_up(*POINTS))
+    text = tradeoff_plot.svg(made_up(*POINTS))
     root = ElementTree.fromstring(text)
     written = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
     assert "Made <up>" in written
@@ -182,29 +195,29 @@ def test_a_picture_draws_the_ladder_and_says_what_a_form_saves_over_its_rung() -
     rung = point("exact-4", 0.01, 100.0, kind="quadrature")
     fit = point("fit", 0.02, 10.0, kind="approximation", rung="exact-4", saving=Saving(low=9.0, times=10.4, high=11.0))
     whole = made_up(POINTS[0], rung, fit)
-    written = [element.text for element in ElementTree.fromstring(scatter.svg(whole)).iter() if element.text]
+    written = [element.text for element in ElementTree.fromstring(tradeoff_plot.svg(whole)).iter() if element.text]
     assert "ladder" in written
     assert "quadrature" in written
     assert "10 (exact-4)" in written
     assert "10 % (8-12)" in written  # the 99th percentile and its interval
-    assert "ladder" not in scatter.svg(made_up(POINTS[0]))
+    assert "ladder" not in tradeoff_plot.svg(made_up(POINTS[0]))
 
 
 def test_a_picture_shows_the_noise_and_time_of_samplers() -> None:
-    text = scatter.svg(made_up(*POINTS))
+    text = tradeoff_plot.svg(made_up(*POINTS))
     written = [element.text for element in ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}text")]
     assert "the model's lobe" in written
     assert written.count("0.1 (0.09-0.11)") == 2  # of the albedo and of the sphere
 
 
 def test_a_picture_is_the_same_every_time() -> None:
-    assert scatter.svg(made_up(*POINTS)) == scatter.svg(made_up(*POINTS))
-    assert scatter.png(made_up(*POINTS)) == scatter.png(made_up(*POINTS))
-    assert scatter.png(made_up(*POINTS)).startswith(PNG)
+    assert tradeoff_plot.svg(made_up(*POINTS)) == tradeoff_plot.svg(made_up(*POINTS))
+    assert tradeoff_plot.png(made_up(*POINTS)) == tradeoff_plot.png(made_up(*POINTS))
+    assert tradeoff_plot.png(made_up(*POINTS)).startswith(PNG)
 
 
 def test_one_point_is_a_picture_too() -> None:
-    ElementTree.fromstring(scatter.svg(made_up(POINTS[0])))
+    ElementTree.fromstring(tradeoff_plot.svg(made_up(POINTS[0])))
 
 
 @pytest.mark.parametrize(
@@ -220,7 +233,7 @@ def test_one_point_is_a_picture_too() -> None:
     ],
 )
 def test_errors_are_written_for_people(value: float, text: str) -> None:
-    assert panels.percent(value) == text
+    assert plot_panels.percent(value) == text
 
 
 @pytest.mark.parametrize(("value", "text"), [(4.26, "4.26"), (999.6, "1k"), (34800.0, "34.8k"), (1.3e6, "1.3M")])
@@ -234,11 +247,11 @@ def test_labels_hide_neither_points_nor_each_other_where_there_is_room() -> None
     boxes = []
     for _ in range(4):  # four names for one point
         best = min(
-            panels.offsets(30.0),
-            key=lambda offset: panels.hidden(panels.box((100.0, 50.0), offset, 30.0), taken, frame),
+            plot_panels.offsets(30.0),
+            key=lambda offset: plot_panels.hidden(plot_panels.box((100.0, 50.0), offset, 30.0), taken, frame),
         )
-        boxes.append(panels.box((100.0, 50.0), best, 30.0))
-        assert panels.hidden(boxes[-1], taken, frame) == 0.0
+        boxes.append(plot_panels.box((100.0, 50.0), best, 30.0))
+        assert plot_panels.hidden(boxes[-1], taken, frame) == 0.0
         taken.append(boxes[-1])
     assert len(set(boxes)) == 4
 
@@ -266,7 +279,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few directions, and one round of timing."""
     monkeypatch.setattr(charting, "DIRECTIONS", 100)
     monkeypatch.setattr(charting, "SINGLES", 1)
-    monkeypatch.setattr(cost, "ROUNDS", 1)
+    monkeypatch.setattr(timing, "ROUNDS", 1)
 
 
 @pytest.fixture(scope="module")
@@ -341,8 +354,8 @@ def made_up_family(between: Between | None = None, **axes: list[float]) -> Famil
         wavelength_nm=None,
         truth="exact",
         curves=[
-            Curve.model_validate({**form, **fixed, **cost, "l1": l1, "p99": l1})
-            for form, cost, l1 in zip(forms, costs, errors, strict=True)
+            Curve.model_validate({**form, **fixed, **timing, "l1": l1, "p99": l1})
+            for form, timing, l1 in zip(forms, costs, errors, strict=True)
         ],
         between=between,
         fronts=[["exact"]] * (len(members) - 1) + [["exact", "fit"]],
@@ -354,32 +367,32 @@ def test_the_picture_of_a_family_names_every_form_beside_its_curve_and_in_the_ta
     between = Between.model_validate(
         {**fixed, "bytes": 8, **dict.fromkeys(("batch", "block", "single"), time(5.0)), "l1": 0.1, "p99": 1.0}
     )
-    text = scatter.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
+    text = tradeoff_plot.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
     written = [element.text for element in ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}text")]
     for number, name in enumerate(("the truth", "fit", "between members"), 1):
         assert name in written
         assert f"{number} {name}" in written
     assert "height" in written
     assert "1 of 4" in written  # where the fit is worth having
-    assert text == scatter.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
+    assert text == tradeoff_plot.svg(made_up_family(between, height=[1.0, 2.0, 4.0, 9.0]))
 
 
 def test_members_are_told_apart_along_each_parameter() -> None:
     whole = made_up_family(height=[1.0, 2.0], width=[3.0, 4.0, 5.0])
-    assert swept.along(whole, "height") == [[0, 1, 2], [3, 4, 5]]
-    assert swept.along(whole, "width") == [[0, 3], [1, 4], [2, 5]]
-    assert swept.middle([0.1, None, 0.3, 0.2]) == 0.2
-    assert swept.middle([None]) is None
+    assert family_plot.along(whole, "height") == [[0, 1, 2], [3, 4, 5]]
+    assert family_plot.along(whole, "width") == [[0, 3], [1, 4], [2, 5]]
+    assert family_plot.middle([0.1, None, 0.3, 0.2]) == 0.2
+    assert family_plot.middle([None]) is None
 
 
 def test_names_are_moved_apart_and_no_further_than_they_need() -> None:
-    assert swept.apart([10.0, 50.0], 9.0, 100.0) == [10.0, 50.0]
-    assert swept.apart([10.0, 12.0, 30.0], 9.0, 100.0) == [6.5, 15.5, 30.0]
-    assert swept.apart([95.0, 99.0, 120.0], 9.0, 100.0) == [82.0, 91.0, 100.0]
+    assert family_plot.apart([10.0, 50.0], 9.0, 100.0) == [10.0, 50.0]
+    assert family_plot.apart([10.0, 12.0, 30.0], 9.0, 100.0) == [6.5, 15.5, 30.0]
+    assert family_plot.apart([95.0, 99.0, 120.0], 9.0, 100.0) == [82.0, 91.0, 100.0]
 
 
 def test_the_recipe_of_copper_goes_from_smooth_to_rough() -> None:
-    recipe = load(Path(scatter.__file__).parent / "recipes" / "copper-roughness.toml")
+    recipe = load(Path(tradeoff_plot.__file__).parent / "recipes" / "copper-roughness.toml")
     (sweep,) = recipe.sweeps(recipe.jobs())
     g = [(4.0 * math.pi * value / 0.55) ** 2 for value in sweep.axes["sigma_0_um"]]  # eq. 79 along the normal
     assert g[0] < 0.1 < 100.0 < g[-1]

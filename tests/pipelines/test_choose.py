@@ -13,9 +13,9 @@ import pytest
 from matplotlib.image import imread
 
 import brdfdb
-from brdfdb.candidates import Candidate
-from brdfdb.choices import Choice, Price
 from brdfdb.models import oren_nayar_gaussian_vectors
+from brdfdb.scenes.choice_document import Choice, Price
+from brdfdb.scenes.offered_forms import Candidate
 from brdfdb_pipelines import choose, cli, terminal
 from brdfdb_pipelines.documents import schema
 

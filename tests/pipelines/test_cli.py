@@ -22,7 +22,7 @@ COMMANDS = [
     *("build", "audit", "export exr", "lookup", "list", "show"),
     *("chart", "history", "rollback", "verify", "gc", "serve"),
 ]
-HEAVY = ["numpy", "numba", "xarray", "zarr", "pydantic", "rich", "fastapi", "uvicorn", "OpenEXR", "brdfdb.store"]
+HEAVY = ["numpy", "numba", "xarray", "zarr", "pydantic", "rich", "fastapi", "uvicorn", "OpenEXR", "brdfdb.store.reader"]
 
 
 def fails(capsys: Captured, *arguments: object) -> str:

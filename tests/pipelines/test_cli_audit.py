@@ -13,11 +13,11 @@ import pytest
 import xarray as xr
 
 import brdfdb
-from brdfdb.grids import Grid
-from brdfdb.layout import Layout
 from brdfdb.materials import Material
-from brdfdb.staging import publish_dataset
-from brdfdb.tabulate import tabulate
+from brdfdb.store.staging import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
 from tests.pipelines.command import Captured, run
 
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "audit.schema.json"

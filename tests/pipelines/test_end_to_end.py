@@ -22,10 +22,10 @@ import pytest
 import brdfdb
 from brdfdb import models
 from brdfdb.materials import Material
-from brdfdb_api.app import create_app
-from brdfdb_api.settings import Settings
+from brdfdb_api.http.app import create_app
+from brdfdb_api.serving.settings import Settings
 from brdfdb_pipelines import cli
-from brdfdb_pipelines.recipe import load
+from brdfdb_pipelines.recipe_file import load
 
 # The command line prints and HTTP writes what the library returns, digit by digit
 SAME = 1e-12

@@ -14,15 +14,16 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb import accuracy, family_records, tabulate
-from brdfdb.family_records import measure
-from brdfdb.layout import Layout
 from brdfdb.materials import Material
-from brdfdb.store import Store, UnknownFamilyError
+from brdfdb.store import family_records
+from brdfdb.store.family_records import measure
+from brdfdb.store.reader import Store, UnknownFamilyError
+from brdfdb.tables import error_measurement, tabulation
+from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import build as module
 from brdfdb_pipelines import cli, terminal
 from brdfdb_pipelines.build import build
-from brdfdb_pipelines.recipe import load
+from brdfdb_pipelines.recipe_file import load
 
 AGREEMENT = 0.2  # promised, between a stated p99 and one measured afresh; measured: 0.05
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "family.schema.json"
@@ -150,12 +151,12 @@ def test_a_family_of_he_torrance_is_as_far_off_as_it_states(copper: Path) -> Non
     for number in range(60):
         at = {"sigma_0_um": float(rng.uniform(0.1, 0.12)), "tau_um": float(rng.uniform(1.0, 1.2))}
         material = base.model_copy(update={"parameters": {**base.parameters, **at}})
-        drawn = accuracy.draw(material, family.wavelength_nm, 60, 1000 + number)
+        drawn = error_measurement.draw(material, family.wavelength_nm, 60, 1000 + number)
         draws.append(drawn)
-        truth.append(accuracy.model_values(material, family.wavelength_nm, drawn.wi, drawn.wr))
+        truth.append(error_measurement.model_values(material, family.wavelength_nm, drawn.wi, drawn.wr))
         found.append(family.lookup_vectors(drawn.wi, drawn.wr, **at))
-    whole = accuracy.Draw(*(np.concatenate(parts) for parts in zip(*draws, strict=True)))
-    afresh = accuracy.compare(np.concatenate(found), np.concatenate(truth), whole)
+    whole = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*draws, strict=True)))
+    afresh = error_measurement.compare(np.concatenate(found), np.concatenate(truth), whole)
     assert afresh.overall.p99 == pytest.approx(family.error.overall.p99, rel=AGREEMENT)
 
 
@@ -239,7 +240,7 @@ def test_a_build_that_was_killed_before_the_record_goes_on_there(
 
     root = tmp_path / "store"
     with monkeypatch.context() as patched:
-        patched.setattr(f"brdfdb.family_records.{last}", kill)
+        patched.setattr(f"brdfdb.store.family_records.{last}", kill)
         with pytest.raises(Killed):
             built(root, GREY)
     members = tree(root / "materials")
@@ -271,14 +272,14 @@ def test_a_family_some_of_whose_members_are_asked_for_is_not_measured(tmp_path: 
 
 
 def test_a_family_with_a_member_that_failed_is_not_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    block = tabulate.block
+    block = tabulation.block
 
     def fail(layout: Layout, rows: slice) -> Any:
         if layout.material.name == "grey-003":
             raise RuntimeError("no idea")
         return block(layout, rows)
 
-    monkeypatch.setattr(tabulate, "block", fail)
+    monkeypatch.setattr(tabulation, "block", fail)
     with pytest.raises(RuntimeError, match=r"^no idea$"):
         built(tmp_path / "store", GREY)
     assert brdfdb.open(tmp_path / "store").families() == []

@@ -137,7 +137,7 @@ class Reader(threading.Thread):
                 for name in ("grey", "white"):
                     try:
                         table = brdfdb.open(self.root)[name]
-                    except brdfdb.store.UnknownMaterialError:
+                    except brdfdb.store.reader.UnknownMaterialError:
                         assert name not in seen, "what was published is gone"
                         continue
                     rho = float(np.float32(table.attrs["parameters"]["rho"] / np.pi))

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb.grids import Grid
-from brdfdb.layout import Layout
 from brdfdb.materials import presets
-from brdfdb.staging import publish_dataset
-from brdfdb.tabulate import tabulate
+from brdfdb.store.staging import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
 from brdfdb_pipelines import cli, terminal
 
 RECIPE = """\

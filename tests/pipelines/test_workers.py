@@ -20,7 +20,7 @@ import brdfdb
 from brdfdb_pipelines import build as builds
 from brdfdb_pipelines import cli, workers
 from brdfdb_pipelines.build import build
-from brdfdb_pipelines.recipe import load
+from brdfdb_pipelines.recipe_file import load
 from brdfdb_pipelines.workers import Workers
 
 START_S = 60.0

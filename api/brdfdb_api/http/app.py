@@ -1,0 +1,160 @@
+"""The application: its factory, and which exception becomes which status."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import AsyncIterator
+from typing import TYPE_CHECKING, Any
+
+import orjson
+from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.middleware.cors import CORSMiddleware
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from brdfdb.store.reader import StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb_api.http.files import files
+from brdfdb_api.http.middleware import Edge
+from brdfdb_api.http.pages import pages
+from brdfdb_api.http.responses import PROBLEM_JSON, REVISION, RequestError, problem_response
+from brdfdb_api.http.routes import LARGE_AT_ONCE, answer_point, router
+from brdfdb_api.http.views import views
+from brdfdb_api.serving.settings import Settings
+from brdfdb_api.serving.shelf import Shelf
+
+if TYPE_CHECKING:
+    from brdfdb.store.reader import Store
+
+DESCRIPTION = """\
+Lookups in audited tables of spectral BRDFs, in 1/sr with the cosine not folded in.
+
+All angles are in degrees: theta from the normal, phi counter-clockwise; index i is the light, r the viewer.
+phi_r - phi_i = 0 looks back towards the light, 180 is the side of the mirror direction. Every error is an
+application/problem+json document with one sentence."""
+
+
+# Only JSON is compressed: numbers as bytes hardly shrink, files are compressed already
+UNCOMPRESSED = (*("application/x-npy", "application/octet-stream", "application/zip"), "image/*", "text/*")
+
+
+class Application(FastAPI):
+    """FastAPI behind an edge, whose OpenAPI document gives problems the media type that they are sent with."""
+
+    outermost: ASGIApp
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        scope["app"] = self
+        await self.outermost(scope, receive, send)
+
+    async def routed(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """What lies behind the edge."""
+        await super().__call__(scope, receive, send)
+
+    def openapi(self) -> dict[str, Any]:
+        document = super().openapi()
+        for path in document["paths"].values():
+            for operation in path.values():
+                for status, response in operation["responses"].items():
+                    if status >= "400" and "application/json" in response.get("content", {}):
+                        response["content"][PROBLEM_JSON] = response["content"].pop("application/json")
+        return document
+
+
+def create_app(settings: Settings | None = None, store: Store | None = None) -> FastAPI:
+    """Make the application.
+
+    Parameters
+    ----------
+    settings : Settings, optional
+        Read from the environment (``BRDFDB_*``) if missing.
+    store : Store, optional
+        An open store, instead of `settings.store`. That one is opened by the first request that needs it, so that an
+        application can start, and answer 503, before there is a store.
+
+    Raises
+    ------
+    ValueError
+        If a variable of the environment has a value that is not allowed.
+    """
+    app = Application(
+        title="brdfdb",
+        version="1.0",
+        summary="Spectral BRDF tables from published surface parameters",
+        description=DESCRIPTION,
+        generate_unique_id_function=lambda route: route.name,
+        lifespan=_warmed,
+        redirect_slashes=False,  # what is not an address is 404
+    )
+    app.state.settings = settings or Settings.from_environment()
+    app.state.shelf = Shelf(app.state.settings, store)
+    app.state.large = asyncio.Semaphore(LARGE_AT_ONCE)
+    app.include_router(router)
+    app.include_router(views)
+    app.include_router(files)
+    app.include_router(pages)
+    for kind in (
+        *(RequestError, RequestValidationError, UnknownMaterialError, UnknownRevisionError, StoreError),
+        *(HTTPException, Exception),
+    ):
+        app.add_exception_handler(kind, problem)
+    app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=5, exclude_content_types=UNCOMPRESSED)
+    limit, level = app.state.settings.max_body_bytes, app.state.settings.log_level
+    app.outermost = Edge(app.routed, limit=limit, lookup=answer_point, failed=problem_of, log_level=level)
+    if app.state.settings.cors_origins:
+        app.outermost = CORSMiddleware(
+            app.outermost,
+            allow_origins=app.state.settings.cors_origins,
+            allow_methods=["GET", "POST"],
+            allow_headers=["*"],
+            expose_headers=["ETag", "X-Request-ID", REVISION],
+        )
+    return app
+
+
+@contextlib.asynccontextmanager
+async def _warmed(app: FastAPI) -> AsyncIterator[None]:
+    """While the application runs: a thread that decodes what lists show first."""
+    threading.Thread(target=app.state.shelf.warm, daemon=True).start()
+    yield
+    app.state.shelf.close()
+
+
+async def problem(_: Request, error: Exception) -> Response:
+    """What the router makes of an exception."""
+    return problem_of(error)
+
+
+def problem_of(error: Exception) -> Response:
+    """The one table from exceptions to statuses."""
+    match error:
+        case RequestError():
+            return problem_response(error.status, str(error), error.parameter)
+        case RequestValidationError():
+            first = error.errors()[0]
+            parameter = str(first["loc"][1])  # ("query", name, ...)
+            return problem_response(422, f"{parameter}: {first['msg'].lower()}", parameter)
+        case UnknownMaterialError():
+            return problem_response(404, str(error), closest=error.closest)
+        case UnknownRevisionError():
+            return problem_response(404, str(error), "revision")
+        case StoreError():
+            return problem_response(503, str(error))
+        case HTTPException():
+            return problem_response(error.status_code, error.detail, headers=dict(error.headers or {}))
+        case _:
+            return problem_response(500, "the server failed on this request; its log says why")
+
+
+def openapi_json() -> bytes:
+    """The OpenAPI document as it stands in ``api/openapi.json``."""
+    return orjson.dumps(create_app(Settings()).openapi(), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+
+
+if __name__ == "__main__":
+    print(openapi_json().decode(), end="")

@@ -1,0 +1,295 @@
+"""What goes out: problem+json, JSON through orjson, .npy bytes, and the documents that OpenAPI describes."""
+
+from __future__ import annotations
+
+import functools
+import io
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, WithJsonSchema
+from starlette.responses import Response
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+PROBLEM_JSON = "application/problem+json"
+NPY = "application/x-npy"
+JSON = "application/json"
+REVISION = "Brdfdb-Revision"  # header: which revision the numbers of a lookup are of
+
+# The phrases of RFC 9110; those of http.HTTPStatus change from one Python to the next.
+TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
+
+
+class RequestError(Exception):
+    """A request that is not answered, in one sentence.
+
+    Parameters
+    ----------
+    status : int
+        The HTTP status.
+    detail : str
+        The sentence.
+    parameter : str, optional
+        The parameter that is at fault.
+    """
+
+    def __init__(self, status: int, detail: str, parameter: str | None = None) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.parameter = parameter
+
+
+class Problem(BaseModel):
+    """An error (RFC 9457)."""
+
+    type: str = Field(description="about:blank: the status says which kind of error this is")
+    title: str
+    status: int
+    detail: str = Field(description="one sentence; an error of a parameter starts with its name")
+    parameter: str = Field(default="", description="the parameter at fault, where there is one")
+    closest: list[str] = Field(default=[], description="for an unknown material: the names most like it")
+
+
+class Alive(BaseModel):
+    """The process answers."""
+
+    status: str
+
+
+class Health(Alive):
+    """The store can be read."""
+
+    materials: int = Field(description="number of materials in the store")
+
+
+class Summary(BaseModel):
+    """One line of the catalogue; of a damaged material only `name`, `damaged` and `href`."""
+
+    name: str
+    title: str = ""
+    model: str = ""
+    model_title: str = ""
+    paper: str = Field(default="", description="key of the paper of the model, such as he1991")
+    source: str = Field(default="", description="paper and table, figure or section of the parameters")
+    anisotropic: bool | None = None
+    wavelength_range_nm: list[float] | None = Field(
+        default=None, description="first and last wavelength [nm]; null: grey"
+    )
+    error_p99: float | None = Field(
+        default=None, description="relative error that 99 of 100 values keep to; null: not measured"
+    )
+    verdict: str | None = Field(default=None, description="of the audit of this revision; null: it has none")
+    colour: str | None = Field(default=None, description="#rrggbb of its albedo under D65, at 45 degrees, to look at")
+    revision: str = ""
+    created: str | None = None
+    bytes: int | None = None
+    damaged: str | None = Field(default=None, description="what is wrong with its files")
+    href: str
+
+
+class Catalogue(BaseModel):
+    """Materials of the store, sorted by name."""
+
+    materials: list[Summary]
+    total: int = Field(description="materials that the filters let through, on all pages")
+    next: str | None = Field(description="address of the next page; null: this is the last")
+
+
+class ParameterDocument(BaseModel):
+    """A parameter of a model."""
+
+    name: str
+    value: float | bool
+    unit: str
+    meaning: str
+    source: str
+    assumed: bool = Field(description="the paper does not print it: our choice, explained in attributes.assumed")
+
+
+class Material(BaseModel):
+    """One material: where its table comes from, where it is sampled, how far to believe it."""
+
+    name: str
+    revision: str
+    title: str
+    model: str
+    parameters: list[ParameterDocument]
+    anisotropic: bool
+    wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")
+    axes_deg: dict[str, list[float]] = Field(description="the grid of the table [degrees]")
+    specular: bool = Field(description="whether there is a Dirac part: specular_reflectance is not 0 everywhere")
+    error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
+        description="the measured error of the table against its model, by bands of theta_i; null: not measured"
+    )
+    audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
+        description="verdict of each finding of the audit, and whether it is of this revision; null: none"
+    )
+    colour: str | None
+    attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
+        description="all that the table records of itself"
+    )
+    revisions: list[str] = Field(description="that are kept, oldest first")
+    links: dict[str, str]
+
+
+class Lookup(BaseModel):
+    """Values of a BRDF."""
+
+    material: str
+    revision: str
+    source: Literal["table", "model"]
+    unit: str = Field(description="unit of brdf and error: 1/sr")
+    output: Literal["spectrum", "xyz", "linear-srgb"]
+    illuminant: str | None = Field(description="of a colour; null of a spectrum")
+    wavelength_nm: float | list[float] | None = Field(description="wavelengths that were looked up [nm]; null: grey")
+    brdf: float | list[Any] = Field(
+        description="shape of the broadcast angles, then the wavelengths unless they are one number or null; of a "
+        "colour, then three numbers"
+    )
+    error: float | list[Any] | None = Field(
+        description="in the shape of brdf, 99 of 100 values are within that of the model; null: not asked for"
+    )
+    specular_reflectance: float | list[Any] = Field(
+        description="Dirac part, a reflectance without unit that is not in brdf: shape of theta_i, then as brdf"
+    )
+
+
+class Albedo(BaseModel):
+    """Directional albedo of a table: the share of light from theta_i that it reflects, averaged over phi_i."""
+
+    material: str
+    revision: str
+    wavelength_nm: list[float] | None = Field(description="null: grey")
+    theta_i: list[float] = Field(description="degrees")
+    albedo: list[list[float]] = Field(description="[theta_i][wavelength], without the Dirac part")
+    specular_reflectance: list[list[float]] = Field(description="[theta_i][wavelength], the Dirac part")
+    hemispherical: list[float] = Field(description="[wavelength], of light that is the same from everywhere, both")
+    error: float = Field(description="of albedo, the largest estimate of the integration")
+
+
+class Lobe(BaseModel):
+    """f_r for one light over viewers, or over half and difference angles: axes in degrees, and values over them."""
+
+    material: str
+    revision: str
+    source: Literal["table", "model"]
+    view: Literal["cut", "hemisphere", "half-difference"]
+    theta_i: float | None = Field(description="degrees; null of half-difference")
+    phi_i: float
+    output: Literal["spectrum", "xyz", "linear-srgb"]
+    illuminant: str | None
+    unit: str
+    wavelength_nm: float | list[float] | None
+    axes_deg: dict[str, list[float]] = Field(
+        description="of the axes of brdf, in order; in a cut theta_r is negative back towards the light; in a "
+        "hemisphere delta_phi is phi_r - phi_i"
+    )
+    brdf: list[Any]
+    specular_reflectance: float | list[float] | None
+
+
+class Audit(BaseModel):
+    """What the audit found of a material."""
+
+    material: str
+    revision: str = Field(description="that was audited")
+    current: bool = Field(description="whether that is the current one")
+    when: str
+    finding: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
+        description="MaterialAudit of schemas/audit.schema.json"
+    )
+
+
+def json_bytes(document: dict[str, Any]) -> bytes:
+    """JSON; numpy arrays may stand anywhere in `document` except as 0-d arrays."""
+    return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def json_response(document: dict[str, Any], headers: dict[str, str] | None = None) -> Response:
+    """A JSON answer, of what `json_bytes` takes."""
+    return Response(json_bytes(document), media_type=JSON, headers=headers)
+
+
+def npy_bytes(array: NDArray[Any]) -> bytes:
+    """An array as a .npy file."""
+    buffer = io.BytesIO()
+    np.save(buffer, array, allow_pickle=False)
+    return buffer.getvalue()
+
+
+class Encoded(dict[str, str]):
+    """Headers that many answers have in common, encoded once: it takes as long as the lookup of a point."""
+
+    @functools.cached_property
+    def raw(self) -> list[tuple[bytes, bytes]]:
+        """As they are sent."""
+        return [(name.lower().encode("latin-1"), value.encode("latin-1")) for name, value in self.items()]
+
+
+class EncodedResponse(Response):
+    """An answer with such headers, which name its media type, too."""
+
+    def __init__(self, content: bytes, headers: Encoded) -> None:
+        self.status_code, self.background, self.body = 200, None, content
+        self.raw_headers = [*headers.raw, (b"content-length", str(len(content)).encode())]
+
+
+@functools.lru_cache(maxsize=1024)
+def lookup_headers(tag: str | None, revision: str, kind: str, *, immutable: bool = False) -> Encoded:
+    """Of the answer to a lookup: by its tag, or None of what is not to be kept; which revision the numbers are of."""
+    cached = {"Cache-Control": "no-store"} if tag is None else cache_headers(tag, kind, immutable=immutable)
+    return Encoded({**cached, REVISION: revision, "Content-Type": NPY if kind == "npy" else JSON})
+
+
+def problem_response(
+    status: int,
+    detail: str,
+    parameter: str | None = None,
+    closest: Sequence[str] | None = None,
+    headers: dict[str, str] | None = None,
+) -> Response:
+    """An error as application/problem+json, with the members `parameter` and `closest` where they are known."""
+    problem: dict[str, Any] = {
+        "type": "about:blank",
+        "title": TITLES.get(status) or HTTPStatus(status).phrase,
+        "status": status,
+        "detail": detail.encode(errors="backslashreplace").decode(),  # paths may have what is no text
+    }
+    if parameter is not None:
+        problem["parameter"] = parameter
+    if closest is not None:
+        problem["closest"] = list(closest)
+    return Response(orjson.dumps(problem), status_code=status, media_type=PROBLEM_JSON, headers=headers)
+
+
+def plain(array: Any) -> Any:
+    """What orjson can write: a number for a 0-d array, contiguous memory for any other."""
+    if isinstance(array, np.ndarray):
+        return np.ascontiguousarray(array) if array.ndim else array.item()
+    return array
+
+
+def tag_of(table: Table) -> str:
+    """What an ETag says of a table: name, revision, and its content, as numbers begin anew with a new store."""
+    return f"{table.name}-{table.revision}-{table.digest[:16]}"
+
+
+def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> dict[str, str]:
+    """ETag and Cache-Control; of an address that names a revision, for good. JSON may be compressed: a weak tag."""
+    etag = f'W/"{tag}"' if kind == "json" else f'"{tag}-{kind}"'
+    kept = "public, max-age=31536000, immutable" if immutable else "no-cache"
+    return {"ETag": etag, "Cache-Control": kept, "Vary": "Accept"}
+
+
+def not_modified(held: str | None, headers: dict[str, str]) -> Response | None:
+    """The 304 of a client that already holds the answer with these headers, None for any other."""
+    if held is None:
+        return None
+    tags = {tag.strip().removeprefix("W/") for tag in held.split(",")}
+    return Response(status_code=304, headers=headers) if tags & {headers["ETag"].removeprefix("W/"), "*"} else None

@@ -1,0 +1,79 @@
+"""Colours of what is looked up: XYZ and linear sRGB under a named illuminant, and a swatch of a whole material."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.parameters import Floats
+from brdfdb.spectra import check_illuminant, colour_science, covers_visible, srgb_weights, xyz_weights
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+Colour = Literal["xyz", "linear-srgb"]
+
+_WAVELENGTHS = 1000  # of a colour that is asked for: its weights take the square of their number
+_LIGHT_DEG = 45.0  # of the swatch
+_SAMPLES = 256  # of what it leaves
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
+
+def weights(colour: Colour, wavelength_nm: NDArray[np.float64] | None, illuminant: str) -> NDArray[np.float64]:
+    """Weights (L, 3) from a spectrum to a colour, (1, 3) of a grey material; white is Y = 1, or (1, 1, 1).
+
+    Raises
+    ------
+    ValueError
+        For an unknown illuminant, with the closest names; for more than 1000 wavelengths [nm],
+        or such that make no colour.
+    """
+    check_illuminant(illuminant)
+    if wavelength_nm is not None and wavelength_nm.size > _WAVELENGTHS:
+        raise ValueError(
+            f"wavelength_nm: {wavelength_nm.size} wavelengths are more than the {_WAVELENGTHS} that a colour is of"
+        )
+    if wavelength_nm is not None and not covers_visible(wavelength_nm):
+        raise ValueError(
+            "wavelength_nm: a colour needs increasing wavelengths from 420 nm or less to 680 nm or more in steps of at "
+            "most 20 nm"
+        )
+    # a grey material is a flat spectrum: any wavelengths sum to the same
+    at = (380.0, 780.0) if wavelength_nm is None else tuple(wavelength_nm.tolist())
+    found = (xyz_weights if colour == "xyz" else srgb_weights)(at, illuminant)
+    return found.sum(axis=0, keepdims=True) if wavelength_nm is None else found
+
+
+def coloured(values: Floats, of: NDArray[np.float64], *, grey: bool) -> Floats:
+    """Colours (..., 3) of spectra (..., L), or of grey values (...)."""
+    whole = np.asarray(values)
+    return np.asarray((whole[..., np.newaxis] if grey else whole) @ of)
+
+
+def swatch(table: Table) -> str:
+    """The colour of a table under D65 as ``#rrggbb``: of what it leaves of a light at 45 degrees, Dirac part included.
+
+    Grey where its wavelengths make no colour. To look at: the albedo is a mean over few directions.
+    """
+    from brdfdb.integrals.sampling import sample
+    from brdfdb.tables.albedo import material_of
+
+    material = material_of(table)
+    wi = unit_vector(radians(_LIGHT_DEG), 0.0)
+    number = np.arange(_SAMPLES) + 0.5
+    spectrum = material.arguments(table.wavelength_nm)
+    middle = {name: np.ravel(value)[np.size(value) // 2] for name, value in spectrum.items()}
+    drawn = sample(material.spec, number / _SAMPLES, number * _GOLDEN % 1.0, wi, **middle)
+    cosine = np.maximum(drawn.wr[:, 2], 0.0)
+    weight = np.divide(cosine, drawn.pdf, out=np.zeros(_SAMPLES), where=drawn.pdf > 0.0) / _SAMPLES
+    f_r = np.asarray(table.lookup_vectors(wi, drawn.wr)).reshape(_SAMPLES, -1)
+    reflected = weight @ f_r + np.ravel(table.specular_reflectance(radians(_LIGHT_DEG)))
+    if table.wavelength_nm is not None and covers_visible(table.wavelength_nm):
+        rgb = reflected @ srgb_weights(tuple(table.wavelength_nm.tolist()))
+    else:
+        rgb = np.full(3, reflected.mean())
+    encoded = colour_science().cctf_encoding(np.clip(rgb, 0.0, 1.0), function="sRGB")
+    return "#" + "".join(f"{round(255.0 * value):02x}" for value in encoded.tolist())

@@ -1,0 +1,250 @@
+"""What is served: a store that may change or vanish meanwhile, what lists show of it, and the verdicts of its audit."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import threading
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+import orjson
+
+from brdfdb.store.manifest import check_manifest, read_json
+from brdfdb.store.reader import Store, StoreError, UnknownMaterialError
+from brdfdb_api.serving.colours import swatch
+from brdfdb_api.serving.settings import Settings
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+COLOURED_BYTES = 16 * 2**20  # a larger table is not decoded only to show its colour in a list
+
+IDLE_S = 1.0  # that the thread which finds colours waits for more
+WARMED = 100  # materials whose colours are found when a server starts
+
+
+class Verdict(NamedTuple):
+    """What the audit says of a material: the finding, when, and whether it is about the current revision."""
+
+    finding: dict[str, Any]
+    when: str
+    current: bool
+
+
+class Shelf:
+    """The materials that an application serves.
+
+    Parameters
+    ----------
+    settings : Settings
+        Where the store is.
+    store : Store, optional
+        An open one. By default it is opened when it is first needed, so that there may be none yet.
+    """
+
+    def __init__(self, settings: Settings, store: Store | None = None) -> None:
+        self._settings = settings
+        self._root = settings.store.absolute()  # as it is now, not when the store is opened
+        self._store = store
+        self._seen: set[str] = set()
+        self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
+        self._colours: dict[str, tuple[str, str | None]] = {}
+        self._audit: tuple[tuple[int, int], dict[str, Any]] | None = None
+        self._lock = threading.Lock()
+        self._waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._painter: threading.Thread | None = None
+        self._swatches: WeakKeyDictionary[Table, str | None] = WeakKeyDictionary()
+        self._closed = False
+        self.warming = False  # kernels are being loaded, which takes half a minute where they are compiled
+
+    @property
+    def store(self) -> Store:
+        """The store; StoreError where there is none."""
+        if self._store is None:
+            self._store = Store(self._root, self._settings.cache_bytes, snapshot=self._settings.snapshot)
+        return self._store
+
+    def held(self, name: str) -> Table | None:
+        """The current table of a material if it is decoded already, without a wait; None else, and `table` says why."""
+        try:
+            return self.store.held(name)
+        except StoreError:
+            return None
+
+    def table(self, name: str, revision: str | None = None) -> Table:
+        """The table of a material, of its current revision or another.
+
+        Raises
+        ------
+        UnknownMaterialError, UnknownRevisionError
+            If there is none.
+        StoreError
+            If it cannot be read, or was there and is gone; the sentence names the material.
+        """
+        try:
+            found = self.store[name] if revision is None else self.store.table(name, revision)
+        except (UnknownMaterialError, StoreError) as error:
+            raise self._named(name, error) from error
+        self._seen.add(name)
+        return found
+
+    def head(self, name: str) -> str:
+        """The current revision of a material; errors as by `table`."""
+        try:
+            return self.store.head(name)
+        except (UnknownMaterialError, StoreError) as error:
+            raise self._named(name, error) from error
+
+    def _named(self, name: str, error: Exception) -> Exception:
+        """An error of a material that was served before is one of the store, and names it."""
+        if isinstance(error, UnknownMaterialError) and name not in self._seen:
+            return error
+        if isinstance(error, UnknownMaterialError):
+            return StoreError(f"{name} is gone from the store")
+        return error if name in str(error) else StoreError(f"{name} cannot be read: {error}")
+
+    def names(self) -> list[str]:
+        """The names of all materials, sorted."""
+        names = list(self.store)
+        self._seen.update(names)
+        return names
+
+    def summary(self, name: str) -> dict[str, Any]:
+        """What lists show of a material; of a damaged one its name and a sentence."""
+        try:
+            group, digest, head = self.store.current(name)
+            known = self._summaries.get(name)
+            if known is None or known[0] != digest:
+                known = self._summaries[name] = digest, _described(name, group, digest, head)
+        except (UnknownMaterialError, StoreError) as error:
+            return {"name": name, "damaged": str(error), "href": f"/v1/materials/{name}"}
+        verdict = self.verdict(name)
+        found, colour = self._colours.get(name, ("", None))
+        return {
+            **known[1],
+            "verdict": verdict.finding["verdict"] if verdict and verdict.current else None,
+            "colour": colour if found == digest else None,
+        }
+
+    def colour(self, names: Iterable[str]) -> None:
+        """Have the colours of materials found, one after the other by a thread: they take a decoded table each."""
+        for name in names:
+            self._waiting.put(name)
+        with self._lock:
+            if not self._closed and (self._painter is None or not self._painter.is_alive()):
+                self._painter = threading.Thread(target=self._paint, daemon=True)
+                self._painter.start()
+
+    def _paint(self) -> None:
+        while not self._closed:
+            try:
+                name = self._waiting.get(timeout=IDLE_S)
+            except queue.Empty:
+                return
+            with contextlib.suppress(UnknownMaterialError, StoreError):
+                self.paint(name)
+
+    def close(self) -> None:
+        """End the thread that finds colours: decoding while the interpreter ends leaves a warning."""
+        with self._lock:
+            self._closed = True
+            painter = self._painter
+        if painter is not None:
+            self._waiting.put("")  # it may wait for a name
+            painter.join()
+
+    def paint(self, name: str) -> None:
+        """Find the colour of a material for lists, unless it is known or the table is large; errors as of the store."""
+        _, digest, head = self.store.current(name)
+        if self._colours.get(name, ("",))[0] == digest:
+            return
+        if (head.get("bytes") or 0) > COLOURED_BYTES:
+            self._colours[name] = digest, None
+        else:
+            table = self.store[name]
+            self._colours[name] = table.digest, self.swatch(table)
+
+    def swatch(self, table: Table) -> str | None:
+        """The colour of a table, found once; None of a model that this program does not know."""
+        if table not in self._swatches:
+            try:
+                self._swatches[table] = swatch(table)
+            except ValueError:
+                self._swatches[table] = None
+        return self._swatches[table]
+
+    def warm(self) -> None:
+        """Load the kernels of lookups, then find the colours that the first page of a list shows."""
+        self.warming = True
+        try:
+            with contextlib.suppress(UnknownMaterialError, StoreError):
+                names = self.names()
+                for name in names[:1]:
+                    self.store[name].lookup(0.0, 0.0, 0.0, 0.0)
+                self.colour(names[:WARMED])
+        finally:
+            self.warming = False
+
+    def verdict(self, name: str) -> Verdict | None:
+        """What the last audit says of a material; None where there is none, or its report cannot be read."""
+        report = self._report()
+        found = report["by_name"].get(name)
+        if found is None:
+            return None
+        return Verdict(found, report["when"], found["revision"] == self.head(name))
+
+    def _report(self) -> dict[str, Any]:
+        path = self._settings.audit_file
+        try:
+            at = os.stat(path)
+        except OSError:
+            return {"when": "", "by_name": {}}
+        seen = at.st_mtime_ns, at.st_size
+        with self._lock:
+            if self._audit is None or self._audit[0] != seen:
+                self._audit = seen, _read(path)
+            return self._audit[1]
+
+
+def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> dict[str, Any]:
+    """A line of a list, of one revision."""
+    check_manifest(group, digest, contents=False)
+    attributes = read_json(group / "zarr.json")["attributes"]
+    return {
+        "name": name,
+        "title": attributes["title"],
+        "model": attributes["model"],
+        "model_title": attributes.get("model_title", attributes["model"]),
+        "paper": attributes.get("model_reference", ""),
+        "source": attributes["source"],
+        "anisotropic": attributes["anisotropic"],
+        "wavelength_range_nm": attributes["wavelength_range_nm"] or None,
+        "error_p99": head.get("error_p99"),
+        "revision": group.name,
+        "created": head.get("created"),
+        "bytes": head.get("bytes"),
+        "href": f"/v1/materials/{name}",
+    }
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """The findings of a report by material; none of a file that is no report."""
+    try:
+        report = orjson.loads(path.read_bytes())
+        by_name = {each["material"]: each for each in report["materials"] if _complete(each)}
+        return {"when": str(report["when"]), "by_name": by_name}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {"when": "", "by_name": {}}
+
+
+def _complete(finding: Any) -> bool:
+    """Whether a finding has what is shown of it."""
+    try:
+        shown = (finding["revision"], finding["verdict"], finding["energy"]["reason"], finding["validity"]["standing"])
+    except (KeyError, TypeError):
+        return False
+    return all(isinstance(each, str) for each in shown)

@@ -1,0 +1,1 @@
+"""Every form of a material, and their speed against their accuracy."""

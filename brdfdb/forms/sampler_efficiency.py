@@ -1,0 +1,150 @@
+"""Efficiency of samplers: the variance of Monte Carlo estimates, times the time that a sample takes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.sampling import sample
+from brdfdb.materials import Material
+
+Array = NDArray[np.float64]
+
+SAMPLERS = {
+    "model": "the model's own: its lobe and cosine",
+    "cosine": "cosine of the polar angle",
+    "uniform": "uniform over the hemisphere",
+}
+THETA_DEG = 60.0  # of the light, where the albedo is estimated
+SAMPLES = 1 << 15  # of an estimate in a round
+ROUNDS = 9
+PER_POINT = 4  # samples of a point of the sphere: their variance is the noise, not what differs from point to point
+SEED = 1994
+
+# Light on the sphere, radiance: a sky that brightens upwards, and a lamp about 20 degrees wide, ahead and to the right
+_SKY, _LAMP, _SHARPNESS = 0.2, 5.0, 20.0
+_LAMP_AT = np.array([0.6, 0.4, np.sqrt(1.0 - 0.6**2 - 0.4**2)])
+
+Draw = Callable[[Array, Array, Array], tuple[Array, Array]]
+
+
+class Work(NamedTuple):
+    """Noise and time of a sampler, a number for each round: shape (rounds,).
+
+    `mean` is the estimate, `variance` [1] that of one sample over the square of the mean, `seconds` the time of one
+    sample on the processor.
+    """
+
+    mean: Array
+    variance: Array
+    seconds: Array
+
+    @property
+    def seconds_to_percent(self) -> Array:
+        """Time [s] to an estimate with a standard deviation of 1 %, for each round."""
+        return 1e4 * self.variance * self.seconds
+
+
+def works(
+    material: Material,
+    wavelength_nm: float | None,
+    *,
+    rounds: int = ROUNDS,
+    samples: int = SAMPLES,
+    clock: Callable[[], float] = time.process_time,
+) -> dict[str, tuple[Work, Work]]:
+    """Measure what samplers need for an estimate of the directional albedo, and of the picture of a lit sphere.
+
+    Parameters
+    ----------
+    material : Material
+        Of any model. Its own model is sampled, without the specular part.
+    wavelength_nm : float [nm] or None
+        Of a spectral material.
+    rounds : int
+        Each has random numbers of its own, which all samplers share.
+    samples : int
+        Of an estimate in a round.
+    clock : callable
+        Gives seconds.
+
+    Returns
+    -------
+    dict
+        For each of `SAMPLERS`, the work of the albedo and that of the sphere.
+
+    Notes
+    -----
+    The albedo is that of light from `THETA_DEG`. The sphere is seen from afar under a sky and a lamp; the variance is
+    the mean over its points of that of a point. Random numbers are drawn before the clock starts. Seeds are fixed:
+    means and variances are the same in every run.
+    """
+    arguments = material.arguments(None if wavelength_nm is None else np.array([wavelength_nm]))
+    parameters = {name: np.ravel(value)[0] if np.ndim(value) else value for name, value in arguments.items()}
+    draws = _draws(material, parameters)
+    numbers = np.empty((len(draws), 2, 3, rounds))
+    for row in range(rounds):
+        for problem, estimate in enumerate((_albedo, _sphere)):
+            u = np.random.default_rng([SEED, row]).random((4, samples))
+            for number, draw in enumerate(draws.values()):
+                if row == 0:
+                    estimate(draw, u[:, :256])  # compile
+                start = clock()
+                found = estimate(draw, u)
+                seconds = (clock() - start) / samples
+                mean = found.mean()
+                spread = found.var() if problem == 0 else found.var(axis=1, ddof=1).mean()
+                numbers[number, problem, :, row] = mean, spread / mean**2 if mean > 0.0 else 0.0, seconds
+    return {key: (Work(*numbers[number, 0]), Work(*numbers[number, 1])) for number, key in enumerate(draws)}
+
+
+def _draws(material: Material, parameters: dict[str, Any]) -> dict[str, Draw]:
+    """Return, for each sampler, a function of u1, u2 and directions of light: new directions, f_r cos over density."""
+    spec = material.spec
+
+    def of_model(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
+        drawn = sample(spec, u1, u2, wi, **parameters)
+        return drawn.wr, drawn.weight
+
+    def of_cosine(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
+        wr = _around(np.sqrt(u1), np.sqrt(1.0 - u1), u2)
+        return wr, np.asarray(np.pi * spec.vectors(wi, wr, **parameters), dtype=np.float64)
+
+    def uniformly(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
+        wr = _around(np.sqrt(u1 * (2.0 - u1)), 1.0 - u1, u2)
+        return wr, np.asarray(2.0 * np.pi * wr[:, 2] * spec.vectors(wi, wr, **parameters), dtype=np.float64)
+
+    return dict(zip(SAMPLERS, (of_model, of_cosine, uniformly), strict=True))
+
+
+def _around(sin_theta: Array, cos_theta: Array, u2: Array) -> Array:
+    angle = 2.0 * np.pi * u2
+    return np.stack([sin_theta * np.cos(angle), sin_theta * np.sin(angle), cos_theta], axis=-1)
+
+
+def _albedo(draw: Draw, u: Array) -> Array:
+    """Return samples (N,) of the directional albedo [1]."""
+    wi = np.broadcast_to(unit_vector(radians(THETA_DEG), 0.0), (u.shape[1], 3))
+    return draw(u[0], u[1], wi)[1]
+
+
+def _sphere(draw: Draw, u: Array) -> Array:
+    """Return samples (points, `PER_POINT`) of the radiance of points of a sphere, seen along z from afar."""
+    points = u.shape[1] // PER_POINT
+    radius, angle = np.sqrt(u[2, :points]), 2.0 * np.pi * u[3, :points]
+    n = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.sqrt(1.0 - radius**2)], axis=-1)
+    # the tangent runs level around the sphere
+    level = np.hypot(n[:, 0], n[:, 2])
+    t = np.stack([n[:, 2] / level, np.zeros(points), -n[:, 0] / level], axis=-1)
+    b = np.cross(n, t)
+    viewer = np.stack([t[:, 2], b[:, 2], n[:, 2]], axis=-1)
+    t, b, n, viewer = (np.repeat(each, PER_POINT, axis=0) for each in (t, b, n, viewer))
+    light, weight = draw(u[0, : len(n)], u[1, : len(n)], viewer)
+    world = light[:, :1] * t + light[:, 1:2] * b + light[:, 2:] * n
+    sky = _SKY * (1.0 + world[:, 1])
+    return np.asarray(weight * (sky + _LAMP * np.exp(_SHARPNESS * (world @ _LAMP_AT - 1.0)))).reshape(points, PER_POINT)

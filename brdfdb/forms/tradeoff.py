@@ -1,0 +1,340 @@
+"""Speed against accuracy: every representation of a material, or along a family, its error, its cost, the best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.forms import sampler_efficiency, timing
+from brdfdb.forms.catalogue import SPECTRAL_TOLERANCES, Representation, of_family, representations
+from brdfdb.forms.tradeoff_document import (
+    Between,
+    Chart,
+    Cost,
+    Curve,
+    FamilyChart,
+    Fronts,
+    Point,
+    Sampler,
+    Saving,
+    Work,
+)
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+from brdfdb.store.family import Family, Sweep
+from brdfdb.tables import error_measurement
+
+DIRECTIONS = 1000  # of each band of theta_i
+SEED = 1992
+BLOCK = 256  # directions of a call between one and many
+SINGLES = 21  # rounds of calls of one direction, and of `BLOCK`
+TIMED = timing.ROUNDS + 2 * SINGLES  # steps of timing, as `tick` counts them
+STEPS = 4 + TIMED  # of a chart
+SHARE, CONFIDENCE = 0.99, 0.95  # the percentile that is charted, and the confidence of its interval
+
+
+def chart(
+    material: Material,
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerances: Sequence[float] | None = None,
+    *,
+    also: Sequence[Representation] = (),
+    tick: Callable[[], None] = lambda: None,
+) -> Chart:
+    """Measure error and cost of every representation of a material.
+
+    Parameters
+    ----------
+    material : Material
+        Of any model.
+    wavelength_nm : array of shape (L,) [nm], or None
+        For spectral materials, and only for them.
+    tolerances : sequence of float, optional
+        Of planned tables, as `representations` takes them.
+    also : sequence of Representation
+        More of them, at the same wavelengths: a table of a store.
+    tick : callable
+        Called `STEPS` times.
+
+    Returns
+    -------
+    Chart
+        Errors are those that tables state, at directions of their own: see `brdfdb.tables.error_measurement`.
+
+    Raises
+    ------
+    ValueError
+        If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
+    """
+    forms = [*representations(material, wavelength_nm, tolerances), *also]
+    tick()
+    drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+    errors = _errors(forms, drawn)
+    tick()
+    batch, block, single = _timed(forms, drawn, tick)
+    mixed = timing.mixed_times(forms, drawn.wi[drawn.above], drawn.wr[drawn.above])
+    tick()
+    middle = None if wavelength_nm is None else float(wavelength_nm[wavelength_nm.size // 2])
+    samplers = [
+        Sampler(key=key, title=sampler_efficiency.SAMPLERS[key], albedo=_work(albedo), sphere=_work(sphere))
+        for key, (albedo, sphere) in sampler_efficiency.works(material, middle).items()
+    ]
+    tick()
+    seconds = np.stack([each.seconds for each in batch], axis=1)
+    rungs = [number for number, form in enumerate(forms) if form.kind in ("exact", "quadrature") and not form.rounded]
+
+    def front(costs: Floats) -> list[str]:
+        return _front(forms, [error["l1"] for error in errors], costs)
+
+    return Chart(
+        material=material.name,
+        title=material.title,
+        model=material.model,
+        parameters=material.file_parameters(),
+        wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
+        directions=int(np.count_nonzero(drawn.above)),
+        truth=forms[0].key,
+        points=[
+            Point(
+                **_described(form, batch[number], block[number], single[number]),
+                **errors[number],
+                **_against(number, rungs, errors, seconds, forms),
+                mixed=_cost(mixed[number]),
+            )
+            for number, form in enumerate(forms)
+        ],
+        ladder=[forms[number].key for number in sorted(rungs, key=lambda number: errors[number]["l1"])],
+        fronts=Fronts(
+            batch=front(seconds),
+            single=front(np.stack([each.seconds for each in single], axis=1)),
+            bytes=front(np.array([[form.bytes for form in forms]], dtype=np.float64)),
+        ),
+        samplers=samplers,
+    )
+
+
+def _against(
+    number: int,
+    rungs: Sequence[int],
+    errors: Sequence[dict[str, Any]],
+    seconds: Floats,
+    forms: Sequence[Representation],
+) -> dict[str, Any]:
+    """The cheapest rung that is as accurate as a form, and the ratio of their times: fields of a `Point`."""
+    if forms[number].kind in ("exact", "quadrature"):
+        return {"rung": None, "saving": None}
+    own = errors[number]
+    as_good = [each for each in rungs if errors[each]["l1"] <= own["l1"] and errors[each]["p99"] <= own["p99"]]
+    rung = min(as_good, key=lambda each: float(np.median(seconds[:, each])))
+    ratios = seconds[:, rung] / seconds[:, number]
+    low, middle, high = (float(f"{ratio:.3g}") for ratio in np.percentile(ratios, [25.0, 50.0, 75.0]).tolist())
+    return {"rung": forms[rung].key, "saving": Saving(low=low, times=middle, high=high)}
+
+
+def _work(work: sampler_efficiency.Work) -> Work:
+    low, middle, high = np.percentile(1e3 * work.seconds_to_percent, [25.0, 50.0, 75.0]).tolist()
+    numbers = (float(np.median(work.variance)), 1e9 * float(np.median(work.seconds)), low, middle, high)
+    return Work(**dict(zip(Work.model_fields, (float(f"{n:.3g}") for n in numbers), strict=True)))
+
+
+def chart_family(
+    sweep: Sweep,
+    materials: Sequence[Material],
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerances: Sequence[float] | None = None,
+    *,
+    family: Family | None = None,
+    tick: Callable[[], None] = lambda: None,
+) -> FamilyChart:
+    """Measure the error of every representation at every member of a family, and the cost of each at one of them.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        The family.
+    materials : sequence of Material
+        Its members, in order.
+    wavelength_nm : array of shape (L,) [nm], or None
+        For spectral materials, and only for them.
+    tolerances : sequence of float, optional
+        Of planned tables, as `representations` takes them; by default 0.1 and 0.01.
+    family : Family, optional
+        As the store has it: its lookups between members are measured, too.
+    tick : callable
+        Called once for each member, and `TIMED` times.
+
+    Returns
+    -------
+    FamilyChart
+        Errors of members as `chart` measures them.
+
+    Raises
+    ------
+    ValueError
+        If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the materials.
+    StoreError
+        If a member of `family` was built anew since it was recorded.
+    """
+    tolerances = SPECTRAL_TOLERANCES if tolerances is None else tolerances
+    middle = len(materials) // 2
+    kept: dict[str, tuple[int, Representation]] = {}  # of each key the one next to the middle, which is timed
+    errors: list[dict[str, dict[str, Any]]] = []
+    for number, material in enumerate(materials):
+        forms = representations(material, wavelength_nm, tolerances)
+        drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+        errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
+        for form in forms:
+            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
+                kept[form.key] = number, form
+        tick()
+    timed = [form for _, form in kept.values()]
+    between = None if family is None else of_family(family)
+    drawn = error_measurement.draw(materials[middle], wavelength_nm, DIRECTIONS, SEED)
+    batch, block, single = _timed([*timed, *([between] if between else [])], drawn, tick)
+    seconds = np.stack([each.seconds for each in batch], axis=1)
+    fronts = []
+    for found in errors:
+        here = [index for index, form in enumerate(timed) if form.key in found]
+        some = [timed[index] for index in here]
+        fronts.append(_front(some, [found[form.key]["l1"] for form in some], seconds[:, here]))
+    return FamilyChart(
+        family=sweep.name,
+        title=sweep.title,
+        model=sweep.model,
+        axes=sweep.axes,
+        members=sweep.members,
+        g=_g(materials, wavelength_nm),
+        wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
+        truth=timed[0].key,
+        curves=[
+            Curve(
+                **_described(form, *costs),
+                timed=sweep.members[number],
+                l1=[found[form.key]["l1"] if form.key in found else None for found in errors],
+                p99=[found[form.key]["p99"] if form.key in found else None for found in errors],
+            )
+            for (number, form), *costs in zip(kept.values(), batch, block, single, strict=False)
+        ],
+        between=None
+        if family is None or between is None
+        else Between(
+            **_described(between, batch[-1], block[-1], single[-1]),
+            l1=family.error.overall.l1,
+            p99=family.error.overall.p99,
+        ),
+        fronts=fronts,
+    )
+
+
+def _g(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> list[float] | None:
+    """Eq. 79 of He et al. along the normal, where nothing is hidden and sigma is sigma_0; None of other models."""
+    if materials[0].model != "he_torrance" or wavelength_nm is None:
+        return None
+    middle_um = 1e-3 * float(wavelength_nm[wavelength_nm.size // 2])
+    return [float(f"{(4.0 * np.pi * m.parameters['sigma_0_um'] / middle_um) ** 2:.3g}") for m in materials]
+
+
+def _timed(
+    forms: Sequence[Representation], drawn: error_measurement.Draw, tick: Callable[[], None]
+) -> tuple[list[timing.Times], list[timing.Times], list[timing.Times]]:
+    """Return the costs of calls with many directions, with a block of them, and with one."""
+    mixed = np.random.default_rng(SEED).permutation(np.flatnonzero(drawn.above))  # few of them are as mixed as all
+    wi, wr = drawn.wi[mixed], drawn.wr[mixed]
+    batch = timing.times(forms, wi, wr, rounds=timing.ROUNDS, tick=tick)
+    block, single = (timing.times(forms, wi, wr, most=most, rounds=SINGLES, tick=tick) for most in (BLOCK, 1))
+    return batch, block, single
+
+
+def _front(forms: Sequence[Representation], l1: Sequence[float], costs: Floats) -> list[str]:
+    """Keys of the forms worth having, of which costs has a column each."""
+    # black is free, and has an l1 of 1
+    rivals = [
+        index
+        for index, (form, error) in enumerate(zip(forms, l1, strict=True))
+        if form.kind != "other model" and error < 1.0
+    ]
+    return [forms[rivals[index]].key for index in timing.front([l1[index] for index in rivals], costs[:, rivals])]
+
+
+def _described(form: Representation, batch: timing.Times, block: timing.Times, single: timing.Times) -> dict[str, Any]:
+    """The fields of a `Form`."""
+    return {
+        "key": form.key,
+        "title": form.title,
+        "kind": form.kind,
+        "python": form.python,
+        "dtype": "float32" if form.dtype is np.float32 else "float64",
+        "bytes": form.bytes,
+        "batch": _cost(batch),
+        "block": _cost(block),
+        "single": _cost(single),
+    }
+
+
+def _errors(forms: Sequence[Representation], drawn: error_measurement.Draw) -> list[dict[str, Any]]:
+    """Of each form against the first one: the errors of a `Point`, to three digits."""
+    truth = forms[0].evaluate(drawn.wi, drawn.wr)
+    classes = error_measurement.classes(drawn)
+    rows = []
+    for form in forms:
+        given = drawn.wi.astype(form.dtype), drawn.wr.astype(form.dtype)
+        found = truth if form is forms[0] else form.evaluate(*given).astype(np.float64)
+        overall = error_measurement.compare(found, truth, drawn, SEED).overall
+        parts = {
+            name: float(f"{error_measurement.mean_error(found, truth, np.where(some, drawn.weight, 0.0)).max():.3g}")
+            for name, some in classes.items()
+        }
+        low, high = _tail(
+            error_measurement.relative(found, truth, error_measurement.floor_of(truth, drawn))[drawn.above]
+        )
+        rows.append({"l1": overall.l1, "p99": overall.p99, "p99_low": low, "p99_high": high, **parts})
+    return rows
+
+
+def _tail(errors: Floats) -> tuple[float, float | None]:
+    """Confidence interval of the 99th percentile of errors (N, L), at the worst wavelength: two of the errors.
+
+    Directions count as independent. They are stratified in theta_i, which makes the interval wider than it need be.
+    """
+    worst = np.sort(errors[:, int(np.argmax(np.percentile(errors, 100.0 * SHARE, axis=0)))])
+    low, high = ranks(len(worst), SHARE, CONFIDENCE)
+    at = [None if rank > len(worst) else float(f"{worst[max(rank, 1) - 1]:.3g}") for rank in (low, high)]
+    return at[0] or 0.0, at[1]
+
+
+def ranks(count: int, share: float, confidence: float) -> tuple[int, int]:
+    """Return ranks, from 1, of the order statistics that enclose a quantile with a confidence, by the binomial law.
+
+    Parameters
+    ----------
+    count : int
+        Number of independent draws.
+    share : float [1]
+        Of the distribution below the quantile, in (0, 1).
+    confidence : float [1]
+        At least, in (0, 1).
+
+    Returns
+    -------
+    tuple of int
+        Rank 0 stands for no lower bound, and count + 1 for no upper one.
+    """
+    k = np.arange(count + 1)
+    log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, count + 1)))])
+    log_pmf = (
+        log_factorial[-1] - log_factorial - log_factorial[::-1] + k * np.log(share) + (count - k) * np.log1p(-share)
+    )
+    below = np.cumsum(np.exp(log_pmf))  # probability that k draws or fewer are below the quantile
+    # P(the draw of rank r > quantile) = P(fewer than r below) = below[r - 1]
+    rest = 0.5 * (1.0 - confidence)
+    low = int(np.searchsorted(below, rest, side="right"))
+    high = int(np.searchsorted(below, 1.0 - rest, side="left")) + 1
+    return low, min(high, count + 1)
+
+
+def _cost(times: timing.Times) -> Cost:
+    low, middle, high = (float(f"{ns:.3g}") for ns in times.quartiles_ns)
+    return Cost(ns=middle, low=low, high=high, directions=times.directions)

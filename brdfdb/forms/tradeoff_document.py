@@ -1,0 +1,172 @@
+"""Charts of speed against accuracy as data: forms, their errors and costs, fronts, ladders and samplers."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from brdfdb.forms.catalogue import Kind
+from brdfdb.materials.provenance import Number
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class Cost(BaseModel):
+    """Time of an evaluation on a processor of the machine of the chart, on one thread."""
+
+    model_config = _STRICT
+
+    ns: float = Field(description="median over all rounds, of a value of f_r: one direction, one wavelength")
+    low: float = Field(description="lower quartile")
+    high: float = Field(description="upper quartile")
+    directions: int = Field(description="evaluated at once")
+
+
+class Form(BaseModel):
+    """A representation, and what it costs."""
+
+    model_config = _STRICT
+
+    key: str
+    title: str
+    kind: Kind
+    python: str = Field(description="what it is called in Python")
+    dtype: Literal["float64", "float32"]
+    bytes: int = Field(description="of the numbers that an evaluation reads")
+    batch: Cost = Field(description="of 100 000 directions at once, fewer of slow forms")
+    block: Cost = Field(description="of 256 directions at once")
+    single: Cost = Field(description="of one direction")
+
+
+class Saving(BaseModel):
+    """A ratio of times within rounds."""
+
+    model_config = _STRICT
+
+    low: float = Field(description="lower quartile")
+    times: float = Field(description="median")
+    high: float = Field(description="upper quartile")
+
+
+class Point(Form):
+    """A representation: errors are relative to the truth, at the worst wavelength."""
+
+    l1: float = Field(description="mean of abs(f_r - truth) over that of the truth, weighted with the cosine")
+    p99: float = Field(description="99th percentile of abs(f_r - truth) / max(truth, floor)")
+    p99_low: float = Field(description="lower end of the 95 % confidence interval of p99, an order statistic")
+    p99_high: float | None = Field(description="upper end; null where the directions are too few to give one")
+    forward: float = Field(description="l1 of viewers within 45 degrees of the azimuth of the mirror direction")
+    back: float = Field(description="l1 of viewers within 45 degrees of the azimuth of the light")
+    grazing: float = Field(description="l1 where light or viewer is beyond 75 degrees")
+    mixed: Cost = Field(
+        description="of 64 materials in turn, 32 directions of each, read from memory and not from caches"
+    )
+    rung: str | None = Field(
+        description="key of the cheapest rung of the truth as accurate in l1 and p99; null of the truth and its rungs"
+    )
+    saving: Saving | None = Field(description="time of that rung over the time of this form, in batches")
+
+
+class Work(BaseModel):
+    """Noise and time of a Monte Carlo estimate."""
+
+    model_config = _STRICT
+
+    variance: float = Field(description="of one sample, over the square of the mean; median over rounds")
+    ns: float = Field(description="of one sample; median over rounds")
+    low_ms: float = Field(description="to a standard deviation of 1 %, variance times time: lower quartile over rounds")
+    ms: float = Field(description="median")
+    high_ms: float = Field(description="upper quartile")
+
+
+class Sampler(BaseModel):
+    """A way to draw directions, for the model of the material at its middle wavelength, without the specular part."""
+
+    model_config = _STRICT
+
+    key: str
+    title: str
+    albedo: Work = Field(description="of the directional albedo of light from 60 degrees")
+    sphere: Work = Field(description="of the picture of a sphere under a sky and a lamp about 20 degrees wide")
+
+
+class Fronts(BaseModel):
+    """Keys of the points worth having, the most accurate (l1) first, each clearly cheaper than the one before.
+
+    Models that are meant to differ are not among them, nor what is further off than black would be.
+    """
+
+    model_config = _STRICT
+
+    batch: list[str]
+    single: list[str]
+    bytes: list[str]
+
+
+class Chart(BaseModel):
+    """One material."""
+
+    model_config = _STRICT
+
+    material: str
+    title: str
+    model: str
+    parameters: dict[str, Number] = Field(description="angles in degrees, under names that end in _deg")
+    wavelength_nm: list[float] | None
+    directions: int = Field(description="that errors are measured at")
+    truth: str = Field(description="key of the point that the others are compared with")
+    points: list[Point]
+    ladder: list[str] = Field(description="keys of the truth and of its rungs, the most accurate (l1) first")
+    fronts: Fronts
+    samplers: list[Sampler]
+
+
+class Curve(Form):
+    """A representation along a family: errors as those of a point, bytes and cost those of one member."""
+
+    timed: str = Field(description="the member: of those that have this form, the one next to the middle of the family")
+    l1: list[float | None] = Field(description="of each member; null where there is no such form")
+    p99: list[float | None]
+
+
+class Between(Form):
+    """Lookups between the members of a family in a store, timed in its middle."""
+
+    l1: float = Field(description="as the family states it, over all its parameters")
+    p99: float
+
+
+class FamilyChart(BaseModel):
+    """A family: which form is right where in it."""
+
+    model_config = _STRICT
+
+    family: str
+    title: str
+    model: str
+    axes: dict[str, list[float]] = Field(description="values of each swept parameter, as in the record of a family")
+    members: list[str] = Field(description="names of the materials; the last axis runs fastest")
+    g: list[float] | None = Field(
+        description="of He-Torrance, for each member: eq. 79 along the normal, at the middle wavelength"
+    )
+    wavelength_nm: list[float] | None
+    truth: str = Field(description="key of the curve that the others are compared with")
+    curves: list[Curve]
+    between: Between | None = Field(description="null unless the family is in the store")
+    fronts: list[list[str]] = Field(
+        description="of each member, keys of the curves worth having in bulk: as of a chart, with the costs above"
+    )
+
+
+class Charts(BaseModel):
+    """Charts of materials and families, made in one go; a file holds one of them."""
+
+    model_config = _STRICT
+
+    brdfdb: str
+    when: datetime
+    machine: str
+    charts: list[Chart]
+    families: list[FamilyChart]

@@ -1,0 +1,261 @@
+"""Importance sampling of every model: directions that follow its lobe, their density, and the weights that make up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.geometry import checked_vectors
+from brdfdb.integrals.quadrature import named, spec_of
+from brdfdb.parameters import Floats, Lobe, ModelSpec
+
+Array = NDArray[np.float64]
+
+_TINY = 1e-300  # u of 0 is read as this: its logarithm is finite
+_DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
+
+
+class Sample(NamedTuple):
+    """Directions drawn for a light.
+
+    `wr` are unit vectors of shape (..., 3), some below the horizon; `pdf` [1/sr] is their density over the sphere;
+    `weight` [1] is f_r cos theta_r / pdf, 0 below the horizon: its mean is the albedo.
+    """
+
+    wr: Array
+    pdf: Array
+    weight: Array
+
+
+def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, **parameters: ArrayLike) -> Sample:
+    """Draw a viewer (or, what reciprocity makes the same, the next light of a path) for each light `wi`.
+
+    Parameters
+    ----------
+    model : ModelSpec or str
+        A model, or its name in `brdfdb.models.MODELS`.
+    u1, u2 : array_like
+        Uniform random numbers in [0, 1]; points that are stratified give directions that are.
+    wi : array_like
+        Unit vectors of the light, of shape (..., 3).
+    **parameters : array_like
+        Those of the model; they broadcast with u1, u2 and the vectors.
+
+    Returns
+    -------
+    Sample
+        (wr, pdf, weight), float64, in the broadcast shape of all arguments. nan where an argument is; the weight of a
+        light below the horizon is 0.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    With the probability that the model's `lobe` gives, a half vector is drawn from a Gaussian of slopes, Ward's eq. 7
+    with tan(delta) in (7a), which is printed without its arctan, and the light is mirrored in it; else a direction
+    with a density of cos theta_r / pi. u1 chooses, and is stretched to serve again. Directions that a lobe throws below
+    the horizon are kept, with a weight of 0: they are a part of the density. Ward's samples are not "uniformly
+    weighted": the weights are those of `Sample`.
+    The Dirac part of a model is not drawn: add `spec.specular` in the mirror direction.
+
+    References
+    ----------
+    ward1992
+
+    Examples
+    --------
+    >>> drawn = sample("lambert", 0.3, 0.7, [0.0, 0.0, 1.0], rho=0.5)
+    >>> round(float(drawn.weight), 12)
+    0.5
+    """
+    spec = spec_of(model)
+    parameters = named(spec, parameters)
+    v1, v2 = _uniform("u1", u1), _uniform("u2", u2)
+    i = checked_vectors(wi, wi).w_i.astype(np.float64)
+    lobe = lobe_of(spec, i, parameters)
+    wr = directions(lobe, v1, v2, i)
+    with np.errstate(all="ignore"):  # samples reach every corner; what is finite is tested, not flagged
+        f_r = spec.vectors(i, wr, **parameters)
+    wr = np.broadcast_to(wr, (*np.shape(f_r), 3)).copy()  # a lobe or none: parameters shape the result
+    wr[np.isnan(f_r)] = np.nan
+    density = mixture_density(lobe, i, wr)
+    reflected = f_r * np.maximum(wr[..., 2], 0.0)
+    # a density that has vanished leaves a direction that nothing draws
+    weight = np.divide(reflected, density, where=density != 0.0, out=np.zeros(np.shape(density)))
+    return Sample(wr, density[()], weight[()])
+
+
+def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: ArrayLike) -> Floats:
+    """The density [1/sr] with which `sample` draws `wr` for the light `wi`.
+
+    Parameters
+    ----------
+    model : ModelSpec or str
+        A model, or its name in `brdfdb.models.MODELS`.
+    wi, wr : array_like
+        Unit vectors, of shape (..., 3), `wr` anywhere on the sphere.
+    **parameters : array_like
+        Those of the model; they broadcast with the vectors.
+
+    Returns
+    -------
+    array [1/sr]
+        In the broadcast shape of all arguments; over the sphere it integrates to 1.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Examples
+    --------
+    >>> round(float(pdf("lambert", [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], rho=0.5)), 6)
+    0.31831
+    """
+    vectors = checked_vectors(wi, wr)
+    i, r = vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64)
+    spec = spec_of(model)
+    parameters = named(spec, parameters)
+    density = mixture_density(lobe_of(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan goes through
+    shape = np.broadcast_shapes(density.shape, *(np.shape(value) for value in parameters.values()))
+    return np.broadcast_to(density, shape).copy()[()]
+
+
+def ward_sample(
+    u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, *, rho_s: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike
+) -> Sample:
+    """Draw from the lobe of `brdfdb.models.ward` alone, by the paper's eq. 7 with its misprint put right.
+
+    Parameters
+    ----------
+    u1, u2 : array_like
+        Uniform random numbers, in [0, 1].
+    wi : array_like
+        Unit vectors of the light, of shape (..., 3).
+    rho_s, alpha_x, alpha_y : array_like [1]
+        As in `brdfdb.models.ward`.
+
+    Returns
+    -------
+    Sample
+        (wr, pdf, weight): weight = rho_s (h.i) cos^3(delta) sqrt(cos theta_r / cos theta_i), 0 below the horizon.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    Notes
+    -----
+    Eq. (7): delta = arctan([-log(u1) / (cos^2 phi / alpha_x^2 + sin^2 phi / alpha_y^2)]^(1/2)), where (7a) is printed
+    without the arctan, and phi = arctan(alpha_y / alpha_x tan(2 pi u2)) in the quadrant of 2 pi u2.
+
+    References
+    ----------
+    ward1992
+
+    Examples
+    --------
+    >>> wr, density, weight = ward_sample(1.0, 0.2, [0.6, 0.0, 0.8], rho_s=0.3, alpha_x=0.1, alpha_y=0.2)
+    >>> (wr + 0.0).round(6).tolist(), round(float(weight), 6)
+    ([-0.6, 0.0, 0.8], 0.24)
+    """
+    return sample("ward", u1, u2, wi, rho_d=0.0, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
+
+
+def ward_pdf(wi: ArrayLike, wr: ArrayLike, *, alpha_x: ArrayLike, alpha_y: ArrayLike) -> Floats:
+    """The density [1/sr] with which `ward_sample` draws `wr` for the light `wi`.
+
+    Parameters
+    ----------
+    wi, wr : array_like
+        Unit vectors, of shape (..., 3), `wr` anywhere on the sphere.
+    alpha_x, alpha_y : array_like [1]
+        As in `brdfdb.models.ward`.
+
+    Returns
+    -------
+    array [1/sr]
+        exp(-tan^2(delta) (..)) / (4 pi alpha_x alpha_y (h.i) cos^3(delta)); over the sphere it integrates to 1.
+
+    Raises
+    ------
+    ValueError
+        If an argument is outside its range.
+
+    References
+    ----------
+    ward1992
+
+    Examples
+    --------
+    >>> round(float(ward_pdf([0.6, 0.0, 0.8], [-0.6, 0.0, 0.8], alpha_x=0.1, alpha_y=0.2)), 6)
+    4.973592
+    """
+    return pdf("ward", wi, wr, rho_d=0.0, rho_s=1.0, alpha_x=alpha_x, alpha_y=alpha_y)
+
+
+def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> Lobe:
+    """Where a model has its lobe, of lights `i`; of a diffuse model, a lobe that has no share."""
+    for parameter in spec.parameters:
+        if parameter.name in parameters:
+            parameter.check(parameters[parameter.name])
+    return _DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
+
+
+def _uniform(name: str, u: ArrayLike) -> Array:
+    array = np.asarray(u)
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{name}: {u!r} is not a number in [0, 1]")
+    array = array.astype(np.float64)
+    bad = (array < 0.0) | (array > 1.0)
+    if np.any(bad):
+        raise ValueError(f"{name}: {array[bad].flat[0]:.9g} is outside [0, 1]")
+    return array
+
+
+def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
+    """Directions (..., 3) whose density is `mixture_density`: u1 chooses lobe or cosine, stretched it serves again."""
+    in_lobe = (u1 < lobe.share) | (lobe.share >= 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of the component that is not taken
+        stretched = np.where(in_lobe, u1 / lobe.share, (u1 - lobe.share) / (1.0 - lobe.share))
+    angle = 2.0 * np.pi * u2
+    mirrored = mirrored_in_lobe(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
+    return np.where(in_lobe[..., np.newaxis], mirrored, _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle))
+
+
+def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
+    """The light mirrored in a half vector drawn by Ward's eq. 7, in slopes: tan(delta) times cos(phi) and sin(phi)."""
+    radius = np.sqrt(-np.log(u1))
+    s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
+    s_x, s_y = np.broadcast_arrays(s_x, s_y)
+    h = np.stack([s_x, s_y, np.ones_like(s_x)], axis=-1)
+    h /= np.sqrt(np.sum(h * h, axis=-1, keepdims=True))
+    return np.asarray(2.0 * np.sum(h * i, axis=-1, keepdims=True) * h - i)
+
+
+def _cosine_weighted(u1: Array, angle: Array) -> Array:
+    sin_theta = np.sqrt(u1)
+    x, y, z = np.broadcast_arrays(sin_theta * np.cos(angle), sin_theta * np.sin(angle), np.sqrt(1.0 - u1))
+    return np.stack([x, y, z], axis=-1)
+
+
+def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
+    """Density [1/sr] of the mixture over the whole sphere."""
+    cosine = np.maximum(r[..., 2], 0.0) / np.pi
+    if not np.any(lobe.share):
+        return np.asarray(cosine + 0.0 * i[..., 2])
+    # h = i + r not normalised: h.i = length / 2, cos(delta) = h_z / length
+    x, y, z = (i[..., axis] + r[..., axis] for axis in range(3))
+    length2 = x * x + y * y + z * z
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        exponent = ((x / lobe.alpha_x) ** 2 + (y / lobe.alpha_y) ** 2) / (z * z)
+        gaussian = np.exp(-exponent) * length2 / (2.0 * np.pi * lobe.alpha_x * lobe.alpha_y * np.abs(z) ** 3)
+    gaussian = np.where((np.abs(z) < 1e-100) | (exponent > 700.0), 0.0, gaussian)  # half vectors that are not drawn
+    return np.asarray(lobe.share * gaussian + (1.0 - lobe.share) * cosine)

@@ -1,0 +1,322 @@
+"""The cheapest form of each material that a scene cannot tell from the truth."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from brdfdb.forms.timing import ALIKE, clearly_cheaper
+from brdfdb.geometry import radians
+from brdfdb.parameters import Floats
+from brdfdb.scenes.gbuffer import Points, View
+from brdfdb.scenes.image import difference
+from brdfdb.scenes.offered_forms import Candidate
+from brdfdb.scenes.renderer import Reflector, composed, radiance
+from brdfdb.scenes.scene import Scene, Tolerance
+from brdfdb.scenes.shapes import Array
+
+GRAZING_DEG = 89.99  # up to where errors count: nearer to the horizon models have poles, and a sphere shows 3e-8 of it
+# Of a statement from samples, over all rounds of checks that might be the last: a round has fresh places, which its
+# choices were not fitted to, and the one numbered j spends 1 / (j (j + 1)) of what may go wrong
+CONFIDENCE = 0.95
+DARK = 1e-3  # exposed radiance: relative errors of what is darker are relative to this
+FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # integrals over facets are known to 1e-6
+
+
+class InfeasibleError(ValueError):
+    """The tolerance is finer than the truth is known; str() is one sentence."""
+
+
+class Left(NamedTuple):
+    """The error that is left over the places of a material: at the percentile of the tolerance, and the largest."""
+
+    counted: float
+    most: float
+
+
+class Pick(NamedTuple):
+    """The candidate that is chosen for a material and the best of what is clearly cheaper, if any, as indices."""
+
+    chosen: int
+    cheaper: int | None
+
+
+class Sample(NamedTuple):
+    """A sample of the places of a material: how many, and how far the choices are off there.
+
+    `share` is the upper bound, at `CONFIDENCE`, of the share of all places so drawn that are beyond the tolerance.
+    """
+
+    places: int
+    most: float
+    share: float
+
+
+class Decision(NamedTuple):
+    """The choice for a material: the error that it leaves by itself, and with all other choices.
+
+    Attributes
+    ----------
+    pick : Pick
+        What is chosen.
+    left : Left
+        By itself, where candidates are compared.
+    cheaper_left : Left or None
+        How the next cheaper breaks the tolerance.
+    refused : bool
+        Whether the next cheaper does so only where choices are checked.
+    whole : Left
+        With all other choices, at every pixel of the picture, and at fresh places.
+    even, edges : Sample or None
+        Fresh places: evenly spread over the picture, and at edges; None of a recorded scene.
+    """
+
+    pick: Pick
+    left: Left
+    cheaper_left: Left | None
+    refused: bool
+    whole: Left
+    even: Sample | None = None
+    edges: Sample | None = None
+
+
+class Seen:
+    """A scene at the points of one view: its true picture, and what candidates make of it.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen.
+    view : View
+        Its points.
+    truths : mapping
+        By the name of each material, the candidate that the others are compared with.
+    materials : mapping
+        The result of `brdfdb.scenes.renderer.reflectors`: mirror and albedo, which are the same for all candidates.
+
+    Attributes
+    ----------
+    truth : array (height, width, L)
+        The true picture.
+    """
+
+    def __init__(
+        self, scene: Scene, view: View, truths: Mapping[str, Candidate], materials: Mapping[str, Reflector]
+    ) -> None:
+        self.scene, self.view = scene, view
+        self._materials = materials
+        self._lists = self._radiances(truths)
+        self.truth = composed(scene, view, self._lists, materials)
+
+    def _radiances(self, forms: Mapping[str, Candidate]) -> list[Floats]:
+        """Of each list of points: by its candidate, or else the truth."""
+        return [
+            radiance(self.scene, points, self._materials[points.material], forms[points.material].brdf)
+            if points.material in forms
+            else self._lists[number]
+            for number, points in enumerate(self.view.points)
+        ]
+
+    def picture(self, forms: Mapping[str, Candidate]) -> Array:
+        """The picture (height, width, L) with candidates for some materials, the truth for all others."""
+        return composed(self.scene, self.view, self._radiances(forms), self._materials)
+
+    def pixels(self, material: str) -> NDArray[np.int64]:
+        """Return the pixels that show a material, directly or in a mirror, up to `GRAZING_DEG` from the normal."""
+        shown = [self._at(points) for points in self.view.points if points.material == material]
+        return np.setdiff1d(np.concatenate(shown), self._grazing) if shown else np.empty(0, dtype=np.int64)
+
+    def _at(self, points: Points) -> NDArray[np.int64]:
+        """Return the pixel of each point of a list."""
+        return points.at if points.via is None else self.view.points[points.via].at[points.at]
+
+    @functools.cached_property
+    def _grazing(self) -> NDArray[np.int64]:
+        """Return the pixels that show something between `GRAZING_DEG` and the horizon."""
+        least = np.cos(radians(GRAZING_DEG))
+        found = [self._at(points)[(points.wr[:, 2] > 0.0) & (points.wr[:, 2] < least)] for points in self.view.points]
+        return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *found]))
+
+    def differences(self, picture: Array) -> Array:
+        """How far each pixel of a picture is from the truth (height, width), as the tolerance of the scene counts.
+
+        Relative errors are those of spectral radiance at the worst wavelength.
+        """
+        return _differences(self.scene, self.truth, picture)
+
+    def errors(self, material: str, picture: Array) -> Array:
+        """Return the errors (N,) of a picture at the pixels of a material, in the unit of the tolerance."""
+        at = np.unravel_index(self.pixels(material), self.truth.shape[:2])
+        return _differences(self.scene, self.truth[at], picture[at])
+
+
+def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
+    if scene.tolerance.unit == "CIEDE2000":
+        return difference(scene, truth, picture)
+    return np.asarray((np.abs(picture - truth) / np.maximum(truth, DARK / scene.exposure)).max(axis=-1))
+
+
+def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick:
+    """Pick the cheapest candidate that keeps to a tolerance; of those that cost about the same, the most accurate.
+
+    Parameters
+    ----------
+    costs : array of shape (rounds, candidates)
+        Of each candidate in each round of timing, in one unit; one round of costs that do not scatter.
+    error : callable
+        Of the candidate with an index, 0 of the truth; asked in the order of median costs, and of nothing clearly
+        costlier than need be.
+    tolerance : float
+        Of the error.
+
+    Returns
+    -------
+    Pick
+        The cost is about the same where neither is clearly cheaper (`brdfdb.forms.timing.clearly_cheaper`), as in a
+        chart; the error, where it is less than `brdfdb.forms.timing.ALIKE` times as large. Of candidates alike in both
+        it is the one given first. The next cheaper is the most accurate of those that are clearly cheaper than the
+        choice, all of which break the tolerance.
+    """
+    errors: dict[int, float] = {}
+    least: int | None = None
+    for index in np.argsort(np.median(costs, axis=0), kind="stable").tolist():
+        if least is not None and clearly_cheaper(costs, least, index):
+            continue
+        errors[index] = error(index)
+        if errors[index] <= tolerance and least is None:
+            least = index
+    kept = {index: errors[index] for index in sorted(errors) if errors[index] <= tolerance}
+    chosen = next(index for index in kept if kept[index] <= ALIKE * min(kept.values()))
+    cheaper = [index for index in sorted(errors) if index not in kept and clearly_cheaper(costs, index, chosen)]
+    return Pick(chosen, min(cheaper, key=lambda index: errors[index], default=None))
+
+
+def check_feasible(tolerance: Tolerance) -> None:
+    """InfeasibleError if a tolerance is finer than the truth is known."""
+    value, unit = tolerance.value, tolerance.unit
+    if value < FINEST[unit]:
+        raise InfeasibleError(f"tolerance: {value:g} ({unit}) is finer than the truth is known, {FINEST[unit]:g}")
+
+
+class Look(NamedTuple):
+    """A scene at places that are spread evenly, as the pixels of a picture are, and at places near edges, if any."""
+
+    even: Seen
+    edges: Seen | None
+
+    def errors(self, names: Iterable[str], forms: Mapping[str, Candidate]) -> dict[str, list[Array]]:
+        """Return the errors of materials with candidates for some, all at once: at even places, and at edges."""
+        seen = [self.even] if self.edges is None else [self.even, self.edges]
+        pictures = [each.picture(forms) for each in seen]
+        return {
+            name: [each.errors(name, picture) for each, picture in zip(seen, pictures, strict=True)] for name in names
+        }
+
+
+def _left(errors: Sequence[Array], percentile: float) -> Left:
+    """Return what is left of errors at even places, and at edges, which count where all places do."""
+    most = max(float(each.max(initial=0.0)) for each in errors)
+    if percentile == 100.0 or not errors[0].size:
+        return Left(most, most)
+    return Left(float(np.percentile(errors[0], percentile)), most)
+
+
+def _sample(errors: Array, tolerance: float, confidence: float) -> Sample:
+    """Return a sample with Clopper and Pearson's upper bound; where nothing was drawn, anything may be beyond."""
+    beyond, places = int(np.count_nonzero(errors > tolerance)), errors.size
+    share = 1.0 if beyond == places else float(stats.beta.ppf(confidence, beyond + 1, places - beyond))
+    return Sample(places, float(errors.max(initial=0.0)), share)
+
+
+def choose(
+    planned: Look,
+    check: Callable[[int], Look | None],
+    offered: Mapping[str, Sequence[Candidate]],
+    costs: Mapping[str, Floats],
+    tick: Callable[[], None] = lambda: None,
+) -> dict[str, Decision]:
+    """Choose a candidate for each material of a scene, and check all of them together.
+
+    Parameters
+    ----------
+    planned : Look
+        The picture, and places near edges: where candidates are compared, each against a picture that is true
+        otherwise.
+    check : callable
+        Gives the same scene at fresh places for a round from 1 on, where all choices at once are held to the tolerance;
+        None of a scene that has no other places.
+    offered : mapping
+        By the name of each material, its candidates, the truth first.
+    costs : mapping
+        The same, what each of them costs, of shape (rounds, candidates).
+    tick : callable
+        Called for each material, and for each round of checks.
+
+    Returns
+    -------
+    dict
+        A decision for each material. Where the whole breaks the tolerance, the choices that do so by themselves are
+        refused, or, if only all of them together do, the one that leaves the most; the truth is never refused. Then the
+        next round looks at other places.
+
+    Raises
+    ------
+    InfeasibleError
+        If the tolerance is finer than the truth is known.
+    """
+    check_feasible(planned.even.scene.tolerance)
+    tolerance, percentile = planned.even.scene.tolerance.value, planned.even.scene.tolerance.percentile
+    refused: dict[tuple[str, int], Left] = {}
+
+    def left(look: Look, name: str, index: int) -> Left:
+        return _left(look.errors([name], {name: offered[name][index]})[name], percentile)
+
+    alone = functools.cache(functools.partial(left, planned))
+
+    def known(name: str, index: int) -> Left:
+        return refused[name, index] if (name, index) in refused else alone(name, index)
+
+    def picked(name: str) -> Pick:
+        return pick(costs[name], lambda index: known(name, index).counted, tolerance)
+
+    picks = {}
+    for name in offered:
+        picks[name] = picked(name)
+        tick()
+    for number in itertools.count(1):
+        forms = {name: offered[name][one.chosen] for name, one in picks.items()}
+        checked = check(number)
+        looks = [planned] if checked is None else [planned, checked]
+        errors = [look.errors(forms, forms) for look in looks]
+        whole = {name: Left(*np.max([_left(each[name], percentile) for each in errors], axis=0)) for name in forms}
+        tick()
+        if max(whole.values()).counted <= tolerance:
+            break
+        own = {name: max(left(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
+        for name, each in _broken(own, max(whole.values()), tolerance).items():
+            refused[name, picks[name].chosen] = each
+            picks[name] = picked(name)
+    confidence = 1.0 - (1.0 - CONFIDENCE) / (number * (number + 1))
+    return {
+        name: Decision(
+            one,
+            alone(name, one.chosen),
+            None if one.cheaper is None else known(name, one.cheaper),
+            (name, one.cheaper) in refused,
+            whole[name],
+            *(_sample(each, tolerance, confidence) for fresh in errors[1:] for each in fresh[name]),
+        )
+        for name, one in picks.items()
+    }
+
+
+def _broken(own: Mapping[str, Left], whole: Left, tolerance: float) -> dict[str, Left]:
+    """Return the choices that break the tolerance by themselves, or else the one that leaves the most, and how far."""
+    broke = {name: each for name, each in own.items() if each.counted > tolerance}
+    return broke or {max(own, key=lambda name: own[name]): whole}

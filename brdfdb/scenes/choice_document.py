@@ -1,0 +1,228 @@
+"""What a choice for a scene says: the types of choice.json, and reasons in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from brdfdb.forms.catalogue import Kind
+from brdfdb.parameters import Floats
+from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Left, Sample
+from brdfdb.scenes.offered_forms import Candidate
+from brdfdb.scenes.scene import Scene, Tolerance
+
+THIRD = 1.0 / 3.0  # of the truth: what a choice is expected to cost at most
+
+Weigh = Literal["time", "bytes", "both"]
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class Price(NamedTuple):
+    """The price of a candidate: time [ns] of a pair of directions, and what is weighed in each round of timing."""
+
+    ns: float
+    costs: Floats
+
+    @property
+    def cost(self) -> float:
+        """The median cost."""
+        return float(np.median(self.costs))
+
+
+class Residue(BaseModel):
+    """Error over the places that show a material, in the unit of the tolerance."""
+
+    model_config = _STRICT
+
+    counted: float = Field(description="at the percentile of the tolerance: what keeps to it")
+    most: float = Field(description="largest")
+
+
+class Sampled(BaseModel):
+    """A sample of the places that show a material, which played no part in the choice."""
+
+    model_config = _STRICT
+
+    places: int = Field(description="looked at")
+    most: float = Field(description="largest error at them")
+    one_in: int = Field(
+        description="fewer than 1 in so many of all places so drawn is beyond the tolerance, with the confidence stated"
+    )
+
+
+class Option(BaseModel):
+    """A form of a material, with all others of the scene at their truth."""
+
+    model_config = _STRICT
+
+    key: str
+    title: str
+    kind: Kind
+    python: str = Field(description="what it is called in Python")
+    dtype: Literal["float64", "float32"]
+    wavelengths_nm: list[float] | None = Field(description="that it is evaluated at; null of a grey form")
+    bytes: int = Field(description="of the numbers that an evaluation reads")
+    ns: float = Field(description="of a pair of directions at all wavelengths of the scene, on one thread")
+    share: float = Field(description="of what the truth costs, as it is weighed")
+    error: Residue
+
+
+class Material(BaseModel):
+    """What is chosen for a material, and why."""
+
+    model_config = _STRICT
+
+    material: str
+    title: str
+    pixels: int = Field(description="of the picture that show it, directly or in a mirror")
+    truth: Option
+    choice: Option
+    next_cheaper: Option | None = Field(description="the most accurate of what is cheaper; null without any")
+    refused: bool = Field(description="whether the next cheaper breaks it only where choices are checked")
+    whole: Residue = Field(description="of the choices all at once: at all pixels of the picture, and all samples")
+    even: Sampled | None = Field(description="places anywhere in the picture, equally likely; null if recorded")
+    edges: Sampled | None = Field(
+        description="places beside limbs, terminators and edges of shadows: each power of ten of the distance, from a "
+        "pixel's width down to a hundred millionth of it, is equally likely; null if recorded"
+    )
+    reason: str
+    revision: str | None = Field(description="of the table in the store, if a store was named and a table chosen")
+
+
+class Choice(BaseModel):
+    """The cheapest form of each material that a scene cannot tell from the truth."""
+
+    model_config = _STRICT
+
+    brdfdb: str
+    when: datetime
+    machine: str
+    scene: str
+    tolerance: Tolerance
+    weigh: Weigh
+    picture: tuple[int, int] = Field(
+        description="pixels across and down: the choices keep to the tolerance at each of them, seen through its middle"
+    )
+    confidence: float = Field(description="of what is said of samples, for each material and each kind of sample")
+    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is said beyond")
+    statement: str = Field(description="what is proven, and what is sampled, in a few sentences")
+    materials: list[Material]
+
+
+def within(tolerance: Tolerance) -> str:
+    """Return in words how far a picture may be off."""
+    share = tolerance.percentile
+    where = "" if share == 100.0 else f" at {share:g} % of the places of each material"
+    return f"within {tolerance.value:g} ({tolerance.unit}){where}"
+
+
+def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequence[Material]) -> str:
+    """Return in words what is proven of choices, and what follows from samples, with which confidence."""
+    value = f"{tolerance.value:g}"
+    size, share = f"{picture[0]} x {picture[1]}", tolerance.percentile
+    proven = f"Proven: each of the {size} pixels, seen through its middle, is within {value}."
+    if share != 100.0:
+        proven = (
+            f"Proven: {share:g} % of each material's pixels, of {size} seen through their middles, are within {value}."
+        )
+    even = [each.even for each in materials if each.even is not None]
+    edges = [each.edges for each in materials if each.edges is not None]
+    if not even:
+        return f"{proven} The file holds no other places."
+    places, most = sum(each.places for each in (*even, *edges)), max(each.most for each in (*even, *edges))
+    return (
+        f"{proven} Sampled: all other places of the picture, for other widths and offsets of its pixels, at {places} "
+        f"places that were not used to choose; the largest error at them is {most:.2g}. With {100 * CONFIDENCE:g} % "
+        f"confidence for each material, fewer than 1 in {min(each.one_in for each in even)} of its places is beyond "
+        f"{value}, and fewer than 1 in {min(each.one_in for each in edges)} of those beside its edges. "
+        f"What is seen within {90.0 - GRAZING_DEG:.2g} degrees of grazing is left out."
+    )
+
+
+def describe(
+    scene: Scene,
+    chosen: Mapping[str, Decision],
+    offered: Mapping[str, Sequence[Candidate]],
+    prices: Mapping[str, Sequence[Price]],
+    pixels: Mapping[str, int],
+    revisions: Mapping[str, str],
+) -> list[Material]:
+    """What is chosen for each material of a scene: costs to three digits, and reasons."""
+
+    def option(name: str, index: int, left: Left) -> Option:
+        candidate, price = offered[name][index], prices[name][index]
+        form, at = candidate.form, candidate.wavelength_nm
+        return Option(
+            key=form.key,
+            title=form.title,
+            kind=form.kind,
+            python=form.python,
+            dtype="float32" if form.dtype is np.float32 else "float64",
+            wavelengths_nm=None if at is None else at.tolist(),
+            bytes=form.bytes,
+            ns=_short(price.ns),
+            share=_short(price.cost / prices[name][0].cost),
+            error=_residue(left),
+        )
+
+    found = []
+    for name, decision in chosen.items():
+        truth = option(name, 0, Left(0.0, 0.0))
+        choice = option(name, decision.pick.chosen, decision.left)
+        cheaper = None
+        if decision.pick.cheaper is not None and decision.cheaper_left is not None:
+            cheaper = option(name, decision.pick.cheaper, decision.cheaper_left)
+        found.append(
+            Material(
+                material=name,
+                title=scene.materials[name].title,
+                pixels=pixels[name],
+                truth=truth,
+                choice=choice,
+                next_cheaper=cheaper,
+                refused=decision.refused,
+                whole=_residue(decision.whole),
+                even=_sampled(decision.even),
+                edges=_sampled(decision.edges),
+                reason=_reason(choice, cheaper, decision, scene.tolerance.value),
+                revision=revisions.get(name),
+            )
+        )
+    return found
+
+
+def _reason(choice: Option, cheaper: Option | None, decision: Decision, tolerance: float) -> str:
+    """Why this one, and that it costs more than a third of the truth where it does."""
+    said = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.counted:.2g}"
+    if decision.pick.chosen != 0 and choice.share > THIRD:
+        said += f" at {choice.share:.2g} of the truth's cost, more than a third"
+    if cheaper is None:
+        return f"{said}, and nothing is cheaper"
+    where = " at fresh places" if decision.refused else ""
+    left = _above(tolerance, cheaper.error.counted)
+    return f"{said}; the best of what is cheaper, {cheaper.title}, would leave {left}{where}"
+
+
+def _above(tolerance: float, error: float) -> str:
+    """An error with as many digits as show that it is above the tolerance, two at least."""
+    return next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
+
+
+def _residue(left: Left) -> Residue:
+    return Residue(counted=left.counted, most=left.most)
+
+
+def _sampled(sample: Sample | None) -> Sampled | None:
+    """Return a sample as it is written: bounds are rounded so that they hold."""
+    if sample is None:
+        return None
+    return Sampled(places=sample.places, most=sample.most, one_in=int(1.0 / sample.share))
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.3g}")

@@ -1,0 +1,201 @@
+"""Light from all around: radiance over the sphere, and directions towards it drawn from the lobe of a material."""
+
+from __future__ import annotations
+
+import functools
+import zipfile
+import zlib
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, field_validator, model_validator
+
+from brdfdb.integrals.sampling import directions, lobe_of, mixture_density
+from brdfdb.materials import Material
+from brdfdb.parameters import Lobe
+from brdfdb.scenes.shapes import STRICT, Array
+
+# Of the directions, how many a lobe gets at least, or few would carry all of a faint gloss, and at most, which bounds
+# f_r cos / pdf in its tails, and for every other f_r that is evaluated at the same directions
+_LEAST, _MOST = 0.25, 0.9
+_TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
+_LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}  # of linear sRGB
+
+
+class Environment(BaseModel):
+    """Radiance from every direction, far away, as multiples of the scene's illuminant: it has no colour of its own.
+
+    Rows of numbers, all equally long, are a picture in latitude and longitude as one sees it from inside. The first
+    row is around the zenith (+z), the last around the nadir. From left to right the azimuth falls from 180 to -180
+    degrees: the middle of the picture is towards +x, its left quarter towards +y, both edges towards -x. Numbers stand
+    for the middles of their pixels, and are joined bilinearly, across both edges, too; from the middles of the first
+    and the last row on to the poles they stay the same.
+
+    `file`, in place of rows, is an EXR (its channel ``Y``, or else the luminance of ``R``, ``G``, ``B``), an .npz with
+    an array ``radiance``, or a .npy. Where an object stands in the light the environment is dark: what that object
+    sends on is not traced. The lights of the scene are no part of the picture, or they would count twice.
+    """
+
+    model_config = STRICT
+
+    rows: list[list[float]] | None = Field(default=None, description="from the zenith to the nadir")
+    file: str | None = Field(default=None, min_length=1, description="EXR, .npz or .npy; lies beside the scene")
+    samples: int = Field(default=32, ge=1, le=4096, description="directions for each point, drawn from its lobe")
+    seed: int = Field(default=0, ge=0, description="of what these directions are turned by, from point to point")
+
+    @field_validator("rows")
+    @classmethod
+    def _check_rows(cls, rows: list[list[float]] | None) -> list[list[float]] | None:
+        if rows is not None:
+            if not rows or not rows[0] or any(len(row) != len(rows[0]) for row in rows):
+                raise ValueError("rows: must be lists of numbers, all of one length")
+            _checked("rows", np.array(rows, dtype=np.float64))
+        return rows
+
+    @model_validator(mode="after")
+    def _check(self) -> Environment:
+        if (self.rows is None) == (self.file is None):
+            raise ValueError("rows, file: give one of the two")
+        return self
+
+    def resolved(self, folder: Path) -> Environment:
+        """The same with its file, if it has one, named relative to a folder."""
+        return self if self.file is None else self.model_copy(update={"file": str(folder / self.file)})
+
+    @property
+    def picture(self) -> Array:
+        """Radiance (rows, columns).
+
+        Raises
+        ------
+        ValueError
+            If the file is not there, not readable, or holds no picture; if radiance is negative, not finite, or
+            nowhere above 0.
+        """
+        if self.file is None:
+            return np.array(self.rows, dtype=np.float64)
+        path = Path(self.file)
+        if not path.is_file():
+            raise ValueError(f"environment.file: {path}: there is no such file")
+        return _read(path, path.stat().st_mtime_ns)
+
+    def radiance(self, towards: Array) -> Array:
+        """Radiance that comes from directions (..., 3), unit vectors in the frame of the scene."""
+        picture = self.picture
+        rows, columns = picture.shape
+        theta = np.arccos(np.clip(towards[..., 2], -1.0, 1.0))
+        row = np.clip(theta / np.pi * rows - 0.5, 0.0, rows - 1.0)
+        column = (0.5 - np.arctan2(towards[..., 1], towards[..., 0]) / (2.0 * np.pi)) * columns - 0.5
+        upper, left = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
+        down, right = row - upper, column - left
+        lower = np.minimum(upper + 1, rows - 1)
+
+        def along(at: NDArray[np.int64]) -> Array:
+            return np.asarray((1.0 - right) * picture[at, left % columns] + right * picture[at, (left + 1) % columns])
+
+        return np.asarray((1.0 - down) * along(upper) + down * along(lower))
+
+    def drawn(self, material: Material, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> Drawn:
+        """Directions for points of a material, from its lobe around the mirror direction and from all above.
+
+        Parameters
+        ----------
+        material : Material
+            Of the points.
+        wavelength_nm : array (L,) [nm]
+            Those of the scene: the lobe is as wide as at the wavelength where it is widest.
+        wr : array (N, 3)
+            Unit vectors towards the viewer in the frame of the surface.
+        stream : tuple of int
+            Which points these are: others are turned independently.
+
+        Returns
+        -------
+        Drawn
+            `samples` directions for each point, the same whenever they are drawn.
+
+        Notes
+        -----
+        By reciprocity the lobe around the viewer's mirror direction is that of the light. Half vectors follow eq. (7)
+        of Ward 1992 (``ward1992``), with its misprint put right and weights in place of "uniformly weighted" ones.
+        """
+        turns = np.random.default_rng([self.seed, *stream]).random((2, 1, len(wr)))
+        number = np.arange(self.samples)[:, np.newaxis]
+        # Even over the unit square for any number of samples, and turned: even for each point, independent between them
+        u1, u2 = (number / self.samples + turns[0]) % 1.0, (number * _TURN + turns[1]) % 1.0
+        lobe = _widest(material, wavelength_nm, wr)
+        wi = directions(lobe, u1, u2, wr)
+        density = self.samples * mixture_density(lobe, wr, wi)
+        return Drawn(wi, np.divide(1.0, density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape)))
+
+
+class Drawn(NamedTuple):
+    """Unit vectors (samples, N, 3) in the frame of the surface, and the solid angles [sr] that they stand for.
+
+    Summed over the samples, f_r times radiance times cosine times solid angle is an unbiased estimate of what is
+    reflected. Solid angles (samples, N) are 0 below the horizon.
+    """
+
+    wi: Array
+    solid_angle: Array
+
+
+def _widest(material: Material, wavelength_nm: Array, wr: Array) -> Lobe:
+    """The lobe (N,) around the mirror directions of viewers, no narrower than that of any wavelength."""
+    parameters = material.arguments(material.evaluated_at(wavelength_nm))
+    width = np.broadcast(*parameters.values()).size
+    lobe = lobe_of(material.spec, wr[:, np.newaxis], parameters)
+    share, alpha_x, alpha_y = (np.broadcast_to(each, (len(wr), width)) for each in lobe)
+    mean = share.mean(axis=1)
+    share = np.where(mean > 0.0, np.clip(mean, _LEAST, _MOST), 0.0)
+    return Lobe(share, alpha_x.max(axis=1), alpha_y.max(axis=1))
+
+
+def _checked(name: str, picture: Array) -> Array:
+    bad = ~(np.isfinite(picture) & (picture >= 0.0))
+    if np.any(bad):
+        row, column = np.argwhere(bad)[0]
+        value = picture[row, column]
+        raise ValueError(f"{name}: {value:g} at row {row}, column {column} must be finite and not below 0")
+    if not np.any(picture):
+        raise ValueError(f"{name}: radiance is 0 everywhere")
+    return picture
+
+
+@functools.lru_cache(maxsize=4)
+def _read(path: Path, _written: int) -> Array:
+    """The picture of a file, kept until it is written anew: every list of points asks for it."""
+    picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
+    if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
+        raise ValueError(f"environment.file: {path}: must hold numbers of shape (rows, columns)")
+    return _checked(f"environment.file: {path}", picture.astype(np.float64))
+
+
+def _from_numpy(path: Path) -> NDArray[np.generic]:
+    try:
+        found = np.load(path)
+        if isinstance(found, np.ndarray):
+            return found
+        with found:
+            if "radiance" in found:
+                return np.asarray(found["radiance"])
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error):
+        raise ValueError(f"environment.file: {path}: is no .npz or .npy of numbers, or a damaged one") from None
+    raise ValueError(f"environment.file: {path}: has no array `radiance`")
+
+
+def _from_exr(path: Path) -> NDArray[np.generic]:
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = {name: np.asarray(each.pixels, dtype=np.float64) for name, each in file.channels().items()}
+    except RuntimeError:
+        raise ValueError(f"environment.file: {path}: is no OpenEXR file, or a damaged one") from None
+    if "Y" in channels:
+        return channels["Y"]
+    if channels.keys() >= _LUMINANCE.keys():
+        return np.asarray(sum(weight * channels[name] for name, weight in _LUMINANCE.items()))
+    raise ValueError(f"environment.file: {path}: has neither a channel Y nor R, G, B; it has {', '.join(channels)}")

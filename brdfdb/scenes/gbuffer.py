@@ -1,0 +1,369 @@
+"""What a camera sees of a scene: for each object the visible points, with viewer and lights in the surface's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import radians
+from brdfdb.scenes.recorded_directions import Recorded
+from brdfdb.scenes.scene import Camera, Object, Scene
+from brdfdb.scenes.shapes import Array, Plane, unit
+
+# How far off their surface shadow and mirror rays begin: of the height that the picture has there, and of coordinates,
+# which are rounded
+_LIFT, _ROUNDED = 1e-4, 1e-14
+_BATCH = 40_000  # shadow rays at a time: fewer are slow for the calls, twice as many leave the cache
+_BEHIND = -0.1  # cosine: the smooth normals of cones turn away by half a degree at limbs, backs of surfaces by more
+_WIDEST, _MOST = 8192, 16384  # pixels on either side of a picture, and rays: a spectral one of 8192 x 6144 takes 16 GB
+_LENGTH_OFF = 0.05  # how far from 1 a recorded vector may be, which is then made 1 long: EXR with 16 bits is at 5e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """The points of one object that a camera sees, or that another object shows in its mirror.
+
+    Attributes
+    ----------
+    name, material : str
+        The object and its material.
+    wr : array (N, 3)
+        Unit vectors towards the viewer in the frame of the surface: x along the grain, z the normal.
+    wi : array (E, N, 3)
+        The same towards each sample of each light, and then in each direction that is drawn of the environment.
+    irradiance : array (E, N)
+        Irradiance of the surface by that sample, cosine included; 0 in shadow. pi for a light of strength 1 that the
+        surface faces; for spectral irradiance, times the illuminant. Of the environment, radiance times cosine times
+        the solid angle that the direction stands for.
+    beyond : array (N,)
+        Radiance that arrives from the mirror direction: of a light with a solid angle, ambient, and the environment; 0
+        where an object of the list stands there.
+    via : int or None
+        In the mirror of which points of the list these are seen; None if the camera sees them.
+    at : int array (N,)
+        The pixel of each point, counted row by row from the top; or its index among the points of `via`.
+    """
+
+    name: str
+    material: str
+    wr: Array
+    wi: Array
+    irradiance: Array
+    beyond: Array
+    via: int | None
+    at: NDArray[np.int64]
+
+
+class View(NamedTuple):
+    """What a camera sees: points, those seen in mirrors after those that they are seen in.
+
+    `samples` are the rays of each of width x height pixels; where fewer points are, the rest of the pixel sees none.
+    `background` (width * height,) is the radiance of the environment along these, summed over the rays of each pixel.
+    """
+
+    points: list[Points]
+    width: int
+    height: int
+    samples: int
+    background: Array
+
+
+def gather(scene: Scene, width: int, *, across: int = 1) -> View:
+    """Trace rays from the camera to the nearest object, from there to the lights, and once into mirrors.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen. One that is recorded has the size of its file.
+    width : int
+        Pixels across the picture; the aspect of the camera says how many down. 8192 on either side at most.
+    across : int
+        Rays across each pixel and down: `across` squared are averaged. 16384 rays on either side at most.
+
+    Returns
+    -------
+    View
+        A list of points for each object, then for each mirror and each object that it shows.
+
+    Raises
+    ------
+    ValueError
+        If a side has too many pixels or rays; if no ray meets an object, or the camera is inside one, or a light shines
+        on nothing that is seen; if a recorded file holds no directions, or that of an environment no picture.
+
+    Notes
+    -----
+    Mirrors are surfaces whose model has a Dirac part, and show one reflection, as in section 5 of He et al. 1991
+    (``he1991``). The ambient radiance is not shadowed; the environment is, by objects that send nothing on themselves.
+    """
+    first = scene.objects[0]
+    if isinstance(first.shape, Recorded):
+        view = _recorded(scene, first, first.shape)
+    else:
+        height = _height(scene.camera, width, across)
+        pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
+        rays = scene.camera.rays(width * across, height * across)
+        points, background = _traced(scene, rays, pixels.ravel(), width * height)
+        _check_outside(scene, [each for each in points if each.via is None])
+        unseen = [item.name for item in scene.objects if item.name not in {each.name for each in points}]
+        if unseen:
+            raise ValueError(f"objects: no ray of {width} x {height} pixels meets {', '.join(unseen)}")
+        view = View(points, width, height, across**2, background)
+    _check_lights(scene, view.points)
+    return view
+
+
+def gather_at(scene: Scene, places: Array) -> View:
+    """Trace single rays through places in the picture.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen; not one that is recorded, which has no rays.
+    places : array of shape (N, 2)
+        As `brdfdb.scenes.scene.Camera.through` takes them.
+
+    Returns
+    -------
+    View
+        N pixels in one row, in the order of the places.
+    """
+    points, background = _traced(scene, scene.camera.through(places), np.arange(len(places)), len(places))
+    return View(points, len(places), 1, 1, background)
+
+
+def _traced(
+    scene: Scene, rays: tuple[Array, Array], pixels: NDArray[np.int64], count: int
+) -> tuple[list[Points], Array]:
+    """Return the points that rays meet, directly and in mirrors, and the background of each of `count` pixels."""
+    points, surfaces, missed = _seen(scene, *rays, pixels)
+    for number, surface in enumerate(surfaces):
+        if scene.materials[points[number].material].spec.specular is not None:
+            points += _mirrored(scene, points, number, surface)
+    return points, _background(scene, rays[1][missed], pixels[missed], count)
+
+
+class _Surface(NamedTuple):
+    """Points (N, 3), frames with tangent, across and normal as rows (N, 3, 3), and viewers (N, 3), all in the scene.
+
+    `away` (N,) is how far the camera is, by way of the mirror.
+    """
+
+    position: Array
+    frame: Array
+    viewer: Array
+    away: Array
+
+
+def _seen(
+    scene: Scene,
+    origins: Array,
+    directions: Array,
+    at: NDArray[np.int64],
+    via: int | None = None,
+    before: Array | float = 0.0,
+) -> tuple[list[Points], list[_Surface], NDArray[np.int64]]:
+    """What rays meet first: points of each object that is met, the surfaces that they lie on; rays that meet none.
+
+    `before` is how far the origins are from the camera.
+    """
+    distance, nearest = _trace(scene, origins, directions)
+    away = before + distance
+    points, surfaces = [], []
+    for number, item in enumerate(scene.objects):
+        rays = np.flatnonzero((nearest == number) & np.isfinite(distance))
+        if not rays.size or isinstance(item.shape, Recorded):
+            continue
+        position = origins[rays] + distance[rays, np.newaxis] * directions[rays]
+        surface = _Surface(position, _turned(item.shape.frame(position), item.grain_deg), -directions[rays], away[rays])
+        wr = _viewed(surface)
+        wi, irradiance = _lit(scene, item, surface, wr, (number, 0 if via is None else via + 1))
+        beyond = _from_afar(scene, _mirror(surface))
+        points.append(Points(item.name, item.material, wr, wi, irradiance, beyond, via, at[rays]))
+        surfaces.append(surface)
+    return points, surfaces, np.flatnonzero(~np.isfinite(distance))
+
+
+def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface) -> list[Points]:
+    """What the mirror of some points shows; in place of what lies beyond, which is then 0."""
+    facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
+    origins, directions = _lifted(scene.camera, surface)[facing], _mirror(surface)[facing]
+    found, surfaces, _ = _seen(scene, origins, directions, facing, number, surface.away[facing])
+    for each, shown in zip(found, surfaces, strict=True):
+        points[number].beyond[each.at] = 0.0
+        if scene.materials[each.material].spec.specular is not None:  # what its mirror would show is not traced
+            each.beyond[np.isfinite(_trace(scene, _lifted(scene.camera, shown), _mirror(shown))[0])] = 0.0
+    return found
+
+
+def _trace(scene: Scene, origins: Array, directions: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Distance to the nearest object on each ray, and which it is."""
+    shapes = [item.shape for item in scene.objects]
+    distances = np.stack([shape.hit(origins, directions) for shape in shapes if not isinstance(shape, Recorded)])
+    nearest = np.argmin(distances, axis=0)
+    return np.min(distances, axis=0), nearest
+
+
+def _lit(scene: Scene, item: Object, surface: _Surface, wr: Array, stream: tuple[int, int]) -> tuple[Array, Array]:
+    """Directions of all samples of all light in the frame of the surface, and irradiances; 0 in shadow."""
+    lights = [(light.towards(), light.intensity) for light in scene.lights]
+    towards = np.concatenate([np.zeros((0, 3)), *(samples for samples, _ in lights)])
+    weight = np.concatenate([np.zeros(0), *(np.full(len(samples), each / len(samples)) for samples, each in lights)])
+    wi = unit(np.einsum("nij,ej->eni", surface.frame, towards))
+    irradiance = weight[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
+    _shadow(scene, surface, np.broadcast_to(towards[:, np.newaxis], wi.shape), irradiance)
+    if scene.environment is None:
+        return wi, irradiance
+    drawn = scene.environment.drawn(scene.materials[item.material], np.array(scene.wavelengths_nm), wr, stream)
+    around = np.einsum("eni,nij->enj", drawn.wi, surface.frame)
+    arriving = scene.environment.radiance(around) * np.maximum(drawn.wi[..., 2], 0.0) * drawn.solid_angle
+    _shadow(scene, surface, around, arriving)
+    return np.concatenate([wi, drawn.wi]), np.concatenate([irradiance, arriving])
+
+
+def _shadow(scene: Scene, surface: _Surface, towards: Array, irradiance: Array) -> None:
+    """Make irradiance (E, N) 0 where an object stands in its direction (E, N, 3), in the frame of the scene."""
+    if not scene.shadows:
+        return
+    origins = _lifted(scene.camera, surface)
+    sample, point = np.nonzero(irradiance)
+    for start in range(0, point.size, _BATCH):
+        which = sample[start : start + _BATCH], point[start : start + _BATCH]
+        irradiance[which] *= ~np.isfinite(_trace(scene, origins[which[1]], towards[which])[0])
+
+
+def _from_afar(scene: Scene, directions: Array) -> Array:
+    """Radiance that comes along directions from beyond all objects: of lights, ambient, and of the environment."""
+    radiance = np.full(len(directions), scene.ambient)
+    if scene.environment is not None:
+        radiance += scene.environment.radiance(directions)
+    for light in scene.lights:
+        radiance += np.where(directions @ unit(np.asarray(light.direction)) >= light.cos_radius, light.radiance, 0.0)
+    return radiance
+
+
+def _background(scene: Scene, directions: Array, at: NDArray[np.int64], pixels: int) -> Array:
+    """Radiance of the environment along rays that meet no object, summed over those of each pixel."""
+    background = np.zeros(pixels)
+    if scene.environment is not None:
+        np.add.at(background, at, scene.environment.radiance(directions))
+    return background
+
+
+def _lifted(camera: Camera, surface: _Surface) -> Array:
+    """Where rays from a surface begin: outside it, but by no more than a small part of a pixel."""
+    lift = _LIFT * camera.covered(surface.away) + _ROUNDED * np.abs(surface.position).max(axis=1)
+    return np.asarray(surface.position + lift[:, np.newaxis] * surface.frame[:, 2])
+
+
+def _mirror(surface: _Surface) -> Array:
+    """Where the mirror direction of each viewer points, in the scene."""
+    normal = surface.frame[:, 2]
+    return np.asarray(2.0 * np.sum(normal * surface.viewer, axis=1, keepdims=True) * normal - surface.viewer)
+
+
+def _turned(frame: Array, grain_deg: float) -> Array:
+    """Frames turned about their normals."""
+    turn = float(radians(grain_deg))
+    along = np.cos(turn) * frame[:, 0] + np.sin(turn) * frame[:, 1]
+    return np.stack([along, np.cross(frame[:, 2], along), frame[:, 2]], axis=1)
+
+
+def _viewed(surface: _Surface) -> Array:
+    """Viewers in the frames of their points, 1 long to the last digit."""
+    return unit(np.einsum("nij,nj->ni", surface.frame, surface.viewer))
+
+
+def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
+    """The points of a file of directions."""
+    arrays = shape.read()
+    height, width = arrays["normal" if "normal" in arrays else "wr"].shape[:2]
+    good = np.all(
+        [_is_unit(each) for array in arrays.values() for each in array.reshape(-1, height * width, 3)], axis=0
+    )
+    at = np.flatnonzero(good)
+    if not at.size:
+        raise ValueError(f"{shape.file}: shows nothing: at every pixel a vector is not finite, or not 1 long")
+    flat = {name: unit(array.reshape(-1, height * width, 3)[:, at]) for name, array in arrays.items()}
+    if "normal" in flat:
+        surface = _frames(flat, scene.camera, width, height, at, item.grain_deg)
+        # far apart, and no shadows: a file knows no positions
+        wr, beyond = _viewed(surface), _from_afar(scene, _mirror(surface))
+        wi, irradiance = _lit(scene.model_copy(update={"shadows": False}), item, surface, wr, (0, 0))
+    else:
+        if scene.environment is not None:
+            raise ValueError(f"{shape.file}: has wr and wi; an environment needs normals, to know what is above them")
+        turn = _turned(np.eye(3)[np.newaxis], item.grain_deg)[0]
+        wr, wi = flat["wr"][0] @ turn.T, flat["wi"] @ turn.T
+        if len(wi) != len(scene.lights) or any(light.solid_angle_sr for light in scene.lights):
+            raise ValueError(
+                f"{shape.file}: wi has {len(wi)} lights, the scene {len(scene.lights)}; "
+                "there must be as many, and none with a solid angle"
+            )
+        strength = np.array([light.strength for light in scene.lights])
+        irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
+        beyond = np.full(at.size, scene.ambient)
+    directions, none = scene.camera.rays(width, height)[1], np.flatnonzero(~good)
+    background = _background(scene, directions[none], none, width * height)
+    return View([Points(item.name, item.material, wr, wi, irradiance, beyond, None, at)], width, height, 1, background)
+
+
+def _frames(
+    flat: dict[str, Array], camera: Camera, width: int, height: int, at: NDArray[np.int64], grain_deg: float
+) -> _Surface:
+    """Surfaces of recorded normals and tangents; without tangents these are horizontal."""
+    normal = flat["normal"][0]
+    rough = flat["tangent"][0] if "tangent" in flat else np.cross([0.0, 0.0, 1.0], normal)
+    tangent = rough - np.sum(rough * normal, axis=1, keepdims=True) * normal
+    short = np.linalg.norm(tangent, axis=1) < 1e-6
+    tangent[short] = np.cross(np.cross(normal[short], [1.0, 0.0, 0.0]), normal[short])
+    tangent = unit(tangent)
+    frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
+    directions = camera.rays(width, height)[1]
+    return _Surface(np.zeros_like(normal), _turned(frame, grain_deg), -directions[at], np.zeros(len(normal)))
+
+
+def _is_unit(vectors: Array) -> NDArray[np.bool_]:
+    length = np.linalg.norm(np.nan_to_num(vectors, nan=0.0, posinf=0.0, neginf=0.0), axis=-1)
+    return np.asarray(np.abs(length - 1.0) < _LENGTH_OFF)
+
+
+def _height(camera: Camera, width: int, across: int) -> int:
+    """Pixels from the top of a picture to its bottom; ValueError if there are too many, or none."""
+    for name, value in (("width", width), ("across", across)):
+        if value < 1:
+            raise ValueError(f"{name}: {value} must be at least 1")
+    height = max(1, round(width / camera.aspect))
+    if max(width, height) > _WIDEST:
+        raise ValueError(f"width: {width} x {height} pixels are too many; either side may have {_WIDEST} at most")
+    if across * max(width, height) > _MOST:
+        raise ValueError(
+            f"across: {across} rays across each of {width} x {height} pixels are too many; either side may have "
+            f"{_MOST} rays at most"
+        )
+    return height
+
+
+def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
+    """ValueError if the camera is inside an object: it sees backs alone, which are black; a plane has a back, too."""
+    shapes = {item.name: item.shape for item in scene.objects}
+    for each in points:
+        if not isinstance(shapes[each.name], Plane) and np.median(each.wr[:, 2]) < _BEHIND:
+            raise ValueError(f"camera.position: is inside {each.name}, which is black from there")
+
+
+def _check_lights(scene: Scene, points: Sequence[Points]) -> None:
+    """ValueError if a light falls on nothing that is seen."""
+    start = 0
+    for number, light in enumerate(scene.lights):
+        stop = start + len(light.towards())
+        if not any(np.any(each.irradiance[start:stop]) for each in points):
+            raise ValueError(
+                f"lights.{number}: falls on nothing that is seen: it is below the horizon of every visible point, or "
+                "stands behind another object"
+            )
+        start = stop

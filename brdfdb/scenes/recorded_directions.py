@@ -1,0 +1,97 @@
+"""Directions that a renderer wrote, pixel by pixel: normals, or viewer and lights in the frame of the surface."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field
+
+from brdfdb.scenes.shapes import STRICT, Array
+
+WANTED = "neither `normal`, nor `wr` and `wi`, of shape (height, width, 3)"
+
+
+class Recorded(BaseModel):
+    """What a picture of directions shows, in place of a shape; `file` is an EXR or .npz.
+
+    It has either ``normal`` and, if the material is anisotropic, ``tangent``, vectors in the frame of the scene; or
+    ``wr`` and ``wi``, towards the viewer and towards each light of the scene in the frame of the surface (x the
+    tangent, z the normal), for lights without a solid angle. In an .npz these are arrays (height, width, 3), ``wi``
+    (lights, height, width, 3). In an EXR they are channels such as ``normal.X``, ``normal.Y`` and ``normal.Z``, those
+    of the lights ``wi0.X``, ``wi1.X`` and on. Pixels where a vector is 0 or not finite show nothing. Nothing casts a
+    shadow.
+    """
+
+    model_config = STRICT
+
+    kind: Literal["recorded"]
+    file: Annotated[str, Field(min_length=1)]
+
+    def resolved(self, folder: Path) -> Recorded:
+        """The same with its file named relative to a folder."""
+        return self.model_copy(update={"file": str(folder / self.file)})
+
+    def read(self) -> dict[str, Array]:
+        """The arrays of the file, float64, by name; ``wi`` with its axis of lights.
+
+        Raises
+        ------
+        ValueError
+            If the file is not there, not readable, or holds no directions.
+        """
+        path = Path(self.file)
+        if not path.is_file():
+            raise ValueError(f"{path}: there is no such file")
+        arrays = _from_exr(path) if path.suffix == ".exr" else _from_npz(path)
+        if "normal" not in arrays and not {"wr", "wi"} <= arrays.keys():
+            raise ValueError(f"{path}: has {WANTED}; it has {', '.join(arrays) or 'no vectors'}")
+        first = "normal" if "normal" in arrays else "wr"
+        pixels = arrays[first].shape[:2]
+        for name, array in arrays.items():
+            lights = array.shape[:1] if name == "wi" else ()
+            if array.shape != (*lights, *pixels, 3):
+                wanted = "(lights, height, width, 3)" if name == "wi" else "(height, width, 3)"
+                said = (
+                    f"{path}: {name} has the shape {array.shape}, which is not that of a picture of vectors, {wanted}"
+                )
+                raise ValueError(said if name == first else f"{said}, of as many pixels as {first} has, {pixels}")
+        return arrays
+
+
+def _from_npz(path: Path) -> dict[str, Array]:
+    try:
+        with np.load(path) as file:
+            found = {name: file[name] for name in ("normal", "tangent", "wr", "wi") if name in file}
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
+        raise ValueError(f"{path}: is no .npz of numbers, or a damaged one") from None
+    if any(array.dtype.kind not in "iuf" for array in found.values()):
+        raise ValueError(f"{path}: has {WANTED}: what has these names is not made of numbers")
+    return {name: array.astype(np.float64) for name, array in found.items()}
+
+
+def _from_exr(path: Path) -> dict[str, Array]:
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels: dict[str, NDArray[np.floating]] = {name: c.pixels for name, c in file.channels().items()}
+    except RuntimeError:
+        raise ValueError(f"{path}: is no OpenEXR file, or a damaged one") from None
+    found = {name: vector for name in ("normal", "tangent", "wr") if (vector := _vector(channels, name)) is not None}
+    lights: list[Array] = []
+    while (light := _vector(channels, f"wi{len(lights)}")) is not None:
+        lights.append(light)
+    return {**found, "wi": np.stack(lights)} if lights else found
+
+
+def _vector(channels: Mapping[str, NDArray[np.floating]], name: str) -> Array | None:
+    names = [f"{name}.{axis}" for axis in "XYZ"]
+    if not all(each in channels for each in names):
+        return None
+    return np.stack([channels[each] for each in names], axis=-1).astype(np.float64)

@@ -1,0 +1,234 @@
+"""Radiance of what a camera sees, by the shading of the papers, with any function as the BRDF."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from brdfdb.geometry import radians
+from brdfdb.integrals.quadrature import spectral_albedo
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+from brdfdb.scenes.gbuffer import Points, View
+from brdfdb.scenes.scene import Scene
+from brdfdb.scenes.shapes import Array
+
+# (wi, wr, wavelengths [nm]) of shapes (N, 3), (N, 3), (L,) -> f_r [1/sr], (N, L), or (N, 1) where it has no colour
+Brdf = Callable[[Array, Array, Array], Floats]
+
+# Albedos are polynomials of theta_r, through as many angles from 0 to the last, and as at the last beyond: that makes
+# 4e-3 at most of the papers' metals, 3e-2 where 17 angles are joined by lines
+_DEGREE, _LAST = 20, float(radians(89.5))
+# Between the azimuths of anisotropic materials; the other half turn is the same: lobes are ellipses, grooves straight
+_PHI = np.pi / 6.0
+_TOLERANCE = 1e-3  # absolute, of the albedos that these go through
+_VISIBLE_NM = (380.0, 780.0)  # where a material may be stated whose picture is grey
+_BATCH = 20_000  # pairs of viewer and light at a time: calls cost little beside them, and their spectra are 7 MB
+
+
+class Reflector:
+    """What a material does in a scene: f_r, the albedo that ambient light meets, and the mirror.
+
+    Attributes
+    ----------
+    material : Material
+        Which.
+    wavelength_nm : array (L,) [nm] or None
+        Where it is evaluated: that of the scene, or of the material if its parameters are stated for some wavelengths
+        only, which do not make a colour. None of a model that is not spectral.
+
+    Raises
+    ------
+    ValueError
+        If the parameters are stated for light that nobody sees.
+    """
+
+    def __init__(self, material: Material, wavelength_nm: Array) -> None:
+        self.material = material
+        self.wavelength_nm = material.evaluated_at(wavelength_nm)
+        if material.wavelengths_nm is not None and not _VISIBLE_NM[0] <= material.wavelengths_nm[0] <= _VISIBLE_NM[1]:
+            raise ValueError(
+                f"{material.name}: its parameters are stated for {material.wavelengths_nm[0]:g} nm, outside the "
+                f"visible, {_VISIBLE_NM[0]:g} to {_VISIBLE_NM[1]:g} nm"
+            )
+        self._parameters = material.arguments(self.wavelength_nm)
+        self._brdf = material.brdf_at(self.wavelength_nm)
+
+    def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
+        """f_r [1/sr] of the model: (N, L), or (N, 1) where it has no colour."""
+        return self._brdf(wi, wr)
+
+    def mirror(self, wr: Array) -> Floats:
+        """Reflectance [1] of the Dirac part towards viewers (N, 3): (N, L), (N, 1), or 0."""
+        if self.material.spec.specular is None:
+            return np.zeros((len(wr), 1))
+        theta = np.arccos(np.clip(wr[:, 2], -1.0, 1.0))
+        return np.reshape(self.material.specular_reflectance(theta, self.wavelength_nm), (len(wr), -1))
+
+    def albedo(self, wr: Array) -> Floats:
+        """Share [1] of ambient radiance that viewers (N, 3) see, without the mirror's: (N, L), or (N, 1)."""
+        theta = np.minimum(np.arccos(np.clip(wr[:, 2], -1.0, 1.0)), _LAST)
+        around = np.moveaxis(chebyshev.chebval(2.0 * theta / _LAST - 1.0, self._albedos), -1, 0)  # (N, azimuths, L)
+        values = around[:, 0]
+        if around.shape[1] > 1:
+            turn, share = np.divmod(np.arctan2(wr[:, 1], wr[:, 0]) / _PHI, 1.0)
+            row, low = np.arange(len(wr)), turn.astype(np.int64) % around.shape[1]
+            upper = around[row, (low + 1) % around.shape[1]]
+            values = around[row, low] + share[:, np.newaxis] * (upper - around[row, low])
+        return np.where(wr[:, 2:] >= 0.0, np.maximum(values, 0.0), 0.0)
+
+    @functools.cached_property
+    def _albedos(self) -> Array:
+        """Polynomials of directional albedo, (coefficients, azimuths, L): by reciprocity, of viewers as of lights."""
+        anisotropic = self.material.anisotropic
+        nodes = np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
+        phis = np.arange(0.0, np.pi - 1e-9, _PHI) if anisotropic else np.zeros(1)
+        known = [
+            [
+                spectral_albedo(
+                    self.material.spec,
+                    float(theta),
+                    float(phi),
+                    self._parameters,
+                    tolerance=_TOLERANCE,
+                    mirrored=not anisotropic,
+                ).albedo
+                for phi in phis
+            ]
+            for theta in _LAST * (nodes + 1.0) / 2.0
+        ]
+        shape = np.shape(known)
+        return chebyshev.chebfit(nodes, np.reshape(known, (_DEGREE, -1)), _DEGREE - 1).reshape(shape)
+
+
+def reflectors(scene: Scene) -> dict[str, Reflector]:
+    """What the materials of a scene do, by name."""
+    wavelength = np.array(scene.wavelengths_nm)
+    return {name: Reflector(material, wavelength) for name, material in scene.materials.items()}
+
+
+def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
+    """Spectral radiance of points, as multiples of the illuminant: 1 is white.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its wavelengths and ambient light.
+    points : Points
+        What is seen.
+    reflector : Reflector
+        The material of the points.
+    brdf : callable, optional
+        f_r in place of the model's: ``brdf(wi, wr, wavelength_nm)`` gives (N, L) or (N, 1) [1/sr].
+
+    Returns
+    -------
+    array (N, L)
+        Without what the mirror shows of other objects, which `render` adds.
+
+    Raises
+    ------
+    ValueError
+        If `brdf` returns another shape.
+
+    Notes
+    -----
+    Eq. (6) of Ward 1992 (``ward1992``): lights are deterministic, the environment is sampled. Eq. (12) of He et al.
+    1991 (``he1991``): mirror, lights, and rho_hd times ambient light, where rho_hd is the directional albedo of the
+    same model for the direction of the viewer, not a constant. The mirror has a light only where the disc of the light
+    holds the mirror direction. Albedo and mirror are those of the material whichever BRDF is given.
+    """
+    wavelength = np.array(scene.wavelengths_nm)
+    f_r = reflector.brdf if brdf is None else brdf
+    total = np.zeros((len(points.wr), wavelength.size))
+    step = max(1, _BATCH // max(1, len(points.wi)))
+    for start in range(0, len(total), step):
+        part = slice(start, start + step)
+        irradiance = points.irradiance[:, part].T
+        number, light = np.nonzero(irradiance * (points.wr[part, 2:] > 0.0))
+        if number.size:
+            reflected = np.asarray(f_r(points.wi[light, start + number], points.wr[start + number], wavelength))
+            shapes = (number.size, wavelength.size), (number.size, 1)
+            if reflected.shape not in shapes:
+                raise ValueError(
+                    f"f_r of {points.material}: {number.size} pairs of directions at {wavelength.size} wavelengths "
+                    f"gave the shape {reflected.shape}; must be {shapes[0]} or {shapes[1]}"
+                )
+            first = np.flatnonzero(np.diff(number, prepend=-1))
+            sums = np.add.reduceat(reflected * irradiance[number, light][:, np.newaxis], first)
+            total[start + number[first]] += sums
+    if scene.ambient:
+        total += scene.ambient * reflector.albedo(points.wr)
+    total += points.beyond[:, np.newaxis] * reflector.mirror(points.wr)
+    return total
+
+
+def render(
+    scene: Scene,
+    view: View,
+    brdfs: Mapping[str, Brdf] | None = None,
+    *,
+    materials: Mapping[str, Reflector] | None = None,
+    progress: Callable[[], None] | None = None,
+) -> NDArray[np.float64]:
+    """The picture of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen.
+    view : View
+        Its points, by `brdfdb.scenes.gbuffer.gather`.
+    brdfs : mapping, optional
+        By the name of a material, what is evaluated in place of its model.
+    materials : mapping, optional
+        The result of `reflectors`, which holds albedos: for callers that render a scene more than once.
+    progress : callable, optional
+        Called after each list of points.
+
+    Returns
+    -------
+    array (height, width, L)
+        Spectral radiance as multiples of the illuminant, averaged over each pixel; ambient radiance and environment
+        where there is no object.
+
+    Raises
+    ------
+    ValueError
+        If `brdfs` has a key that is no material of the scene, or one of them returns a wrong shape; if a material is
+        stated for light that nobody sees.
+    """
+    known = reflectors(scene) if materials is None else materials
+    replaced = {} if brdfs is None else brdfs
+    for name in replaced:
+        if name not in scene.materials:
+            raise ValueError(f"brdfs: {name!r} is not one of the scene's materials: {', '.join(scene.materials)}")
+    lists = []
+    for points in view.points:
+        lists.append(radiance(scene, points, known[points.material], replaced.get(points.material)))
+        if progress is not None:
+            progress()
+    return composed(scene, view, lists, known)
+
+
+def composed(
+    scene: Scene, view: View, lists: Sequence[Floats], materials: Mapping[str, Reflector]
+) -> NDArray[np.float64]:
+    """The picture (height, width, L) of radiances of each list of points, to which mirrors add what they show."""
+    known, lists = materials, [values.copy() for values in lists]
+    pixels = np.zeros((view.height * view.width, len(scene.wavelengths_nm)))
+    free = np.full(len(pixels), float(view.samples))
+    # what mirrors show comes after them in the list
+    for points, values in zip(view.points[::-1], lists[::-1], strict=True):
+        if points.via is None:
+            np.add.at(pixels, points.at, values)
+            np.add.at(free, points.at, -1.0)
+        else:
+            mirror = view.points[points.via]
+            lists[points.via][points.at] += known[mirror.material].mirror(mirror.wr[points.at]) * values
+    pixels += (scene.ambient * free + view.background)[:, np.newaxis]
+    return pixels.reshape(view.height, view.width, -1) / view.samples

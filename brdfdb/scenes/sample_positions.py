@@ -1,0 +1,126 @@
+"""Positions in a picture to look at: spread evenly over it, and crowded at limbs, terminators and edges of shadows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.scenes.gbuffer import gather_at
+from brdfdb.scenes.scene import Scene
+from brdfdb.scenes.shapes import Array
+
+# How near to an edge positions lie, in powers of ten below the width of a pixel: there a limb as wide as a pixel is
+# seen at 89.99 degrees
+DECADES = 8
+_HALVINGS = 32  # of a pixel, which leave less than the nearest position
+_TRIES = 4  # each draws twice as many positions as are wanted: the edge may leave the pixel
+_PRIME = np.uint64(1_000_003)
+
+
+def even(width: int, height: int, rng: np.random.Generator) -> Array:
+    """Return places (height * width, 2), one anywhere in each pixel of a picture, row by row from the top.
+
+    Places are those of `brdfdb.scenes.scene.Camera.through`.
+    """
+    column, row = np.meshgrid(np.arange(width), np.arange(height))
+    turn = rng.random((2, height, width))
+    return _places(np.stack([column + turn[0], row + turn[1]], axis=-1).reshape(-1, 2), width, height)
+
+
+def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.Generator) -> Array:
+    """Return places near edges, whose distances from these are spread evenly in their logarithm.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is seen; not one that is recorded.
+    width, height : int
+        Pixels of the picture. Edges are looked for between places a pixel apart.
+    count : int
+        How many places to return, if the scene shows edges.
+    rng : numpy.random.Generator
+        What they are drawn with.
+
+    Returns
+    -------
+    array of shape (N, 2)
+        N is `count`, or less where edges are few. As `brdfdb.scenes.scene.Camera.through` takes them.
+
+    Notes
+    -----
+    Each place is drawn by itself: an edge between two neighbours of a grid, across or down, anywhere along it; one of
+    its two sides; a distance along the grid, from a pixel's width down to `DECADES` powers of ten less.
+
+    An edge is where rays begin to meet another object, directly or in a mirror, or its back, or another light: limbs
+    and outlines, terminators and the edges of shadows. At a distance d from its limb a sphere of radius R is seen at
+    sqrt(2 d / R) from grazing, so that even logarithms cover all grazing angles alike.
+    """
+    hard = scene.model_copy(
+        update={
+            "lights": [light.model_copy(update={"solid_angle_sr": 0.0}) for light in scene.lights],
+            "environment": None,
+        }
+    )
+    size = np.array([width, height], dtype=np.float64)
+
+    def met(pixels: Array) -> NDArray[np.uint64]:
+        return _met(hard, _places(pixels, width, height))
+
+    corners, axes = _straddling(met, width, height, rng)
+    found = [np.empty((0, 2))]
+    left = count if len(corners) else 0
+    for _ in range(_TRIES):
+        if left <= 0:
+            break
+        chosen = rng.integers(len(corners), size=2 * left)
+        near, axis = corners[chosen], axes[chosen]
+        rows = np.arange(len(near))
+        near[rows, 1 - axis] += rng.random(len(near)) - 0.5  # anywhere along the edge, in this pixel
+        far = near + np.eye(2)[axis]
+        first = met(near)
+        differs = first != met(far)
+        near, far, first, axis = near[differs], far[differs], first[differs], axis[differs]
+        for _ in range(_HALVINGS):
+            middle = (near + far) / 2.0
+            same = (met(middle) == first)[:, np.newaxis]
+            near, far = np.where(same, middle, near), np.where(same, far, middle)
+        before = rng.random(len(near)) < 0.5
+        place = np.where(before[:, np.newaxis], near, far)
+        away = 10.0 ** (-DECADES * rng.random(len(near)))
+        place[np.arange(len(near)), axis] += np.where(before, -away, away)
+        place = place[np.all((place >= 0.0) & (place <= size), axis=1)]
+        found.append(place[:left])
+        left -= len(found[-1])
+    return _places(np.concatenate(found), width, height)
+
+
+def _straddling(
+    met: Callable[[Array], NDArray[np.uint64]], width: int, height: int, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return places (N, 2) of a grid, in pixels, and the axis along which the next place lies beyond an edge."""
+    grid = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1) + rng.random(2)
+    known = met(grid.reshape(-1, 2)).reshape(height, width)
+    across = grid[:, :-1][known[:, :-1] != known[:, 1:]]
+    down = grid[:-1][known[:-1] != known[1:]]
+    return np.concatenate([across, down]), np.repeat([0, 1], [len(across), len(down)])
+
+
+def _places(pixels: Array, width: int, height: int) -> Array:
+    """Return places in halves of the height, from the middle, of places in pixels from the upper left corner."""
+    return np.stack([2.0 * pixels[:, 0] - width, height - 2.0 * pixels[:, 1]], axis=1) / height
+
+
+def _met(scene: Scene, places: Array) -> NDArray[np.uint64]:
+    """Return numbers (N,) that are the same where rays meet the same objects, faces of them and lights."""
+    view = gather_at(scene, places)
+    numbers = {item.name: number + 1 for number, item in enumerate(scene.objects)}
+    met = np.zeros(len(places), dtype=np.uint64)
+    for points in view.points:
+        state = 2 * numbers[points.name] + (points.wr[:, 2] > 0.0).astype(np.uint64)
+        for irradiance in points.irradiance:
+            state = 2 * state + (irradiance > 0.0)
+        at = points.at if points.via is None else view.points[points.via].at[points.at]
+        met[at] = met[at] * _PRIME + state.astype(np.uint64)
+    return met

@@ -1,0 +1,252 @@
+"""Scenes: objects of one material each, lights far away, a camera, and how much of an error the picture may show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, Field, field_validator, model_validator
+
+from brdfdb.geometry import radians
+from brdfdb.materials import Material, presets
+from brdfdb.parameters import closest
+from brdfdb.scenes.environment import Environment
+from brdfdb.scenes.recorded_directions import Recorded
+from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Vector, check_direction, unit
+from brdfdb.spectra import ILLUMINANT, OBSERVER, check_illuminant, check_observer, covers_visible
+
+WAVELENGTHS_NM = [float(wavelength) for wavelength in range(380, 781, 10)]
+
+
+class Light(BaseModel):
+    """A light far away: the same from everywhere in the scene.
+
+    `strength` [1] is its irradiance over pi, that of a surface which faces it: the radiance that a white Lambertian
+    surface has there, whatever the solid angle. With one the light is a round disc that glossy surfaces blur and
+    mirrors show; without one mirrors miss it.
+    """
+
+    model_config = STRICT
+
+    direction: Vector = Field(description="towards the light")
+    strength: float = Field(default=1.0, gt=0.0)
+    solid_angle_sr: float = Field(default=0.0, ge=0.0, le=1.0)
+    samples: int = Field(
+        default=16, ge=1, le=1024, description="over the solid angle; much narrower lobes show them one by one"
+    )
+
+    @field_validator("direction")
+    @classmethod
+    def _check_direction(cls, direction: Vector) -> Vector:
+        return check_direction("direction", direction)
+
+    @property
+    def cos_radius(self) -> float:
+        """Cosine of the angle from the middle of the disc to its edge."""
+        return 1.0 - self.solid_angle_sr / (2.0 * np.pi)
+
+    @property
+    def intensity(self) -> float:
+        """Radiance times solid angle: pi times the strength over the mean cosine, on a surface that faces the disc."""
+        return np.pi * self.strength / ((1.0 + self.cos_radius) / 2.0)
+
+    @property
+    def radiance(self) -> float:
+        """Radiance of the disc; 0 if the light has no solid angle."""
+        return self.intensity / self.solid_angle_sr if self.solid_angle_sr else 0.0
+
+    def towards(self) -> Array:
+        """Unit vectors (samples, 3) towards the disc, each of which stands for the same solid angle."""
+        z = unit(np.asarray(self.direction))
+        if self.solid_angle_sr == 0.0:
+            return z[np.newaxis]
+        x = unit(np.cross(z, np.eye(3)[np.argmin(np.abs(z))]))
+        # A spiral of golden angles: even over the disc for any number of samples
+        number = np.arange(self.samples)
+        cos = 1.0 - (1.0 - self.cos_radius) * (number + 0.5) / self.samples
+        turn = number * np.pi * (3.0 - np.sqrt(5.0))
+        ring = np.cos(turn)[:, np.newaxis] * x + np.sin(turn)[:, np.newaxis] * np.cross(z, x)
+        return np.asarray(cos[:, np.newaxis] * z + np.sqrt(1.0 - cos * cos)[:, np.newaxis] * ring)
+
+
+class Camera(BaseModel):
+    """A pinhole with an angle of view, or a camera far away that sees a given height of the scene; z points up."""
+
+    model_config = STRICT
+
+    position: Vector
+    target: Vector = (0.0, 0.0, 0.0)
+    up: Vector = (0.0, 0.0, 1.0)
+    fov_deg: float | None = Field(default=None, gt=0.0, lt=170.0, description="from the lower to the upper edge")
+    height: float | None = Field(default=None, gt=0.0, description="of what a camera far away sees, at the target")
+    aspect: float = Field(default=4.0 / 3.0, ge=0.1, le=10.0, description="width of the picture over its height")
+
+    @model_validator(mode="after")
+    def _check(self) -> Camera:
+        if (self.fov_deg is None) == (self.height is None):
+            raise ValueError("fov_deg, height: give one of the two")
+        forward = np.subtract(self.target, self.position)
+        if np.linalg.norm(np.cross(forward, self.up)) <= 1e-9 * np.linalg.norm(forward) * np.linalg.norm(self.up):
+            raise ValueError("target: the camera must look at another place than its own, and not along `up`")
+        return self
+
+    def covered(self, distance: Array) -> Array:
+        """How high what the camera sees is, at distances from it, from the lower to the upper edge of the picture."""
+        if self.fov_deg is None:
+            assert self.height is not None
+            return np.full_like(distance, self.height)
+        return 2.0 * np.tan(radians(self.fov_deg) / 2.0) * distance
+
+    def rays(self, width: int, height: int) -> tuple[Array, Array]:
+        """Return origins and unit directions (height * width, 3) through the middles of pixels, row by row."""
+        x, y = np.meshgrid(
+            (2.0 * np.arange(width) + 1.0 - width) / height, 1.0 - (2.0 * np.arange(height) + 1.0) / height
+        )
+        return self.through(np.stack([x.ravel(), y.ravel()], axis=1))
+
+    def through(self, places: Array) -> tuple[Array, Array]:
+        """Return origins and unit directions (N, 3) of rays through places (N, 2) in the picture.
+
+        Places are x to the right and y upwards from the middle of the picture, in halves of its height.
+        """
+        eye = np.asarray(self.position)
+        forward = unit(np.subtract(self.target, self.position))
+        right = unit(np.cross(forward, self.up))
+        over = places[:, :1] * right + places[:, 1:] * np.cross(right, forward)
+        if self.fov_deg is None:
+            assert self.height is not None
+            return eye + 0.5 * self.height * over, np.broadcast_to(forward, over.shape)
+        return np.broadcast_to(eye, over.shape), unit(forward + np.tan(radians(self.fov_deg) / 2.0) * over)
+
+
+class Object(BaseModel):
+    """A shape of one material; `grain_deg` turns the material's x axis from the tangent of the shape."""
+
+    model_config = STRICT
+
+    name: Annotated[str, Field(min_length=1)]
+    material: str = Field(description="a preset, or a material that the scene defines")
+    shape: AnyShape | Recorded = Field(discriminator="kind")
+    grain_deg: float = Field(default=0.0, description="counter-clockwise, seen from outside")
+
+
+class Tolerance(BaseModel):
+    """How far the picture may be from the true one: relative in radiance, or in CIEDE2000. One of the two.
+
+    All places that are looked at keep to it, or a percentile of those of each material if isolated ones do not matter.
+    """
+
+    model_config = STRICT
+
+    relative: float | None = Field(default=None, gt=0.0, lt=1.0)
+    ciede2000: float | None = Field(default=None, gt=0.0, le=100.0)
+    percentile: float = Field(default=100.0, gt=0.0, le=100.0, description="of the pixels of each material; 100: all")
+
+    @model_validator(mode="after")
+    def _check(self) -> Tolerance:
+        if (self.relative is None) == (self.ciede2000 is None):
+            raise ValueError("relative, ciede2000: give one of the two")
+        return self
+
+    @property
+    def unit(self) -> Literal["relative", "CIEDE2000"]:
+        """What `value` counts."""
+        return "CIEDE2000" if self.relative is None else "relative"
+
+    @property
+    def value(self) -> float:
+        """The largest error, in `unit`."""
+        found = self.ciede2000 if self.relative is None else self.relative
+        assert found is not None  # as `_check` saw
+        return found
+
+
+class Scene(BaseModel):
+    """A scene. Radiance 1 is that of a white Lambertian surface that faces a light of strength 1.
+
+    Raises
+    ------
+    ValueError
+        For an unknown material, illuminant or observer, with the closest names; for wavelengths that make no colour.
+    """
+
+    model_config = STRICT
+
+    title: str = ""
+    source: str = Field(default="", description="the picture that it is after")
+    objects: list[Object] = Field(min_length=1)
+    lights: list[Light] = []
+    ambient: float = Field(default=0.0, ge=0.0, description="radiance that comes from everywhere, unshadowed")
+    environment: Environment | None = Field(default=None, description="radiance that differs with the direction")
+    shadows: bool = Field(default=True, description="whether objects stand in each other's light, and in their own")
+    camera: Camera
+    exposure: float = Field(default=1.0, gt=0.0, description="what radiance is multiplied with to be 1 for white")
+    illuminant: str = Field(default=ILLUMINANT, description="spectrum of all light: a name of colour-science")
+    observer: str = Field(default=OBSERVER, description="a name of colour-science")
+    wavelengths_nm: list[float] = WAVELENGTHS_NM
+    tolerance: Tolerance = Tolerance(ciede2000=1.0)
+    define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
+
+    @field_validator("illuminant")
+    @classmethod
+    def _check_illuminant(cls, name: str) -> str:
+        return check_illuminant(name)
+
+    @field_validator("observer")
+    @classmethod
+    def _check_observer(cls, name: str) -> str:
+        return check_observer(name)
+
+    @field_validator("wavelengths_nm")
+    @classmethod
+    def _check_wavelengths(cls, wavelengths_nm: list[float]) -> list[float]:
+        if not covers_visible(wavelengths_nm):
+            raise ValueError("wavelengths_nm: must increase from 420 or less to 680 or more in steps of at most 20 nm")
+        return wavelengths_nm
+
+    @model_validator(mode="after")
+    def _check(self) -> Scene:
+        if not self.lights and not self.ambient and self.environment is None:
+            raise ValueError("lights, ambient, environment: there is no light")
+        names = [item.name for item in self.objects]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"objects: {name!r} is the name of two")
+        if any(isinstance(item.shape, Recorded) for item in self.objects) and len(names) > 1:
+            raise ValueError("objects: one that is recorded is the whole picture, and stands alone")
+        _materials(self)
+        return self
+
+    @property
+    def materials(self) -> dict[str, Material]:
+        """The materials of the objects by name, each once."""
+        return _materials(self)
+
+    def resolved(self, folder: Path) -> Scene:
+        """The scene with the names of files that it reads relative to a folder."""
+        objects = [
+            item.model_copy(update={"shape": item.shape.resolved(folder)}) if isinstance(item.shape, Recorded) else item
+            for item in self.objects
+        ]
+        environment = None if self.environment is None else self.environment.resolved(folder)
+        return self.model_copy(update={"objects": objects, "environment": environment})
+
+
+def _materials(scene: Scene) -> dict[str, Material]:
+    known: dict[str, Material] = presets()
+    for name, table in scene.define.items():
+        if name in known:
+            raise ValueError(f"define.{name}: is the name of a built-in material; give yours another")
+        try:
+            known[name] = Material.from_table(name, table)
+        except ValueError as error:
+            raise ValueError(f"define.{error}") from None
+    found = {}
+    for item in scene.objects:
+        if item.material not in known:
+            raise ValueError(
+                f"objects.{item.name}.material: {item.material!r} is unknown{closest(item.material, known)}"
+            )
+        found[item.material] = known[item.material]
+    return found

@@ -1,0 +1,440 @@
+"""Families: a model at any parameters between those of the tables of a sweep, interpolated, with a measured error.
+
+ROOT/families/NAME.json   which tables, over which parameters, how values between them are found, and how well
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from brdfdb.geometry import checked_angles, checked_vectors, radians
+from brdfdb.materials import written_name
+from brdfdb.models import MODELS
+from brdfdb.parameters import Floats, Parameter
+from brdfdb.store.manifest import StoreError, read_sealed
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.stated_error import Error
+from brdfdb.tables.table import Table
+from brdfdb.tables.table_base import Stated
+
+FORMAT = "brdfdb-family"
+FORMAT_VERSION: Literal[1] = 1
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+_SAME = 1e-12  # of the largest value: as close to one of a member is at the member
+
+
+class Sweep(BaseModel):
+    """Which tables make a family."""
+
+    model_config = _STRICT
+
+    name: str
+    title: str
+    model: str
+    axes: dict[str, list[float]] = Field(
+        description="values of each swept parameter, named and in the unit as in files: degrees under names in _deg"
+    )
+    members: list[str] = Field(description="names of the materials; the last axis runs fastest")
+    request_sha256: list[str] = Field(description="of the request that each member was built for")
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """The swept parameters, by the names that `axes` gives them."""
+        found = {written_name(parameter): parameter for parameter in MODELS[self.model].parameters}
+        return {written: found[written] for written in self.axes}
+
+    @property
+    def nodes(self) -> dict[str, Axis]:
+        """The values of the swept parameters by the names and in the units of the model: angles in radians."""
+        return {
+            parameter.name: np.array([radians(v) if parameter.unit == "rad" else v for v in self.axes[written]])
+            for written, parameter in self.parameters.items()
+        }
+
+
+class Blend(BaseModel):
+    """How values between members are found: by polynomials, in one parameter after the other."""
+
+    model_config = _STRICT
+
+    method: Literal["linear", "cubic"] = Field(
+        description="between the two values next to a parameter, or by the cubic through the four around it, fewer if "
+        "there are no more"
+    )
+    powers: dict[str, Literal[-2, -1, 0, 1, 2]] = Field(
+        description="of each swept parameter, in which these are polynomials; 0: its logarithm"
+    )
+    offset: float | None = Field(
+        description="1/sr; what is interpolated is the logarithm of f_r plus this. null: f_r itself"
+    )
+    specular_offset: float | None = Field(description="the same of the reflectance of the Dirac part")
+    reason: str = Field(description="what this and the other ways were measured to leave")
+
+
+class WorstPoint(BaseModel):
+    """The parameters, of those measured at, where the interpolation is worst."""
+
+    model_config = _STRICT
+
+    parameters: dict[str, float] = Field(description="as in axes")
+    p99: float = Field(description="99th percentile of the relative error of f_r, at the worst wavelength")
+
+
+class FamilyRecord(Sweep):
+    """A family as the store records it."""
+
+    format: Literal["brdfdb-family"] = "brdfdb-family"
+    version: Literal[1] = FORMAT_VERSION
+    interpolation: Blend
+    error: Error = Field(
+        description="of interpolated f_r against the model, over directions and parameters: all points pooled, as many "
+        "in each cell between members, spread evenly in it; of more than 256 cells one point in each of 256 drawn at "
+        "random. 99 of 100 values of the family are within p99"
+    )
+    points: int = Field(description="parameters at which the error was measured")
+    worst: WorstPoint
+    specular_error: float | None = Field(
+        description="largest absolute error of the reflectance of the Dirac part at the same parameters"
+    )
+
+
+def path_of(root: Path, name: str) -> Path:
+    """Return the path of the record of a family in the store at `root`."""
+    return root / "families" / f"{name}.json"
+
+
+def read_record(path: Path) -> FamilyRecord:
+    """Read the record of a family; StoreError, naming the family, if it is none that this program reads."""
+    where = f"the family {path.stem}"
+    return record_from(read_sealed(path, where), where)
+
+
+def record_from(content: Mapping[str, Any], where: str) -> FamilyRecord:
+    """Return a family from its JSON; StoreError, beginning with `where`, if it is none that this program reads."""
+    if (content.get("format"), content.get("version")) != (FORMAT, FORMAT_VERSION):
+        raise StoreError(
+            f"{where} is of format {content.get('format')} version {content.get('version')}, "
+            f"this program reads {FORMAT} version {FORMAT_VERSION}"
+        )
+    try:
+        record = FamilyRecord.model_validate(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise StoreError(f"{where} is damaged: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+    if where != f"the family {record.name}":
+        raise StoreError(f"{where} is damaged: its record is that of {record.name}")
+    return record
+
+
+def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], Table]:
+    """A function that gives the member of a number, as it is when first asked for, and keeps those used last.
+
+    It raises StoreError for a member that was built anew for another request, and for one at other wavelengths than
+    another one.
+    """
+    shared: dict[str, Axis | None] = {}
+
+    @functools.lru_cache(maxsize=2 * math.prod(min(4, len(values)) for values in sweep.axes.values()))
+    def load(number: int) -> Table:
+        name = sweep.members[number]
+        table = tables[name]
+        if table.attrs.get("request_sha256") != sweep.request_sha256[number]:
+            raise StoreError(stale(sweep.name, name))
+        if not _same(shared.setdefault("wavelength_nm", table.wavelength_nm), table.wavelength_nm):
+            raise StoreError(f"the family {sweep.name}: {name} is at other wavelengths than another member")
+        return table
+
+    return load
+
+
+def stale(family: str, member: str) -> str:
+    """The sentence about a family whose member is not the one that its record was made of."""
+    return (
+        f"the family {family} is out of date: {member} is another table than it was measured with; "
+        "build its recipe again"
+    )
+
+
+def _same(one: Axis | None, other: Axis | None) -> bool:
+    return one is other if one is None or other is None else np.array_equal(one, other)
+
+
+def stencil(nodes: Axis, value: float, power: int, *, cubic: bool) -> tuple[int, Floats]:
+    """Which values of a parameter count for one between them: the number of the first, and the weight of each.
+
+    Lagrange's polynomial through 2 of them, or 4 (3 if there are no more), in a power of the parameter or its logarithm
+    (power 0). At a node its weight is exactly 1, that of others 0.
+    """
+    width = min(4 if cubic else 2, nodes.size)
+    cell = int(np.searchsorted(nodes, value, side="right")) - 1
+    first = min(max(cell - (width - 2) // 2, 0), nodes.size - width)
+    some = nodes[first : first + width]
+    x, at = (np.log(some), np.log(value)) if power == 0 else (some ** float(power), value ** float(power))
+    others = ~np.eye(width, dtype=bool)
+    return first, np.prod(np.divide(at - x, x[:, np.newaxis] - x, out=np.ones((width, width)), where=others), axis=1)
+
+
+def blended(values: Sequence[Floats], weights: Sequence[ArrayLike], offset: float | None) -> Floats:
+    """The weighted mean of values, or of the logarithms of values plus `offset`; nothing below 0, 0 where all are."""
+    if offset is None:
+        mean = sum(np.asarray(weight) * value for weight, value in zip(weights, values, strict=True))
+        return np.maximum(mean, 0.0)
+    logarithms = sum(
+        np.asarray(weight) * np.log(np.maximum(value, 0.0) + offset)
+        for weight, value in zip(weights, values, strict=True)
+    )
+    black = np.logical_and.reduce([np.equal(value, 0.0) for value in values])
+    return np.where(black, 0.0, np.maximum(np.exp(logarithms) - offset, 0.0))
+
+
+class _Part(NamedTuple):
+    """A member and its weight."""
+
+    table: Table
+    weight: float
+
+
+class Family:
+    """A family opened for reading: f_r at any parameters within the swept ranges, without the model.
+
+    Attributes
+    ----------
+    record : FamilyRecord
+        What the store says of it: members, interpolation, measured error.
+    axes : dict of str to array
+        The values of the swept parameters, in the units of the model: angles in radians.
+
+    Parameters
+    ----------
+    record : FamilyRecord
+        Of the family.
+    tables : mapping of str to Table
+        The members by name, such as the store. They are looked at when a lookup needs them, and kept while they do.
+    """
+
+    def __init__(self, record: FamilyRecord, tables: Mapping[str, Table]) -> None:
+        self.record = record
+        self.axes = record.nodes
+        self._member = member_loader(record, tables)
+        self._limits = [
+            replace(parameter, low=float(self.axes[parameter.name][0]), high=float(self.axes[parameter.name][-1]))
+            for parameter in record.parameters.values()
+        ]
+        self._powers = [record.interpolation.powers[written] for written in record.axes]
+
+    @property
+    def name(self) -> str:
+        """Of the family."""
+        return self.record.name
+
+    @property
+    def error(self) -> Error:
+        """The measured error of f_r between members, over directions and parameters."""
+        return self.record.error
+
+    @property
+    def wavelength_nm(self) -> Axis | None:
+        """Wavelengths [nm] of all members; None if they are grey."""
+        return self._member(0).wavelength_nm
+
+    @overload
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[False] = False,
+        **parameters: float,
+    ) -> Floats: ...
+
+    @overload
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[True],
+        **parameters: float,
+    ) -> Stated: ...
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: bool = False,
+        **parameters: float,
+    ) -> Floats | Stated:
+        """Interpolate f_r over directions, wavelengths and parameters.
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r, wavelength_nm
+            As in `Table.lookup`: angles in radians.
+        with_error : bool
+            Give the error beside the values: at the parameters of a member what its table states, else what was
+            measured of the family.
+        **parameters : float
+            One number for each swept parameter, in the unit of the model: angles in radians.
+
+        Returns
+        -------
+        array [1/sr], or Stated
+            Shaped as by `Table.lookup`. At the parameters of a member, what that table gives.
+
+        Raises
+        ------
+        ValueError
+            If a parameter is missing, not swept, not one number or outside its swept range, or an angle or wavelength
+            is outside its range; the message names it.
+        StoreError
+            If a member was built anew since the family was recorded.
+        """
+        parts = self._parts(parameters)
+        given = (theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+        if len(parts) == 1:
+            table = parts[0].table
+            return table.lookup(*given, with_error=True) if with_error else table.lookup(*given)
+        brdf = self._blended(parts, [part.table.lookup(*given) for part in parts])
+        if not with_error:
+            return brdf
+        directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
+        return Stated(brdf, parts[0].table.stated_by(self.error, directions, brdf, wavelength_nm))
+
+    @overload
+    def lookup_vectors(
+        self,
+        wi: ArrayLike,
+        wr: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[False] = False,
+        **parameters: float,
+    ) -> Floats: ...
+
+    @overload
+    def lookup_vectors(
+        self,
+        wi: ArrayLike,
+        wr: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[True],
+        **parameters: float,
+    ) -> Stated: ...
+
+    def lookup_vectors(
+        self,
+        wi: ArrayLike,
+        wr: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: bool = False,
+        **parameters: float,
+    ) -> Floats | Stated:
+        """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+        parts = self._parts(parameters)
+        if len(parts) == 1:
+            table = parts[0].table
+            if with_error:
+                return table.lookup_vectors(wi, wr, wavelength_nm, with_error=True)
+            return table.lookup_vectors(wi, wr, wavelength_nm)
+        brdf = self._blended(parts, [part.table.lookup_vectors(wi, wr, wavelength_nm) for part in parts])
+        if not with_error:
+            return brdf
+        return Stated(brdf, parts[0].table.stated_by(self.error, checked_vectors(wi, wr), brdf, wavelength_nm))
+
+    def specular_reflectance(
+        self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
+    ) -> Floats:
+        """Interpolate the reflectance of the Dirac part; 0 for models that have none.
+
+        Parameters
+        ----------
+        theta_i, wavelength_nm
+            As in `Table.specular_reflectance`.
+        **parameters : float
+            As in `lookup`.
+
+        Returns
+        -------
+        array [1]
+            Shaped as by `Table.specular_reflectance`; off by up to `record.specular_error`.
+
+        Raises
+        ------
+        ValueError, StoreError
+            As `lookup`.
+        """
+        parts = self._parts(parameters)
+        values = [part.table.specular_reflectance(theta_i, wavelength_nm) for part in parts]
+        if len(parts) == 1:
+            return values[0]
+        return blended(values, [part.weight for part in parts], self.record.interpolation.specular_offset)[()]
+
+    def around(self, **parameters: float) -> list[Table]:
+        """The members that a lookup at these parameters is made of; parameters and errors as `lookup` has them."""
+        return [part.table for part in self._parts(parameters)]
+
+    def _blended(self, parts: Sequence[_Part], values: Sequence[Floats]) -> Floats:
+        mean = blended(
+            [np.asarray(value, dtype=np.float64) for value in values],
+            [part.weight for part in parts],
+            self.record.interpolation.offset,
+        )
+        return mean.astype(np.asarray(values[0]).dtype)[()]
+
+    def _parts(self, parameters: Mapping[str, Any]) -> list[_Part]:
+        """The members around a point, those that count, with weights that add up to 1."""
+        names = list(self.axes)
+        for name in parameters:
+            if name not in names:
+                raise ValueError(
+                    f"{name}: {parameters[name]!r} given, but the parameters of the family {self.name} are "
+                    f"{', '.join(names)}"
+                )
+        around = []
+        cubic = self.record.interpolation.method == "cubic"
+        for limits, nodes, power in zip(self._limits, self.axes.values(), self._powers, strict=True):
+            if limits.name not in parameters:
+                raise ValueError(f"{limits.name}: missing, {self.name} needs a value in {limits.interval}")
+            first, weights = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
+            around.append([(first + k, w) for k, w in enumerate(weights) if w != 0.0])
+        shape = [nodes.size for nodes in self.axes.values()]
+        parts = []
+        for corner in itertools.product(*around):
+            number = int(np.ravel_multi_index([at for at, _ in corner], shape))
+            parts.append(_Part(self._member(number), float(np.prod([weight for _, weight in corner]))))
+        return parts
+
+
+def _checked(limits: Parameter, nodes: Axis, value: Any) -> float:
+    """One number within limits, that of a node if it is one but for rounding, as of degrees to radians."""
+    if np.ndim(value) != 0:
+        raise ValueError(f"{limits.name}: {value!r} is not one number in {limits.interval}")
+    given: NDArray[Any] = np.asarray(value)
+    if given.dtype.kind in "iuf":
+        nearest = nodes[np.argmin(np.abs(nodes - given))]
+        if abs(nearest - given) <= _SAME * np.abs(nodes).max():
+            return float(nearest)
+    return float(limits.check(value))

@@ -1,0 +1,351 @@
+"""Records of families: how interpolation between members is chosen, measured, written once and verified."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import degrees, radians
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+from brdfdb.store.family import (
+    Blend,
+    FamilyRecord,
+    Sweep,
+    WorstPoint,
+    blended,
+    member_loader,
+    path_of,
+    read_record,
+    stale,
+    stencil,
+)
+from brdfdb.store.manifest import StoreError, sync_directory, write_sealed
+from brdfdb.store.reader import Store, UnknownMaterialError
+from brdfdb.store.staging import Lock, writing
+from brdfdb.tables import error_measurement
+from brdfdb.tables.layout import PLAIN
+from brdfdb.tables.places import BANDS
+from brdfdb.tables.stated_error import Between
+from brdfdb.tables.table import Table
+
+Power = Literal[-2, -1, 0, 1, 2]
+
+SEED = 1991
+POINTS = 256  # parameters at which a family is measured, at least
+_DIRECTIONS = 50  # of a band of theta_i at each of them
+_DIRECTIONS_BETWEEN, _SEARCHED = 10, 40  # between wavelengths; and of one member, to find out where
+_FEWEST_DIRECTIONS = 10
+_CORNER_VALUES = 10_000_000  # that are held at a time: of more, fewer directions are drawn
+_THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # where the Dirac part is measured
+_SPECULAR_OFFSET = 1e-6
+_POWERS: tuple[Power, ...] = (-2, -1, 0, 1, 2)
+_MOST_CORNERS = 64  # of a cubic: of more swept parameters than three, it is not tried
+_THINNED = 4  # of so many directions one is looked at to choose powers
+
+
+class _Point(NamedTuple):
+    """Parameters inside a cell: its first corner, and how far the point is from there along each axis."""
+
+    cell: tuple[int, ...]
+    within: Floats
+
+
+class _Way(NamedTuple):
+    """A way to interpolate: the fields of a `Blend`."""
+
+    method: Literal["linear", "cubic"]
+    offset: float | None
+    powers: tuple[Power, ...]
+
+    def said(self, sweep: Sweep) -> str:
+        """In words."""
+        along = {-2: "1/{}^2", -1: "1/{}", 0: "ln {}", 1: "{}", 2: "{}^2"}
+        axes = ", ".join(along[power].format(name) for name, power in zip(sweep.axes, self.powers, strict=True))
+        return f"{self.method} in {'f_r' if self.offset is None else 'logarithms'} along {axes}"
+
+
+class _Measured(NamedTuple):
+    """What is known at the points: members around them, the model, directions."""
+
+    points: list[_Point]
+    parameters: list[dict[str, float]]  # in the units of the model
+    corners: Floats  # f_r of the members that a cubic is made of, of shape (points, corners, directions, wavelengths)
+    truth: Floats  # (points, directions, wavelengths)
+    drawn: list[error_measurement.Draw]
+    specular_corners: Floats | None  # (points, corners, angles, wavelengths)
+    specular_truth: Floats | None
+
+
+def parameter_points(shape: tuple[int, ...], seed: int) -> list[_Point]:
+    """Where a family of so many values along each axis is measured.
+
+    The same number of points in each cell, 256 in all or the next multiple; of more than 256 cells, one point in each
+    of 256. They follow a sequence that fills the cells evenly, from a random start.
+    """
+    rng = np.random.default_rng(seed)
+    cells = tuple(nodes - 1 for nodes in shape)
+    count = math.prod(cells)
+    chosen = np.arange(count) if count <= POINTS else np.sort(rng.choice(count, POINTS, replace=False))
+    chosen = np.repeat(chosen, math.ceil(POINTS / chosen.size))
+    # Kronecker's sequence of the powers of the root of x^(k+1) = x + 1: for one axis the golden ratio
+    root = 1.5
+    for _ in range(60):
+        root = (1.0 + root) ** (1.0 / (len(shape) + 1))
+    steps = root ** -np.arange(1.0, len(shape) + 1.0)
+    within = (rng.random(len(shape)) + np.arange(chosen.size)[:, np.newaxis] * steps) % 1.0
+    return [_Point(tuple(map(int, np.unravel_index(cell, cells))), t) for cell, t in zip(chosen, within, strict=True)]
+
+
+def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> FamilyRecord:
+    """Choose the interpolation of a family by what it leaves, and measure its error against the model.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        Which tables, over which parameters.
+    tables : mapping of str to Table
+        The members by name, such as the store.
+    seed : int
+        Of parameters and directions.
+
+    Raises
+    ------
+    StoreError
+        If a member is not the one that the sweep asks for, or members have different wavelengths.
+    """
+    found = _look(sweep, tables, seed)
+    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*found.drawn, strict=True)))
+    truth = found.truth.reshape(-1, found.truth.shape[-1])
+    floor = error_measurement.floor_of(truth, drawn)
+    ways = _ways(sweep, found, drawn, floor)
+    best = min(ways, key=lambda way: ways[way])
+    value = blended(*_weighted(sweep, found, found.corners, best), best.offset)
+    specular_offset, specular_error = _specular(sweep, found, best)
+    between = _between(sweep, tables, seed, best, floor) if floor.size > 1 else None
+    p99 = [
+        float(np.percentile(error_measurement.relative(v, t, floor)[d.above], 99.0, axis=0).max())
+        for v, t, d in zip(value, found.truth, found.drawn, strict=True)
+    ]
+    worst = int(np.argmax(p99))
+    return FamilyRecord(
+        **sweep.model_dump(include=set(Sweep.model_fields)),
+        interpolation=Blend(
+            method=best.method,
+            powers=dict(zip(sweep.axes, best.powers, strict=True)),
+            offset=best.offset,
+            specular_offset=specular_offset,
+            reason="; ".join(
+                f"{way.said(sweep)}: p99 {left:.3g}" for way, left in sorted(ways.items(), key=lambda item: item[1])
+            ),
+        ),
+        error=error_measurement.compare(value.reshape(truth.shape), truth, drawn, seed).model_copy(
+            update={"between": between}
+        ),
+        points=len(found.points),
+        worst=WorstPoint(parameters=_written(sweep, found.parameters[worst]), p99=float(f"{p99[worst]:.3g}")),
+        specular_error=specular_error,
+    )
+
+
+def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, floor: Floats) -> Between:
+    """Measure the error between the wavelengths of the members, at fewer directions."""
+    first = member_loader(sweep, tables)(0)
+    material, stored = Material.model_validate(first.attrs["request"]["material"]), first.wavelength_nm
+    assert stored is not None
+    pairs = error_measurement.draw(material, stored, _SEARCHED, seed)
+    wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
+    at = error_measurement.worst_wavelengths(material, stored, PLAIN, wi, wr, floor)
+    found = _look(sweep, tables, seed, at)
+    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*found.drawn, strict=True)))
+    truth = found.truth.reshape(-1, at.size)
+    value = blended(*_weighted(sweep, found, found.corners, way), way.offset).reshape(truth.shape)
+    error = error_measurement.relative(truth, value, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
+    bands = error_measurement.limits_of_bands(error[drawn.above], drawn.band[drawn.above])
+    return Between(wavelength_nm=at.tolist(), bands=bands)
+
+
+def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[np.float64] | None = None) -> _Measured:
+    """Return the model and the members around, at directions of their own at each point.
+
+    By default they are looked at at the wavelengths of the members, else at those given and fewer directions.
+    """
+    nodes = sweep.nodes
+    shape = tuple(values.size for values in nodes.values())
+    member = member_loader(sweep, tables)
+    base = Material.model_validate(member(0).attrs["request"]["material"])
+    wavelength_nm = member(0).wavelength_nm if at_nm is None else at_nm
+    points = parameter_points(shape, seed)
+    stencils = tuple(min(_width(shape), nodes) for nodes in shape)
+    values = len(points) * BANDS * math.prod(stencils) * (1 if wavelength_nm is None else wavelength_nm.size)
+    count = max(
+        _FEWEST_DIRECTIONS, min(_DIRECTIONS if at_nm is None else _DIRECTIONS_BETWEEN, _CORNER_VALUES // values)
+    )
+    spec = base.spec
+    parameters, corners, truth, draws, specular_corners, specular_truth = [], [], [], [], [], []
+    for number, (cell, within) in enumerate(points):
+        at = {
+            name: float(axis[i] + t * (axis[i + 1] - axis[i]))
+            for (name, axis), i, t in zip(nodes.items(), cell, within, strict=True)
+        }
+        material = base.model_copy(update={"parameters": {**base.parameters, **at}})
+        first = [stencil(axis, at[name], 1, cubic=_width(shape) == 4)[0] for name, axis in nodes.items()]
+        around = [member(int(np.ravel_multi_index(np.add(first, corner), shape))) for corner in np.ndindex(*stencils)]
+        drawn = error_measurement.draw(material, wavelength_nm, count, seed + 1 + number)
+        parameters.append(at)
+        draws.append(drawn)
+        truth.append(error_measurement.model_values(material, wavelength_nm, drawn.wi, drawn.wr))
+        corners.append([table.lookup_vectors(drawn.wi, drawn.wr, at_nm).reshape(truth[-1].shape) for table in around])
+        if spec.specular is not None and at_nm is None:
+            specular_corners.append(
+                [table.specular_reflectance(_THETA_I).reshape(_THETA_I.size, -1) for table in around]
+            )
+            arguments = material.arguments(wavelength_nm)
+            specular_truth.append(
+                spec.specular(
+                    _THETA_I[:, np.newaxis], **{name: arguments[name] for name in spec.specular_parameters}
+                ).reshape(_THETA_I.size, -1)
+            )
+    return _Measured(
+        points,
+        parameters,
+        np.array(corners),
+        np.array(truth),
+        draws,
+        np.array(specular_corners) if specular_corners else None,
+        np.array(specular_truth) if specular_truth else None,
+    )
+
+
+def _width(shape: tuple[int, ...]) -> int:
+    """How many values of each parameter the interpolation is made of at most."""
+    return 4 if math.prod(min(4, nodes) for nodes in shape) <= _MOST_CORNERS else 2
+
+
+def _ways(sweep: Sweep, found: _Measured, drawn: error_measurement.Draw, floor: Floats) -> dict[_Way, float]:
+    """The best powers of each method, in f_r and in logarithms, with the 99th percentile of the error they leave."""
+    above = drawn.above.reshape(found.truth.shape[:2])
+    shape = tuple(map(len, sweep.axes.values()))
+    offsets: list[float | None] = [None]
+    if floor.max() > 0.0:
+        offsets.append(float(f"{0.5 * floor[floor > 0.0].min():.6g}"))
+    methods: list[Literal["linear", "cubic"]] = ["linear", "cubic"]
+
+    def left(way: _Way, thinned: int = 1) -> float:
+        some = slice(None, None, thinned)
+        value = blended(*_weighted(sweep, found, found.corners[:, :, some], way), way.offset)
+        error = error_measurement.relative(value, found.truth[:, some], floor)[above[:, some]]
+        return float(np.percentile(error, 99.0, axis=0).max())
+
+    ways: dict[_Way, float] = {}
+    for method in methods if _width(shape) == 4 and max(shape) > 2 else methods[:1]:
+        for offset in offsets:
+            one: Power = 1
+            best = _Way(method, offset, (one,) * len(shape))
+            least = left(best, _THINNED)
+            for axis, values in [*enumerate(sweep.axes.values())] * 2:  # the best of one depends on the others
+                for power in _POWERS if values[0] > 0.0 else (1, 2) if values[0] == 0.0 else (1,):
+                    other = best._replace(powers=(*best.powers[:axis], power, *best.powers[axis + 1 :]))
+                    if other != best and (there := left(other, _THINNED)) < least:
+                        best, least = other, there
+            ways[best] = left(best)
+    return ways
+
+
+def _weighted(
+    sweep: Sweep, found: _Measured, corners: Floats, way: _Way
+) -> tuple[list[Floats], list[NDArray[np.float64]]]:
+    """The values of the members around the points, corner by corner, and their weights, which broadcast to them."""
+    nodes = sweep.nodes
+    shape = tuple(axis.size for axis in nodes.values())
+    rows = []
+    for at in found.parameters:
+        weight = np.ones(1)
+        for (name, axis), power in zip(nodes.items(), way.powers, strict=True):
+            base, ones = stencil(axis, at[name], 1, cubic=_width(shape) == 4)
+            first, some = stencil(axis, at[name], power, cubic=way.method == "cubic")
+            along = np.zeros(ones.size)
+            along[first - base : first - base + some.size] = some
+            weight = np.outer(weight, along).reshape(-1)
+        rows.append(weight)
+    weights = np.array(rows)
+    used = np.flatnonzero(np.any(weights != 0.0, axis=0))
+    spread = (slice(None), *(np.newaxis,) * (corners.ndim - 2))
+    return [corners[:, c] for c in used], [weights[:, c][spread] for c in used]
+
+
+def _specular(sweep: Sweep, found: _Measured, way: _Way) -> tuple[float | None, float | None]:
+    """How the reflectance of the Dirac part is interpolated, offset or None, and its largest error; None without."""
+    if found.specular_corners is None or found.specular_truth is None:
+        return None, None
+    left: dict[float | None, float] = {}
+    for offset in (None, _SPECULAR_OFFSET):
+        value = blended(*_weighted(sweep, found, found.specular_corners, way), offset)
+        left[offset] = float(np.abs(value - found.specular_truth).max())
+    best = min(left, key=lambda offset: left[offset])
+    return best, float(f"{left[best]:.3g}")
+
+
+def _written(sweep: Sweep, at: Mapping[str, float]) -> dict[str, float]:
+    return {
+        written: float(f"{degrees(at[parameter.name]) if parameter.unit == 'rad' else at[parameter.name]:.6g}")
+        for written, parameter in sweep.parameters.items()
+    }
+
+
+def recorded(root: Path, sweep: Sweep) -> FamilyRecord | None:
+    """Return the record of a family in the store at `root`, if it is there and of these very members; else None."""
+    try:
+        record = read_record(path_of(root, sweep.name))
+    except StoreError:
+        return None
+    return record if all(getattr(record, name) == getattr(sweep, name) for name in Sweep.model_fields) else None
+
+
+def write_family(root: str, sweep: Sweep) -> FamilyRecord:
+    """Measure a family whose members are built, and record it, unless that was done: a task for a worker.
+
+    The record appears whole, synced to disk, or not at all.
+
+    Raises
+    ------
+    StoreError
+        If a member is not the one that the sweep asks for, or the record cannot be written.
+    """
+    store, path = Path(root), path_of(Path(root), sweep.name)
+    with Lock(store, sweep.name) as lock:
+        if (record := recorded(store, sweep)) is not None:
+            return record
+        record = measure(sweep, Store(store))
+        with writing(store, sweep.name):
+            path.parent.mkdir(exist_ok=True)
+            write_sealed(path, record.model_dump(mode="json"), lock.path.parent)
+            sync_directory(path.parent)
+            sync_directory(store)
+    return record
+
+
+def verify_family(root: Path, name: str) -> int:
+    """Check the record of a family: that it is one, and its members are those it was made of; returns its bytes.
+
+    Raises
+    ------
+    StoreError
+        Naming what is wrong first.
+    """
+    store, path = Store(root), path_of(root, name)
+    record = read_record(path)
+    if not len(record.members) == len(record.request_sha256) == math.prod(map(len, record.axes.values())):
+        raise StoreError(f"the family {name} is damaged: its axes do not make {len(record.members)} members")
+    for member, request_sha256 in zip(record.members, record.request_sha256, strict=True):
+        try:
+            if store.summary(member)["request_sha256"] != request_sha256:
+                raise StoreError(stale(name, member))
+        except UnknownMaterialError:
+            raise StoreError(f"the family {name} is out of date: the store has no {member}") from None
+    return path.stat().st_size

@@ -1,0 +1,486 @@
+"""The store, for reading: one immutable revision per build of a material, a manifest for each, a pointer to one.
+
+ROOT/brdfdb.json                     format name and version
+ROOT/materials/NAME/r000001/         a self-contained zarr v3 group, never modified
+ROOT/materials/NAME/r000001.MANIFEST.json   size and sha256 of its files; beside it, zarr warns of strangers inside
+ROOT/materials/NAME/HEAD.json        current revision, digests of the manifests, and what lists show; swapped atomically
+ROOT/families/NAME.json              which materials make a family, and how well it interpolates (`brdfdb.store.family`)
+ROOT/snapshots/NAME.json             a whole database: a revision of each material, families (`brdfdb.store.snapshots`)
+ROOT/.staging/NAME/                  a build in progress or broken off (`brdfdb.store.staging`)
+
+The first line of each of these JSON files is the digest of the rest. ROOT is not itself a zarr group: xarray would
+rewrite a shared root file, and stale metadata hides groups.
+"""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+import json
+import os
+import threading
+import weakref
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from brdfdb.store.manifest import (
+    NAME,
+    Head,
+    Manifest,
+    Snapshot,
+    StoreError,
+    check_manifest,
+    head_from,
+    number_of,
+    read_json,
+    read_manifest,
+    read_sealed,
+    read_snapshot,
+    regular_bytes,
+    unsealed,
+    whole_revisions,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from brdfdb.store.family import Family
+    from brdfdb.store.zarr_store import Whole
+    from brdfdb.tables.table import Table
+
+__all__ = [
+    "FORMAT",
+    "FORMAT_VERSION",
+    "DamagedMarkerError",
+    "Store",
+    "StoreError",
+    "UnknownFamilyError",
+    "UnknownMaterialError",
+    "UnknownRevisionError",
+    "WrongSummaryError",
+]
+
+FORMAT = "brdfdb"
+FORMAT_VERSION = 2  # 1 had no digests in the first lines
+
+CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
+_SHOWN = 60  # characters of an unknown name
+
+
+class DamagedMarkerError(StoreError):
+    """A brdfdb.json that cannot be believed: `brdfdb build` writes it anew where there are tables beside it."""
+
+
+class WrongSummaryError(StoreError):
+    """A pointer that says of its revision other than the manifest."""
+
+
+class UnknownMaterialError(KeyError):
+    """A name that is not in the store.
+
+    Attributes
+    ----------
+    name : str
+        What was asked for.
+    closest : list of str
+        Up to five names that are close to it.
+    """
+
+    kind = "material"
+
+    def __init__(self, name: str, names: list[str]) -> None:
+        super().__init__(name)
+        self.name = name
+        self.closest = difflib.get_close_matches(name, names, n=5, cutoff=0.4)
+
+    def __str__(self) -> str:
+        hint = f"; closest: {', '.join(self.closest)}" if self.closest else ""
+        shown = self.name if len(self.name) <= _SHOWN else f"{self.name[:_SHOWN]}..."
+        return f"no {self.kind} {shown!r} in the store{hint}"
+
+
+class UnknownFamilyError(UnknownMaterialError):
+    """A name that is not that of a family in the store."""
+
+    kind = "family"
+
+
+class UnknownRevisionError(KeyError):
+    """A revision that a material does not have; str() is one sentence."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def _check_marker(root: Path) -> None:
+    """Raise StoreError unless there is a store at `root` that this program reads."""
+    marker = root / "brdfdb.json"
+    try:
+        data = marker.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise StoreError(f"no store at {root}: brdfdb.json is missing there; `brdfdb build` makes one") from None
+    except OSError as error:
+        raise StoreError(f"cannot read {marker}: {error.strerror}") from error
+    try:
+        found = unsealed(data, str(root), marker.name)
+    except StoreError as damaged:
+        if data != json.dumps({"format": FORMAT, "version": 1}, indent=1).encode():  # as version 1 wrote it
+            raise DamagedMarkerError(f"{damaged}; `brdfdb build` writes it anew") from None
+        found = {"format": FORMAT, "version": 1}
+    if (found.get("format"), found.get("version")) != (FORMAT, FORMAT_VERSION):
+        raise StoreError(
+            f"{marker} says format {found.get('format')} version {found.get('version')}, this program reads {FORMAT} "
+            f"version {FORMAT_VERSION}; `brdfdb build --store DIR` builds its recipe in another directory"
+        )
+
+
+class Store(Mapping[str, "Table"]):
+    """A store opened for reading: a mapping from material names to decoded tables of the current revisions.
+
+    Threads may share it. A child of `os.fork` may go on using it, also while threads of the parent read tables, once
+    one table was read before the fork: the first one imports modules, whose locks a child would find taken.
+
+    Parameters
+    ----------
+    root : path
+        Directory of the store; a relative one is taken from the directory that is current now.
+    cache_bytes : int
+        Bytes of decoded tables that are kept; those used last stay, and always the very last.
+    snapshot : str, optional
+        Name of a snapshot: the materials, revisions and families that it names are the store, whatever is built later.
+
+    Raises
+    ------
+    StoreError
+        If there is no store at `root`, or one of another format version; if it has no such snapshot, or a damaged one.
+    """
+
+    def __init__(
+        self, root: str | os.PathLike[str], cache_bytes: int = CACHE_BYTES, *, snapshot: str | None = None
+    ) -> None:
+        self.root = Path(root).absolute()
+        _check_marker(self.root)
+        self.snapshot: Snapshot | None = None if snapshot is None else read_snapshot(self.root, snapshot)
+        self._cache_bytes = cache_bytes
+        self._decoded: OrderedDict[tuple[str, str], Table] = OrderedDict()
+        self._pointers: dict[str, _Pointer] = {}
+        self._lock = threading.Lock()
+        self._decoding = threading.Lock()
+        _OPEN[next(_NUMBERS)] = self
+
+    def __iter__(self) -> Iterator[str]:
+        if self.snapshot is not None:
+            return iter(sorted(self.snapshot["materials"]))
+        directory = f"{self.root}/materials"
+        try:
+            names = sorted(os.listdir(directory))
+        except OSError as error:
+            raise StoreError(f"no store at {self.root}: {error.strerror}") from error
+        return (name for name in names if self._has(name))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __contains__(self, name: object) -> bool:
+        if self.snapshot is not None:
+            return name in self.snapshot["materials"]
+        return isinstance(name, str) and self._has(name)
+
+    def _has(self, name: str) -> bool:
+        """Return whether there is a material of a name, be it one whose pointer was lost."""
+        return NAME.fullmatch(name) is not None and (
+            os.path.isfile(f"{self.root}/materials/{name}/HEAD.json") or self._lost(name)
+        )
+
+    def _lost(self, name: str) -> bool:
+        """Return whether a material has revisions, and no pointer that a first publication is about to write."""
+        material, staged = self.root / "materials" / name, self.root / ".staging" / name
+        revisions = [group.name for group in whole_revisions(material)]
+        if not revisions or (revisions == ["r000001"] and any(path.is_dir() for path in staged.glob("*"))):
+            return False
+        return not (material / "HEAD.json").is_file()  # asked last: it may have been written meanwhile
+
+    def __getitem__(self, name: str) -> Table:
+        while True:
+            group, digest = self.location(name)
+            try:
+                return self._table(name, group, digest)
+            except StoreError:
+                if self.location(name) == (group, digest):
+                    raise
+                # a newer revision was published, and the one we were reading removed: read the newer one
+
+    def table(self, name: str, revision: str) -> Table:
+        """The decoded table of a revision, current or not.
+
+        Raises
+        ------
+        UnknownMaterialError, UnknownRevisionError
+            If the store has no such material, or it no such revision.
+        StoreError
+            If the revision is damaged.
+        """
+        return self._table(name, *self.located(name, revision))
+
+    def located(self, name: str, revision: str) -> tuple[Path, str]:
+        """Return the directory of a revision, current or not, and the digest of its manifest; errors as by `table`."""
+        group, digest, head = self.current(name)
+        if revision == group.name:
+            return group, digest
+        if revision not in self.revisions(name):
+            raise UnknownRevisionError(f"{name} has no revision {revision[:40]!r}; the current one is {group.name}")
+        group = group.with_name(revision)
+        # one that no pointer knows was left by a crash: it is known by the digest in its first line
+        return group, read_manifest(group, head["manifests"].get(revision))[1]
+
+    def revisions(self, name: str) -> list[str]:
+        """Return the revisions of a material that are whole, oldest first; of a snapshot the one it names."""
+        current = self.path(name)
+        found = whole_revisions(current.parent) if self.snapshot is None else [current]
+        return [group.name for group in found]
+
+    def held(self, name: str) -> Table | None:
+        """The current table of a material if it is decoded already: an answer without waiting; None else.
+
+        Raises
+        ------
+        StoreError
+            As `location` does.
+        """
+        pointer = self._read_pointer(name)
+        return None if pointer is None else self._used((name, pointer.location[1]))
+
+    def _table(self, name: str, group: Path, digest: str) -> Table:
+        key = name, digest
+        if (held := self._used(key)) is not None:
+            return held
+        from brdfdb.store.zarr_store import Whole  # loads zarr
+
+        with self._decoding:  # who asks for the same table meanwhile waits for it
+            if (held := self._used(key)) is not None:
+                return held
+            files = check_manifest(group, digest, contents=False)["files"]
+            table = _decode(name, group, Whole(group, files), digest)
+            with self._lock:
+                self._decoded[key] = table
+                size = sum(each.nbytes for each in self._decoded.values())
+                while size > self._cache_bytes and len(self._decoded) > 1:
+                    size -= self._decoded.popitem(last=False)[1].nbytes
+            return table
+
+    def _used(self, key: tuple[str, str]) -> Table | None:
+        """A decoded table, which is now the one used last."""
+        with self._lock:
+            if key in self._decoded:
+                self._decoded.move_to_end(key)
+            return self._decoded.get(key)
+
+    def head(self, name: str) -> str:
+        """The current revision of a material, such as ``r000003``, read anew each time.
+
+        Raises
+        ------
+        UnknownMaterialError
+            If the store has no such material.
+        """
+        return self.path(name).name
+
+    def path(self, name: str) -> Path:
+        """Directory of the current revision: a zarr group that xarray opens."""
+        return self.location(name)[0]
+
+    def summary(self, name: str) -> Head:
+        """Return what lists show of the current revision: what its pointer says, without a look at the table.
+
+        Raises
+        ------
+        UnknownMaterialError
+            If the store has no such material.
+        StoreError
+            If the pointer is damaged.
+        """
+        return self._pointer(name).head
+
+    def attributes(self, name: str) -> dict[str, Any]:
+        """What the current revision says of itself, without decoding its values."""
+        group, digest = self.location(name)
+        check_manifest(group, digest, contents=False)
+        return dict(read_json(group / "zarr.json")["attributes"])
+
+    def families(self) -> list[str]:
+        """Return the names of the families, sorted."""
+        if self.snapshot is not None:
+            return sorted(self.snapshot["families"])
+        try:
+            found = sorted(os.listdir(f"{self.root}/families"))
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise StoreError(f"cannot read {self.root}/families: {error.strerror}") from error
+        names = (name.removesuffix(".json") for name in found if name.endswith(".json"))
+        return [name for name in names if NAME.fullmatch(name)]
+
+    def family(self, name: str) -> Family:
+        """Return a family: its model at any parameters between those of its members.
+
+        Raises
+        ------
+        UnknownFamilyError
+            If the store has no such family.
+        StoreError
+            If its record cannot be read.
+        """
+        from brdfdb.store.family import Family, record_from
+
+        return Family(record_from(self.family_content(name), f"the family {name}"), self)
+
+    def family_content(self, name: str) -> dict[str, Any]:
+        """Return the record of a family as JSON, which is all that lists show of it; errors as by `family`."""
+        if name not in self.families():
+            raise UnknownFamilyError(name, self.families())
+        if self.snapshot is not None:
+            return self.snapshot["families"][name]
+        return read_sealed(self.root / "families" / f"{name}.json", f"the family {name}")
+
+    def dataset(self, name: str) -> xr.Dataset:
+        """Return the current revision as a lazy xarray Dataset.
+
+        Raises
+        ------
+        UnknownMaterialError
+            If the store has no such material.
+        StoreError
+            If a file of it is missing or changed, also later, while it is read; it names material, revision and file.
+        """
+        import xarray as xr
+
+        from brdfdb.store.zarr_store import Whole
+        from brdfdb.tables.xarray_view import with_brdf
+
+        group, digest = self.location(name)
+        files = check_manifest(group, digest, contents=False)["files"]
+        return with_brdf(xr.open_zarr(Whole(group, files), chunks=None))
+
+    def verify(self, name: str) -> None:
+        """Check every file of the current revision against its manifest, and the manifest against the pointer.
+
+        Raises
+        ------
+        StoreError
+            Naming the first file that is missing, of another size or of another content.
+        """
+        group, digest, head = self.current(name)
+        check_summary(head, check_manifest(group, digest, contents=True))
+
+    def _pointer(self, name: str) -> _Pointer:
+        pointer = self._read_pointer(name)
+        if pointer is not None:
+            return pointer
+        if self.snapshot is None and NAME.fullmatch(name) and self._lost(name):
+            raise StoreError(f"{name} is damaged: HEAD.json is missing")
+        raise UnknownMaterialError(name, list(self))
+
+    def _pinned(self, name: str, snapshot: Snapshot) -> _Pointer | None:
+        """Return what the snapshot says of a material, as a pointer; None of one that it does not name."""
+        known, pin = self._pointers.get(name), snapshot["materials"].get(name)
+        if known is None and pin is not None:
+            group = self.root / "materials" / name / pin["revision"]
+            manifest, digest = read_manifest(group, pin["manifest_sha256"])
+            head: Head = {
+                **manifest["summary"],
+                "material": name,
+                "revision": group.name,
+                "manifests": {group.name: digest},
+                "last": number_of(group.name),
+            }
+            known = self._pointers[name] = _Pointer((0, 0, 0), group.parent, head)
+        return known
+
+    def _read_pointer(self, name: str) -> _Pointer | None:
+        """Return the pointer of a material, read anew if it changed; None if there is none."""
+        if self.snapshot is not None:
+            return self._pinned(name, self.snapshot)
+        known = self._pointers.get(name)
+        if known is None and not NAME.fullmatch(name):
+            return None
+        path = f"{self.root}/materials/{name}/HEAD.json"
+        try:
+            at = os.stat(path)
+            seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
+            if known is None or known.seen != seen:
+                head = head_from(Path(path), regular_bytes(path))
+                known = self._pointers[name] = _Pointer(seen, self.root / "materials" / name, head)
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError as error:
+            raise StoreError(f"{name} is damaged: HEAD.json cannot be read: {error.strerror}") from error
+        return known
+
+    def location(self, name: str) -> tuple[Path, str]:
+        """Return the directory of the current revision and the digest of its manifest, from one look at the pointer."""
+        return self._pointer(name).location
+
+    def current(self, name: str) -> tuple[Path, str, Head]:
+        """Return what `location` gives, and what else the pointer says, from one look at it."""
+        pointer = self._pointer(name)
+        return *pointer.location, pointer.head
+
+
+def check_summary(head: Head, manifest: Manifest) -> None:
+    """Raise WrongSummaryError unless a pointer says of its revision what the manifest does."""
+    for key, value in manifest["summary"].items():
+        if head.get(key) != value:
+            raise WrongSummaryError(
+                f"{head['material']} is damaged: HEAD.json says {key} {head.get(key)!r}, not {value!r}"
+            )
+
+
+class _Pointer(NamedTuple):
+    """The pointer of a material as it was read, and how to tell that it is another now."""
+
+    seen: tuple[int, int, int]
+    material: Path
+    head: Head
+
+    @property
+    def location(self) -> tuple[Path, str]:
+        """The directory of the revision, and the digest of its manifest."""
+        revision = self.head["revision"]
+        return self.material / revision, self.head["manifests"][revision]
+
+
+_OPEN: weakref.WeakValueDictionary[int, Store] = weakref.WeakValueDictionary()
+_NUMBERS = itertools.count()
+
+
+def _after_fork() -> None:
+    """Give the stores of a child new locks: a fork copies one thread only, and what others held stays locked.
+
+    What the locks guard is whole at any moment. Waiting for the threads before a fork is no way: they may need locks
+    that the fork has taken already, such as that of thread pools.
+    """
+    for store in list(_OPEN.values()):
+        store._lock = threading.Lock()
+        store._decoding = threading.Lock()
+
+
+os.register_at_fork(after_in_child=_after_fork)
+
+
+def _decode(name: str, path: Path, files: Whole, digest: str) -> Table:
+    import numpy as np
+    import zarr
+
+    from brdfdb.tables.table import table_from
+
+    try:
+        group = zarr.open_group(files, mode="r")
+        arrays = {key: np.asarray(array[...]) for key, array in group.arrays()}
+    except StoreError:
+        raise
+    except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
+        raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
+    return replace(table_from(name, path.name, arrays, dict(group.attrs)), digest=digest)

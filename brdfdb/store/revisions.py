@@ -1,0 +1,282 @@
+"""The revisions of a material: how the current one stands to a request, history, rollback, collection."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from brdfdb.store.manifest import (
+    Summary,
+    check_manifest,
+    number_of,
+    read_manifest,
+    read_snapshot,
+    snapshot_names,
+    whole_revisions,
+)
+from brdfdb.store.reader import Store, StoreError, UnknownMaterialError
+from brdfdb.store.staging import BusyError, Lock, adoptable, known_manifests, point_to, writing
+from brdfdb.tables.layout import digest
+
+SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turns; no material has such a name
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a material stands to a request.
+
+    Attributes
+    ----------
+    state : str
+        "current" if the current revision answers it and is undamaged, "adoptable" if another one does, else "missing".
+    revision : str
+        The one that answers it; empty if none does.
+    why : str
+        In a phrase, why the current revision does not.
+    """
+
+    state: Literal["current", "adoptable", "missing"]
+    revision: str = ""
+    why: str = ""
+
+
+def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
+    """Return how a material stands to a request, after a look at every byte of the revisions in question."""
+    wanted = digest(request)
+    store = Store(root)
+    try:
+        group, _, head = store.current(name)
+        if head["request_sha256"] == wanted:
+            store.verify(name)
+            return Standing("current", group.name)
+        why = difference(store.attributes(name).get("request", {}), request)
+    except UnknownMaterialError:
+        why = "new"
+    except StoreError as error:
+        why = str(error)
+    found = adoptable(root, name, wanted)
+    return Standing("missing", "", why) if found is None else Standing("adoptable", found, why)
+
+
+def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """In a phrase, how a request differs from that of the current table."""
+    if not old:
+        return "the current table does not say what was asked for"
+    new = json.loads(json.dumps(new))
+    said: list[str] = []
+    for key in sorted({*old, *new}):
+        before, after = old.get(key), new.get(key)
+        if before == after:
+            continue
+        words = key.replace("_", " ")
+        if isinstance(before, dict) and isinstance(after, dict) and key == "material":
+            parts = [part for part in sorted({*before, *after}) if before.get(part) != after.get(part)]
+            said.append(f"{', '.join(part.replace('_', ' ') for part in parts)} changed")
+        elif isinstance(before, int | str) and isinstance(after, int | str):
+            said.append(f"{words} {before} -> {after}")
+        else:
+            said.append(f"{words} changed")
+    return ", ".join(said)
+
+
+@dataclass(frozen=True)
+class Revision:
+    """A line of a history: a revision, what its manifest says, and whether it is the current one."""
+
+    name: str
+    summary: Summary
+    current: bool
+
+
+def history(root: Path, name: str) -> list[Revision]:
+    """The revisions of a material that are whole, oldest first.
+
+    Raises
+    ------
+    UnknownMaterialError
+        If the store has no such material.
+    StoreError
+        If a manifest cannot be read.
+    """
+    current, _, head = Store(root).current(name)
+    return [
+        Revision(group.name, read_manifest(group, head["manifests"].get(group.name))[0]["summary"], group == current)
+        for group in whole_revisions(current.parent)
+    ]
+
+
+def rollback(root: Path, name: str, revision: str) -> str:
+    """Make an older revision current again, or a newer one; this repairs a pointer that is missing or damaged, too.
+
+    Returns
+    -------
+    str
+        The revision that was current; empty if the pointer was missing or damaged.
+
+    Raises
+    ------
+    UnknownMaterialError
+        If the store has no such material.
+    StoreError
+        If the material has no such revision, or it is damaged.
+    """
+    store, material = Store(root), root / "materials" / name
+    if name not in store:
+        raise UnknownMaterialError(name, list(store))
+    with Lock(root, name):
+        known = [group.name for group in whole_revisions(material)]
+        if revision not in known:
+            raise StoreError(f"{name} has no revision {revision[:40]!r}; it has {', '.join(known)}")
+        before = ""
+        with suppress(StoreError):
+            before = store.head(name)
+        check_manifest(material / revision, known_manifests(material).get(revision), contents=True)
+        with writing(root, name):
+            point_to(material, revision)
+    return before
+
+
+@dataclass
+class Collected:
+    """What a collection removed.
+
+    Attributes
+    ----------
+    removed : list of str
+        Paths, below the root of the store.
+    busy : list of str
+        Materials that were left alone, since a build is at work on them.
+    freed : int
+        Bytes.
+    """
+
+    removed: list[str] = field(default_factory=list)
+    busy: list[str] = field(default_factory=list)
+    freed: int = 0
+
+
+def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
+    """Remove what no reader is served and no build is at work on.
+
+    Staging directories of builds that were broken off (they could have been resumed), revisions that are neither
+    current nor among the newest nor named by a snapshot, and what crashes and others left behind: directories without
+    a manifest, manifests without a directory, temporary files, files in a revision that its manifest does not list. A
+    reader that holds a decoded table keeps it; one that is just reading a revision that goes reads the current one
+    instead, or is told.
+
+    Parameters
+    ----------
+    root : Path
+        Directory of the store.
+    keep : int
+        How many revisions of each material stay, the current one included; at least 1.
+    damaged : bool
+        Whether to read all other revisions that stay but the current one, and remove those that are damaged.
+
+    Raises
+    ------
+    StoreError
+        If there is no store, a snapshot is damaged, or something cannot be removed.
+    """
+    if keep < 1:
+        raise ValueError(f"keep: {keep} is not at least 1; the current revision always stays")
+    store = Store(root)
+    collected = Collected()
+    try:
+        with Lock(store.root, SNAPSHOTS):
+            _collect(store, keep, damaged, collected)
+    except OSError as error:
+        raise StoreError(f"cannot collect in the store at {root}: {error.filename}: {error.strerror}") from error
+    return collected
+
+
+def pinned(root: Path) -> dict[Path, str]:
+    """Return the revisions that snapshots name, each with the name of one; StoreError if a snapshot is damaged."""
+    found = {}
+    for name in snapshot_names(root):
+        for material, pin in read_snapshot(root, name)["materials"].items():
+            found[root / "materials" / material / pin["revision"]] = name
+    return found
+
+
+def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> None:
+    try:
+        stay = pinned(store.root)
+    except StoreError as error:
+        raise StoreError(f"nothing is collected, since {error}; remove it with `brdfdb snapshot --remove`") from error
+    for path in store.root.glob(".brdfdb.json.*"):
+        _remove(store.root, path, collected)
+    staged, materials = store.root / ".staging", store.root / "materials"
+    names = {path.name for directory in (staged, materials) for path in directory.iterdir() if path.is_dir()}
+    for name in sorted(names - {SNAPSHOTS}):
+        try:
+            with Lock(store.root, name, wait=False) as lock:
+                material = materials / name
+                if whole_revisions(material) and not (material / "HEAD.json").is_file():
+                    continue  # killed before the first pointer, or it was lost: the next build makes one
+                for path in lock.path.parent.iterdir():
+                    if path != lock.path:
+                        _remove(store.root, path, collected)
+                if material.is_dir():
+                    _collect_material(store, material, keep, damaged, set(stay), collected)
+        except BusyError:
+            collected.busy.append(name)
+    for path in staged.iterdir():
+        if path.is_file():
+            _remove(store.root, path, collected)
+
+
+def _collect_material(
+    store: Store, material: Path, keep: int, damaged: bool, stay: set[Path], collected: Collected
+) -> None:
+    whole, known = whole_revisions(material), known_manifests(material)
+    kept: set[Path] = set()
+    try:
+        current = store.path(material.name)
+        others = [group for group in whole if group != current]
+        # what a snapshot names stays, damaged or not: half of it may be all that is left
+        kept = {current, *others[max(0, len(others) - (keep - 1)) :], *stay}
+    except UnknownMaterialError:  # nothing but what crashes left behind
+        current = material
+    except StoreError:
+        return  # nobody knows what the pointer pointed to: the next build repairs it
+    for group in sorted(kept & set(whole)):
+        if damaged and group != current and group not in stay:
+            try:
+                check_manifest(group, known.get(group.name), contents=True)
+            except StoreError:
+                kept.remove(group)
+                continue
+        for path in strangers(group, known.get(group.name)):
+            _remove(store.root, path, collected)
+    for path in sorted(material.iterdir(), reverse=True):  # a manifest before its directory: that is then an orphan
+        group = path.with_name(path.name.removesuffix(".MANIFEST.json"))
+        if (number_of(group.name) and group not in kept) or path.name.startswith("."):
+            _remove(store.root, path, collected)
+    if not any(material.iterdir()):
+        material.rmdir()
+
+
+def strangers(group: Path, digest: str | None) -> list[Path]:
+    """Return the files in a revision that its manifest does not list; none where the manifest is damaged."""
+    try:
+        files = read_manifest(group, digest)[0]["files"]
+    except StoreError:
+        return []
+    return [path for path in group.rglob("*") if path.is_file() and path.relative_to(group).as_posix() not in files]
+
+
+def _remove(root: Path, path: Path, collected: Collected) -> None:
+    files = [path] if path.is_file() else [found for found in path.rglob("*") if found.is_file()]
+    freed = sum(file.stat().st_size for file in files)
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink()
+    collected.freed += freed
+    collected.removed.append(str(path.relative_to(root)))

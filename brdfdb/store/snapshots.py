@@ -1,0 +1,104 @@
+"""Snapshots: one name for a whole database, which a paper can cite and a service can pin.
+
+ROOT/snapshots/NAME.json   a revision of each material with the sha256 of its manifest, and the records of the families
+
+A snapshot never changes, and a collection keeps the revisions that it names. Its digest is the first line of its file.
+It depends on nothing but the tables: a snapshot of the same revisions under the same name has the same digest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from brdfdb.store.family import stale
+from brdfdb.store.manifest import (
+    NAME,
+    SNAPSHOT_FORMAT,
+    SNAPSHOT_VERSION,
+    Pin,
+    Snapshot,
+    StoreError,
+    read_snapshot,
+    seal_of,
+    snapshot_path,
+    sync_directory,
+    write_sealed,
+)
+from brdfdb.store.reader import Store
+from brdfdb.store.revisions import SNAPSHOTS
+from brdfdb.store.staging import Lock, writing
+
+
+def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) -> str:
+    """Name the current revisions of all materials, and the families; return the digest of the snapshot.
+
+    Parameters
+    ----------
+    root : Path
+        Directory of the store.
+    name : str
+        Lower-case letters, digits and single hyphens.
+    advance : callable
+        Called after each material, every file of which is read.
+
+    Raises
+    ------
+    ValueError
+        If the name is none.
+    StoreError
+        If the store has a snapshot of this name, or no material; if a material is damaged or a family out of date.
+    """
+    if not NAME.fullmatch(name):
+        raise ValueError(f"snapshot: {name[:60]!r} is not made of lower-case letters, digits and single hyphens")
+    store, path = Store(root), snapshot_path(root, name)
+    with Lock(root, SNAPSHOTS) as lock:
+        if path.exists():
+            raise StoreError(f"the store at {root} has a snapshot {name}, which never changes; take another name")
+        materials: dict[str, Pin] = {}
+        requests: dict[str, str] = {}
+        for material in store:
+            group, digest, head = store.current(material)
+            store.verify(material)
+            materials[material] = {"revision": group.name, "manifest_sha256": digest}
+            requests[material] = head["request_sha256"]
+            advance()
+        if not materials:
+            raise StoreError(f"the store at {root} has no material to name")
+        families = {}
+        for family in store.families():
+            record = store.family(family).record
+            for member, request_sha256 in zip(record.members, record.request_sha256, strict=True):
+                if requests.get(member) != request_sha256:
+                    raise StoreError(stale(family, member))
+            families[family] = record.model_dump(mode="json")
+        snapshot: Snapshot = {
+            "format": SNAPSHOT_FORMAT,
+            "version": SNAPSHOT_VERSION,
+            "name": name,
+            "materials": materials,
+            "families": families,
+        }
+        with writing(root, f"the snapshot {name}"):
+            path.parent.mkdir(exist_ok=True)
+            write_sealed(path, snapshot, lock.path.parent)
+            sync_directory(path.parent)
+            sync_directory(root)
+    return seal_of(path)
+
+
+def remove(root: Path, name: str) -> None:
+    """Remove a snapshot, damaged or not; the revisions stay until they are collected.
+
+    Raises
+    ------
+    StoreError
+        If there is none of this name.
+    """
+    with Lock(root, SNAPSHOTS):
+        path = snapshot_path(root, name)
+        if not (NAME.fullmatch(name) and path.is_file()):
+            read_snapshot(root, name)  # says which there are
+        with writing(root, f"the snapshot {name}"):
+            path.unlink()
+            sync_directory(path.parent)

@@ -1,0 +1,48 @@
+"""A revision as zarr reads it: chunks that went missing or changed are errors, not nan."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from zarr.abc.store import ByteRequest
+from zarr.core.buffer import Buffer, BufferPrototype
+from zarr.storage import LocalStore
+
+from brdfdb.store.manifest import Entry, StoreError, manifest_of
+
+
+class Whole(LocalStore):
+    """A revision as zarr reads it, but that a file of it that is missing or changed is an error with its name.
+
+    Parameters
+    ----------
+    group : Path
+        Directory of the revision.
+    files : mapping
+        Size and sha256 of each file that belongs there, by its path.
+    """
+
+    def __init__(self, group: Path, files: Mapping[str, Entry]) -> None:
+        super().__init__(group, read_only=True)
+        self._files = dict(files)
+
+    async def get(
+        self, key: str, prototype: BufferPrototype | None = None, byte_range: ByteRequest | None = None
+    ) -> Buffer | None:
+        """Return a file, as `LocalStore.get` does; StoreError for one that should be there, or is another one."""
+        where = f"{self.root.parent.name} {self.root.name}"
+        try:
+            value = await super().get(key, prototype, byte_range)
+        except OSError as error:
+            raise StoreError(f"{where} is damaged: {key} cannot be read: {error.strerror}") from error
+        if (entry := self._files.get(key)) is None:
+            return value
+        if value is None:
+            if not manifest_of(self.root).is_file():
+                raise StoreError(f"{where} was removed while it was read; open the material anew")
+            raise StoreError(f"{where} is damaged: {key} is missing")
+        if byte_range is None and hashlib.sha256(value.to_bytes()).hexdigest() != entry["sha256"]:
+            raise StoreError(f"{where} is damaged: the content of {key} changed")
+        return value

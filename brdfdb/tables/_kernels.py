@@ -1,0 +1,446 @@
+"""The inside of lookups: from directions to points on a grid, through the interpolation, to values of f_r.
+
+All work in blocks of directions, step by step, so that each step is a short loop.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb._elementary import BLOCK, arcsin, cos, cosine, exp, sine
+from brdfdb._numba import kernel, loop
+from brdfdb.tables._interpolation import Axes, locate, tricubic, trilinear, weighted
+
+Array = NDArray[np.float64]
+
+PI = np.pi
+TURN = 2.0 * np.pi
+HALF_PI = np.pi / 2.0
+PHI_MAX = 1e15
+
+
+class Rule(NamedTuple):
+    """How numbers on a grid become f_r.
+
+    Attributes
+    ----------
+    half_difference : bool
+        Whether the axes are those of half and difference vectors.
+    copies : int
+        How many times the azimuth of an anisotropic grid goes into a full turn: 1, 2 or 4.
+    logarithm : bool
+        Whether the numbers are logarithms, ...
+    offset : float
+        ... of values to which this was added.
+    power : float
+        What was tabulated is f_r times (cos theta_i cos theta_r) to this power.
+    overshoots : bool
+        Whether what is interpolated may fall below 0 where no node is: it is 0 there.
+    """
+
+    half_difference: bool
+    copies: int
+    logarithm: bool
+    offset: float
+    power: float
+    overshoots: bool
+
+
+@kernel
+def angle(y: float, x: float) -> float:
+    """atan2(y, x) of a point in the first quadrant, the axes included; 0 at the origin."""
+    length = np.sqrt(x * x + y * y)
+    a = arcsin(min(x, y) / (length if length > 0.0 else 1.0))
+    return float(HALF_PI - a if y > x else a)
+
+
+@kernel
+def _full_turn(y: float, x: float) -> float:
+    """atan2(y, x) in [0, 2 pi)."""
+    a = angle(abs(y), abs(x))
+    a = PI - a if x < 0.0 else a
+    return TURN - a if y < 0.0 and a > 0.0 else a
+
+
+@kernel
+def _folded(phi: float, period: float) -> float:
+    """An azimuth in [0, period]."""
+    return float(phi - np.floor(phi * (1.0 / period)) * period)
+
+
+@kernel
+def _turned(phi: float, other: float, copies: int) -> tuple[float, float]:
+    """Two azimuths after the symmetries of the surface brought the first into its part of the turn.
+
+    Half a turn of the surface moves both by pi, the mirror changes the sign of both.
+    """
+    phi = _folded(phi, TURN)
+    if copies > 1 and phi >= PI:
+        phi, other = phi - PI, other - PI
+    if copies == 4 and phi > HALF_PI:  # mirrored in y: pi - phi
+        phi, other = PI - phi, PI - other
+    return phi, other
+
+
+@kernel
+def _halved(phi_h: float, phi_d: float, copies: int) -> tuple[float, float]:
+    """The azimuths of half and difference vector after the symmetries of the surface and reciprocity.
+
+    Half a turn of the surface moves phi_h alone, the mirror changes the sign of both.
+    """
+    if copies > 1 and phi_h >= PI:
+        phi_h -= PI
+    if copies == 4 and phi_h > HALF_PI:
+        phi_h, phi_d = PI - phi_h, -phi_d
+    return phi_h, _folded(phi_d, PI)
+
+
+@loop
+def points_of_angles(
+    rule: Rule, theta_i: Array, phi_i: Array, theta_r: Array, phi_r: Array, count: int, x: Array, mu: Array
+) -> None:
+    """Points on a grid of light and viewer, and mu = cos theta_i cos theta_r, which is needed of some rules only."""
+    if x.shape[0] == 3:
+        for j in range(count):
+            d = np.float64(phi_r[j]) - np.float64(phi_i[j])
+            d -= np.floor(d * (1.0 / TURN) + 0.5) * TURN
+            x[0, j] = theta_i[j]
+            x[1, j] = theta_r[j]
+            x[2, j] = abs(d)
+    else:
+        for j in range(count):
+            phi, other = _turned(np.float64(phi_i[j]), np.float64(phi_r[j]), rule.copies)
+            x[0, j] = theta_i[j]
+            x[1, j] = phi
+            x[2, j] = theta_r[j]
+            x[3, j] = _folded(other, TURN)
+    if rule.power != 0.0:
+        for j in range(count):
+            mu[j] = cosine(cos(np.float64(theta_i[j]))) * cosine(cos(np.float64(theta_r[j])))
+
+
+@loop
+def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu: Array, scratch: Array) -> None:
+    """Points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r.
+
+    `scratch` holds four rows. One loop for the products and one for each angle: all in one would not vectorise.
+    """
+    if rule.half_difference:
+        _half_difference(ui, ur, count, x[0], x[x.shape[0] - 2], x[x.shape[0] - 1], scratch)
+        if x.shape[0] == 4:
+            for j in range(count):
+                phi_h = _full_turn(scratch[3, j], scratch[2, j])
+                x[1, j], x[3, j] = _halved(phi_h, _full_turn(scratch[1, j], scratch[0, j]), rule.copies)
+    elif x.shape[0] == 3:
+        _light_and_viewer(ui, ur, count, x[0], x[1], x[2], scratch)
+    else:
+        for j in range(count):
+            phi_i, phi_r = _full_turn(ui[3 * j + 1], ui[3 * j]), _full_turn(ur[3 * j + 1], ur[3 * j])
+            phi, other = _turned(phi_i, phi_r, rule.copies)
+            x[0, j] = _polar(ui[3 * j], ui[3 * j + 1], ui[3 * j + 2])
+            x[1, j] = phi
+            x[2, j] = _polar(ur[3 * j], ur[3 * j + 1], ur[3 * j + 2])
+            x[3, j] = _folded(other, TURN)
+    for j in range(count):
+        mu[j] = cosine(np.float64(ui[3 * j + 2])) * cosine(np.float64(ur[3 * j + 2]))
+
+
+@kernel
+def _polar(x: float, y: float, z: float) -> float:
+    return angle(np.sqrt(x * x + y * y), abs(z))
+
+
+@kernel
+def _half_difference(
+    ui: Array, ur: Array, count: int, theta_h: Array, theta_d: Array, phi_d: Array, scratch: Array
+) -> None:
+    """theta_h, theta_d, and phi_d in the first quadrant.
+
+    `scratch` gets the difference vector along theta_h and along phi_h, both times one positive number, and the
+    horizontal half vector; where that is nothing, the frame is that of phi_h = 0.
+    """
+    along, across, x_h, y_h = scratch[0], scratch[1], scratch[2], scratch[3]
+    for j in range(count):
+        x_i, y_i, z_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1]), np.float64(ui[3 * j + 2])
+        x_r, y_r, z_r = np.float64(ur[3 * j]), np.float64(ur[3 * j + 1]), np.float64(ur[3 * j + 2])
+        h_x, h_y, h_z = x_i + x_r, y_i + y_r, z_i + z_r
+        d_x, d_y, d_z = x_i - x_r, y_i - y_r, z_i - z_r
+        flat2 = h_x * h_x + h_y * h_y
+        h2 = flat2 + h_z * h_z
+        pole = flat2 < 1e-28 * h2
+        along[j] = d_x if pole else (d_x * h_x + d_y * h_y) * h_z - d_z * flat2
+        across[j] = d_y if pole else (d_y * h_x - d_x * h_y) * np.sqrt(h2)
+        x_h[j] = 1.0 if pole else h_x
+        y_h[j] = 0.0 if pole else h_y
+        theta_h[j] = np.sqrt(flat2)
+        theta_d[j] = np.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
+        phi_d[j] = h2
+    for j in range(count):
+        theta_d[j] = angle(theta_d[j], np.sqrt(phi_d[j]))
+    for j in range(count):
+        h_z = np.float64(ui[3 * j + 2]) + np.float64(ur[3 * j + 2])
+        theta_h[j] = angle(theta_h[j], abs(h_z))
+    for j in range(count):
+        phi_d[j] = angle(abs(across[j]), abs(along[j]))
+
+
+@kernel
+def _light_and_viewer(
+    ui: Array, ur: Array, count: int, theta_i: Array, theta_r: Array, delta_phi: Array, scratch: Array
+) -> None:
+    """theta_i, theta_r and delta_phi."""
+    dot, cross = scratch[0], scratch[1]
+    for j in range(count):
+        x_i, y_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1])
+        x_r, y_r = np.float64(ur[3 * j]), np.float64(ur[3 * j + 1])
+        dot[j], cross[j] = x_i * x_r + y_i * y_r, x_i * y_r - y_i * x_r
+        theta_i[j], theta_r[j] = np.sqrt(x_i * x_i + y_i * y_i), np.sqrt(x_r * x_r + y_r * y_r)
+    for j in range(count):
+        theta_i[j] = angle(theta_i[j], abs(np.float64(ui[3 * j + 2])))
+    for j in range(count):
+        theta_r[j] = angle(theta_r[j], abs(np.float64(ur[3 * j + 2])))
+    for j in range(count):
+        turn = angle(abs(cross[j]), abs(dot[j]))
+        delta_phi[j] = PI - turn if dot[j] < 0.0 else turn
+
+
+@loop
+def interpolated(axes: Axes, table: NDArray[np.float32], channels: int, x: Array, count: int, numbers: Array) -> None:
+    """What a table holds at points on its grid: `channels` numbers a point, point after point."""
+    cell, share = np.empty((x.shape[0], BLOCK), np.int64), np.empty((x.shape[0], BLOCK))
+    for axis in range(x.shape[0]):
+        locate(axes, axis, x[axis], count, cell[axis], share[axis])
+    if channels == 1 and x.shape[0] == 3 and axes.width.sum() == 6:
+        trilinear(axes, cell, share, count, table, numbers)
+    elif channels == 1 and x.shape[0] == 3 and axes.width.sum() == 12:
+        tricubic(axes, cell, share, count, table, numbers)
+    else:
+        weighted(axes, cell, share, count, table, channels, numbers)
+
+
+@loop
+def finished(
+    rule: Rule,
+    numbers: Array,
+    channels: int,
+    mu: Array,
+    spectra: Array,
+    uniform: Array,
+    nodes: NDArray[np.int64],
+    weight: Array,
+    count: int,
+    out: Array,
+) -> None:
+    """Write f_r [1/sr] at the wavelengths asked for, point after point, from what was interpolated over the angles.
+
+    `spectra` of shape (channels, L) says how the channels make up L wavelengths. If it is empty, the channels are the
+    wavelengths. `nodes` and `weight`, of shape (wavelengths, 4), say which of the L count: between them the numbers
+    that are stored are interpolated, not f_r.
+    """
+    if rule.power == 0.5:
+        for j in range(count):
+            mu[j] = 1.0 / np.sqrt(mu[j])
+    elif rule.power == 1.0:
+        for j in range(count):
+            mu[j] = 1.0 / mu[j]
+    else:
+        for j in range(count):
+            mu[j] = 1.0
+    wavelengths = nodes.shape[0]
+    if channels == 1 and wavelengths == 1 and spectra.size == 0:
+        if rule.logarithm:
+            for j in range(count):
+                numbers[j] = exp(numbers[j]) - rule.offset
+        if rule.overshoots:
+            for j in range(count):
+                value = numbers[j]
+                numbers[j] = 0.0 if value < 0.0 else value  # nan stays nan
+        for j in range(count):
+            out[j] = numbers[j] * mu[j] + uniform[0]
+        return
+    total, column = np.empty(BLOCK), np.empty(channels)
+    for m in range(wavelengths):
+        apart, overshoots = 0.0, True
+        for side in range(4):
+            apart += weight[m, side] * uniform[nodes[m, side]]
+            overshoots = overshoots and weight[m, side] != 1.0  # on a node nothing is interpolated
+        overshoots = overshoots or rule.overshoots
+        for j in range(count):
+            total[j] = 0.0
+        if spectra.size > 0:
+            for channel in range(channels):
+                column[channel] = 0.0
+                for side in range(4):
+                    column[channel] += weight[m, side] * spectra[channel, nodes[m, side]]
+            for j in range(count):
+                for channel in range(channels):
+                    total[j] += numbers[j * channels + channel] * column[channel]
+        else:
+            for side in range(4):
+                part, w = weight[m, side], nodes[m, side]
+                if part != 0.0:  # what does not count may be nan
+                    for j in range(count):
+                        total[j] += part * numbers[j * channels + w]
+        if rule.logarithm:
+            for j in range(count):
+                total[j] = exp(total[j]) - rule.offset
+        for j in range(count):
+            value = 0.0 if overshoots and total[j] < 0.0 else total[j]  # nan stays nan
+            out[j * wavelengths + m] = value * mu[j] + apart
+
+
+@loop
+def vectors_of_angles(theta: Array, phi: Array, count: int, w: Array) -> None:
+    """Unit vectors, three numbers each, of directions by angles [rad]; below the horizon, at the horizon.
+
+    The float32 nearest pi/2 lies above pi/2, and is the horizon.
+    """
+    for j in range(count):
+        w[3 * j + 2] = sine(_held(theta[j]))
+    for j in range(count):
+        w[3 * j] = w[3 * j + 2] * cos(np.float64(phi[j]))
+    for j in range(count):
+        w[3 * j + 1] = w[3 * j + 2] * sine(np.float64(phi[j]))
+    for j in range(count):
+        w[3 * j + 2] = cos(_held(theta[j]))
+
+
+@kernel
+def _held(theta: float) -> float:
+    return np.float64(theta) if theta < HALF_PI else HALF_PI
+
+
+@kernel
+def by_angles(
+    rule: Rule,
+    axes: Axes,
+    table: NDArray[np.float32],
+    channels: int,
+    spectra: Array,
+    uniform: Array,
+    nodes: NDArray[np.int64],
+    weight: Array,
+    theta_i: Array,
+    phi_i: Array,
+    theta_r: Array,
+    phi_r: Array,
+    horizon: float,
+    out: Array,
+) -> bool:
+    """f_r of directions by angles [rad] on either kind of grid; False where an angle is not what it may be."""
+    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
+    wi, wr = np.empty(3 * BLOCK), np.empty(3 * BLOCK)
+    numbers = np.empty(BLOCK * channels)
+    wavelengths = nodes.shape[0]
+    good = True
+    for start in range(0, theta_i.size, BLOCK):
+        count = min(BLOCK, theta_i.size - start)
+        here = slice(start, start + count)  # an index that starts at 0 is known not to be negative: loops vectorise
+        t_i, p_i, t_r, p_r = theta_i[here], phi_i[here], theta_r[here], phi_r[here]
+        f_r = out[start * wavelengths : (start + count) * wavelengths]
+        if rule.half_difference:
+            vectors_of_angles(t_i, p_i, count, wi)
+            vectors_of_angles(t_r, p_r, count, wr)
+            points_of_vectors(rule, wi, wr, count, x, mu, scratch)
+        else:
+            points_of_angles(rule, t_i, p_i, t_r, p_r, count, x, mu)
+        interpolated(axes, table, channels, x, count, numbers)
+        finished(rule, numbers, channels, mu, spectra, uniform, nodes, weight, count, f_r)
+        odd = 0
+        for j in range(count):
+            usual = (t_i[j] >= 0.0) & (t_i[j] <= horizon) & (t_r[j] >= 0.0) & (t_r[j] <= horizon)
+            odd += int(not (usual & (abs(p_i[j]) <= PHI_MAX) & (abs(p_r[j]) <= PHI_MAX)))
+        if odd > 0:
+            for j in range(count):
+                bad = t_i[j] < 0.0 or t_i[j] > PI or t_r[j] < 0.0 or t_r[j] > PI
+                good = good and not (bad or abs(p_i[j]) > PHI_MAX or abs(p_r[j]) > PHI_MAX)
+                below = t_i[j] > horizon or t_r[j] > horizon
+                _outside(t_i[j] + t_r[j] + p_i[j] + p_r[j], below, j, wavelengths, f_r)
+    return good
+
+
+@kernel
+def _outside(direction: float, below: bool, point: int, wavelengths: int, out: Array) -> None:
+    """nan where a direction is nan, 0 below the horizon."""
+    if below or direction != direction:
+        for m in range(wavelengths):
+            out[point * wavelengths + m] = np.nan if direction != direction else 0.0
+
+
+@kernel
+def by_vectors(
+    rule: Rule,
+    axes: Axes,
+    table: NDArray[np.float32],
+    channels: int,
+    spectra: Array,
+    uniform: Array,
+    nodes: NDArray[np.int64],
+    weight: Array,
+    wi: Array,
+    wr: Array,
+    out: Array,
+) -> None:
+    """f_r of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
+    x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
+    numbers = np.empty(BLOCK * channels)
+    points, wavelengths = wi.size // 3, nodes.shape[0]
+    for start in range(0, points, BLOCK):
+        count = min(BLOCK, points - start)
+        ui, ur = wi[3 * start : 3 * (start + count)], wr[3 * start : 3 * (start + count)]
+        f_r = out[start * wavelengths : (start + count) * wavelengths]
+        points_of_vectors(rule, ui, ur, count, x, mu, scratch)
+        interpolated(axes, table, channels, x, count, numbers)
+        finished(rule, numbers, channels, mu, spectra, uniform, nodes, weight, count, f_r)
+        odd = 0
+        for j in range(count):
+            flat = abs(ui[3 * j]) + abs(ui[3 * j + 1]) + abs(ur[3 * j]) + abs(ur[3 * j + 1])
+            odd += int(not ((ui[3 * j + 2] >= 0.0) & (ur[3 * j + 2] >= 0.0) & (flat < PHI_MAX)))
+        if odd > 0:
+            for j in range(count):
+                direction = ui[3 * j] + ui[3 * j + 1] + ui[3 * j + 2] + ur[3 * j] + ur[3 * j + 1] + ur[3 * j + 2]
+                _outside(direction, ui[3 * j + 2] < 0.0 or ur[3 * j + 2] < 0.0, j, wavelengths, f_r)
+
+
+@kernel
+def specular(
+    theta_nodes: Array,
+    rows: NDArray[np.float32],
+    nodes: NDArray[np.int64],
+    weight: Array,
+    theta: Array,
+    horizon: float,
+    out: Array,
+) -> bool:
+    """Write the Dirac part [1], linear between its nodes `theta_nodes` [rad]; `out` stays as it is if there are none.
+
+    Wavelengths, directions below the horizon and the result are as by `by_angles`.
+    """
+    wavelengths = nodes.shape[0]
+    last = theta_nodes.size - 1
+    good = True
+    for j in range(theta.size):
+        t = theta[j]
+        good = good and not (t < 0.0 or t > PI)
+        if last > 0:
+            below, above = 0, last
+            while above - below > 1:
+                middle = (below + above) // 2
+                if theta_nodes[middle] <= t:
+                    below = middle
+                else:
+                    above = middle
+            part = (t - theta_nodes[below]) / (theta_nodes[above] - theta_nodes[below])
+            part = min(max(part, 0.0), 1.0)
+            for m in range(wavelengths):
+                value = 0.0
+                for side in range(4):
+                    w = nodes[m, side]
+                    if weight[m, side] != 0.0:
+                        value += weight[m, side] * ((1.0 - part) * rows[below, w] + part * rows[above, w])
+                out[j * wavelengths + m] = 0.0 if value < 0.0 else value
+        _outside(t, t > horizon, j, wavelengths, out)
+    return good

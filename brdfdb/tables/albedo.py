@@ -1,0 +1,184 @@
+"""The directional albedo of a table: the exact integral of what is linear between nodes, else by quadrature."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from brdfdb.geometry import radians
+from brdfdb.integrals.quadrature import narrowest, reflected_share
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.table import Table
+
+# Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
+QUADRATURE_TOLERANCE = 2e-5
+_MOST_PANELS = 1000
+# Lights for which such a table is integrated [degree]; phi_i up to where the symmetry of its grid begins anew
+THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=np.float64)
+_PHI_I_STEP_DEG = 30.0
+
+
+class TableAlbedo(NamedTuple):
+    """The directional albedo of a table, without the Dirac part.
+
+    Attributes
+    ----------
+    theta_i_deg, phi_i_deg : array [degree]
+        The lights; one phi_i, 0, of isotropic tables.
+    albedo : array (theta_i, phi_i, wavelengths) [1]
+        One wavelength of grey tables.
+    error : array (theta_i,) [1]
+        Estimate of its absolute error, over phi_i and wavelengths the largest; 0 where it is exact.
+    """
+
+    theta_i_deg: Axis
+    phi_i_deg: Axis
+    albedo: Floats
+    error: Floats
+
+    @property
+    def mean(self) -> Floats:
+        """The mean over phi_i, of shape (theta_i, wavelengths)."""
+        if self.phi_i_deg.size == 1:
+            return self.albedo[:, 0]
+        weights = _trapezoid_weights(self.phi_i_deg) / self.phi_i_deg[-1]
+        return np.asarray(np.einsum("tpw,p->tw", self.albedo, weights))
+
+
+def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAlbedo:
+    """Integrate f_r cos theta_r over the hemisphere [1], as the table gives f_r between its nodes.
+
+    Parameters
+    ----------
+    table : Table
+        Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the model.
+    theta_i_deg : array (theta_i,) [degree], optional
+        The lights, in [0, 90].
+
+    Returns
+    -------
+    TableAlbedo
+        By default at the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and every 30
+        degrees of phi_i; at nodes and `THETA_I_DEG`, but not 90 degrees, if a planner chose the nodes: the attribute
+        ``reason`` says so.
+
+    Notes
+    -----
+    Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
+    stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
+    quadrature of `brdfdb.integrals.quadrature`, which follows the lobe of the model, to `QUADRATURE_TOLERANCE`.
+    """
+    if not linear_in_angles(table):
+        return _integrated(table, material_of(table), THETA_I_DEG if theta_i_deg is None else theta_i_deg)
+    nodes = table.axes_deg["theta_i"]
+    theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
+    if table.anisotropic:
+        phi_i = table.axes_deg["phi_i"]
+        phi_weights = _trapezoid_weights(radians(table.axes_deg["phi_r"]))
+        brdf = table.brdf.reshape(*table.brdf.shape[:4], -1)
+        albedo = np.einsum("ipjkw,j,k->ipw", brdf, theta_weights, phi_weights, optimize=True)
+    else:
+        phi_i = np.zeros(1)
+        phi_weights = 2.0 * _trapezoid_weights(radians(table.axes_deg["delta_phi"]))  # the other half by symmetry
+        brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
+        albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)[:, np.newaxis]
+    lights = theta_i_deg
+    if lights is None and table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
+        lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
+    if lights is not None:
+        matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
+        nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
+    return TableAlbedo(nodes, phi_i, np.asarray(albedo), np.zeros(nodes.size))
+
+
+def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
+    """The share that is reflected of light that is the same from everywhere.
+
+    Parameters
+    ----------
+    theta_i_deg : array (theta_i,) [degree]
+        From 0 on.
+    albedo : array (theta_i, wavelengths) [1]
+        Directional albedo at these angles, taken as linear between them and the same beyond the last.
+
+    Returns
+    -------
+    array (wavelengths,) [1]
+        Twice the integral of albedo cos(theta_i) sin(theta_i).
+    """
+    return np.asarray(2.0 * _theta_weights(radians(theta_i_deg)) @ albedo)
+
+
+def material_of(table: Table) -> Material:
+    """The material behind a table, from what the table says of itself."""
+    fields = ("title", "model", "parameters", "source")
+    return Material.from_table(
+        table.name,
+        {
+            **{field: table.attrs[field] for field in fields},
+            "refractive_index": table.attrs["refractive_index"] or None,
+        },
+    )
+
+
+def linear_in_angles(table: Table) -> bool:
+    """Whether the table is f_r over light and viewer, linear in each angle between its nodes."""
+    return table.values_are_brdf and not table.grid.half_difference and not table.interpolation.cubic
+
+
+def wavelengths_of(table: Table) -> int:
+    """How many wavelengths a table has; 1 if it is grey."""
+    return 1 if table.wavelength_nm is None else table.wavelength_nm.size
+
+
+def _integrated(table: Table, material: Material, theta_i_deg: Axis) -> TableAlbedo:
+    """The albedo by quadrature of lookups, at all wavelengths at once."""
+    width = wavelengths_of(table)
+    phi_i_deg = np.zeros(1)
+    if table.anisotropic:
+        phi_i_deg = np.arange(0.0, 360.0 / table.grid.copies + 1.0, _PHI_I_STEP_DEG)
+    albedo, error = np.empty((theta_i_deg.size, phi_i_deg.size, width)), np.empty((theta_i_deg.size, phi_i_deg.size))
+    arguments = material.arguments(table.wavelength_nm)
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        return table.lookup_vectors(wi, wr).reshape(*wr.shape[:-1], width)
+
+    for t, p in np.ndindex(*error.shape):
+        theta_i = float(radians(theta_i_deg[t]))
+        albedo[t, p], error[t, p] = reflected_share(
+            brdf,
+            theta_i,
+            float(radians(phi_i_deg[p])),
+            narrowest(material.spec, float(np.cos(theta_i)), arguments),
+            tolerance=QUADRATURE_TOLERANCE,
+            most_panels=_MOST_PANELS,
+            width=width,
+            mirrored=not table.anisotropic,
+        )
+    return TableAlbedo(theta_i_deg, phi_i_deg, albedo, error.max(axis=1))
+
+
+def _trapezoid_weights(nodes: Axis) -> Axis:
+    steps = np.diff(nodes)
+    weights = np.zeros(nodes.size)
+    weights[:-1] += steps / 2.0
+    weights[1:] += steps / 2.0
+    return weights
+
+
+def _theta_weights(nodes: Axis) -> Axis:
+    """Integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat held constant up to pi/2.
+
+    With F = sin^2 / 2 and its integral G = theta / 4 - sin(2 theta) / 8, the rising half over [a, b] gives
+    F(b) - (G(b) - G(a)) / (b - a).
+    """
+    F = np.sin(nodes) ** 2 / 2.0
+    slope = np.diff(nodes / 4.0 - np.sin(2.0 * nodes) / 8.0) / np.diff(nodes)
+    weights = np.zeros(nodes.size)
+    weights[1:] += F[1:] - slope
+    weights[:-1] += slope - F[:-1]
+    weights[-1] += 0.5 - F[-1]
+    return weights

@@ -1,0 +1,321 @@
+"""The error of a table against its model, measured at directions that are not its nodes."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb._elementary import COS_HORIZON
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.sampling import lobe_of, mirrored_in_lobe, mixture_density
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats, Lobe
+from brdfdb.tables import places
+from brdfdb.tables._interpolation import weights_of_nodes
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.places import BANDS_DEG
+from brdfdb.tables.stated_error import Between, Error, Overall, Places
+from brdfdb.tables.table import Table, points
+
+FLOOR = 1e-3  # of the Lambertian BRDF with the albedo of the material
+WIDTHS = (1.0, 2.0)  # of the lobes that directions are drawn in, of the material's own
+DIRECTIONS = 4000  # of each band; of more than _FEW wavelengths, each with errors of its own, fewer
+_FEW, _FEWER_DIRECTIONS = 4, 3000
+SEED = 1991
+# Directions of a sample in a place, and of a band between wavelengths, of those of a band at the wavelengths
+_IN_PLACES, _BETWEEN, _BETWEEN_IN_PLACES = 1 / 10, 1 / 6, 1 / 15
+_WITHIN, _CONFIDENCE = 0.98, 0.98  # share of the values within a limit, and how sure that is
+_SEARCHED, _SEARCHED_AT = (9, 400), 40  # wavelengths of an interval, of all; directions of a band: for the worst
+_WINDOW = 1 << 21  # values of a table that are held at a time
+_MODEL = 1 << 16  # directions at which the model is evaluated at a time
+
+
+class Draw(NamedTuple):
+    """Pairs of directions: unit vectors (N, 3), the band of theta_i of each, and what an integral weighs it with.
+
+    `weight` is cos theta_r over the density with which the viewer was drawn; 0 below the horizon. `in_lobe` says which
+    viewers were drawn in the lobe.
+    """
+
+    wi: Floats
+    wr: Floats
+    band: NDArray[np.int64]
+    weight: Floats
+    in_lobe: NDArray[np.bool_]
+
+    @property
+    def above(self) -> NDArray[np.bool_]:
+        """Which viewers are above the horizon."""
+        return np.asarray(self.weight > 0.0)
+
+
+def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int) -> Draw:
+    """`count` pairs of directions a band, half of the viewers over the hemisphere and half in the lobe.
+
+    theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
+    light is mirrored in half vectors that follow `ModelSpec.lobe`, of the wavelengths in turn, or a lobe twice as wide:
+    its own Gaussian hardly ever reaches the shoulder where the lobe ends. Viewers of a model without a lobe are all
+    drawn over the hemisphere.
+    """
+    rng = np.random.default_rng(seed)
+    band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
+    theta_i = radians(BANDS_DEG[band] + rng.random(band.size) * np.diff(BANDS_DEG)[band])
+    wi = unit_vector(theta_i, rng.uniform(0.0, 2.0 * np.pi, band.size))
+    u, angle = 1.0 - rng.random(band.size), rng.uniform(0.0, 2.0 * np.pi, band.size)
+    over = unit_vector(np.arccos(u), angle)
+    if material.spec.lobe is None:
+        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), np.zeros(band.size, dtype=bool))
+    turns = np.arange(band.size) % (1 if wavelength_nm is None else wavelength_nm.size)
+    spectrum = material.arguments(wavelength_nm)
+    lobe = lobe_of(material.spec, wi, {name: v[turns] if np.ndim(v) else v for name, v in spectrum.items()})
+    lobes = [Lobe(np.ones(1), width * lobe.alpha_x, width * lobe.alpha_y) for width in WIDTHS]
+    which = rng.random(band.size) * 2 * len(lobes)  # one half over the hemisphere, the other among the lobes
+    wr = over
+    for number, drawn in enumerate(lobes):
+        chosen = (which >= number) & (which < number + 1)
+        wr = np.where(chosen[:, np.newaxis], mirrored_in_lobe(u, angle, wi, drawn), wr)
+    density = 0.5 / (2.0 * np.pi) + 0.5 * np.mean([mixture_density(drawn, wi, wr) for drawn in lobes], axis=0)
+    return Draw(wi, wr, band, np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density, which < len(lobes))
+
+
+def model_values(material: Material, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:
+    """f_r [1/sr] of the model, of shape (N, L), L = 1 for a grey material."""
+    brdf = material.brdf_at(wavelength_nm)
+    values = np.empty((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
+    for start in range(0, len(wi), _MODEL):
+        some = slice(start, start + _MODEL)
+        values[some] = brdf(wi[some], wr[some])
+    return values
+
+
+def floor_of(truth: Floats, drawn: Draw) -> Floats:
+    """The floor [1/sr] of relative errors at each wavelength: `FLOOR` of the Lambertian BRDF of the same albedo."""
+    return np.asarray(FLOOR / np.pi * np.mean(drawn.weight[:, np.newaxis] * truth, axis=0))
+
+
+def relative(found: Floats, truth: Floats, floor: Floats) -> Floats:
+    """abs(found - truth) / max(truth, floor); 0 where nothing is and nothing was found."""
+    scale = np.maximum(truth, floor)
+    error = np.abs(found - truth)
+    return np.divide(error, scale, out=np.where(error > 0.0, np.inf, 0.0), where=scale > 0.0)
+
+
+def mean_error(found: Floats, truth: Floats, weight: Floats) -> Floats:
+    """Weighted mean of abs(found - truth) over that of truth, for each row of weights and each wavelength; or 0."""
+    wrong, whole = weight @ np.abs(found - truth), weight @ truth
+    return np.divide(wrong, whole, out=np.zeros_like(wrong), where=whole > 0.0)
+
+
+def classes(drawn: Draw) -> dict[str, NDArray[np.bool_]]:
+    """Which viewers of a draw look forward or back, within 45 degrees of azimuth, and which pairs graze, beyond 75."""
+    wi, wr = drawn.wi, drawn.wr
+    along = np.sum(wi[:, :2] * wr[:, :2], axis=1)
+    across = np.hypot(*wi[:, :2].T) * np.hypot(*wr[:, :2].T)
+    return {
+        "forward": along < -np.sqrt(0.5) * across,
+        "back": along > np.sqrt(0.5) * across,
+        "grazing": np.minimum(wi[:, 2], wr[:, 2]) < np.cos(radians(75.0)),
+    }
+
+
+def measure(
+    layout: Layout, read: Callable[[slice], NDArray[np.float32]], count: int | None = None, seed: int = SEED
+) -> Error:
+    """Measure the error of a table.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the table.
+    read : callable
+        Gives some rows of the first axis of the stored array. Large tables are read piece by piece.
+    count : int, optional
+        Directions a band of theta_i, by default 4000, or 3000 of more than four wavelengths.
+    seed : int
+        Of the directions.
+
+    Returns
+    -------
+    Error
+        For each band and wavelength, and overall, to three digits; and limits in places and between wavelengths.
+    """
+    if count is None:
+        several = layout.wavelength_nm is not None and layout.wavelength_nm.size > _FEW
+        count = _FEWER_DIRECTIONS if several else DIRECTIONS
+    drawn = draw(layout.material, layout.wavelength_nm, count, seed)
+    pairs = places.draw(math.ceil(count * _IN_PLACES), seed)
+    wi, wr = np.concatenate([drawn.wi, pairs.wi]), np.concatenate([drawn.wr, pairs.wr])
+    truth = model_values(layout.material, layout.wavelength_nm, wi, wr)
+    found = _looked_up(layout, read, wi, wr, layout.wavelength_nm)
+    own = len(drawn.wi)
+    error = compare(found[:own], truth[:own], drawn, seed)
+    floor = floor_of(truth[:own], drawn)
+    return error.model_copy(
+        update={
+            "places": _in_places(relative(truth[own:], found[own:], floor), pairs),
+            "between": None if floor.size < 2 else _between(layout, read, drawn, pairs, floor, count),
+        }
+    )
+
+
+def _between(
+    layout: Layout,
+    read: Callable[[slice], NDArray[np.float32]],
+    drawn: Draw,
+    pairs: places.Pairs,
+    floor: Floats,
+    count: int,
+) -> Between:
+    """Measure the error between wavelengths, at some of the directions that it was measured at on them."""
+    assert layout.wavelength_nm is not None
+    few = _first(drawn.band, min(count, _SEARCHED_AT)) & drawn.above
+    at = worst_wavelengths(
+        layout.material, layout.wavelength_nm, layout.interpolation, drawn.wi[few], drawn.wr[few], floor
+    )
+    some = _first(drawn.band, math.ceil(count * _BETWEEN)) & drawn.above
+    fewer = pairs.some(_first(pairs.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
+    wi, wr = np.concatenate([drawn.wi[some], fewer.wi]), np.concatenate([drawn.wr[some], fewer.wr])
+    found, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.material, at, wi, wr)
+    error = relative(truth, found, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
+    own = np.count_nonzero(some)
+    return Between(
+        wavelength_nm=at.tolist(),
+        bands=limits_of_bands(error[:own], drawn.band[some]),
+        places=_in_places(error[own:], fewer),
+    )
+
+
+def worst_wavelengths(
+    material: Material, stored: NDArray[np.float64], how: Interpolation, wi: Floats, wr: Floats, floor: Floats
+) -> NDArray[np.float64]:
+    """Return the wavelength [nm] inside each interval where interpolation of the model itself is worst.
+
+    Nine or more wavelengths of an interval are tried, at a few pairs of directions `wi`, `wr`. `floor` is that of the
+    `stored` wavelengths, `how` the interpolation of the table.
+    """
+    intervals = stored.size - 1
+    within = max(_SEARCHED[0], _SEARCHED[1] // intervals)
+    share = np.arange(1, within + 1) / (within + 1)
+    at = (stored[:-1, np.newaxis] + np.diff(stored)[:, np.newaxis] * share).reshape(-1)
+    mu = np.maximum(wi[:, 2], COS_HORIZON) * np.maximum(wr[:, 2], COS_HORIZON)
+    numbers = how.numbers(model_values(material, stored, wi, wr), mu)
+    nodes, weight = weights_of_nodes(stored, at)
+    error = relative(
+        np.maximum(how.f_r(np.sum(numbers[:, nodes] * weight, axis=-1), mu), 0.0),
+        model_values(material, at, wi, wr),
+        np.repeat(np.maximum(floor[1:], floor[:-1]), within),
+    )
+    worst = np.percentile(error, 95.0, axis=0).reshape(intervals, within).argmax(axis=1)
+    return np.asarray(at.reshape(intervals, within)[np.arange(intervals), worst])
+
+
+def limits_of_bands(error: Floats, band: NDArray[np.int64]) -> list[list[float]]:
+    """Return the limit of errors (N, columns) in each band of theta_i."""
+    return [_short(_limit(error[band == each])) for each in range(places.BANDS)]
+
+
+def _first(sample: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
+    """Return which members of samples are among the first `count` of theirs; those of a sample stand together."""
+    return np.asarray(np.arange(sample.size) - np.searchsorted(sample, sample) < count)
+
+
+def _in_places(error: Floats, pairs: places.Pairs) -> Places:
+    """Return limits of errors (N, columns) at pairs drawn in places: the largest of the samples of each place."""
+    rows: dict[int, Floats] = {}
+    for sample in range(pairs.sample[-1] + 1):
+        here = pairs.sample == sample
+        row = int(pairs.row[here][0])
+        rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[here]))
+
+    limits = {row: _short(limit) for row, limit in rows.items()}
+    return Places(
+        alongside=[limits[row] for row in range(places.ALONGSIDE, places.ONE_GRAZING)],
+        one_grazing=[limits[row] for row in range(places.ONE_GRAZING, places.BOTH_GRAZING)],
+        both_grazing=[limits[row] for row in range(places.BOTH_GRAZING, places.ROWS)],
+    )
+
+
+def _limit(error: Floats) -> Floats:
+    """Return the limit that `_WITHIN` of all errors are within, with `_CONFIDENCE`, of a sample (N, columns)."""
+    if len(error) == 0:
+        return np.zeros(error.shape[1])
+    return np.asarray(np.sort(error, axis=0)[-_rank(len(error))])
+
+
+@functools.cache
+def _rank(count: int) -> int:
+    """Return which of so many values, from the largest, 1 or more, bounds the quantile `_WITHIN`.
+
+    The number of values beyond the quantile is binomial. That fewer than the rank are is the chance of a limit that is
+    too low.
+    """
+    rank, chance = 0, 0.0  # the chance that no more than `rank` are beyond
+    while True:
+        ways = math.lgamma(count + 1) - math.lgamma(rank + 1) - math.lgamma(count - rank + 1)
+        chance += math.exp(ways + rank * math.log(1.0 - _WITHIN) + (count - rank) * math.log(_WITHIN))
+        if chance > 1.0 - _CONFIDENCE:
+            return max(rank, 1)
+        rank += 1
+
+
+def compare(found: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:
+    """The error of values of f_r, shape (N, L), against the truth at the directions of a draw."""
+    floor = floor_of(truth, drawn)
+    count = BANDS_DEG.size - 1
+    # rows of weights: each band of theta_i, then all of them
+    weights = np.concatenate(
+        [np.where(drawn.band == np.arange(count)[:, np.newaxis], drawn.weight, 0.0), [drawn.weight]]
+    )
+    l1 = mean_error(found, truth, weights)
+    error = np.ascontiguousarray(relative(found, truth, floor).T)
+    chosen = [drawn.above & (drawn.band == band) for band in range(count)] + [drawn.above]
+    percentiles = [np.percentile(error[:, rows], [50.0, 95.0, 99.0, 100.0], axis=1) for rows in chosen]
+    # [statistic][band][wavelength]
+    bands = np.stack([l1[:-1], *np.moveaxis(np.stack(percentiles[:-1]), 1, 0)])
+    worst = np.concatenate([[l1[-1].max()], percentiles[-1].max(axis=-1)])
+    names = tuple(Overall.model_fields)
+    return Error.model_validate(
+        {
+            "theta_i_deg": BANDS_DEG.tolist(),
+            "directions": int(np.count_nonzero(drawn.above)),
+            "seed": seed,
+            "floor": _short(floor),
+            "overall": dict(zip(names, _short(worst), strict=True)),
+            **{name: [_short(row) for row in rows] for name, rows in zip(names, bands, strict=True)},
+        }
+    )
+
+
+def _looked_up(
+    layout: Layout,
+    read: Callable[[slice], NDArray[np.float32]],
+    wi: Floats,
+    wr: Floats,
+    wavelength_nm: NDArray[np.float64] | None,
+) -> Floats:
+    """Return values (N, L) of a table at directions, read in windows of rows with one more on either side."""
+    rows = layout.shape[0]
+    step = max(2, min(rows, _WINDOW // (layout.size // rows)))
+    found = np.zeros((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
+    if step >= rows:
+        return Table.of(layout, read(slice(0, rows))).lookup_vectors(wi, wr, wavelength_nm).reshape(found.shape)
+    grid = layout.grid
+    x = points(grid, wi, wr)
+    row = np.clip(np.searchsorted(radians(next(iter(grid.axes.values()))), x[0], side="right") - 1, 0, rows - 2)
+    for start in range(0, rows - 1, step):
+        here = (row >= start) & (row < start + step)
+        window = slice(max(start - 1, 0), min(start + step + 2, rows))
+        table = Table.of(layout, read(window), Grid.part(grid, window))
+        found[here] = table.lookup_vectors(wi[here], wr[here], wavelength_nm).reshape(-1, found.shape[1])
+    return found
+
+
+def _short(values: Floats) -> list[float]:
+    """Numbers to three digits."""
+    return [float(f"{value:.3g}") for value in values.tolist()]

@@ -1,0 +1,143 @@
+"""What a table states of its error against its model."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from brdfdb.geometry import Directions
+from brdfdb.parameters import Floats
+from brdfdb.tables import places
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+Numbers = list[list[float]]
+
+
+class Overall(BaseModel):
+    """Relative error over all bands of theta_i, at the wavelength where it is largest."""
+
+    model_config = _STRICT
+
+    l1: float = Field(description="integral of abs(error) cos theta_r over that of f_r cos theta_r")
+    median: float
+    p95: float
+    p99: float
+    max: float
+
+
+class Places(BaseModel):
+    """Limits of the error in places of their own: 98 of 100 values are within, with a confidence of 98 %.
+
+    The error is abs(table - model) / max(table, floor): next to a pole, where a table can be low by a factor, the value
+    of the table is what a lookup knows.
+    """
+
+    model_config = _STRICT
+
+    alongside: Numbers = Field(
+        description="[band][wavelength]: theta_r within 10 degrees of theta_i, delta_phi within 90 degrees, and not "
+        "both directions beyond 85 degrees; the largest of four: exactly towards the light, within two degrees of "
+        "that, theta_r = theta_i, and within 10 degrees of that"
+    )
+    one_grazing: Numbers = Field(
+        description="[ring][wavelength]: one direction beyond 85 degrees, at 85 to 87, 87 to 89 or 89 to 90 degrees"
+    )
+    both_grazing: Numbers = Field(
+        description="[ring][wavelength]: both directions beyond 85 degrees, the lower one in the ring; the largest of "
+        "three: any azimuth, exactly towards the light, and theta_r = theta_i"
+    )
+
+
+class Between(BaseModel):
+    """Limits of the error between neighbouring wavelengths, as those of `Places`, with the larger of two floors."""
+
+    model_config = _STRICT
+
+    wavelength_nm: list[float] = Field(
+        description="where each interval was measured: where interpolation of the model itself is worst, of nine or "
+        "more places in it"
+    )
+    bands: Numbers = Field(description="[band][interval]")
+    places: Places | None = Field(default=None, description="[band or ring][interval]; none of a family")
+
+
+class Error(BaseModel):
+    """The error of a table, abs(table - model) / max(model, floor), for each band of theta_i and each wavelength."""
+
+    model_config = _STRICT
+
+    theta_i_deg: list[float] = Field(description="edges of the bands")
+    directions: int = Field(description="drawn above the horizon, half over the hemisphere and half in the lobe")
+    seed: int
+    floor: list[float] = Field(
+        description="1/sr, for each wavelength: a thousandth of the Lambertian BRDF of the same albedo"
+    )
+    l1: Numbers = Field(
+        description="[band][wavelength]: integral of abs(error) cos theta_r over that of f_r cos theta_r"
+    )
+    median: Numbers = Field(description="[band][wavelength]")
+    p95: Numbers = Field(description="[band][wavelength]")
+    p99: Numbers = Field(description="[band][wavelength]")
+    max: Numbers = Field(description="[band][wavelength]")
+    overall: Overall
+    places: Places | None = Field(default=None, description="none of a family, and of a table of before version 3")
+    between: Between | None = Field(default=None, description="none without two wavelengths, and before version 3")
+
+    @functools.cached_property
+    def limits(self) -> NDArray[np.float64]:
+        """The relative error that is stated, nan where there is none: shape (rows, L + intervals).
+
+        Rows are those of `places`. Columns are the wavelengths, and after them the intervals between them. In an
+        interval no less is stated than at its two ends.
+        """
+        at = _rows(self.p99, self.places)
+        if self.between is None:
+            return np.concatenate([at, np.full((places.ROWS, at.shape[1] - 1), np.nan)], axis=1)
+        inside = _rows(self.between.bands, self.between.places)
+        return np.concatenate([at, np.maximum(inside, np.maximum(at[:, 1:], at[:, :-1]))], axis=1)
+
+    @functools.cached_property
+    def floors(self) -> NDArray[np.float64]:
+        """The floor [1/sr] of each column of `limits`."""
+        floor = np.array(self.floor)
+        return np.concatenate([floor, np.maximum(floor[1:], floor[:-1])])
+
+
+def _rows(bands: Numbers, some: Places | None) -> NDArray[np.float64]:
+    """Return limits by row; of places that were not measured, 0: the band counts there."""
+    if some is None:
+        some = Places(
+            alongside=np.zeros_like(bands).tolist(),
+            one_grazing=np.zeros((places.RINGS, len(bands[0]))).tolist(),
+            both_grazing=np.zeros((places.RINGS, len(bands[0]))).tolist(),
+        )
+    return np.concatenate([bands, some.alongside, some.one_grazing, some.both_grazing])
+
+
+def stated(error: Error, directions: Directions, brdf: Floats, column: NDArray[np.int64]) -> Floats:
+    """Return the error [1/sr] that a table states for values of f_r.
+
+    Parameters
+    ----------
+    error : Error
+        Of the table.
+    directions : Angles or Vectors
+        Checked directions, which broadcast to the shape of `brdf` without its last axis.
+    brdf : array (..., M) [1/sr]
+        Values that were looked up.
+    column : int array (M,)
+        The column of `Error.limits` for each wavelength.
+
+    Returns
+    -------
+    array (..., M) [1/sr]
+        The largest of what is stated for the band of theta_i and for the places that a pair is in; nan where a value is
+        nan, or nothing is stated.
+    """
+    limits, floor = error.limits[:, column], error.floors[column]
+    relative = functools.reduce(np.maximum, (limits[row] for row in places.rows_of(directions)))
+    return np.asarray(relative * np.maximum(brdf, floor) + 0.0 * brdf)

@@ -1,0 +1,352 @@
+"""Values of a table at any direction and wavelength: what is stored, interpolated on its grid."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from brdfdb._elementary import COS_HORIZON
+from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians
+from brdfdb.parameters import Floats
+from brdfdb.tables import _kernels
+from brdfdb.tables._interpolation import Axes, prepared
+from brdfdb.tables.grids import Axis, Grid, axes_among
+from brdfdb.tables.layout import PLAIN, Interpolation, Layout
+from brdfdb.tables.table_base import Described, Stated
+
+# how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
+_Ready = tuple[_kernels.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Table(Described):
+    """A decoded table: the values of one revision of one material, in memory.
+
+    Attributes
+    ----------
+    name, revision : str
+        Which material, and which of its revisions.
+    attrs : dict
+        What the store says of it: title, model, parameters, sources and more.
+    grid : Grid
+        The angular axes, in the order of the dimensions.
+    wavelength_nm : array (L,) [nm] or None
+        Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
+    values : float32 array
+        Numbers over the angular axes and, last, the wavelengths, or the parts of a factored spectrum.
+    specular : float32 array (theta_i[, L]) [1] or None
+        Reflectance of the Dirac part, None if the model has none.
+    specular_theta_deg : array [degree] or None
+        Where; by default the nodes of the axis theta_i.
+    interpolation : Interpolation
+        How the numbers become f_r between the nodes; by default they are f_r and linear.
+    spectra : array (parts, L) or None
+        How the parts of a factored spectrum make up the wavelengths.
+    uniform : array (L,) or (1,) [1/sr]
+        The part of f_r that is the same in all directions, which is not in `values`.
+    digest : str
+        sha256 of the manifest of the revision; empty of a table that was not read from a store.
+    n, k : array (L,) [1] or None
+        Refractive index and extinction coefficient that the store says the table was computed with. Lookups do not
+        read them.
+    """
+
+    name: str
+    revision: str
+    attrs: Mapping[str, Any] = field(repr=False)
+    grid: Grid = field(repr=False)
+    wavelength_nm: Axis | None = field(repr=False)
+    values: NDArray[np.float32] = field(repr=False)
+    specular: NDArray[np.float32] | None = field(repr=False)
+    specular_theta_deg: Axis | None = field(default=None, repr=False)
+    interpolation: Interpolation = PLAIN
+    spectra: NDArray[np.float64] | None = field(default=None, repr=False)
+    uniform: NDArray[np.float64] | None = field(default=None, repr=False)
+    digest: str = ""
+    n: Axis | None = field(default=None, repr=False)
+    k: Axis | None = field(default=None, repr=False)
+
+    @classmethod
+    def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
+        """The table of a layout, or of a part of its grid, before it is stored: without the Dirac part."""
+        return cls(
+            name=layout.material.name,
+            revision="",
+            attrs={},
+            grid=layout.grid if grid is None else grid,
+            wavelength_nm=layout.wavelength_nm,
+            values=values,
+            specular=None,
+            interpolation=layout.interpolation,
+            spectra=layout.spectra,
+            uniform=layout.uniform,
+        )
+
+    @property
+    def axes_deg(self) -> Mapping[str, Axis]:
+        """Nodes of the angular axes [degree] by name."""
+        return self.grid.axes
+
+    @property
+    def anisotropic(self) -> bool:
+        """Whether the table resolves how the surface is turned about its normal."""
+        return self.grid.anisotropic
+
+    @functools.cached_property
+    def brdf(self) -> NDArray[np.float32]:
+        """f_r [1/sr] at the nodes: over the angular axes and, last, the wavelengths; 0 below the horizon."""
+        if self.values_are_brdf:
+            return self.values
+        numbers = self.values.reshape(*self.grid.shape, -1)
+        f_r = rebuilt(numbers, self.interpolation, self.spectra, self.uniform, *self.grid.directions()[::2])
+        return f_r.astype(np.float32).reshape(self.grid.shape if self.wavelength_nm is None else f_r.shape)
+
+    @property
+    def nbytes(self) -> int:
+        """Of the arrays that lookups read."""
+        arrays = (self.values, self.specular, self.spectra, self.uniform)
+        return sum(array.nbytes for array in arrays if array is not None)
+
+    @property
+    def values_are_brdf(self) -> bool:
+        """Whether the stored numbers are f_r itself."""
+        return self.spectra is None and self.uniform is None and self.interpolation.plain
+
+    @overload
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[False] = False,
+    ) -> Floats: ...
+
+    @overload
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[True],
+    ) -> Stated: ...
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: bool = False,
+    ) -> Floats | Stated:
+        """Interpolate f_r.
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r : array_like [rad]
+            Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
+        wavelength_nm : float or array_like (M,) [nm], optional
+            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table. Between them
+            the numbers that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
+        with_error : bool
+            Give the error that the table states beside the values, between its wavelengths, too: see `Stated`.
+
+        Returns
+        -------
+        array [1/sr], or Stated
+            In the shape of the angles, with a last axis for the wavelengths of a spectral table, or M if an array of
+            wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is nan.
+            Beyond the last theta node of its grid the value is that of the node. float32 arrays in give float32 out.
+
+        Raises
+        ------
+        ValueError
+            If an angle or a wavelength is outside its range; the message names it. If an error is asked of a table
+            that states none, or between the wavelengths of a table of before version 3.
+        """
+        if with_error:
+            brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+            return Stated(brdf, self._stated(checked_angles(theta_i, phi_i, theta_r, phi_r), brdf, wavelength_nm))
+        at = self._wavelengths(wavelength_nm)
+        given: Sequence[ArrayLike] = (theta_i, phi_i, theta_r, phi_r)
+        shape: tuple[int, ...] = ()
+        if all(isinstance(angle, float) for angle in given):  # broadcasting takes longer than the lookup of one point
+            numbers = np.array(given).reshape(4, 1)
+            numbers.flags.writeable = False  # as by `_flat`
+            dtype, flat = numbers.dtype, list(numbers)
+        else:
+            arrays = [np.asarray(angle) for angle in given]
+            dtype = asked_for(theta_i, phi_i, theta_r, phi_r)
+            if any(angle.dtype.kind not in "iuf" for angle in arrays):
+                checked_angles(*given)
+            shape = np.broadcast_shapes(*(angle.shape for angle in arrays))
+            flat = [_flat(angle, shape, dtype) for angle in arrays]
+        values = np.empty(flat[0].size * at.size, dtype)
+        horizon = float(dtype.type(HALF_PI))
+        if not _kernels.by_angles(
+            *self._kernel, at.nodes, at.weight, flat[0], flat[1], flat[2], flat[3], horizon, values
+        ):
+            checked_angles(*given)
+        return values.reshape(shape + at.tail)[()]
+
+    @overload
+    def lookup_vectors(
+        self,
+        wi: ArrayLike,
+        wr: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        *,
+        with_error: Literal[False] = False,
+    ) -> Floats: ...
+
+    @overload
+    def lookup_vectors(
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: Literal[True]
+    ) -> Stated: ...
+
+    def lookup_vectors(
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: bool = False
+    ) -> Floats | Stated:
+        """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+        if with_error:
+            brdf = self.lookup_vectors(wi, wr, wavelength_nm)
+            return Stated(brdf, self._stated(checked_vectors(wi, wr), brdf, wavelength_nm))
+        at = self._wavelengths(wavelength_nm)
+        vectors = checked_vectors(wi, wr)
+        shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
+        flat = [_flat(w, shape, vectors.dtype) for w in (vectors.w_i, vectors.w_r)]
+        values = np.empty(flat[0].size // 3 * at.size, vectors.dtype)
+        _kernels.by_vectors(*self._kernel, at.nodes, at.weight, flat[0], flat[1], values)
+        return values.reshape(shape[:-1] + at.tail)[()]
+
+    @functools.cached_property
+    def _kernel(self) -> _Ready:
+        """What kernels need to know of the table."""
+        grid, how = self.grid, self.interpolation
+        # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
+        overshoots = how.logarithm or how.cubic or grid.half_difference
+        rule = _kernels.Rule(
+            grid.half_difference, grid.copies, how.logarithm, float(how.offset), float(how.power), overshoots
+        )
+        axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
+        channels = self.values.size // int(np.prod(grid.shape))
+        spectra = np.empty((0, 0)) if self.spectra is None else self.spectra
+        count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
+        uniform = np.zeros(count) if self.uniform is None else np.broadcast_to(self.uniform, (count,)).copy()
+        return rule, axes, self.values.reshape(-1), channels, spectra, uniform
+
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate the reflectance of the Dirac part; 0 for models that have none.
+
+        Parameters
+        ----------
+        theta_i : array_like [rad]
+            Angle of incidence, in [0, pi].
+        wavelength_nm : float or array_like (M,) [nm], optional
+            As in `lookup`.
+
+        Returns
+        -------
+        array [1]
+            Shaped as by `lookup`.
+
+        Raises
+        ------
+        ValueError
+            If theta_i or a wavelength is outside its range.
+        """
+        at = self._wavelengths(wavelength_nm)
+        given = np.asarray(theta_i)
+        dtype = asked_for(theta_i)
+        if given.dtype.kind not in "iuf":
+            checked_angles(theta_i, 0.0, 0.0, 0.0)
+        values = np.zeros(given.size * at.size, dtype)
+        horizon = float(dtype.type(HALF_PI))
+        nodes, rows = self._specular_rows
+        if not _kernels.specular(nodes, rows, at.nodes, at.weight, _flat(given, given.shape, dtype), horizon, values):
+            checked_angles(theta_i, 0.0, 0.0, 0.0)
+        return values.reshape(given.shape + at.tail)[()]
+
+    @functools.cached_property
+    def _specular_rows(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+        """Nodes [rad] of the Dirac part, and its values there, a row a node; none of either where there is none."""
+        if self.specular is None:
+            return np.empty(0), np.empty((0, 0), np.float32)
+        at_deg = self.specular_theta_deg
+        nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
+        expected = (nodes.size,) if self.wavelength_nm is None else (nodes.size, self.wavelength_nm.size)
+        if self.specular.shape != expected or nodes.size < 2:  # kernels do not look
+            raise ValueError(
+                f"specular: shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
+            )
+        return nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1))
+
+
+def rebuilt(
+    numbers: Floats,
+    interpolation: Interpolation,
+    spectra: Floats | None,
+    uniform: Floats | None,
+    theta_i: Floats,
+    theta_r: Floats,
+) -> Floats:
+    """f_r [1/sr] at nodes, shape (..., L), from what is stored there, shape (..., parts or L); 0 below the horizon.
+
+    theta_i and theta_r [rad] broadcast to the shape of the nodes; uniform and spectra are those of a `Table`.
+    """
+    wavelengths = numbers if spectra is None else numbers.astype(np.float64) @ spectra
+    mu = np.maximum(np.cos(theta_i), COS_HORIZON) * np.maximum(np.cos(theta_r), COS_HORIZON)
+    f_r = interpolation.f_r(wavelengths, mu) + (0.0 if uniform is None else uniform)
+    return np.asarray(np.where((np.maximum(theta_i, theta_r) > HALF_PI)[..., np.newaxis], 0.0, f_r))
+
+
+def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """One number after the other, and never writable: kernels are compiled anew for arrays that are, 10 s a time."""
+    whole = array if array.shape == shape else np.broadcast_to(array, shape)
+    flat = np.ascontiguousarray(whole, dtype=dtype).reshape(-1)
+    flat.flags.writeable = False
+    return flat
+
+
+def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
+    """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
+    x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
+    rule = _kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False)
+    flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
+    _kernels.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
+    return x
+
+
+def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], attrs: Mapping[str, Any]) -> Table:
+    """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
+    how = dict(attrs.get("interpolation", {}))
+    variable = "brdf" if "brdf" in arrays else "parts"
+    specular = arrays.get("specular_reflectance")
+    uniform = arrays.get("uniform")
+    return Table(
+        name=name,
+        revision=revision,
+        attrs=attrs,
+        grid=Grid({axis: arrays[axis] for axis in axes_among(arrays)}),
+        wavelength_nm=arrays.get("wavelength"),
+        values=arrays[variable],
+        specular=None if specular is None else specular.astype(np.float32),
+        specular_theta_deg=arrays.get("specular_theta_i"),
+        interpolation=Interpolation(**how),
+        spectra=arrays.get("spectra"),
+        uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),
+        n=arrays.get("n"),
+        k=arrays.get("k"),
+    )

@@ -1,0 +1,153 @@
+"""What a table says of itself, wherever its values are: its wavelengths, and the error that it states."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.geometry import Directions
+from brdfdb.parameters import Floats
+from brdfdb.tables._interpolation import weights_of_nodes
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.stated_error import Error, stated
+
+_MOST_KNOWN = 64  # single wavelengths that are remembered
+
+
+class Located(NamedTuple):
+    """Wavelengths that are asked for, M of them, on the axis of a table.
+
+    Attributes
+    ----------
+    nodes : int64 array (M, 4)
+        The wavelengths of the table that count.
+    weight : float64 array (M, 4)
+        Their weights, as by `weights_of_nodes`.
+    column : int64 array (M,)
+        Where a stated error stands for each: see `Error.limits`.
+    tail : tuple of int
+        The shape that the wavelengths add to that of the directions.
+    """
+
+    nodes: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    column: NDArray[np.int64]
+    tail: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of wavelengths."""
+        return self.column.size
+
+
+class Stated(NamedTuple):
+    """Values of f_r with the error that their table states for them.
+
+    Attributes
+    ----------
+    brdf : array [1/sr]
+        As by `Table.lookup`.
+    error : array [1/sr]
+        In the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
+        model. Between wavelengths, and in the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
+    """
+
+    brdf: Floats
+    error: Floats
+
+
+class Described:
+    """What a table in memory and one behind a service have in common; `Table` says what the attributes are."""
+
+    name: str
+    revision: str
+    attrs: Mapping[str, Any]
+    wavelength_nm: Axis | None
+
+    @functools.cached_property
+    def error(self) -> Error | None:
+        """The error that the table states; None if none was measured."""
+        return None if "error" not in self.attrs else Error.model_validate(self.attrs["error"])
+
+    def _stated(self, directions: Directions, brdf: Floats, wavelength_nm: ArrayLike | None) -> Floats:
+        if self.error is None:
+            raise ValueError(f"with_error: the table of {self.name} states no error; build it anew")
+        return self.stated_by(self.error, directions, brdf, wavelength_nm)
+
+    def stated_by(
+        self, error: Error, directions: Directions, brdf: Floats, wavelength_nm: ArrayLike | None = None
+    ) -> Floats:
+        """Return what an error at the wavelengths of the table says [1/sr] of values, in their shape.
+
+        Raises
+        ------
+        ValueError
+            If a wavelength is between those of the table, and the error was not measured there.
+        """
+        at = self._wavelengths(wavelength_nm)
+        if error.between is None and at.size and at.column.max() >= len(error.floor):
+            assert self.wavelength_nm is not None
+            below = int(at.column.max()) - len(error.floor)
+            raise ValueError(
+                f"with_error: the error of {self.name} was not measured between its wavelengths of "
+                f"{self.wavelength_nm[below]:g} and {self.wavelength_nm[below + 1]:g} nm; build it anew"
+            )
+        values = brdf if at.tail else np.asarray(brdf)[..., np.newaxis]
+        errors = stated(error, directions, values, at.column)
+        return np.asarray(errors if at.tail else errors[..., 0])[()]
+
+    @functools.cached_property
+    def _all_wavelengths(self) -> Located:
+        stored = np.zeros(1) if self.wavelength_nm is None else self.wavelength_nm
+        return _on_axis(stored, stored, () if self.wavelength_nm is None else (stored.size,))
+
+    @functools.cached_property
+    def _known_wavelengths(self) -> dict[float, Located]:
+        return {}
+
+    def _wavelengths(self, wavelength_nm: ArrayLike | None) -> Located:
+        """Return where wavelengths [nm] lie on the axis of the table; ValueError if one is not allowed."""
+        if wavelength_nm is None:
+            return self._all_wavelengths
+        if not isinstance(wavelength_nm, float):
+            return self._located(wavelength_nm)
+        known = self._known_wavelengths  # the checks of one wavelength take as long as the lookup of one point
+        at = known.get(wavelength_nm)
+        if at is None:
+            at = self._located(wavelength_nm)
+            if len(known) >= _MOST_KNOWN:
+                known.clear()
+            known[wavelength_nm] = at
+        return at
+
+    def _located(self, wavelength_nm: ArrayLike) -> Located:
+        stored = self.wavelength_nm
+        given = np.asarray(wavelength_nm)
+        if given.size and given.dtype.kind not in "iuf":
+            raise ValueError(f"wavelength_nm: {wavelength_nm!r} is not a number of nanometres")
+        wanted = given.astype(np.float64)
+        if wanted.ndim > 1:
+            raise ValueError(f"wavelength_nm: {wanted.ndim} axes; allowed are a number and a list of numbers")
+        flat = wanted.reshape(-1)
+        good = (flat > 0.0) & np.isfinite(flat)
+        if not np.all(good):
+            raise ValueError(f"wavelength_nm: {flat[~good][0]:g} is not a positive number of nanometres")
+        if stored is None:
+            return _on_axis(np.zeros(1), np.zeros(flat.size), wanted.shape)
+        outside = (flat < stored[0]) | (flat > stored[-1])
+        if np.any(outside):
+            raise ValueError(
+                f"wavelength_nm: {flat[outside][0]:.9g} is outside [{stored[0]:g}, {stored[-1]:g}] nm of {self.name}"
+            )
+        return _on_axis(stored, flat, wanted.shape)
+
+
+def _on_axis(stored: NDArray[np.float64], wanted: NDArray[np.float64], tail: tuple[int, ...]) -> Located:
+    """Return where wavelengths [nm] lie among those of a table."""
+    below = np.searchsorted(stored, wanted, side="right") - 1
+    column = np.where(stored[below] == wanted, below, stored.size + below)
+    return Located(*weights_of_nodes(stored, wanted), column, tail)

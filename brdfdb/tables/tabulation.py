@@ -1,0 +1,288 @@
+"""From a material and a grid to a table: an xarray Dataset in memory that says where every number comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from brdfdb._elementary import COS_HORIZON
+from brdfdb.geometry import directions_from_half_difference, radians, unit_vector
+from brdfdb.materials import Material
+from brdfdb.parameters import Floats
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.layout import TABLE_VERSION, Layout
+
+_SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
+POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
+_CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
+# Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
+SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
+_SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
+
+
+def tabulate(layout: Layout) -> xr.Dataset:
+    """Tabulate the BRDF of a material: all blocks of a layout, in memory.
+
+    Returns
+    -------
+    Dataset
+        ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says: float32, over
+        the axes of the grid and, last, ``wavelength`` or ``part``; for models with a Dirac part
+        ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
+        ``k`` as used.
+        Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
+    """
+    values = np.concatenate([block(layout, rows) for rows in layout.blocks])
+    return frame(layout).assign({layout.variable: (layout.dims, values, VARIABLES[layout.variable])})
+
+
+def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
+    """The values of some rows of the first axis of a table: float32, in the shape of the table's other axes."""
+    values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
+    step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
+    for start in range(rows.start, rows.stop, step):
+        here = slice(start, min(start + step, rows.stop))
+        at = slice(here.start - rows.start, here.stop - rows.start)
+        if layout.plain and not layout.grid.half_difference:
+            for last, arguments in _spectrum(layout):
+                index: tuple[Any, ...] = (at, ..., *last)
+                values[index] = _evaluated(layout, here, arguments)
+        else:
+            numbers = node_numbers(layout, here)
+            if layout.spectra is not None:
+                # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
+                numbers = np.einsum("...w,pw->...p", numbers, layout.spectra)
+            values[at] = numbers.reshape(here.stop - here.start, *layout.shape[1:])
+    return rounded(values, layout.bits)
+
+
+def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
+    """float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
+    drop = 23 - bits
+    if drop == 0:
+        return values
+    whole = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
+    return ((whole + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
+
+
+def _spectrum(layout: Layout) -> list[tuple[tuple[int, ...], dict[str, Any]]]:
+    """The arguments of the model at each wavelength, and where their values go in the last dimension."""
+    if layout.wavelength_nm is None:
+        return [((), layout.material.arguments())]
+    return [((w,), layout.material.arguments(one)) for w, one in enumerate(layout.wavelength_nm)]
+
+
+def _evaluated(layout: Layout, rows: slice, arguments: dict[str, Any]) -> Floats:
+    """The model at some rows of the first axis; on a reciprocal grid with the smaller theta always the light's.
+
+    There a table is its own transpose to the last bit, in whatever pieces it is computed.
+    """
+    evaluate = layout.material.spec.evaluate
+    if not layout.grid.reciprocal:
+        return evaluate(*layout.grid.directions(rows), **arguments)
+    theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
+    here, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
+    values = np.empty((here.size, theta.size, delta_phi.size))
+    values[:, rows.start :] = evaluate(*_spread(here, right, delta_phi), **arguments)
+    swapped = evaluate(*_spread(left, here, delta_phi), **arguments)
+    smaller = left < here[:, np.newaxis]
+    np.copyto(values[:, : rows.stop], np.swapaxes(swapped, 0, 1), where=smaller[..., np.newaxis])
+    return values
+
+
+def _spread(theta_i: Axis, theta_r: Axis, delta_phi: Axis) -> tuple[Axis, ...]:
+    light, seen, turned = np.ix_(theta_i, theta_r, delta_phi)
+    return light, np.zeros(()), seen, turned
+
+
+def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
+    """What a table holds or would hold at any directions: shape (..., L), before a spectrum is taken in parts.
+
+    Parameters
+    ----------
+    layout : Layout
+        Which numbers.
+    wi, wr : arrays of shape (..., 3)
+        Unit vectors, at the horizon or above.
+    """
+    mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
+    return _numbers(layout, lambda arguments: layout.material.spec.vectors(wi, wr, **arguments), mu)
+
+
+def _numbers(layout: Layout, evaluate: Callable[[dict[str, Any]], Floats], mu: Floats) -> Floats:
+    """Numbers from f_r at the wavelengths of a layout, mu = cos theta_i cos theta_r."""
+    without = {} if layout.apart is None else {layout.apart: 0.0}
+    f_r = [evaluate(arguments | without) for _, arguments in _spectrum(layout)]
+    return layout.interpolation.numbers(np.stack(f_r, axis=-1).astype(np.float64), mu)
+
+
+def node_numbers(layout: Layout, rows: slice) -> Floats:
+    """`numbers` at some rows of nodes, continued beyond the horizon on a grid of half and difference vectors.
+
+    There theta_d is held at its largest value, where light or viewer is at the horizon, or at 89.9 degrees if the
+    numbers have a pole there; from there they go on along theta_d with the slope that they arrive with.
+    """
+    grid = layout.grid
+    if not grid.half_difference:
+        angles = grid.directions(rows)
+        mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
+        return _numbers(layout, lambda arguments: _evaluated(layout, rows, arguments), mu)
+    axes = [radians(nodes) for nodes in grid.axes.values()]
+    axes[0] = axes[0][rows]
+    nodes = np.ix_(*axes)
+    theta_h, phi_h, theta_d, phi_d = nodes if grid.anisotropic else (nodes[0], np.zeros(()), nodes[1], nodes[2])
+    return continued(layout, theta_h, phi_h, theta_d, phi_d)
+
+
+def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
+    """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
+    lowest = 0.0  # cosine of light and viewer
+    if layout.material.spec.grazing_pole and layout.interpolation.power == 0.0:
+        end = radians(POLE_END_DEG)
+        lowest, theta_h = float(np.cos(end)), np.minimum(theta_h, end)
+    # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
+    along, across = np.cos(theta_h), np.sin(theta_h) * np.abs(np.cos(phi_d))
+    largest = np.arccos(np.minimum(lowest / np.hypot(along, across), 1.0)) - np.arctan2(across, along)
+    largest = np.maximum(largest * (1.0 - 1e-12), 0.0)
+    held = np.minimum(theta_d, largest)
+    values = numbers(layout, *_half_vectors(theta_h, phi_h, held, phi_d))
+    beyond = np.broadcast_to(theta_d - held, values.shape[:-1])
+    if np.any(beyond > 0.0):
+        step = np.minimum(_SLOPE_STEP, 0.5 * largest)
+        inside = numbers(layout, *_half_vectors(theta_h, phi_h, np.maximum(held - step, 0.0), phi_d))
+        share = np.minimum(beyond / np.broadcast_to(np.maximum(step, 1e-9), beyond.shape), _CONTINUED)
+        values += share[..., np.newaxis] * (values - inside)
+    return values
+
+
+def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats]:
+    theta_i, phi_i, theta_r, phi_r = directions_from_half_difference(theta_h, phi_h, theta_d, phi_d)
+    light, viewer = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+    for w in (light, viewer):
+        w[..., 2] = np.maximum(w[..., 2], 0.0)  # rounding at the horizon
+    return light, viewer
+
+
+def frame(layout: Layout) -> xr.Dataset:
+    """All of a table but its values: coordinates, Dirac part, how to rebuild f_r, refractive indices, attributes."""
+    material, grid, wavelength_nm = layout.material, layout.grid, layout.wavelength_nm
+    spec = material.spec
+    spectral = () if wavelength_nm is None else ("wavelength",)
+    coordinates: dict[str, Any] = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
+    variables: dict[str, Any] = {}
+    arguments = material.arguments(wavelength_nm)
+    if wavelength_nm is not None:
+        coordinates["wavelength"] = (
+            "wavelength",
+            wavelength_nm,
+            {"units": "nm", "long_name": "wavelength in vacuum"},
+        )
+        for name, meaning in (("n", "refractive index"), ("k", "extinction coefficient")):
+            variables[name] = ("wavelength", arguments[name], {"units": "1", "long_name": meaning})
+    if layout.spectra is not None:
+        parts = np.arange(float(len(layout.spectra)))
+        coordinates["part"] = ("part", parts, {"units": "1", "long_name": "number of a part"})
+        variables["spectra"] = (("part", "wavelength"), layout.spectra, VARIABLES["spectra"])
+    if layout.uniform is not None:
+        variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])
+    if spec.specular is not None:
+        theta_i_deg = specular_nodes(layout)
+        name = "specular_theta_i" if theta_i_deg is SPECULAR_THETA_DEG else "theta_i"
+        coordinates[name] = _coordinate(name, theta_i_deg)
+        theta_i = radians(theta_i_deg)
+        variables["specular_reflectance"] = (
+            (name, *spectral),
+            spec.specular(
+                theta_i[:, np.newaxis] if spectral else theta_i,
+                **{name: arguments[name] for name in spec.specular_parameters},
+            ),
+            {"units": "1", "long_name": "reflectance of the Dirac part, in the exact mirror direction"},
+        )
+    extent = [] if wavelength_nm is None else [float(wavelength_nm[0]), float(wavelength_nm[-1])]
+    how = {"interpolation": asdict(layout.interpolation), "bits": layout.bits}
+    return xr.Dataset(
+        variables,
+        coordinates,
+        _attributes(material)
+        | {"anisotropic": grid.anisotropic, "symmetries": grid.symmetries, "wavelength_range_nm": extent}
+        | how
+        | {"reconstruction": _reconstruction(layout), "reason": layout.reason},
+    )
+
+
+def specular_nodes(layout: Layout) -> Axis:
+    """Return the angles of incidence [degree] at which the Dirac part of a table is stored."""
+    given = "theta_i" in layout.grid.axes and not layout.reason
+    return layout.grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
+
+
+def _coordinate(name: str, nodes: Axis) -> tuple[str, Axis, dict[str, str]]:
+    return name, nodes, {"units": "degree", "long_name": _LONG_NAMES[name]}
+
+
+def _reconstruction(layout: Layout) -> str:
+    """How to rebuild f_r from the arrays of a table, in one line."""
+    spectrum = "" if layout.wavelength_nm is None else "; over wavelengths cubic"
+    if layout.plain:
+        return f"brdf is f_r; between nodes {layout.interpolation.method}{spectrum}"
+    how = layout.interpolation
+    number = "parts @ spectra" if layout.spectra is not None else "parts"
+    value = f"max(exp({number}) - {how.offset!r}, 0)" if how.logarithm else number
+    if how.power != 0.0:
+        value = f"{value} / (cos(theta_i) * cos(theta_r))**{how.power:g}"
+    value = f"uniform + {value}" if layout.uniform is not None else value
+    beyond = "; nodes below the horizon hold a continuation" if layout.grid.half_difference else ""
+    return f"brdf = {value}; between nodes, parts are interpolated, {how.method}{spectrum}{beyond}"
+
+
+def _attributes(material: Material) -> dict[str, Any]:
+    spec = material.spec
+    # parameters by the names that files give them
+    written = dict(zip(material.parameters, material.file_parameters(), strict=True))
+    return {
+        "title": material.title,
+        "material": material.name,
+        "table_version": TABLE_VERSION,
+        "model": spec.name,
+        "model_version": spec.version,
+        "model_title": spec.title,
+        "model_equation": spec.equation,
+        "model_reference": spec.reference,
+        "parameters": material.file_parameters(),
+        "parameter_sources": {written[name]: material.sources.get(name, material.source) for name in written},
+        "source": material.source,
+        "assumed": {written.get(name, name): each.model_dump(mode="json") for name, each in material.assumed.items()},
+        "note": material.note,
+        "refractive_index": material.refractive_index or "",
+        "known_excess": material.known_excess.model_dump() if material.known_excess else {},
+        "conventions": (
+            "directions point away from the surface; delta_phi = phi_r - phi_i, 0 is back towards the light, "
+            "180 degrees the mirror half plane; f_r without cosine; isotropic tables are even in delta_phi"
+        ),
+    }
+
+
+_LONG_NAMES = {
+    "theta_i": "polar angle of the light",
+    "specular_theta_i": "polar angle of the light, of the Dirac part",
+    "theta_r": "polar angle of the viewer",
+    "phi_i": "azimuth of the light",
+    "phi_r": "azimuth of the viewer",
+    "delta_phi": "azimuth of the viewer minus azimuth of the light",
+    "theta_h": "polar angle of the half vector, the bisector of light and viewer",
+    "phi_h": "azimuth of the half vector",
+    "theta_d": "angle between light and half vector",
+    "phi_d": "azimuth of the light about the half vector",
+}
+
+VARIABLES = {
+    "brdf": {"units": "sr-1", "long_name": "bidirectional reflectance f_r"},
+    "parts": {"units": "1", "long_name": "what f_r is rebuilt from, as the attribute reconstruction says"},
+    "spectra": {"units": "1", "long_name": "how the parts make up each wavelength"},
+    "uniform": {"units": "sr-1", "long_name": "the part of f_r that is the same in all directions"},
+}

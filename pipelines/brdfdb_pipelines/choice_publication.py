@@ -1,0 +1,97 @@
+"""The tables of a choice: measured as those of a build are, and published in a store."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from brdfdb.store.reader import Store, StoreError
+from brdfdb.store.staging import publish_dataset
+from brdfdb.tables import error_measurement
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import frame, tabulate
+from brdfdb_pipelines import terminal
+
+
+class Built(NamedTuple):
+    """The revision of a store that is the table of a choice, and in a sentence what became of the one before."""
+
+    revision: str
+    said: str
+
+
+def build(root: Path, layouts: Mapping[str, Layout]) -> dict[str, Built]:
+    """Publish tables under names of materials, each with its error against the model that it stands for.
+
+    Parameters
+    ----------
+    root : Path
+        Directory of the store, which is there.
+    layouts : mapping
+        By the name under which a table is published. One that is current there already is left as it is.
+
+    Raises
+    ------
+    StoreError
+        If the store cannot be written.
+    """
+    built = {}
+    with terminal.progress() as bar:
+        task = bar.add_task("building", total=len(layouts))
+        for name, layout in layouts.items():
+            built[name] = _build(root, name, layout)
+            bar.advance(task)
+    return built
+
+
+def _build(root: Path, name: str, layout: Layout) -> Built:
+    store = Store(root)
+    if _is_there(store, name, layout):
+        return Built(store.head(name), f"{store.head(name)} of the store is this table")
+    table = tabulate(layout)
+    values = table[layout.variable].to_numpy()
+    error = error_measurement.measure(layout, lambda rows: values[rows])
+    before = _before(store, name)
+    revision, _ = publish_dataset(root, name, table.assign_attrs(error=error.model_dump(mode="json")))
+    stated = f"{layout.material.model}, whose error (p99) is {terminal.error(error.overall.p99)}"
+    return Built(revision, f"{revision} is a table of {stated}; it {before}")
+
+
+def _before(store: Store, name: str) -> str:
+    """What a new revision does to the current one."""
+    if name not in store:
+        return "is new in the store"
+    try:
+        head = store.summary(name)
+    except StoreError:
+        return "replaces one that was damaged"
+    return f"replaces {head['revision']}, of {head['model']}, whose error was {terminal.error(head.get('error_p99'))}"
+
+
+def _is_there(store: Store, name: str, layout: Layout) -> bool:
+    """Whether the current table has this layout, whatever the reason, states its error, and is undamaged."""
+    if name not in store:
+        return False
+    wanted = frame(layout)
+    try:
+        store.verify(name)
+        stored = store.dataset(name)
+    except StoreError:
+        return False
+    told = json.loads(json.dumps(wanted.attrs)) | {"reason": stored.attrs.get("reason")}
+    return (
+        "error" in stored.attrs
+        and told.items() <= stored.attrs.items()
+        and all(key in stored and np.array_equal(stored[key], value) for key, value in wanted.variables.items())
+    )
+
+
+def with_reason(layout: Layout, title: str, wanted: str) -> Layout:
+    """A layout that says what it was chosen for, beside why it was laid out so."""
+    planned = f"; {layout.reason}" if layout.reason else ""
+    return replace(layout, reason=f"{title}, chosen for {wanted}{planned}")

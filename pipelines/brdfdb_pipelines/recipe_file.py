@@ -1,0 +1,392 @@
+"""Recipes: which materials to tabulate, on which grids and at which wavelengths, checked before anything is built."""
+
+from __future__ import annotations
+
+import fnmatch
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Discriminator, FailFast, Field, Tag, TypeAdapter, ValidationError
+
+from brdfdb.materials import Material, presets, written_name
+from brdfdb.models import MODELS
+from brdfdb.store.family import Sweep
+from brdfdb.tables.grids import Axis, Grid, check_wavelengths
+from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest
+from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, plan
+from brdfdb_pipelines import toml_file
+
+_STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+_MOST_NODES = 100_000  # of an axis: far above any that is used, far below what fills the memory
+_MOST_VALUES = 1 << 36  # of a table: 275 GB
+_MOST_PATTERNS = 10_000  # each is compared with every name
+_MOST_MEMBERS = 100_000  # of all families of a recipe
+_MOST_SWEPT = 6  # parameters of a family: a lookup is made of two members for each, 64 in all
+
+
+class RecipeError(ValueError):
+    """A recipe that cannot be built; str() is one sentence that names the field."""
+
+
+class Range(BaseModel):
+    """Equally spaced numbers from start to stop, both included."""
+
+    model_config = _STRICT
+
+    start: float
+    stop: float
+    step: float = Field(gt=0.0)
+
+    def nodes(self, name: str) -> Axis:
+        """The numbers; RecipeError if the step does not lead from start to stop."""
+        count = (self.stop - self.start) / self.step
+        if count >= _MOST_NODES:
+            raise RecipeError(f"{name}: steps of {self.step:g} make more than the {_MOST_NODES} nodes an axis may have")
+        if not count >= 0.0 or abs(count - round(count)) > 1e-6:
+            raise RecipeError(f"{name}: steps of {self.step:g} from {self.start:g} do not end at {self.stop:g}")
+        return np.linspace(self.start, self.stop, round(count) + 1)
+
+
+# FailFast: pydantic would keep two errors for each wrong number
+Nodes = Annotated[list[float | Range], FailFast(), Field(min_length=1, max_length=_MOST_NODES)]
+_VALUES: TypeAdapter[list[float | Range]] = TypeAdapter(Nodes, config=ConfigDict(strict=True, allow_inf_nan=False))
+
+
+def _nodes(name: str, parts: list[float | Range]) -> Axis:
+    """Return the numbers of a list with ranges; RecipeError if there are more than an axis may have."""
+    pieces, count = [], 0
+    for part in parts:
+        pieces.append(part.nodes(name) if isinstance(part, Range) else np.array([part]))
+        count += pieces[-1].size
+        if count > _MOST_NODES:
+            raise RecipeError(f"{name}: the list makes more than the {_MOST_NODES} nodes an axis may have")
+    return np.concatenate(pieces)
+
+
+class IsotropicGrid(BaseModel):
+    """Axes of a table of an isotropic material."""
+
+    model_config = _STRICT
+
+    theta_i_deg: Nodes
+    theta_r_deg: Nodes
+    delta_phi_deg: Nodes
+
+
+class AnisotropicGrid(BaseModel):
+    """Axes of a table of an anisotropic material."""
+
+    model_config = _STRICT
+
+    theta_i_deg: Nodes
+    phi_i_deg: Nodes
+    theta_r_deg: Nodes
+    phi_r_deg: Nodes
+
+
+class HalfDifferenceGrid(BaseModel):
+    """Axes of half and difference vectors, of a table of an isotropic material."""
+
+    model_config = _STRICT
+
+    theta_h_deg: Nodes
+    theta_d_deg: Nodes
+    phi_d_deg: Nodes
+
+
+class AnisotropicHalfDifferenceGrid(BaseModel):
+    """Axes of half and difference vectors, of a table of an anisotropic material."""
+
+    model_config = _STRICT
+
+    theta_h_deg: Nodes
+    phi_h_deg: Nodes
+    theta_d_deg: Nodes
+    phi_d_deg: Nodes
+
+
+def _meant(grid: Any) -> str:
+    """Which kind of grid a table of a recipe is meant to be."""
+    half = isinstance(grid, BaseModel | dict) and "theta_h_deg" in (grid if isinstance(grid, dict) else dict(grid))
+    return "half" if half else "plain"
+
+
+AnyIsotropicGrid = Annotated[
+    Annotated[IsotropicGrid, Tag("plain")] | Annotated[HalfDifferenceGrid, Tag("half")], Discriminator(_meant)
+]
+AnyAnisotropicGrid = Annotated[
+    Annotated[AnisotropicGrid, Tag("plain")] | Annotated[AnisotropicHalfDifferenceGrid, Tag("half")],
+    Discriminator(_meant),
+]
+
+
+class Grids(BaseModel):
+    """The grid for each kind of material, over light and viewer or over half and difference vectors."""
+
+    model_config = _STRICT
+
+    isotropic: AnyIsotropicGrid
+    spectral: AnyIsotropicGrid
+    anisotropic: AnyAnisotropicGrid
+
+
+@dataclass(frozen=True)
+class Job:
+    """One table to build: on a grid, or to a tolerance, of which one is None; `family` says what it is a member of."""
+
+    material: Material
+    wavelength_nm: NDArray[np.float64] | None
+    grid: Grid | None
+    tolerance: float | None
+    interpolation: str = "linear"
+    family: Mapping[str, Any] | None = None
+
+    def layout(self) -> Layout:
+        """What the table is going to be; to a tolerance, this takes the planner a second or more."""
+        if self.grid is not None:
+            method, logarithm = self.interpolation.removeprefix("log-"), self.interpolation.startswith("log-")
+            offset = offset_of(self.material, self.wavelength_nm) if logarithm else 0.0
+            how = Interpolation(method, logarithm, offset)
+            return Layout(self.material, self.grid, self.wavelength_nm, interpolation=how)
+        assert self.tolerance is not None
+        return plan(self.material, self.wavelength_nm, self.tolerance)
+
+    def check(self) -> None:
+        """Raise the ValueError that `layout` would raise for what does not suit the material."""
+        grid = coarsest(self.material) if self.grid is None else self.grid
+        layout = Layout(self.material, grid, self.wavelength_nm)
+        if layout.size > _MOST_VALUES:
+            shape = " x ".join(map(str, layout.shape))
+            raise ValueError(f"{shape} are {layout.size:.3g} values, more than the {_MOST_VALUES:.3g} of a table")
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """All that decides the table, ready for JSON: the same request makes the same table."""
+        member = {} if self.family is None else {"family": dict(self.family)}
+        return {
+            **member,
+            "table_version": TABLE_VERSION,
+            "model_version": self.material.spec.version,
+            "material": self.material.model_dump(mode="json"),
+            "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
+            "grid": None if self.grid is None else {name: nodes.tolist() for name, nodes in self.grid.axes.items()},
+            "interpolation": None if self.grid is None else self.interpolation,
+            "tolerance": self.tolerance,
+            "plan_version": None if self.tolerance is None else PLAN_VERSION,
+        }
+
+
+class Recipe(BaseModel):
+    """A recipe file. Angles are degrees, wavelengths nanometres."""
+
+    model_config = _STRICT
+
+    title: str = ""
+    materials: Annotated[list[str], FailFast()] = Field(
+        min_length=1, max_length=_MOST_PATTERNS, description="names or shell patterns"
+    )
+    wavelengths_nm: Nodes
+    tolerance: float | None = Field(
+        default=None, ge=1e-4, le=0.5, description="99th percentile of the relative error, instead of grids"
+    )
+    grids: Grids | None = None
+    interpolation: Literal["linear", "cubic", "log-linear", "log-cubic"] | None = Field(
+        default=None, description="between the nodes of grids, of f_r or of its logarithm; by default linear"
+    )
+    define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
+    sweep: dict[str, dict[str, Any]] = Field(
+        default={}, description="families of materials: written like a material, with lists as values of parameters"
+    )
+
+    def jobs(self) -> list[Job]:
+        """Every table that the recipe asks for.
+
+        Raises
+        ------
+        RecipeError
+            If a name matches nothing, or a material, grid or wavelength is not what it must be.
+        """
+        if (self.tolerance is None) == (self.grids is None):
+            raise RecipeError("tolerance, grids: give one of the two")
+        if self.interpolation is not None and self.grids is None:
+            raise RecipeError("interpolation: goes with grids; to a tolerance, the planner chooses")
+        grids = {} if self.grids is None else {name: self._grid(self.grids, name) for name in Grids.model_fields}
+        try:
+            wavelengths = check_wavelengths(_nodes("wavelengths_nm", self.wavelengths_nm))
+        except ValueError as error:
+            raise RecipeError(str(error)) from None
+        jobs = []
+        for material, family in self._selected():
+            wavelength_nm = None
+            if material.spectral:
+                stated = material.wavelengths_nm
+                wavelength_nm = wavelengths if stated is None else np.array(stated)
+            several = wavelength_nm is not None and wavelength_nm.size > 1
+            kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
+            job = Job(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear", family)
+            try:
+                job.check()
+            except ValueError as error:
+                where = "" if job.grid is None else f" on grids.{kind}"
+                raise RecipeError(f"{material.name}{where}: {error}") from None
+            jobs.append(job)
+        return jobs
+
+    def _grid(self, grids: Grids, name: str) -> Grid:
+        parts: dict[str, list[float | Range]] = dict(getattr(grids, name))
+        try:
+            axes = {field.removesuffix("_deg"): _nodes(field, nodes) for field, nodes in parts.items()}
+        except RecipeError as error:
+            raise RecipeError(f"grids.{name}.{error}") from None
+        try:
+            return Grid(axes)
+        except ValueError as error:
+            axis, _, said = str(error).partition(":")
+            raise RecipeError(f"grids.{name}.{axis}_deg:{said}") from None
+
+    def sweeps(self, jobs: Sequence[Job]) -> list[Sweep]:
+        """The families all of whose members are among the jobs."""
+        found = []
+        for name, table in self.sweep.items():
+            axes = _swept(name, table)
+            members = sorted((j for j in jobs if j.family and j.family["name"] == name), key=lambda j: j.material.name)
+            if len(members) == math.prod(map(len, axes.values())):
+                found.append(
+                    Sweep(
+                        name=name,
+                        title=table["title"],
+                        model=table["model"],
+                        axes=axes,
+                        members=[job.material.name for job in members],
+                        request_sha256=[digest(job.request) for job in members],
+                    )
+                )
+        return found
+
+    def _selected(self) -> list[tuple[Material, dict[str, Any] | None]]:
+        """The materials, and of which family each is a member."""
+        known: dict[str, tuple[Material, dict[str, Any] | None]] = {n: (m, None) for n, m in presets().items()}
+        for name, table in self.define.items():
+            if name in known:
+                raise RecipeError(f"define.{name}: is the name of a built-in material; give yours another")
+            try:
+                known[name] = Material.from_table(name, table), None
+            except ValueError as error:
+                raise RecipeError(f"define.{error}") from None
+        families: dict[str, list[str]] = {}
+        count = 0
+        for name, table in self.sweep.items():  # before the first member of the first family is made
+            count += math.prod(map(len, _swept(name, table).values()))
+            if count > _MOST_MEMBERS:
+                raise RecipeError(
+                    f"sweep.{name}.parameters: the lists make {count} members, more than the {_MOST_MEMBERS} that all "
+                    "families of a recipe may have"
+                )
+        for name, table in self.sweep.items():
+            members = {material.name: (material, family) for material, family in _members(name, table)}
+            for taken in (name, *members):
+                if taken in known or taken in families:
+                    raise RecipeError(f"sweep.{name}: {taken!r} is the name of another material or family")
+            known |= members
+            families[name] = list(members)
+        chosen: dict[str, tuple[Material, dict[str, Any] | None]] = {}
+        for pattern in self.materials:
+            matches = fnmatch.filter(known, pattern)
+            for family in fnmatch.filter(families, pattern):
+                matches += families[family]
+            if not matches:
+                raise RecipeError(f"materials: {pattern!r} matches no material; `brdfdb list --presets` names them")
+            chosen |= {name: known[name] for name in matches}
+        return list(chosen.values())
+
+
+def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
+    """The parameters of a sweep that are lists, in the order of the model, each with its values."""
+    parameters, model = table.get("parameters"), table.get("model")
+    where = f"sweep.{name}.parameters"
+    lists = {x: v for x, v in parameters.items() if isinstance(v, list)} if isinstance(parameters, dict) else {}
+    if not lists:
+        raise RecipeError(f"{where}: give a list of numbers for one of them at least")
+    if len(lists) > _MOST_SWEPT:
+        raise RecipeError(f"{where}: {len(lists)} are lists, at most {_MOST_SWEPT} may be")
+    known = [written_name(p) for p in MODELS[model].parameters] if isinstance(model, str) and model in MODELS else []
+    axes = {}
+    for x in sorted(lists, key=lambda x: known.index(x) if x in known else len(known)):
+        try:
+            parts = _VALUES.validate_python(lists[x])
+        except ValidationError as error:
+            field, said = _first(error)
+            raise RecipeError(f"{where}.{x}{field and f'.{field}'}: {said}") from None
+        values = [float(f"{value:.12g}") for value in _nodes(f"{where}.{x}", parts)]  # 0.3, not 0.1 + 0.1 + 0.1
+        if len(values) < 2:
+            raise RecipeError(f"{where}.{x}: needs a list of at least two values")
+        if not all(low < high for low, high in itertools.pairwise(values)):
+            raise RecipeError(f"{where}.{x}: the values must increase strictly")
+        axes[x] = values
+    return axes
+
+
+def _members(name: str, table: Mapping[str, Any]) -> list[tuple[Material, dict[str, Any]]]:
+    """The materials of a sweep, the last of its lists running fastest, each with what it is in its family."""
+    axes = _swept(name, table)
+    width = max(3, len(str(math.prod(map(len, axes.values())))))
+    members = []
+    for number, values in enumerate(itertools.product(*axes.values()), start=1):
+        member, at = f"{name}-{number:0{width}d}", dict(zip(axes, values, strict=True))
+        fields = {**table, "parameters": {**table["parameters"], **at}}
+        if isinstance(title := table.get("title"), str) and title:
+            fields["title"] = ", ".join([title, *(f"{x} {value:.12g}" for x, value in at.items())])
+        try:
+            members.append((Material.from_table(member, fields), {"name": name, "parameters": at}))
+        except ValueError as error:
+            said = str(error).removeprefix(f"{member}: ")
+            field = said.partition(":")[0]
+            written = (
+                [written_name(p) for p in MODELS[table["model"]].parameters] if table.get("model") in MODELS else []
+            )
+            inside = ".parameters." if field in (*table["parameters"], *written) else ": "
+            raise RecipeError(f"sweep.{name}{inside}{said}") from None
+    return members
+
+
+def load(path: Path | None = None) -> Recipe:
+    """Read a recipe file, by default the one that comes with the program, and see that it can be built.
+
+    Raises
+    ------
+    RecipeError
+        If the file cannot be read, is not TOML, or is not a recipe; the message names the file and the field.
+    """
+    source = resources.files("brdfdb_pipelines") / "recipes" / "default.toml" if path is None else path
+    try:
+        content = toml_file.read(source)
+    except OSError as error:
+        raise RecipeError(f"{source}: {error.strerror}") from None
+    except ValueError as error:
+        raise RecipeError(f"{source}: {error}") from None
+    try:
+        recipe = Recipe.model_validate(content)
+        recipe.jobs()
+    except RecipeError as error:
+        raise RecipeError(f"{source}: {error}") from None
+    except ValidationError as error:
+        field, said = _first(error)
+        raise RecipeError(f"{source}: {field}: {said}") from None
+    return recipe
+
+
+def _first(error: ValidationError) -> tuple[str, str]:
+    """The first field that pydantic finds fault with, and what it says."""
+    # pydantic lists each branch of number | range: a table was meant as a range, whatever else is wrong with it,
+    # and the names of the branches are not names of the recipe
+    found = error.errors(include_url=False)
+    first = next(item for item in found if not ("float" in item["loc"][-1:] and isinstance(item["input"], dict)))
+    field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
+    return field, "unknown key" if first["type"] == "extra_forbidden" else first["msg"]

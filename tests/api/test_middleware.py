@@ -1,0 +1,255 @@
+"""Around every answer: compression, pages of other origins, ids, the log, and what is counted."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from unittest.mock import AsyncMock
+
+import httpx
+import pytest
+
+from brdfdb_api.http.app import create_app, problem_of
+from brdfdb_api.http.middleware import Edge
+from brdfdb_api.serving.settings import Settings
+from tests.api.a_store import Client, client_of, npy
+
+FELT = "/v1/materials/grey-felt"
+POINT = f"{FELT}/lookup?theta_i=10&theta_r=20"
+
+
+def test_json_is_compressed_for_those_who_ask(client: Client) -> None:
+    body = {"theta_i": 1, "theta_r": [2] * 500}
+    answers = [
+        client.post(f"{FELT}/lookup", json=body, headers={"Accept-Encoding": how}) for how in ("gzip", "identity")
+    ]
+    assert [answer.headers.get("content-encoding") for answer in answers] == ["gzip", None]
+    assert int(answers[0].headers["content-length"]) < int(answers[1].headers["content-length"])
+    assert answers[0].json() == answers[1].json()
+    assert "accept-encoding" in answers[0].headers["vary"].lower()
+
+
+@pytest.mark.parametrize("rest", ["lobe?format=npy", "slice.exr", "download.zarr"])
+def test_numbers_as_bytes_are_not_compressed(client: Client, rest: str) -> None:
+    answer = client.get(f"{FELT}/{rest}", headers={"Accept-Encoding": "gzip"})
+    assert answer.status_code == 200
+    assert len(answer.content) > 1024
+    assert "content-encoding" not in answer.headers
+
+
+def test_pages_of_other_origins_may_ask_only_where_that_is_set(root: Path) -> None:
+    origin = {"Origin": "https://a.example"}
+    asked = {**origin, "Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "content-type"}
+    assert "access-control-allow-origin" not in client_of(root).get(POINT, headers=origin).headers
+    client = client_of(root, cors_origins=("https://a.example",))
+    answer = client.get(POINT, headers=origin)
+    assert answer.headers["access-control-allow-origin"] == "https://a.example"
+    assert "ETag" in answer.headers["access-control-expose-headers"]
+    assert client.request("OPTIONS", f"{FELT}/lookup", headers=asked).status_code == 200
+    other = client.get(POINT, headers={"Origin": "https://b.example"})
+    assert "access-control-allow-origin" not in other.headers
+
+
+ADDRESSES = [POINT, FELT, "/healthz", "/nothing", "/v1/materials/grey-fell", f"{FELT}/lookup?theta_i=900&theta_r=1"]
+
+
+@pytest.mark.parametrize("address", ADDRESSES)
+def test_a_request_has_an_id(client: Client, address: str) -> None:
+    assert client.get(address, headers={"X-Request-ID": "my-id.7_A"}).headers["x-request-id"] == "my-id.7_A"
+    made = [client.get(address).headers["x-request-id"] for _ in range(2)]
+    assert all(re.fullmatch("[0-9a-f]{16}", each) for each in made)
+    assert made[0] != made[1]
+
+
+@pytest.mark.parametrize("sent", ["", "two words", "a" * 65, 'a"b', "a\tb"])
+def test_an_id_that_could_harm_a_log_is_replaced(client: Client, sent: str) -> None:
+    answer = client.get(POINT, headers={"X-Request-ID": sent})
+    assert re.fullmatch("[0-9a-f]{16}", answer.headers["x-request-id"])
+
+
+@pytest.mark.parametrize("address", [*ADDRESSES, "/", "/v1/materials"])
+def test_head_is_get_without_the_body(client: Client, address: str) -> None:
+    shelf = client.app.state.shelf
+    for name in shelf.names():
+        shelf.paint(name)  # lists change when colours come
+    got, asked = client.get(address), client.request("HEAD", address)
+    assert (asked.status_code, asked.content) == (got.status_code, b"")
+    for name in ("content-type", "content-length", "etag", "cache-control"):
+        assert asked.headers.get(name) == got.headers.get(name)
+
+
+def test_bodies_that_wait_are_counted_together(root: Path) -> None:
+    app = create_app(Settings(store=root, max_body_bytes=1000, log_level="error"))
+
+    async def ask(count: int) -> list[int]:
+        free = asyncio.Event()
+
+        async def slow() -> Any:
+            yield b" " * 900
+            await free.wait()
+
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test") as http:
+            asked = [asyncio.create_task(http.post(f"{FELT}/lookup", content=slow())) for _ in range(count)]
+            await asyncio.wait(asked, timeout=0.5)
+            free.set()
+            return sorted(answer.status_code for answer in await asyncio.gather(*asked))
+
+    assert asyncio.run(ask(8)) == [422] * 8
+    assert asyncio.run(ask(10)) == [422] * 8 + [503] * 2
+    assert asyncio.run(ask(8)) == [422] * 8
+
+
+def test_a_server_is_ready_when_its_kernels_are_loaded(client: Client) -> None:
+    shelf = client.app.state.shelf
+    shelf.warming = True
+    assert "kernels are being loaded" in client.problem("GET", "/readyz", 503)["detail"]
+    assert client.get("/healthz").status_code == 200
+    shelf.warm()
+    assert client.get("/readyz").json() == {"status": "ok", "materials": 4}
+
+
+Log = Callable[[], list[dict[str, Any]]]
+
+
+@pytest.fixture
+def log(capfd: pytest.CaptureFixture[str]) -> Log:
+    """The lines of the log since it was read last."""
+    return lambda: [json.loads(line) for line in capfd.readouterr().err.splitlines()]
+
+
+REQUESTS = [(POINT, 200), (FELT, 200), ("/nothing", 404), (f"{FELT}/lookup", 422)]
+
+
+@pytest.mark.parametrize(("address", "status"), REQUESTS)
+def test_the_log_has_a_line_of_json_for_each_request(client: Client, log: Log, address: str, status: int) -> None:
+    client.get(address, headers={"X-Request-ID": "mine"})
+    (line,) = log()
+    path, _, query = address.partition("?")
+    told = {"request": "mine", "method": "GET", "path": path, "query": query, "status": status}
+    assert {key: line[key] for key in told} == told
+    assert line["ms"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("level", "logged"), [("info", [200, 200, 404, 422, 503]), ("warning", [404, 422, 503]), ("error", [503])]
+)
+def test_the_log_may_be_of_refusals_or_failures_alone(own: Path, log: Log, level: str, logged: list[int]) -> None:
+    client = client_of(own, log_level=level)
+    (own / "materials" / "white-tile" / "r000001" / "zarr.json").write_bytes(b"{}")
+    for address in [*(address for address, _ in REQUESTS), "/v1/materials/white-tile"]:
+        client.get(address)
+    assert [line["status"] for line in log()] == logged
+
+
+@pytest.mark.parametrize("character", ["a", "%01", "%5C", "%C3%A9", "%F0%9F%98%80"])
+def test_a_line_of_the_log_is_whole_where_several_write(
+    client: Client, capfd: pytest.CaptureFixture[str], character: str
+) -> None:
+    query = "&".join(f"wavelength_nm={wavelength}.25" for wavelength in range(400, 441))
+    client.get(f"{POINT}&{query}")
+    assert json.loads(capfd.readouterr().err)["query"].endswith("wavelength_nm=440.25")
+    client.get(f"/{character * 2000}?{'%01' * 2000}", headers={"X-Request-ID": "i" * 64})
+    written = capfd.readouterr().err
+    assert len(written.encode()) <= 4096
+    assert written.isascii()
+    assert json.loads(written)["path"].startswith("/")
+
+
+def test_head_is_logged_as_such(client: Client, log: Log) -> None:
+    client.request("HEAD", POINT)
+    assert [line["method"] for line in log()] == ["HEAD"]
+
+
+def test_a_whole_download_is_no_client_that_went_away(client: Client, log: Log) -> None:
+    assert client.get(f"{FELT}/download.zarr").status_code == 200
+    assert [line["status"] for line in log()] == [200]
+
+
+def test_an_answer_that_breaks_in_the_middle_is_a_failure(log: Log) -> None:
+    async def breaks(_: Any, __: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b"first", "more_body": True})
+        raise OSError("the disk \udcff")
+
+    edge = Edge(breaks, limit=1, lookup=AsyncMock(), failed=problem_of, log_level="error")
+    scope = {"type": "http", "method": "GET", "path": "/", "query_string": b"", "headers": []}
+    with pytest.raises(OSError, match="the disk"):
+        asyncio.run(edge(scope, AsyncMock(), AsyncMock()))
+    failed, answered = log()
+    assert failed["failed"] == "OSError: the disk \\udcff"
+    assert answered["status"] == 500
+
+
+@pytest.mark.parametrize("address", [POINT, FELT])
+def test_a_failure_is_in_the_log_and_not_in_the_answer(
+    client: Client, log: Log, monkeypatch: pytest.MonkeyPatch, address: str
+) -> None:
+    def fail(*_: Any) -> Any:
+        raise RuntimeError("secret")
+
+    monkeypatch.setattr("brdfdb_api.serving.shelf.Shelf.held", fail)
+    monkeypatch.setattr("brdfdb_api.serving.shelf.Shelf.table", fail)
+    assert "secret" not in client.problem("GET", address, 500, headers={"X-Request-ID": "mine"})["detail"]
+    failed, answered = log()  # a line each, the traceback included
+    assert (failed["request"], failed["failed"]) == ("mine", "RuntimeError: secret")
+    assert "in fail\n" in failed["traceback"]
+    assert failed["traceback"].endswith("RuntimeError: secret\n")
+    assert (answered["request"], answered["status"]) == ("mine", 500)
+
+
+def test_a_client_that_goes_away_is_no_failure(client: Client, log: Log) -> None:
+    sent = []
+
+    async def gone() -> Any:
+        return {"type": "http.disconnect"}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    line = 'brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="499"}'
+    before = counted(client, line)
+    log()
+    scope = {"type": "http", "http_version": "1.1", "method": "POST", "path": f"{FELT}/lookup", "query_string": b""}
+    asyncio.run(client.app({**scope, "headers": []}, gone, send))
+    assert sent == []
+    assert [each["status"] for each in log()] == [499]
+    assert counted(client, line) - before == 1
+
+
+def counted(client: Client, line: str) -> float:
+    """The value of a line of /metrics, 0 where there is none."""
+    values = [
+        text.rpartition(" ")[2] for text in client.get("/metrics").text.splitlines() if text.startswith(line + " ")
+    ]
+    return float(values[0]) if values else 0.0
+
+
+@pytest.mark.parametrize(
+    ("ask", "line", "more"),
+    [
+        (POINT, 'brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"}', 1),
+        (POINT, 'brdfdb_points_total{source="table"}', 1),
+        (POINT + "&from=model", 'brdfdb_points_total{source="model"}', 1),
+        (POINT, 'brdfdb_request_seconds_count{route="/v1/materials/{name}/lookup"}', 1),
+        (FELT, 'brdfdb_requests_total{route="/v1/materials/{name}",status="200"}', 1),
+        (f"{FELT}/lookup", 'brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="422"}', 1),
+        ("/nothing/at/all", 'brdfdb_requests_total{route="other",status="404"}', 1),
+    ],
+)
+def test_requests_and_points_are_counted(client: Client, ask: str, line: str, more: int) -> None:
+    before = counted(client, line)
+    client.get(ask)
+    assert counted(client, line) - before == more
+
+
+def test_points_of_a_body_are_counted(client: Client) -> None:
+    line = 'brdfdb_points_total{source="table"}'
+    before = counted(client, line)
+    client.post(
+        f"{FELT}/lookup", content=npy([[10.0, 0.0, 20.0, 0.0]] * 17), headers={"Content-Type": "application/x-npy"}
+    )
+    assert counted(client, line) - before == 17

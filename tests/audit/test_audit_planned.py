@@ -1,0 +1,189 @@
+"""Audits of planned tables: their stated error excuses what it explains and nothing else, on each kind of grid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from brdfdb.audit import audit
+from brdfdb.audit.reciprocity import LOOKUP_RECIPROCITY_TOLERANCE
+from brdfdb.audit.table_energy import _band_means, table_energy_of
+from brdfdb.materials.provenance import KnownExcess
+from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import tabulate
+from tests.audit.test_audit import ISOTROPIC, known, material, verdicts, written
+from tests.tables.test_albedo import KINDS, planned, table_of
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
+
+
+@pytest.fixture(autouse=True)
+def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samplers are audited at length in test_audit_model.py."""
+    monkeypatch.setattr("brdfdb.audit.sampling.SAMPLES", 2000)
+
+
+def scaled(table: Table, factor: float) -> Table:
+    """The table with all of f_r times a factor."""
+    how = table.interpolation
+    if not how.logarithm:
+        values = table.values * np.float32(factor)
+    elif table.spectra is None:
+        values = table.values + np.float32(np.log(factor))
+    else:  # rows are orthonormal: what they make of the logarithm of the factor, the same at each wavelength
+        values = table.values + (np.log(factor) * table.spectra.sum(axis=1)).astype(np.float32)
+    uniform = None if table.uniform is None else table.uniform * factor
+    return replace(table, values=values, uniform=uniform, interpolation=replace(how, offset=how.offset * factor))
+
+
+def worst(table: Table) -> float:
+    return max(max(row) for row in table.error.l1) if table.error else 0.0
+
+
+@KINDS
+def test_planned_tables_pass_and_their_reports_are_valid(kind: str) -> None:
+    table = table_of(kind)
+    found = audit(table)
+    assert (found.verdict, verdicts(found), found.energy.table.reason) == ("passes", {}, "")
+    assert found.energy.table.bands is not None
+    assert found.energy.table.bands.stated_error == table.attrs["error"]["l1"]
+    assert np.max(found.energy.table.bands.excess) == 0.0
+    assert np.min(found.energy.table.bands.explained) > 0.0
+    assert found.values.looked_up > 1000
+    assert found.values.count >= table.values.size
+    written([found])
+
+
+@KINDS
+def test_half_as_much_light_again_violates(kind: str) -> None:
+    table = table_of(kind)
+    albedo = audit(table).energy.table.max_albedo
+    assert albedo is not None
+    found = audit(scaled(table, 1.5 / albedo))
+    assert (found.verdict, found.energy.table.verdict) == ("violates", "violates")
+    assert found.energy.table.max_albedo == pytest.approx(1.5, rel=0.02)
+    assert "more than the error that the table states explains" in found.energy.table.reason
+    assert found.energy.table.exceeds_1_beyond_error_from_theta_i_deg == found.energy.table.exceeds_1_from_theta_i_deg
+
+
+@KINDS
+def test_one_node_of_nan_violates_and_the_report_is_json(kind: str) -> None:
+    table = table_of(kind)
+    values = table.values.copy()
+    values[(1,) * values.ndim if table.spectra is None else (1,) * (values.ndim - 1)] = np.nan
+    found = audit(replace(table, values=values))
+    assert (found.verdict, found.values.finiteness) == ("violates", "violates")
+    assert found.values.not_finite > 0
+    written([found])
+
+
+@pytest.mark.parametrize("name", ["spectra", "uniform"])
+def test_what_is_stored_beside_the_values_is_audited(name: str) -> None:
+    table = table_of("polar-parts" if name == "spectra" else "half-difference")
+    broken = getattr(table, name).copy()
+    broken.flat[0] = np.nan
+    found = audit(replace(table, **{name: broken}))
+    assert found.values.finiteness == "violates"
+
+
+def test_a_negative_uniform_part_violates() -> None:
+    table = table_of("half-difference")
+    assert table.uniform is not None
+    found = audit(replace(table, uniform=-table.uniform))
+    assert found.values.positivity == "violates"
+    assert found.values.smallest is not None
+    assert found.values.smallest < 0.0
+
+
+def test_a_negative_node_violates_even_if_lookups_stop_at_0() -> None:
+    cubic = Layout(material("lambert", {"rho": 0.5}), ISOTROPIC, interpolation=Interpolation("cubic"))
+    dataset = tabulate(cubic)
+    values = dataset["brdf"].values
+    values[2, 3, 1] = values[3, 2, 1] = -1e-3
+    found = audit(replace(Table.of(cubic, values), attrs=dataset.attrs))
+    assert (found.values.positivity, found.values.negative) == ("violates", 2)
+    assert found.values.smallest == np.float32(-1e-3)
+
+
+@pytest.mark.parametrize("kind", ["polar", "polar-parts"])
+def test_one_node_that_is_not_reciprocal_violates(kind: str) -> None:
+    table = table_of(kind)
+    values = table.values.copy()
+    values[2, 5, 1] *= np.float32(1.0 + 1e-4)
+    found = audit(replace(table, values=values))
+    assert verdicts(found)["reciprocity"] == "violates"
+    assert found.reciprocity.table_nodes is not None
+    assert found.reciprocity.table_nodes.max > 1e-5
+
+
+@pytest.mark.parametrize("kind", ["half-difference", "half-difference-anisotropic"])
+def test_half_and_difference_vectors_are_reciprocal_whatever_they_hold(kind: str) -> None:
+    table = table_of(kind)
+    noise = np.random.default_rng(5).uniform(0.9, 1.1, table.values.shape).astype(np.float32)
+    found = audit(replace(table, values=table.values * noise))
+    reciprocity = found.reciprocity
+    assert reciprocity.table_nodes is None
+    assert reciprocity.table_lobe is not None
+    for each in (reciprocity.table_random, reciprocity.table_lobe):
+        assert each.pairs > 1000
+        assert each.max <= LOOKUP_RECIPROCITY_TOLERANCE == each.tolerance
+
+
+# A surface that reflects all light, whose table therefore exceeds 1 wherever it errs on the bright side
+IDEAL: dict[str, Any] = {"rho": 1.0, "roughness": 0.5}
+
+
+@pytest.fixture(scope="module")
+def ideal() -> Table:
+    return planned("oren_nayar_energy_preserving", IDEAL)
+
+
+def test_an_ideal_material_may_exceed_1_by_what_its_error_explains(ideal: Table) -> None:
+    found = audit(ideal)
+    energy = found.energy.table
+    assert energy.max_albedo is not None
+    assert energy.max_albedo > 1.001
+    assert energy.exceeds_1_from_theta_i_deg is not None
+    assert energy.exceeds_1_beyond_error_from_theta_i_deg is None
+    assert (found.verdict, energy.verdict) == ("passes", "passes")
+    assert energy.reason.endswith("degrees, within the error that the table states")
+    assert energy.bands is not None
+    assert 0.0 < np.max(energy.bands.excess) <= np.max(energy.bands.explained)
+
+
+def test_the_same_table_without_a_stated_error_violates(ideal: Table) -> None:
+    attrs = {key: value for key, value in ideal.attrs.items() if key != "error"}
+    found = audit(replace(ideal, attrs=attrs))
+    assert (found.verdict, found.energy.table.verdict, found.energy.table.bands) == ("violates", "violates", None)
+
+
+def test_the_error_excuses_no_more_than_itself(ideal: Table) -> None:
+    factor = 1.0 + 1.1 * worst(ideal)
+    assert audit(scaled(ideal, factor)).energy.table.verdict == "violates"
+
+
+def test_a_stated_error_that_nobody_can_ask_for_is_no_excuse(ideal: Table) -> None:
+    boast = {**ideal.attrs["error"], "l1": [[1e9] for _ in ideal.attrs["error"]["l1"]]}
+    found = audit(replace(scaled(ideal, 3.0), attrs={**ideal.attrs, "error": boast}))
+    assert found.energy.table.verdict == "violates"
+
+
+@pytest.mark.parametrize(
+    ("excess", "verdict"),
+    [(known(1.2, 0.0), "known published excess"), (known(1.05, 0.0), "violates"), (known(1.2, 60.0), "violates")],
+)
+def test_what_is_known_is_compared_as_1_is(ideal: Table, excess: KnownExcess, verdict: str) -> None:
+    assert table_energy_of(scaled(ideal, 1.1), excess).verdict == verdict
+
+
+def test_means_over_bands_are_those_of_what_is_linear_between_lights() -> None:
+    lights, edges = np.array([0.0, 5.0, 10.0, 15.0, 20.0]), np.array([0.0, 10.0, 20.0])
+    means = _band_means(lights, edges)
+    np.testing.assert_allclose(means.sum(axis=1), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(means @ lights, [5.0, 15.0], rtol=1e-12)
+    np.testing.assert_allclose(_band_means(lights[:3], edges) @ lights[:3], [5.0, 10.0], rtol=1e-12)

@@ -1,0 +1,206 @@
+"""The page of an audit: whole, well formed, quiet on the network."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from brdfdb.audit.findings import AuditReport
+from brdfdb_pipelines import audit_page, figure_svg
+from tests.pipelines.a_report import ODD, material, report_of, whole
+
+
+class Document(HTMLParser):
+    """Elements, their attributes and the text of a page, of which every tag is closed."""
+
+    VOID = frozenset({"meta", "link", "br", "input"})
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.unbalanced: list[str] = []
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.text: list[tuple[str, str]] = []
+        self.feed(html)
+        self.close()
+        self.unbalanced += self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if self.open and self.open[-1] == tag:
+            self.open.pop()
+        else:
+            self.unbalanced.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.text.append((self.open[-1] if self.open else "", data))
+
+    def attributes(self, name: str) -> list[str]:
+        return [value for _, attributes in self.elements if (value := attributes.get(name)) is not None]
+
+    def words(self) -> str:
+        return "".join(text for tag, text in self.text if tag not in ("script", "style"))
+
+
+@pytest.fixture(scope="module")
+def report() -> AuditReport:
+    return whole()
+
+
+@pytest.fixture(scope="module")
+def html(report: AuditReport) -> str:
+    return audit_page.render(report)
+
+
+@pytest.fixture(scope="module")
+def document(html: str) -> Document:
+    return Document(html)
+
+
+def test_every_tag_is_closed_where_it_should_be(document: Document) -> None:
+    assert document.unbalanced == []
+    assert len(document.elements) > 1000
+
+
+def test_a_tag_left_open_would_be_noticed() -> None:
+    assert Document("<p><b>bold</p>").unbalanced == ["p", "p", "b"]
+
+
+def test_ids_are_unique_and_every_link_has_its_target(document: Document) -> None:
+    ids = Counter(document.attributes("id"))
+    assert [name for name, count in ids.items() if count > 1] == []
+    local = [link[1:] for link in document.attributes("href") if link.startswith("#")]
+    local += [found for path in document.attributes("clip-path") for found in re.findall(r"url\(#(.+)\)", path)]
+    local += document.attributes("aria-controls")
+    assert len(local) > 50
+    assert set(local) <= set(ids)
+
+
+def test_nothing_is_fetched_from_anywhere(document: Document) -> None:
+    fetched = [value for name in ("src", "href", "srcset", "data", "action") for value in document.attributes(name)]
+    assert {value[:5] for value in fetched if not value.startswith("#")} == {"data:"}
+    styles = " ".join(text for tag, text in document.text if tag == "style")
+    assert "url(" not in styles
+    assert "@import" not in styles
+    (policy,) = [value for value in document.attributes("content") if "default-src" in value]
+    assert policy.startswith("default-src 'none'; ")
+
+
+def test_every_material_figure_and_statement_is_there(document: Document, report: AuditReport) -> None:
+    words = document.words()
+    for each in report.materials:
+        assert words.count(each.material) >= 2  # in the table, and on top of its section
+        assert audit_page.anchor(each.material) in document.attributes("id")
+    for each in (*report.atlas, *report.gallery):
+        assert each.title in words
+        assert each.caption in words
+        for statement in each.statements:
+            assert statement.says in words
+            assert statement.seen in words
+            assert statement.threshold_from is None or f"Threshold from {statement.threshold_from}." in words
+    drawings = sum(len(each.panels) for each in (*report.atlas, *report.gallery))
+    drawings += sum(len(each.table_error.maps) for each in report.materials)
+    drawings += 4 * 2 + 5  # grey: model and table, furnace; spectral: the model alone, uniform light, the bound, too
+    assert sum(tag == "svg" for tag, _ in document.elements) == drawings
+
+
+def test_what_holds_and_what_does_not_is_said_in_words(document: Document, report: AuditReport) -> None:
+    found = [each.holds for figure in (*report.atlas, *report.gallery) for each in figure.statements]
+    words = document.words()
+    assert words.count("Does not hold:") == found.count(False) > 0
+    assert words.count("Holds:") == found.count(True) > 0
+
+
+def test_reasons_are_sentences_and_said_once(document: Document) -> None:
+    words = re.sub(r"\s+", " ", document.words())
+    assert words.count("Reflects up to 0.4774 at 89 degrees.") == 1  # of model and table alike
+    assert "Energy of the model: loses. Reflects" in words
+    assert "Energy of the table: passes. As the model." in words
+    assert "Reciprocity: passes. Asymmetry up to 3·10⁻¹³, of 1·10⁻¹¹ allowed." in words
+    assert "Nodes: passes. All 360 stored values that were compared, of the 720 in the table, are the model's." in words
+    assert "Smoothness: passes. Jumps by 0.0001 of f_r across delta_phi = 180°, of 0.01 allowed." in words
+    assert "Sampling: passes. The smallest p of 3 lights is below 0.001." in words
+    assert "Validity: at the edge. Of 2 limits that its paper states 1 inside, 1 at the edge." in words
+
+
+def test_violations_come_first_then_known_excess_then_losses(html: str) -> None:
+    rows = re.findall(r'<th scope="row"><a href="#([^"]+)">', html)
+    assert rows == [audit_page.anchor(name) for name in (ODD, "gold", "oxide", "paint", "brass")]
+
+
+def test_names_with_markup_in_them_stay_names(html: str, document: Document) -> None:
+    assert ODD not in html
+    assert ODD in document.words()
+
+
+def test_anchors_of_different_names_differ() -> None:
+    names = ["a b", "a_b", "a-b", "a_20_b", "ä", "a.b", "a/b"]
+    anchors = [audit_page.anchor(name) for name in names]
+    assert len(set(anchors)) == len(names)
+    assert all(re.fullmatch(r"m-[A-Za-z0-9_-]+", anchor) for anchor in anchors)
+
+
+def test_the_dark_page_has_a_colour_for_every_variable(html: str) -> None:
+    dark = html[html.index("prefers-color-scheme: dark") :]
+    dark = dark[: dark.index("}")]
+    for variable in {*figure_svg.VARIABLES.values(), *re.findall(r"var\((--[a-z0-9-]+)\)", html)}:
+        if variable not in ("--text", "--display", "--tone", "--back"):
+            assert f"{variable}: #" in dark, variable
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (0.01234, "0.0123"),
+        (-2.0, "−2"),
+        (3e-13, "3·10⁻¹³"),
+        (1.26e5, "1.3·10⁵"),
+        (None, "–"),
+        (1.0, "1"),
+        (np.inf, "not finite"),
+    ],
+)
+def test_numbers_are_those_that_people_write(value: float | None, text: str) -> None:
+    assert audit_page.number(value) == text
+
+
+@pytest.mark.parametrize(("of", "column"), [("model", 1), ("table", 2)])
+def test_an_albedo_that_is_not_finite_sorts_after_all_others(of: str, column: int) -> None:
+    good = material("good", "violates", 3.0)
+    not_finite = getattr(good.energy, of).model_copy(update={"max_albedo": None})
+    bad = good.model_copy(update={"material": "bad", "energy": good.energy.model_copy(update={of: not_finite})})
+    found = report_of([good, bad], ["good", "bad"])
+    html = audit_page.render(found)
+    cells = [float(value) for value in Document(html).attributes("data-sort")]
+    columns = np.array(cells).reshape(2, -1)  # rows: bad, good
+    assert np.all(np.isfinite(columns))
+    assert columns[0, column] > columns[1, column]
+    assert "not finite at 89°" in html
+
+
+@pytest.mark.parametrize(
+    ("shown", "word"), [([1.0], "conserves"), ([1.005, 0.98], "loses"), ([1.25], "gains"), ([0.99, 1.02], "gains")]
+)
+def test_a_furnace_conserves_neither_where_it_loses_light_nor_where_it_makes_it_up(
+    shown: list[float], word: str
+) -> None:
+    furnace = material("paint").energy.model.furnace
+    assert furnace is not None
+    cell = audit_page._furnace(furnace.model_copy(update={"hemispherical": shown}))
+    assert (cell.word, cell.level) == (word, {"conserves": "good", "loses": "calm", "gains": "note"}[word])
+
+
+def test_a_report_of_nothing_is_a_page(document: Document) -> None:
+    empty = Document(audit_page.render(report_of([], [])))
+    assert empty.unbalanced == []
+    assert "atlas" in document.attributes("id")
+    assert "atlas" not in empty.attributes("id")

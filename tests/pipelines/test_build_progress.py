@@ -1,0 +1,48 @@
+"""How a build tells where it is: rates leave out what was kept, bars show tables in progress, lines are JSON."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from brdfdb_pipelines import build_progress
+from brdfdb_pipelines.build_progress import Bars, Lines, Tally
+
+
+def test_the_rate_is_that_of_what_was_computed_and_tells_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([100.0, 101.0, 102.0, 104.0])
+    monkeypatch.setattr(build_progress.time, "perf_counter", lambda: next(clock))
+    tally = Tally(1000)
+    assert tally.add(300, kept=True) == {
+        "values_done": 300, "values_total": 1000, "values_per_s": 0, "seconds_left": None
+    }  # fmt: skip
+    assert tally.add(100, kept=False) == {
+        "values_done": 400, "values_total": 1000, "values_per_s": 50, "seconds_left": 12.0
+    }  # fmt: skip
+    assert tally.add(600, kept=False)["seconds_left"] == 0.0
+
+
+def test_lines_are_json_and_bars_are_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    with Lines() as lines:
+        lines({"event": "unchanged", "material": "Größe", "revision": "r000001"})
+    out, err = capsys.readouterr()
+    assert (json.loads(out), err) == ({"event": "unchanged", "material": "Größe", "revision": "r000001"}, "")
+    block = {"event": "block", "blocks": 2, "kept": False, "values_total": 4, "values_per_s": 2e6, "seconds_left": 0.0}
+    with Bars() as bars:
+        bars({"event": "start", "tables": 2, "store": "store"})
+        bars({"event": "surveyed", "material": "white", "state": "missing", "why": "new"})
+        bars({"event": "planned", "tables": 2, "values": 4})
+        bars({"event": "waiting", "material": "grey"})
+        bars({**block, "material": "white", "block": 0, "values_done": 2})
+        assert [task.description for task in bars._progress.tasks] == ["tabulating", "  white"]
+        bars({**block, "material": "white", "block": 1, "values_done": 4})
+        bars({"event": "failed", "material": "grey", "error": "[no] idea"})
+        bars({"event": "published", "material": "white", "revision": "r000001", "bytes": 1, "why": "new"})
+        (overall,) = bars._progress.tasks
+        assert (overall.completed, overall.total, overall.fields["rate"]) == (4, 4, "2.0 M values/s")
+        bars({"event": "done"})
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "waiting for grey: another build is at work on it" in err
+    assert "grey failed: [no] idea" in err

@@ -1,0 +1,83 @@
+"""Memory and disk that a build expects to take: more than it does take, and refused where there is less."""
+
+from __future__ import annotations
+
+import json
+import tracemalloc
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb.materials import presets
+from brdfdb.store import staging
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb_pipelines import build_resources, cli
+
+LOG = Interpolation("cubic", True, 1e-4)
+WAVELENGTHS = np.linspace(400.0, 700.0, 31)
+
+
+def layout(name: str, half: bool, how: Interpolation, nodes: int, rows: int) -> Layout:
+    """A table whose rows hold many directions."""
+    material = presets()[name]
+    first, second, third = ("theta_h", "theta_d", "phi_d") if half else ("theta_i", "theta_r", "delta_phi")
+    axes = {first: np.linspace(0, 80, rows), second: np.linspace(0, 80, nodes)}
+    axes[third] = np.linspace(0, 90 if half else 180, nodes)
+    return Layout(material, Grid(axes), WAVELENGTHS if material.spectral else None, interpolation=how)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        pytest.param(layout("foam", False, Interpolation(), 600, 5), id="grey"),
+        pytest.param(layout("foam", True, LOG, 600, 5), id="half vectors"),
+        pytest.param(layout("scene-copper-sphere", False, Interpolation(), 100, 5), id="spectral"),
+        pytest.param(layout("scene-copper-sphere", True, LOG, 100, 20), id="spectral half vectors"),
+    ],
+)
+def test_a_task_takes_at_most_the_memory_that_is_expected_and_not_a_tenth_of_it(table: Layout, tmp_path: Path) -> None:
+    staging.make_store(tmp_path / "store")
+    text = json.dumps(table.document())
+    directory = str(staging.prepare(tmp_path / "store", table.material.name, {"asked": "by a test"}, text))
+    for number in range(len(table.blocks)):  # the first time kernels are compiled
+        staging.write_block(directory, text, number)
+    staging.write_frame(directory, text)
+    for path in Path(directory, "blocks").iterdir():
+        path.unlink()
+    peaks = []
+    tracemalloc.start()
+    for number in range(len(table.blocks)):
+        tracemalloc.reset_peak()
+        staging.write_block(directory, text, number)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+    tracemalloc.reset_peak()
+    staging.write_frame(directory, text)
+    peaks.append(tracemalloc.get_traced_memory()[1])
+    tracemalloc.stop()
+    assert 0.1 * build_resources.task_bytes(table) <= max(peaks) <= build_resources.task_bytes(table)
+
+
+def test_a_disk_that_is_too_small_is_one_sentence_before_anything_is_written(
+    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=10_000))
+    root = tmp_path / "store"
+    assert cli.main(["build", str(recipe), "--store", str(root)]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("brdfdb: disk: the tables take up to ")
+    assert said.endswith(f" kB, {root} has 10 kB free")
+    assert not root.exists()
+
+
+def test_what_is_staged_already_needs_no_disk_again(
+    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tmp_path / "store"
+    assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
+    monkeypatch.setattr(build_resources.shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
+    assert cli.main(["build", str(recipe), "--store", str(root)]) == 0
+    assert brdfdb.open(root).head("foam") == "r000001"

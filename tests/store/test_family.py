@@ -1,0 +1,360 @@
+"""Families: members come back as they are, what lies between is as far off as stated, and what is refused."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb import models
+from brdfdb.forms.catalogue import of_family, of_table
+from brdfdb.materials import Material
+from brdfdb.store.family import Family, FamilyRecord, Sweep, blended, path_of, read_record, stencil
+from brdfdb.store.family_records import POINTS, measure, parameter_points
+from brdfdb.store.manifest import StoreError, sealed
+from brdfdb.tables import error_measurement
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.table import Table, table_from
+from brdfdb.tables.tabulation import tabulate
+
+AGREEMENT = 0.2  # promised, between a stated p99 and one measured afresh; measured: 0.03 at most
+FLOAT32 = 2e-7  # relative, of tables that are float32; measured: 6e-8
+ROUNDING = 2e-12  # of weights that are differences of powers; measured: 3e-13
+WAVELENGTHS = np.array([450.0, 550.0, 650.0])
+THETA = np.append(np.arange(0.0, 89.0, 5.0), 89.5)
+ISOTROPIC = Grid({"theta_i": THETA, "theta_r": THETA, "delta_phi": np.linspace(0.0, 180.0, 37)})
+HALF = Grid(
+    {
+        "theta_h": np.linspace(0.0, 1.0, 41) ** 2 * 90.0,
+        "theta_d": np.linspace(0.0, 90.0, 19),
+        "phi_d": np.linspace(0.0, 90.0, 10),
+    }
+)
+ELLIPSE = Grid(
+    {
+        "theta_h": np.linspace(0.0, 1.0, 33) ** 2 * 90.0,
+        "phi_h": np.linspace(0.0, 90.0, 10),
+        "theta_d": [0, 90],
+        "phi_d": [0, 180],
+    }
+)
+LOGARITHMS = Interpolation("cubic", True, 1e-5, 0.0)
+FAMILIES: dict[str, dict[str, Any]] = {
+    "clay": {
+        "model": "oren_nayar",
+        "fixed": {"rho": 0.8},
+        "axes": {"sigma_deg": [0.0, 10.0, 20.0, 30.0, 40.0]},
+        "layout": (ISOTROPIC, None, Interpolation()),
+    },
+    "brushed": {
+        "model": "ward",
+        "fixed": {"rho_d": 0.1, "rho_s": 0.2, "alpha_y": 0.2},
+        "axes": {"alpha_x": [0.1, 0.15, 0.2, 0.3]},
+        "layout": (ELLIPSE, None, Interpolation("cubic", True, 1e-4, 0.5)),
+    },
+    "copper": {
+        "model": "he_torrance",
+        "fixed": {},
+        "axes": {"sigma_0_um": [0.1, 0.13], "tau_um": [1.0, 1.2, 1.5]},
+        "layout": (HALF, WAVELENGTHS, LOGARITHMS),
+    },
+    "grey": {
+        "model": "lambert",
+        "fixed": {},
+        "axes": {"rho": [0.0, 0.5, 1.0]},
+        "layout": (ISOTROPIC, None, Interpolation()),
+    },
+}
+
+
+def made(name: str) -> tuple[Sweep, dict[str, Table]]:
+    """The members of a family, in memory."""
+    family = FAMILIES[name]
+    tables = {}
+    for number, values in enumerate(itertools.product(*family["axes"].values()), start=1):
+        member = f"{name}-{number:03d}"
+        fields = {
+            "title": name,
+            "model": family["model"],
+            "source": "no paper",
+            "parameters": {**family["fixed"], **dict(zip(family["axes"], values, strict=True))},
+        }
+        if family["model"] == "he_torrance":
+            fields["refractive_index"] = "main/Cu/Johnson"
+        material = Material.from_table(member, fields)
+        grid, wavelength_nm, how = family["layout"]
+        dataset = tabulate(Layout(material, grid, wavelength_nm, how))
+        arrays = {str(key): np.asarray(value.values) for key, value in dataset.variables.items()}
+        request = {"material": material.model_dump(mode="json")}
+        attrs = {**dataset.attrs, "request": request, "request_sha256": member}
+        tables[member] = table_from(member, "r000001", arrays, attrs)
+    sweep = Sweep(
+        name=name,
+        title=name,
+        model=family["model"],
+        axes=family["axes"],
+        members=list(tables),
+        request_sha256=list(tables),
+    )
+    return sweep, tables
+
+
+@pytest.fixture(scope="module")
+def families() -> dict[str, tuple[Family, dict[str, Table]]]:
+    """Each family, measured, and its members."""
+    found = {}
+    for name in FAMILIES:
+        sweep, tables = made(name)
+        found[name] = Family(measure(sweep, tables), tables), tables
+    return found
+
+
+Families = dict[str, tuple[Family, dict[str, Table]]]
+
+
+def directions(count: int) -> tuple[np.ndarray, ...]:
+    rng = np.random.default_rng(5)
+    return tuple(rng.uniform(0.0, high, count) for high in (1.5, 6.0, 1.5, 6.0))
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_members_come_back_as_they_are(name: str, families: Families) -> None:
+    family, tables = families[name]
+    angles = directions(50)
+    for member, point in zip(tables, itertools.product(*family.axes.values()), strict=True):
+        at = dict(zip(family.axes, map(float, point), strict=True))
+        np.testing.assert_array_equal(family.lookup(*angles, **at), tables[member].lookup(*angles))
+        expected = tables[member].specular_reflectance(angles[0])
+        np.testing.assert_array_equal(family.specular_reflectance(angles[0], **at), expected)
+
+
+@pytest.mark.parametrize("name", ["clay", "brushed", "copper"])
+def test_the_stated_error_and_one_measured_afresh_agree(name: str, families: Families) -> None:
+    # Oren-Nayar over sigma, Ward over alpha_x, He-Torrance over sigma_0 and tau: other parameters, other directions
+    family, tables = families[name]
+    rng = np.random.default_rng(7)
+    base = Material.model_validate(next(iter(tables.values())).attrs["request"]["material"])
+    draws, found, truth = [], [], []
+    for number in range(120):
+        at = {}
+        for parameter, nodes in family.axes.items():
+            cell = number % (nodes.size - 1)
+            at[parameter] = float(rng.uniform(nodes[cell], nodes[cell + 1]))
+        material = base.model_copy(update={"parameters": {**base.parameters, **at}})
+        drawn = error_measurement.draw(material, family.wavelength_nm, 40, 1000 + number)
+        draws.append(drawn)
+        truth.append(error_measurement.model_values(material, family.wavelength_nm, drawn.wi, drawn.wr))
+        found.append(family.lookup_vectors(drawn.wi, drawn.wr, **at).reshape(truth[-1].shape))
+    whole = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*draws, strict=True)))
+    afresh = error_measurement.compare(np.concatenate(found), np.concatenate(truth), whole)
+    assert afresh.overall.p99 == pytest.approx(family.error.overall.p99, rel=AGREEMENT)
+    assert family.error.overall.p99 > 1e-3
+    assert family.record.worst.p99 >= family.error.overall.p99
+    assert family.record.points >= POINTS
+
+
+def test_what_a_family_states_between_wavelengths_holds(families: Families) -> None:
+    family, tables = families["copper"]
+    assert family.error.between is not None
+    rng = np.random.default_rng(8)
+    base = Material.model_validate(next(iter(tables.values())).attrs["request"]["material"])
+    held = []
+    for number in range(60):
+        at = {name: float(rng.uniform(nodes[0], nodes[-1])) for name, nodes in family.axes.items()}
+        material = base.model_copy(update={"parameters": {**base.parameters, **at}})
+        wavelength = rng.uniform(WAVELENGTHS[0], WAVELENGTHS[-1], 1)
+        drawn = error_measurement.draw(material, wavelength, 20, 2000 + number)
+        wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
+        stated = family.lookup_vectors(wi, wr, wavelength, with_error=True, **at)
+        truth = error_measurement.model_values(material, wavelength, wi, wr)
+        held.append(np.abs(stated.brdf - truth) <= stated.error)
+    assert np.mean(np.concatenate(held)) >= 0.98  # promised
+
+
+def test_the_dirac_part_is_as_far_off_as_stated(families: Families) -> None:
+    family, _ = families["copper"]
+    theta_i = np.linspace(0.0, 1.5, 20)
+    worst = 0.0
+    base = Material.model_validate(family._member(0).attrs["request"]["material"]).arguments(WAVELENGTHS)
+    for sigma_0_um, tau_um in [(0.107, 1.1), (0.115, 1.3), (0.125, 1.45)]:
+        found = family.specular_reflectance(theta_i, sigma_0_um=sigma_0_um, tau_um=tau_um)
+        arguments = {name: base[name] for name in ("wavelength_nm", "n", "k")}
+        truth = models.he_torrance_specular(theta_i[:, np.newaxis], sigma_0_um=sigma_0_um, tau_um=tau_um, **arguments)
+        worst = max(worst, float(np.abs(found - truth).max()))
+    assert family.record.specular_error is not None
+    assert 0.0 < worst < 1.2 * family.record.specular_error
+
+
+def test_what_is_linear_is_interpolated_exactly(families: Families) -> None:
+    family, _ = families["grey"]
+    assert family.record.interpolation.offset is None
+    assert family.error.overall.p99 < FLOAT32
+    assert family.lookup(0.3, 0.0, 0.5, 2.0, rho=0.37) == pytest.approx(0.37 / np.pi, rel=FLOAT32)
+
+
+def test_the_interpolation_chosen_is_the_one_that_was_measured_best(families: Families) -> None:
+    for family, _ in families.values():
+        said = family.record.interpolation.reason.split("; ")
+        left = [float(way.rpartition(" ")[2]) for way in said]
+        assert left == sorted(left)
+        assert said[0].startswith(f"{family.record.interpolation.method} in ")
+        assert ("logarithms" in said[0]) == (family.record.interpolation.offset is not None)
+
+
+@pytest.mark.parametrize("power", [-2, -1, 0, 1, 2])
+@pytest.mark.parametrize(("cubic", "order"), [(False, 1), (True, 3)])
+def test_polynomials_in_a_power_of_the_parameter_come_back(power: int, cubic: bool, order: int) -> None:
+    nodes = np.array([0.5, 0.7, 1.1, 1.3, 2.0])
+
+    def polynomial(x: Any) -> Any:
+        y = np.log(x) if power == 0 else x ** float(power)
+        return sum(c * y**n for n, c in enumerate((1.0, 0.5, -0.3, 0.2)[: order + 1]))
+
+    for value in (0.5, 0.52, 0.9, 1.1, 1.25, 1.9, 2.0):
+        first, weights = stencil(nodes, value, power, cubic=cubic)
+        near = nodes[first : first + weights.size]
+        assert near[0] <= value <= near[-1]
+        assert weights @ polynomial(near) == pytest.approx(polynomial(value), rel=ROUNDING)
+        if value in nodes:
+            assert sorted(weights)[-1] == 1.0
+            assert np.count_nonzero(weights) == 1
+
+
+def test_means_are_not_below_0_and_0_where_all_are() -> None:
+    values = [np.array([0.0, 1.0, np.nan]), np.array([0.0, 4.0, 1.0])]
+    for offset in (None, 1e-6):
+        mean = blended(values, [0.5, 0.5], offset)
+        assert mean[0] == 0.0
+        assert np.isnan(mean[2])
+        assert blended([np.ones(1), np.full(1, 9.0)], [1.5, -0.5], offset)[0] >= 0.0
+    assert blended(values, [0.5, 0.5], 1e-6)[1] == pytest.approx(2.0, rel=1e-5)
+    assert blended(values, [0.5, 0.5], None)[1] == 2.5
+
+
+def test_points_fill_the_cells_evenly() -> None:
+    points = parameter_points((3, 4), 1)
+    cells = [point.cell for point in points]
+    assert [cells.count(cell) for cell in itertools.product(range(2), range(3))] == [43] * 6
+    within = np.array([point.within for point in points])
+    assert np.all((within >= 0.0) & (within < 1.0))
+    assert np.all(np.histogram(within, bins=4, range=(0.0, 1.0))[0] > 120)
+    many = [point.cell for point in parameter_points((101, 11), 1)]
+    assert len(set(many)) == len(many) == POINTS
+    assert many != [point.cell for point in parameter_points((101, 11), 2)]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "sigma: missing, clay needs a value in [0, 0.698132] rad"),
+        ({"sigma": 0.7}, "sigma: 0.7 is outside [0, 0.698132] rad"),
+        ({"sigma": -0.1}, "sigma: -0.1 is outside [0, 0.698132] rad"),
+        ({"sigma": np.nan}, "sigma: nan is outside [0, 0.698132] rad"),
+        ({"sigma": "much"}, "sigma: 'much' is not a number in [0, 0.698132] rad"),
+        ({"sigma": [0.1, 0.2]}, "sigma: [0.1, 0.2] is not one number in [0, 0.698132] rad"),
+        ({"sigma": 0.1, "rho": 0.5}, "rho: 0.5 given, but the parameters of the family clay are sigma"),
+        ({"sigma_deg": 10.0}, "sigma_deg: 10.0 given, but the parameters of the family clay are sigma"),
+    ],
+)
+def test_parameters_that_are_none_of_the_family_are_refused(
+    given: dict[str, Any], said: str, families: Families
+) -> None:
+    family, _ = families["clay"]
+    for ask in (
+        lambda: family.lookup(0.1, 0.0, 0.1, 0.0, **given),
+        lambda: family.lookup_vectors([0, 0, 1], [0, 0, 1], **given),
+        lambda: family.specular_reflectance(0.1, **given),
+    ):
+        with pytest.raises(ValueError, match=r".") as caught:
+            ask()
+        assert str(caught.value) == said
+
+
+def test_angles_are_radians_and_both_ends_are_within(families: Families) -> None:
+    family, tables = families["clay"]
+    at = (0.4, 0.0, 0.9, 2.0)
+    assert family.lookup(*at, sigma=np.deg2rad(40.0)) == tables["clay-005"].lookup(*at)
+    assert family.lookup(*at, sigma=np.deg2rad(40.0) * (1.0 + 1e-15)) == tables["clay-005"].lookup(*at)
+    assert family.lookup(*at, sigma=0) == tables["clay-001"].lookup(*at)
+
+
+def test_values_are_shaped_as_those_of_a_table(families: Families) -> None:
+    family, tables = families["copper"]
+    table = tables["copper-001"]
+    at = {"sigma_0_um": 0.11, "tau_um": 1.1}
+    angles = [angle.astype(np.float32) for angle in directions(6)]
+    for wavelength in (None, 500.0, [500.0], [450.0, 600.0]):
+        found, member = family.lookup(*angles, wavelength, **at), table.lookup(*angles, wavelength)
+        assert (found.shape, found.dtype) == (member.shape, np.float32)
+        stated = family.lookup(*directions(6), wavelength, with_error=True, **at)
+        assert stated.error.shape == stated.brdf.shape == member.shape
+        specular = family.specular_reflectance(directions(6)[0], wavelength, **at)
+        assert specular.shape == member.shape
+    assert np.ndim(family.lookup(0.1, 0.0, 0.1, 0.0, 500.0, **at)) == 0
+    assert np.all(family.lookup(2.0, 0.0, 0.1, 0.0, **at) == 0.0)
+    assert np.all(np.isnan(family.lookup(np.nan, 0.0, 0.1, 0.0, **at)))
+    with pytest.raises(ValueError, match=r"^wavelength_nm: 700 is outside "):
+        family.lookup(0.1, 0.0, 0.1, 0.0, 700.0, **at)
+
+
+def test_angles_and_vectors_agree(families: Families) -> None:
+    family, _ = families["brushed"]
+    wi, wr = np.array([0.6, 0.0, 0.8]), np.array([-0.48, 0.36, 0.8])
+    theta, phi = np.arccos(0.8), np.arctan2(0.36, -0.48)
+    stated = family.lookup_vectors(wi, wr, with_error=True, alpha_x=0.12)
+    angles = family.lookup(theta, 0.0, theta, phi, with_error=True, alpha_x=0.12)
+    assert stated.brdf == pytest.approx(angles.brdf, rel=1e-6)  # measured: 1e-15
+    # between members the error is that of the family, in this band of theta_i
+    assert stated.error / stated.brdf == pytest.approx(family.error.p99[3][0], rel=1e-12)
+
+
+def test_a_member_that_was_built_anew_is_not_served(families: Families) -> None:
+    family, tables = families["grey"]
+    record = family.record.model_copy(update={"request_sha256": ["grey-001", "another", "grey-003"]})
+    with pytest.raises(StoreError, match=r"^the family grey is out of date: grey-002 is another table than it was"):
+        Family(record, tables).lookup(0.1, 0.0, 0.1, 0.0, rho=0.4)
+
+
+def test_members_at_other_wavelengths_are_refused(families: Families) -> None:
+    family, tables = families["copper"]
+    odd = tables["copper-002"]
+    other = Table(odd.name, odd.revision, odd.attrs, odd.grid, WAVELENGTHS + 1.0, odd.values, odd.specular)
+    with pytest.raises(StoreError, match=r"copper-002 is at other wavelengths than another member$"):
+        Family(family.record, {**tables, "copper-002": other}).lookup(0.1, 0, 0.1, 0, sigma_0_um=0.1, tau_um=1.1)
+
+
+def test_a_record_comes_back_and_a_damaged_one_is_named(tmp_path: Path, families: Families) -> None:
+    record = families["copper"][0].record
+    path = path_of(tmp_path, "copper")
+    path.parent.mkdir()
+    content = json.loads(json.dumps(record.model_dump(mode="json")))
+    path.write_bytes(sealed(content))
+    assert read_record(path) == record == FamilyRecord.model_validate(content)
+    for change, said in (
+        ({"version": 2}, r"is of format brdfdb-family version 2, this program reads brdfdb-family version 1$"),
+        ({"points": "many"}, r"is damaged: points: "),
+        ({"name": "gold"}, r"is damaged: its record is that of gold$"),
+    ):
+        path.write_bytes(sealed({**content, **change}))
+        with pytest.raises(StoreError, match=rf"^the family copper {said}"):
+            read_record(path)
+    data = bytearray(sealed(content))
+    data[data.index(b'"points": 2') + 10] ^= 1  # 256 becomes 356
+    path.write_bytes(data)
+    with pytest.raises(StoreError, match=r"^the family copper is damaged: the content of copper\.json changed$"):
+        read_record(path)
+
+
+def test_a_lookup_is_made_of_the_members_around_and_a_form_of_the_middle_ones(families: Families) -> None:
+    family, tables = families["grey"]  # linear: two members, or the one that is there
+    assert family.around(rho=0.7) == [tables["grey-002"], tables["grey-003"]]
+    assert family.around(rho=0.5) == [tables["grey-002"]]
+    form = of_family(family)
+    wi = wr = np.array([[0.0, 0.6, 0.8]])
+    np.testing.assert_allclose(form.evaluate(wi, wr), [[0.25 / np.pi]], rtol=FLOAT32)  # between rho of 0 and 0.5
+    assert form.bytes == sum(of_table(tables[f"grey-00{number}"], "", "").bytes for number in (1, 2))

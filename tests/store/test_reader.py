@@ -1,0 +1,469 @@
+"""The store: what was published stays as it is, readers never see half of a build, and damage is never read as data."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+import zarr
+
+import brdfdb
+from brdfdb.materials import Material
+from brdfdb.store import codec
+from brdfdb.store import reader as module
+from brdfdb.store.manifest import Head, sealed, unsealed
+from brdfdb.store.reader import Store, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.store.staging import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
+
+GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
+COPPER = {
+    "title": "Rakić's copper",
+    "model": "he_torrance",
+    "source": "no paper",
+    "refractive_index": "main/Cu/Johnson",
+    "parameters": {"sigma_0_um": 0.1, "tau_um": 2.0},
+}
+
+
+def lambert(rho: float) -> xr.Dataset:
+    """A table whose values tell which one it is."""
+    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
+    return tabulate(Layout(Material.from_table("white", table), GRID))
+
+
+def copper() -> xr.Dataset:
+    return tabulate(Layout(Material.from_table("copper", COPPER), GRID, np.array([450.0, 500.0, 700.0])))
+
+
+def publish(root: Path, **tables: xr.Dataset) -> list[str]:
+    """One revision a table; returns the revisions."""
+    return [publish_dataset(root, name, dataset)[0] for name, dataset in tables.items()]
+
+
+def rho(store: Store, name: str = "white") -> float:
+    """What the table that is served says of itself."""
+    return float(np.round(store[name].brdf[0, 0, 0] * np.pi, 6))
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+def pointer(root: Path, name: str = "white") -> Path:
+    return root / "materials" / name / "HEAD.json"
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A store with one revision of one material, rho = 0.25."""
+    directory = tmp_path / "store"
+    assert publish(directory, white=lambert(0.25)) == ["r000001"]
+    return directory
+
+
+# Revisions
+
+
+def test_a_second_build_leaves_every_byte_of_the_first_revision_alone(root: Path) -> None:
+    before = contents(root / "materials" / "white")
+    assert publish(root, white=lambert(0.75)) == ["r000002"]
+    after = contents(root / "materials" / "white")
+    assert {name: after[name] for name in before if name != "HEAD.json"} == {
+        name: data for name, data in before.items() if name != "HEAD.json"
+    }
+    assert json.loads(before["HEAD.json"])["revision"] == "r000001"
+    assert json.loads(after["HEAD.json"])["revision"] == "r000002"
+    assert rho(brdfdb.open(root)) == 0.75
+
+
+def test_the_manifest_holds_size_and_digest_of_every_file_and_the_pointer_that_of_the_manifest(root: Path) -> None:
+    revision, stored = publish_dataset(root, "copper", copper())
+    group = root / "materials" / "copper" / revision
+    files = json.loads((group.parent / f"{revision}.MANIFEST.json").read_bytes())["files"]
+    assert files == {
+        name: {"size": len(data), "sha256": hashlib.sha256(data).hexdigest()} for name, data in contents(group).items()
+    }
+    assert stored == sum(len(data) for data in contents(group).values())
+    head = json.loads(pointer(root, "copper").read_bytes())
+    manifest = (group.parent / f"{revision}.MANIFEST.json").read_bytes()
+    assert (head["revision"], head["manifests"]) == (revision, {revision: hashlib.sha256(manifest).hexdigest()})
+
+
+def test_nothing_is_left_of_a_build_that_went_well(root: Path) -> None:
+    assert not list((root / ".staging").iterdir())
+    assert sorted(path.name for path in root.iterdir()) == [".staging", "brdfdb.json", "materials"]
+    assert sorted(path.name for path in (root / "materials" / "white").iterdir()) == [
+        "HEAD.json",
+        "r000001",
+        "r000001.MANIFEST.json",
+    ]
+
+
+def test_a_store_is_a_mapping(root: Path) -> None:
+    publish(root, copper=copper())
+    store = brdfdb.open(root)
+    assert (list(store), len(store)) == (["copper", "white"], 2)
+    assert "white" in store
+    assert "grey" not in store
+    assert 5 not in store
+    assert store.get("grey") is None
+    assert store.head("white") == "r000001"
+    assert store.path("white") == root / "materials" / "white" / "r000001"
+    assert store.attributes("copper")["title"] == "Rakić's copper"
+    assert (store["copper"].name, store["copper"].revision) == ("copper", "r000001")
+
+
+def test_a_table_is_what_was_published(root: Path) -> None:
+    dataset = copper()
+    publish(root, copper=dataset)
+    table = brdfdb.open(root)["copper"]
+    np.testing.assert_array_equal(table.brdf, dataset["brdf"].values)
+    assert table.specular is not None
+    np.testing.assert_array_equal(table.specular, dataset["specular_reflectance"].values.astype(np.float32))
+    assert table.wavelength_nm is not None
+    assert table.wavelength_nm.tolist() == [450.0, 500.0, 700.0]
+    assert {name: nodes.tolist() for name, nodes in table.axes_deg.items()} == {
+        name: nodes.tolist() for name, nodes in GRID.axes.items()
+    }
+    assert list(table.axes_deg) == list(GRID.axes)
+    assert dict(table.attrs) == dataset.attrs
+
+
+def test_decoding_a_table_loads_neither_xarray_nor_pandas(root: Path) -> None:
+    program = "import sys, brdfdb; brdfdb.open(sys.argv[1])['white']; print({'xarray', 'pandas'} & set(sys.modules))"
+    ended = subprocess.run([sys.executable, "-c", program, str(root)], capture_output=True, text=True, check=True)
+    assert ended.stdout == "set()\n"  # half a second of a server's start
+
+
+def test_an_open_store_serves_the_new_head_and_the_old_table_stays_whole(root: Path) -> None:
+    store = brdfdb.open(root)
+    old = store["white"]
+    publish(root, white=lambert(0.75), black=lambert(0.0))
+    assert (rho(store), store["white"].revision) == (0.75, "r000002")
+    assert list(store) == ["black", "white"]
+    assert old.lookup(0.1, 0.0, 0.2, 0.0) == pytest.approx(0.25 / np.pi, rel=1e-6)
+
+
+def test_a_table_never_mixes_two_revisions(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = brdfdb.open(root)
+    read = module.head_from
+    waiting = [lambert(0.75)]
+
+    def overtaken(path: Path, data: bytes) -> Head:
+        head = read(path, data)
+        if waiting:  # another process publishes while we read
+            publish(root, white=waiting.pop())
+        return head
+
+    monkeypatch.setattr(module, "head_from", overtaken)
+    table = store["white"]
+    assert not waiting
+    assert (table.revision, float(table.brdf[0, 0, 0])) == ("r000001", np.float32(0.25 / np.pi))
+    assert (store["white"].revision, rho(store)) == ("r000002", 0.75)
+
+
+def test_decoded_tables_are_kept_and_the_one_not_used_for_longest_goes(root: Path) -> None:
+    publish(root, grey=lambert(0.5), black=lambert(0.0))
+    size = brdfdb.open(root)["white"].nbytes
+    store = Store(root, cache_bytes=2 * size)
+    white, grey = store["white"], store["grey"]
+    assert store["white"] is white
+    black = store["black"]
+    assert store["white"] is white
+    assert store["black"] is black
+    assert store.held("grey") is None
+    assert store["grey"] is not grey
+
+
+def test_a_table_larger_than_the_cache_is_kept_until_the_next_one_is_used(root: Path) -> None:
+    publish(root, grey=lambert(0.5))
+    store = Store(root, cache_bytes=1)
+    white = store["white"]
+    assert store.held("white") is white
+    assert store["grey"] is store.held("grey")
+    assert store.held("white") is None
+
+
+def test_each_revision_that_is_kept_can_be_read(root: Path) -> None:
+    publish(root, white=lambert(0.75))
+    store = brdfdb.open(root)
+    assert store.revisions("white") == ["r000001", "r000002"]
+    found = [float(store.table("white", each).brdf[0, 0, 0] * np.pi) for each in ("r000001", "r000002")]
+    np.testing.assert_allclose(found, [0.25, 0.75], rtol=1e-6)
+    for revision in ("r000003", "../white/r000001", "r1"):
+        with pytest.raises(UnknownRevisionError, match=r"white has no revision '.*'; the current one is r000002"):
+            store.table("white", revision)
+
+
+# The format
+
+
+@pytest.mark.parametrize("keywords", [{}, {"consolidated": False}], ids=["plain", "not consolidated"])
+def test_xarray_reads_a_revision_without_a_warning(root: Path, keywords: dict[str, Any]) -> None:
+    dataset = copper()
+    publish(root, copper=dataset)
+    with xr.open_zarr(brdfdb.open(root).path("copper"), **keywords) as found:
+        xr.testing.assert_identical(found.load(), dataset)
+        assert found["brdf"].dtype == np.float32
+        assert found["theta_i"].attrs["units"] == "degree"
+        assert found.attrs["parameters"] == {"sigma_0_um": 0.1, "tau_um": 2.0, "a": 0.0}
+
+
+def test_the_store_hands_out_the_same_dataset(root: Path) -> None:
+    with brdfdb.open(root).dataset("white") as found:
+        xr.testing.assert_identical(found.load(), lambert(0.25))
+
+
+def test_a_revision_copied_elsewhere_is_a_whole_zarr_group(root: Path, tmp_path: Path) -> None:
+    dataset = copper()
+    publish(root, copper=dataset)
+    shutil.copytree(brdfdb.open(root).path("copper"), tmp_path / "copy")
+    shutil.rmtree(root)
+    group = zarr.open_group(tmp_path / "copy", mode="r")
+    assert sorted(group.array_keys()) == sorted(map(str, dataset.variables))
+    with xr.open_zarr(tmp_path / "copy") as found:
+        xr.testing.assert_identical(found.load(), dataset)
+
+
+def test_every_array_has_a_checksum_and_reads_as_nan_where_it_is_missing(root: Path) -> None:
+    publish(root, copper=copper())
+    group = brdfdb.open(root).path("copper")
+    arrays = sorted(group.glob("*/zarr.json"))
+    assert len(arrays) == 8
+    for path in arrays:
+        metadata = json.loads(path.read_bytes())
+        assert metadata["zarr_format"] == 3
+        assert metadata["fill_value"] == "NaN"
+        assert [codec["name"] for codec in metadata["codecs"]] == ["bytes", "blosc", "crc32c"]
+        assert metadata["codecs"][1]["configuration"]["cname"] == "zstd"
+        assert metadata["codecs"][1]["configuration"]["shuffle"] == "shuffle"
+
+
+def test_metadata_are_consolidated_as_zarr_itself_does_it(root: Path, tmp_path: Path) -> None:
+    publish(root, copper=copper())
+    ours = brdfdb.open(root).path("copper")
+    shutil.copytree(ours, tmp_path / "copy")
+    with pytest.warns(UserWarning, match="Consolidated metadata is currently not part"):
+        zarr.consolidate_metadata(tmp_path / "copy")
+    assert json.loads((ours / "zarr.json").read_bytes()) == json.loads((tmp_path / "copy" / "zarr.json").read_bytes())
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_chunks_of_one_value_are_written_like_all_others(root: Path, value: float) -> None:
+    dataset = lambert(0.5)
+    dataset["brdf"][...] = value
+    publish(root, white=dataset)
+    group = brdfdb.open(root).path("white")
+    assert [path for path in (group / "brdf" / "c").rglob("*") if path.is_file()]
+    np.testing.assert_array_equal(brdfdb.open(root)["white"].brdf, np.full((4, 3, 3), value, dtype=np.float32))
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        ((5,), (5,)),
+        ((91, 91, 181), (63, 91, 181)),
+        ((46, 73, 46, 73), (4, 73, 46, 73)),
+        ((4, 1 << 21), (1, 1 << 21)),
+        ((1, 1, 1, 1), (1, 1, 1, 1)),
+    ],
+)
+def test_chunks_are_whole_rows_of_about_four_megabytes(shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    assert codec._chunks(shape) == expected
+
+
+def test_a_table_of_many_chunks_is_read_back_and_each_of_them_matters(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(codec, "_CHUNK_VALUES", 18)
+    dataset = copper()
+    publish(root, copper=dataset)
+    store = brdfdb.open(root)
+    files = sorted(path for path in (store.path("copper") / "brdf" / "c").rglob("*") if path.is_file())
+    assert len(files) == 4
+    np.testing.assert_array_equal(store["copper"].brdf, dataset["brdf"].values)
+    for chunk in files:
+        data = chunk.read_bytes()
+        chunk.unlink()
+        with pytest.raises(StoreError, match="is missing"):
+            brdfdb.open(root)["copper"]
+        chunk.write_bytes(data)
+
+
+# Damage
+
+
+def delete(path: Path) -> None:
+    path.unlink()
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0x10
+    path.write_bytes(data)
+
+
+FILES = ["brdf/c/0/0/0", "theta_i/c/0", "brdf/zarr.json", "zarr.json", "../r000001.MANIFEST.json"]
+
+
+@pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
+@pytest.mark.parametrize("file", FILES)
+def test_a_damaged_file_is_found_and_never_read_as_data(root: Path, file: str, damage: Callable[[Path], None]) -> None:
+    damage(root / "materials" / "white" / "r000001" / file)
+    store = brdfdb.open(root)
+    with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
+        store["white"]
+    assert "\n" not in str(caught.value)
+    with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
+        store.verify("white")
+    if damage is not flip or not file.endswith("MANIFEST.json"):
+        assert Path(file).name in str(caught.value)
+
+
+@pytest.mark.parametrize("damage", [delete, truncate, empty])
+def test_a_damaged_chunk_is_found_before_xarray_reads_nan_in_its_place(
+    root: Path, damage: Callable[[Path], None]
+) -> None:
+    damage(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
+    with pytest.raises(StoreError, match=r"^white r000001 is damaged: brdf/c/0/0/0"):
+        brdfdb.open(root).dataset("white")
+
+
+def test_a_chunk_that_is_damaged_while_a_dataset_is_read_is_named(root: Path) -> None:
+    with brdfdb.open(root).dataset("white") as lazy:
+        flip(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
+        with pytest.raises(StoreError, match=r"^white r000001 is damaged: the content of brdf/c/0/0/0 changed$"):
+            lazy["brdf"].load()
+
+
+def test_a_store_of_a_relative_path_stays_where_it_was_opened(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = root.parent / "elsewhere" / root.name
+    publish(other, white=lambert(0.75))
+    monkeypatch.chdir(root.parent)
+    store = brdfdb.open(root.name)
+    monkeypatch.chdir(other.parent)
+    assert (rho(store), store.path("white")) == (0.25, root / "materials" / "white" / "r000001")
+
+
+@pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
+def test_damaged_attributes_are_not_served(root: Path, damage: Callable[[Path], None]) -> None:
+    damage(root / "materials" / "white" / "r000001" / "zarr.json")
+    with pytest.raises(StoreError, match=r"^white r000001 is damaged: .*zarr\.json"):
+        brdfdb.open(root).attributes("white")
+
+
+def test_any_flipped_bit_of_a_chunk_is_found(root: Path) -> None:
+    chunk = root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0"
+    data = chunk.read_bytes()
+    brdfdb.open(root).verify("white")
+    for bit in np.random.default_rng(0).choice(8 * len(data), 100, replace=False):
+        damaged = bytearray(data)
+        damaged[bit // 8] ^= 1 << (bit % 8)
+        chunk.write_bytes(damaged)
+        with pytest.raises(StoreError, match="white r000001 is damaged"):
+            brdfdb.open(root)["white"]
+        with pytest.raises(StoreError, match="the content of brdf/c/0/0/0 changed"):
+            brdfdb.open(root).verify("white")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"not json",
+        b"\xff\xfe",
+        b"[]",
+        b'"r000001"',
+        b"{}",
+        {"revision": 1},
+        {"revision": "../../../white/r000001", "manifests": {"../../../white/r000001": "0"}},
+        {"revision": "", "manifests": {"": "0"}},
+        {"revision": "r000009"},
+        {"revision": "r000009", "manifests": {"r000009": "0"}},
+        {"manifests": {"r000001": "0"}},
+        {"manifests": {"r000001": None}},
+        {"manifests": None},
+        {"material": "black"},
+    ],
+)
+@pytest.mark.parametrize("ask", [Store.__getitem__, Store.verify, Store.attributes, Store.dataset])
+def test_a_pointer_that_was_changed_is_not_followed(root: Path, content: bytes | dict[str, Any], ask: Any) -> None:
+    """Not even one that was sealed again."""
+    if isinstance(content, dict):
+        content = sealed({**unsealed(pointer(root).read_bytes(), "", ""), **content})
+    pointer(root).write_bytes(content)
+    with pytest.raises(StoreError, match=r"^white .*(is damaged|manifest)"):
+        ask(brdfdb.open(root), "white")
+
+
+# What is no store, and what is not in it
+
+
+def test_no_store_is_one_sentence(tmp_path: Path) -> None:
+    for missing in (tmp_path / "none", tmp_path):
+        with pytest.raises(StoreError, match=f"^no store at {missing}: brdfdb.json is missing there; `brdfdb build`"):
+            brdfdb.open(missing)
+
+
+@pytest.mark.parametrize(
+    "marker", ["", "{", "[]", "5", "{}", '{"format": "brdfdb", "version": 2}', '{"format": "zarr", "version": 1}']
+)
+def test_a_store_of_another_format_is_neither_read_nor_written(tmp_path: Path, marker: str) -> None:
+    (tmp_path / "brdfdb.json").write_text(marker)
+    with pytest.raises(StoreError, match=r"brdfdb\.json"):
+        brdfdb.open(tmp_path)
+    with pytest.raises(StoreError, match=r"brdfdb\.json"):
+        publish(tmp_path, white=lambert(0.5))
+    assert contents(tmp_path) == {"brdfdb.json": marker.encode()}
+
+
+def test_another_version_is_named(tmp_path: Path) -> None:
+    (tmp_path / "brdfdb.json").write_bytes(sealed({"format": "brdfdb", "version": 3}))
+    with pytest.raises(StoreError, match=r"says format brdfdb version 3, this program reads brdfdb version 2; `brdfdb"):
+        brdfdb.open(tmp_path)
+    (tmp_path / "brdfdb.json").write_bytes(b'{\n "format": "brdfdb",\n "version": 1\n}')  # before there were seals
+    with pytest.raises(StoreError, match=r"says format brdfdb version 1, .*; `brdfdb build --store DIR` builds its"):
+        brdfdb.open(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["whit", "../x", "../materials/white", "white/", "white/r000001", ".", "..", "", "/"])
+@pytest.mark.parametrize(
+    "ask", [Store.__getitem__, Store.head, Store.path, Store.attributes, Store.dataset, Store.verify]
+)
+def test_names_are_matched_and_never_joined_to_a_path(root: Path, name: str, ask: Any) -> None:
+    shutil.copytree(root / "materials" / "white", root / "x")
+    with pytest.raises(UnknownMaterialError) as caught:
+        ask(brdfdb.open(root), name)
+    assert caught.value.name == name
+    assert str(caught.value).startswith(f"no material {name!r} in the store")
+
+
+def test_an_unknown_name_comes_with_the_closest_ones(root: Path) -> None:
+    publish(root, **{"white-tile": lambert(0.5), "copper": lambert(0.5)})
+    with pytest.raises(UnknownMaterialError) as caught:
+        brdfdb.open(root)["whit"]
+    assert caught.value.closest == ["white", "white-tile"]
+    assert str(caught.value) == "no material 'whit' in the store; closest: white, white-tile"
+    with pytest.raises(UnknownMaterialError) as caught:
+        brdfdb.open(root)["zzz"]
+    assert str(caught.value) == "no material 'zzz' in the store"

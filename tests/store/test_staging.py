@@ -1,0 +1,449 @@
+"""Staging: what a killed or failed write leaves behind, who holds the lock, and that no two writes lose a revision."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import brdfdb
+from brdfdb.materials import Material
+from brdfdb.store import manifest, staging
+from brdfdb.store.manifest import StoreError, check_manifest, unsealed
+from brdfdb.store.staging import BusyError, Lock, planned, prepare, publish, publish_dataset, write_block, write_frame
+from brdfdb.tables import layout as layouts
+from brdfdb.tables.error_measurement import measure
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout, digest
+from brdfdb.tables.tabulation import tabulate
+
+GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
+REQUEST = {"asked": "for white"}
+
+
+def layout(rho: float) -> Layout:
+    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
+    return Layout(Material.from_table("white", table), GRID)
+
+
+def lambert(rho: float) -> xr.Dataset:
+    """A table whose values tell which one it is."""
+    return tabulate(layout(rho))
+
+
+def rho(root: Path, name: str = "white") -> float:
+    """What the table that is served says of itself."""
+    return float(np.round(brdfdb.open(root)[name].brdf[0, 0, 0] * np.pi, 6))
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+def staged(root: Path) -> list[str]:
+    return sorted(str(path.relative_to(root / ".staging")) for path in (root / ".staging").rglob("*"))
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A store with one revision of one material, rho = 0.25."""
+    directory = tmp_path / "store"
+    assert publish_dataset(directory, "white", lambert(0.25))[0] == "r000001"
+    return directory
+
+
+@pytest.fixture
+def four_blocks(monkeypatch: pytest.MonkeyPatch) -> str:
+    """The layout of a table of four blocks, rho = 0.75, as JSON."""
+    monkeypatch.setattr(layouts, "_BLOCK_VALUES", 9)
+    table = layout(0.75)
+    assert len(table.blocks) == 4
+    return json.dumps(table.document())
+
+
+# Where a store can be made
+
+
+@pytest.mark.parametrize("name", ["thesis.tex", ".git", "materials", "HEAD.json"])
+def test_a_directory_of_something_else_is_not_touched(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("precious")
+    said = f"^{tmp_path} is not empty and not a store; name an empty or a new directory$"
+    with pytest.raises(StoreError, match=said):
+        publish_dataset(tmp_path, "white", lambert(0.5))
+    assert contents(tmp_path) == {name: b"precious"}
+
+
+@pytest.mark.parametrize("name", ["White", "white-x1.5", "a/b", "..", "", "white-", "white--2"])
+def test_a_name_that_would_not_be_found_again_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ValueError, match="is not made of lower-case letters, digits and single hyphens"):
+        publish_dataset(tmp_path / "store", name, lambert(0.5))
+    assert not (tmp_path / "store").exists()
+
+
+def test_an_empty_directory_becomes_a_store(tmp_path: Path) -> None:
+    assert publish_dataset(tmp_path, "white", lambert(0.5))[0] == "r000001"
+    marker = unsealed((tmp_path / "brdfdb.json").read_bytes(), "", "")
+    assert marker == {"format": "brdfdb", "version": 2}
+
+
+def test_what_a_build_that_was_killed_at_once_left_behind_becomes_a_store(tmp_path: Path) -> None:
+    (tmp_path / ".brdfdb.json.0123456789abcdef").write_text("{")
+    assert publish_dataset(tmp_path, "white", lambert(0.5))[0] == "r000001"
+    shutil.rmtree(tmp_path / "materials")  # killed right after the marker
+    assert publish_dataset(tmp_path, "white", lambert(0.5))[0] == "r000001"
+
+
+@pytest.mark.parametrize("below", ["file/store", "file"])
+def test_a_root_that_cannot_be_made_is_one_sentence(tmp_path: Path, below: str) -> None:
+    (tmp_path / "file").write_text("precious")
+    where = tmp_path / below
+    with pytest.raises(StoreError, match=f"^cannot write a store at {where}: "):
+        publish_dataset(where, "white", lambert(0.5))
+    assert contents(tmp_path) == {"file": b"precious"}
+
+
+def test_a_store_that_cannot_be_made_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", fail)
+        sentence = f"^cannot write a store at {tmp_path / 'new'}: Read-only file system$"
+        with pytest.raises(StoreError, match=sentence):
+            publish_dataset(tmp_path / "new", "white", lambert(0.5))
+    assert contents(tmp_path) == {}
+
+
+# Writes that fail
+
+
+@pytest.mark.parametrize("call", ["replace", "rename", "fsync"])
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), OSError("the disk is gone")])
+def test_a_write_that_fails_leaves_the_old_revision_served(
+    root: Path, monkeypatch: pytest.MonkeyPatch, call: str, error: OSError
+) -> None:
+    def fail(*_: Any) -> None:
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, call, fail)
+        with pytest.raises(StoreError) as caught:
+            publish_dataset(root, "white", lambert(0.75))
+    assert str(caught.value) == f"cannot write white to the store at {root}: {error.strerror or error}"
+    store = brdfdb.open(root)
+    store.verify("white")
+    assert (rho(root), store.head("white")) == (0.25, "r000001")
+    assert not list(root.rglob(".HEAD*"))
+    assert staged(root) == []
+    publish_dataset(root, "white", lambert(0.75))
+    assert rho(root) == 0.75
+
+
+def test_every_directory_of_a_revision_is_synced_before_the_pointer_is_swapped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int] = []
+    sync, replace = os.fsync, os.replace
+    before: list[set[int]] = []
+
+    def fsync(handle: int) -> None:
+        sync(handle)
+        synced.append(os.fstat(handle).st_ino)
+
+    def swap(source: Any, target: Any) -> None:
+        if Path(target).name == "HEAD.json":
+            before.append(set(synced))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(os, "replace", swap)
+    publish_dataset(tmp_path, "white", lambert(0.5))
+    (known,) = before
+    group = tmp_path / "materials" / "white" / "r000001"
+    directories = [group, *(path for path in group.rglob("*") if path.is_dir()), *list(group.parents)[:3]]
+    assert len(directories) > 10
+    assert [path for path in directories if path.stat().st_ino not in known] == []
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+import numpy as np
+import xarray as xr
+from brdfdb import chunks, manifest, staging
+
+def die(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+root, place, step = sys.argv[1:]
+setattr({"staging": staging, "chunks": chunks, "manifest": manifest, "Path": Path}[place], step, die)
+values = np.full((2, 2), 9.0, dtype=np.float32)
+staging.publish_dataset(root, "white", xr.Dataset({"brdf": (("theta_i", "theta_r"), values)}))
+"""
+
+
+@pytest.mark.parametrize(
+    "step", ["staging write_file", "staging publish", "staging sync_directory", "staging write_sealed", "Path rename",
+             "staging point_to", "staging swap_sealed", "manifest sync_directory"],
+)  # fmt: skip
+def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(root: Path, step: str) -> None:
+    command = [sys.executable, "-c", KILLED, root, *step.split()]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    store = brdfdb.open(root)
+    if step == "manifest sync_directory":  # the pointer is swapped; only that it outlasts a power cut is not certain
+        assert store.head("white") == "r000002"
+        store.verify("white")
+        return
+    store.verify("white")
+    assert (rho(root), store.head("white"), list(store)) == (0.25, "r000001", ["white"])
+    before = contents(root / "materials")
+    revision, _ = publish_dataset(root, "white", lambert(0.75))
+    taken = step in ("Path rename", "staging point_to", "staging swap_sealed")
+    assert revision == ("r000003" if taken else "r000002")
+    assert staged(root) == []
+    after = contents(root / "materials")
+    assert {name: after[name] for name in before if not name.endswith("HEAD.json")} == {
+        name: data for name, data in before.items() if not name.endswith("HEAD.json")
+    }
+    assert (rho(root), store.head("white")) == (0.75, revision)
+
+
+# Blocks
+
+
+def staged_table(root: Path, text: str) -> Path:
+    staging.make_store(root)
+    return prepare(root, "white", REQUEST, text)
+
+
+def test_blocks_and_frame_make_the_table_of_tabulate(tmp_path: Path, four_blocks: str) -> None:
+    where = staged_table(tmp_path, four_blocks)
+    blocks = [write_block(str(where), four_blocks, number) for number in (2, 0, 3, 1)]
+    assert [block["kept"] for block in blocks] == [False] * 4
+    assert sorted(block["name"] for block in blocks) == [f"brdf/c/{number}/0/0" for number in range(4)]
+    files = {block["name"]: block["entry"] for block in blocks} | write_frame(str(where), four_blocks)
+    (where / "table" / "stray").write_text("left by an earlier attempt")
+    with Lock(tmp_path, "white"):
+        revision, stored = publish(tmp_path, "white", where, files)
+    store = brdfdb.open(tmp_path)
+    store.verify("white")
+    assert sorted(contents(store.path("white"))) == sorted(files)
+    assert stored == sum(len(data) for data in contents(store.path("white")).values())
+    with store.dataset("white") as found:
+        error = found.attrs["error"]
+        expected = lambert(0.75).assign_attrs(request=REQUEST, request_sha256=digest(REQUEST), error=error)
+        xr.testing.assert_identical(found.load(), expected)
+    layout = Layout.from_document(json.loads(four_blocks))
+    assert error == measure(layout, lambda rows: lambert(0.75)["brdf"].values[rows]).model_dump(mode="json")
+    assert store.summary("white")["error_p99"] == error["overall"]["p99"]
+    assert (revision, store["white"].revision, rho(tmp_path)) == ("r000001", "r000001", 0.75)
+    assert staged(tmp_path) == []
+
+
+def test_the_files_of_blocks_are_those_that_zarr_writes(tmp_path: Path, four_blocks: str) -> None:
+    where = staged_table(tmp_path, four_blocks)
+    for number in range(4):
+        write_block(str(where), four_blocks, number)
+    write_frame(str(where), four_blocks)
+    dataset = lambert(0.75).assign_attrs(request=REQUEST, request_sha256=digest(REQUEST))
+    encoding: dict[str, Any] = {
+        str(name): {"compressors": staging_compressors(), "fill_value": np.nan, "chunks": variable.shape}
+        for name, variable in dataset.variables.items()
+    }
+    encoding["brdf"]["chunks"] = (1, 3, 3)
+    dataset.to_zarr(tmp_path / "theirs", zarr_format=3, consolidated=False, encoding=encoding, write_empty_chunks=True)
+    ours, theirs = contents(where / "table"), contents(tmp_path / "theirs")
+    assert sorted(ours) == sorted(theirs)
+    assert all(ours[name] == theirs[name] for name in ours if not name.endswith("zarr.json"))
+    for name in ours:
+        if name.endswith("/zarr.json"):
+            expected = json.loads(theirs[name])
+            del expected["attributes"]["_FillValue"]  # xarray repeats the fill value there
+            assert json.loads(ours[name]) == expected
+
+
+def staging_compressors() -> Any:
+    from zarr.codecs import BloscCodec, Crc32cCodec
+
+    return (BloscCodec(cname="zstd", clevel=1, shuffle="shuffle"), Crc32cCodec())
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def test_a_block_that_is_whole_is_kept_and_any_other_is_written_again(tmp_path: Path, four_blocks: str) -> None:
+    where = staged_table(tmp_path, four_blocks)
+    first = [write_block(str(where), four_blocks, number) for number in range(4)]
+    again = [write_block(str(where), four_blocks, number) for number in range(4)]
+    assert [block["kept"] for block in again] == [True] * 4
+    assert [block["entry"] for block in again] == [block["entry"] for block in first]
+    chunk = where / "table" / first[1]["name"]
+    marker = where / "blocks" / "000001.json"
+    for damage in (chunk.unlink, lambda: chunk.write_bytes(b""), lambda: chunk.write_bytes(chunk.read_bytes()[:-1]),
+                   lambda: flip(chunk), marker.unlink, lambda: marker.write_bytes(b"{}"),
+                   lambda: marker.write_bytes(b"")):  # fmt: skip
+        damage()
+        block = write_block(str(where), four_blocks, 1)
+        assert (block["kept"], block["entry"]) == (False, first[1]["entry"])
+        assert write_block(str(where), four_blocks, 1)["kept"]
+    other = json.loads(four_blocks)
+    other["material"]["parameters"]["rho"] = 0.5  # as if planned anew: the block is not of this table
+    assert not write_block(str(where), json.dumps(other), 1)["kept"]
+
+
+def test_a_layout_of_another_version_is_refused(tmp_path: Path, four_blocks: str) -> None:
+    where = staged_table(tmp_path, four_blocks)
+    other = json.dumps({**json.loads(four_blocks), "model_version": 99})
+    with pytest.raises(StoreError, match=r"^white: the table was laid out by another version of this program$"):
+        write_block(str(where), other, 0)
+    prepare(tmp_path, "white", REQUEST, other)
+    assert planned(tmp_path, "white", REQUEST) is None
+
+
+def test_a_layout_is_kept_for_the_next_build(tmp_path: Path, four_blocks: str) -> None:
+    assert planned(tmp_path, "white", REQUEST) is None
+    where = staged_table(tmp_path, four_blocks)
+    assert planned(tmp_path, "white", REQUEST) == four_blocks
+    assert planned(tmp_path, "white", {"asked": "for black"}) is None
+    (where / "layout.json").write_bytes(b"{")
+    assert planned(tmp_path, "white", REQUEST) is None
+
+
+def test_a_block_that_cannot_be_written_is_one_sentence(
+    tmp_path: Path, four_blocks: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    where = staged_table(tmp_path, four_blocks)
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    for task in (lambda: write_block(str(where), four_blocks, 0), lambda: write_frame(str(where), four_blocks)):
+        with pytest.raises(StoreError) as caught:
+            task()
+        assert str(caught.value) == f"cannot write white to the store at {tmp_path}: No space left on device"
+    assert staged(tmp_path) == sorted(
+        [f"white{part}" for part in ("", f"/{where.name}", *(f"/{where.name}/{end}" for end in
+         ("blocks", "layout.json", "request.json")))]
+    )  # fmt: skip
+
+
+# Locks
+
+
+def test_a_material_has_one_builder_at_a_time_and_leaves_no_lock_behind(root: Path) -> None:
+    with Lock(root, "white") as lock:
+        with pytest.raises(BusyError, match=r"^another build is at work on white$"), Lock(root, "white", wait=False):
+            pytest.fail("entered")
+        with Lock(root, "black", wait=False):
+            assert staged(root) == ["black", "black/lock", "white", "white/lock"]
+        (lock.path.parent / "key").mkdir()
+    assert staged(root) == ["white", "white/key", "white/lock"]
+    (root / ".staging" / "white" / "key").rmdir()
+    with Lock(root, "white", wait=False):
+        pass
+    assert staged(root) == []
+
+
+def test_a_lock_is_never_held_twice(root: Path) -> None:
+    inside, errors = [], []
+
+    def work() -> None:
+        try:
+            for _ in range(200):
+                with Lock(root, "white"):
+                    inside.append(1)
+                    assert len(inside) == 1
+                    inside.pop()
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not errors
+    assert staged(root) == []
+
+
+def test_stores_that_are_made_at_the_same_moment_are_one(tmp_path: Path) -> None:
+    errors: list[BaseException] = []
+    for attempt in range(20):
+        barrier = threading.Barrier(4)
+
+        def start(root: Path = tmp_path / str(attempt), barrier: threading.Barrier = barrier) -> None:
+            barrier.wait()
+            try:
+                for _ in range(3):
+                    staging.make_store(root)
+            except BaseException as error:
+                errors.append(error)
+
+        threads = [threading.Thread(target=start) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert not errors
+    assert all(len(brdfdb.open(tmp_path / str(attempt))) == 0 for attempt in range(20))
+
+
+PUBLISHER = """
+import sys, time
+from pathlib import Path
+import numpy as np
+import xarray as xr
+from brdfdb.store.staging import publish_dataset
+
+root, me = Path(sys.argv[1]), sys.argv[2]
+value = np.full((2, 2), float(me), dtype=np.float32)
+axes = {"theta_i": [0.0, 80.0], "theta_r": [0.0, 80.0]}
+dataset = xr.Dataset({"brdf": (("theta_i", "theta_r"), value)}, axes, {"by": me})
+root.with_name(me).touch()
+while not (root.with_name("1").exists() and root.with_name("2").exists()):
+    time.sleep(0.001)
+for _ in range(5):
+    print(publish_dataset(root, "white", dataset)[0])
+"""
+
+
+def test_two_processes_write_into_one_new_store_and_none_loses_a_revision(tmp_path: Path) -> None:
+    root = tmp_path / "store"
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-c", PUBLISHER, root, me], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        for me in ("1", "2")
+    ]
+    outputs = [process.communicate(timeout=60) for process in processes]
+    assert [process.returncode for process in processes] == [0, 0], outputs
+    published = [(me, name) for me, (out, _) in zip("12", outputs, strict=True) for name in out.split()]
+    assert sorted(name for _, name in published) == [f"r{number:06d}" for number in range(1, 11)]
+    for me, name in published:
+        group = root / "materials" / "white" / name
+        data = manifest.manifest_of(group).read_bytes()
+        check_manifest(group, hashlib.sha256(data).hexdigest(), contents=True)
+        with xr.open_zarr(group) as found:
+            assert found["brdf"].values.tolist() == [[float(me)] * 2] * 2
+            assert found.attrs == {"by": me}
+    store = brdfdb.open(root)
+    store.verify("white")
+    assert store.head("white") == "r000010"
+    assert staged(root) == []

@@ -1,0 +1,254 @@
+"""Verification: damage of every kind is named with what repairs it, and that does so."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import brdfdb
+from brdfdb.materials import Material
+from brdfdb.store import codec, snapshots, staging, verification
+from brdfdb.store.manifest import StoreError, manifest_of, sealed, unsealed
+from brdfdb.store.revisions import collect, history, rollback, standing
+from brdfdb.store.staging import make_store, publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout, digest
+from brdfdb.tables.tabulation import tabulate
+
+GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
+
+
+def lambert(rho: float) -> xr.Dataset:
+    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
+    dataset = tabulate(Layout(Material.from_table("white", table), GRID))
+    return dataset.assign_attrs(request={"rho": rho}, request_sha256=digest({"rho": rho}))
+
+
+def rho(root: Path) -> float:
+    return float(np.round(brdfdb.open(root)["white"].brdf[0, 0, 0] * np.pi, 6))
+
+
+def findings(root: Path) -> list[str]:
+    return [str(finding) for finding in verification.material(root, "white")[1]]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A store with three revisions of one material: rho = 0.25, 0.5, 0.75."""
+    for quarter in range(1, 4):
+        publish_dataset(tmp_path, "white", lambert(quarter / 4))
+    return tmp_path
+
+
+def changed(path: Path, **changes: object) -> None:
+    """Change a sealed file, and seal it again: what no checksum of the file itself can notice."""
+    path.write_bytes(sealed({**unsealed(path.read_bytes(), "", ""), **changes}))
+
+
+def test_a_sound_store_has_no_findings_and_counts_its_bytes(root: Path) -> None:
+    group = brdfdb.open(root).path("white")
+    size = sum(path.stat().st_size for path in group.rglob("*") if path.is_file())
+    assert verification.material(root, "white") == (size, [])
+
+
+def test_the_first_line_of_a_sealed_file_is_the_digest_of_the_others(root: Path) -> None:
+    first, _, rest = (root / "materials" / "white" / "HEAD.json").read_bytes().partition(b"\n")
+    assert json.loads(first.rstrip(b",") + b"}") == {"sha256": hashlib.sha256(rest).hexdigest()}
+
+
+# What the chain of digests notices
+
+
+def test_a_pointer_that_says_other_than_its_manifest_is_named_and_repaired(root: Path) -> None:
+    head = root / "materials" / "white" / "HEAD.json"
+    changed(head, title="Black")
+    said = "white is damaged: HEAD.json says title 'Black', not 'White'; `brdfdb build` with its recipe repairs it, or"
+    assert findings(root) == [f"{said} `brdfdb rollback white r000003`"]
+    assert rollback(root, "white", "r000003") == "r000003"
+    assert findings(root) == []
+    assert brdfdb.open(root).summary("white")["title"] == "White"
+
+
+def test_a_pointer_that_was_lost_is_missed_and_made_again(root: Path) -> None:
+    (root / "materials" / "white" / "HEAD.json").unlink()
+    store = brdfdb.open(root)
+    assert "white" in store
+    assert list(store) == ["white"]
+    with pytest.raises(StoreError, match=r"^white is damaged: HEAD\.json is missing$"):
+        store["white"]
+    said = (
+        "white is damaged: HEAD.json is missing; `brdfdb build` with its recipe repairs it, or `brdfdb rollback white "
+    )
+    assert findings(root) == [f"{said}r000003`"]
+    assert rollback(root, "white", "r000003") == ""
+    assert (findings(root), rho(root)) == ([], 0.75)
+    assert publish_dataset(root, "white", lambert(1.0))[0] == "r000004"
+
+
+def test_a_pointer_that_a_first_publication_is_about_to_write_is_not_missed(tmp_path: Path) -> None:
+    publish_dataset(tmp_path, "white", lambert(0.25))
+    (tmp_path / "materials" / "white" / "HEAD.json").unlink()
+    (tmp_path / ".staging" / "white" / "0123456789abcdef").mkdir(parents=True)  # as if killed before the swap
+    store = brdfdb.open(tmp_path)
+    assert list(store) == []
+    assert "white" not in store
+    collect(tmp_path)
+    assert list(store) == []
+
+
+def test_an_altered_older_manifest_is_not_believed(root: Path) -> None:
+    older = manifest_of(root / "materials" / "white" / "r000001")
+    files = unsealed(older.read_bytes(), "", "")["files"]
+    chunk = older.with_name("r000001") / "brdf" / "c" / "0" / "0" / "0"
+    other = (older.with_name("r000002") / "brdf" / "c" / "0" / "0" / "0").read_bytes()
+    chunk.write_bytes(other)
+    newer = unsealed(manifest_of(root / "materials" / "white" / "r000002").read_bytes(), "", "")["files"]
+    changed(older, files={**files, "brdf/c/0/0/0": newer["brdf/c/0/0/0"]})
+    said = r"^white r000001 is damaged: r000001\.MANIFEST\.json is not the one whose digest was recorded$"
+    for ask in (
+        lambda: rollback(root, "white", "r000001"),
+        lambda: history(root, "white"),
+        lambda: brdfdb.open(root).table("white", "r000001"),
+    ):
+        with pytest.raises(StoreError, match=said):
+            ask()
+    assert staging.adoptable(root, "white", digest({"rho": 0.25})) is None
+    (found,) = findings(root)
+    assert found.startswith(
+        "white r000001 is damaged: r000001.MANIFEST.json is not the one whose digest was recorded ("
+    )
+    assert found.endswith("; `brdfdb gc --damaged` removes it")
+    assert "materials/white/r000001" in collect(root, 9, damaged=True).removed
+    assert findings(root) == []
+    assert [revision.name for revision in history(root, "white")] == ["r000002", "r000003"]
+
+
+def test_a_damaged_older_revision_is_named_and_collected(root: Path) -> None:
+    chunk = root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0"
+    chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
+    said = "white r000001 is damaged: the content of brdf/c/0/0/0 changed (not the current revision); "
+    assert findings(root) == [f"{said}`brdfdb gc --damaged` removes it"]
+    assert collect(root, 9).removed == []
+    assert collect(root, 9, damaged=True).removed == [
+        "materials/white/r000001.MANIFEST.json",
+        "materials/white/r000001",
+    ]
+    assert findings(root) == []
+
+
+@pytest.mark.parametrize("revision", ["r000001", "r000003"])
+def test_a_stranger_is_named_and_collected_and_no_reason_to_build_again(root: Path, revision: str) -> None:
+    (root / "materials" / "white" / revision / "brdf" / "stray").write_text("")
+    assert findings(root) == [f"white {revision}: brdf/stray does not belong there; `brdfdb gc` removes it"]
+    assert standing(root, "white", {"rho": 0.75}).state == "current"
+    assert collect(root, 9).removed == [f"materials/white/{revision}/brdf/stray"]
+    assert (findings(root), rho(root)) == ([], 0.75)
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:-1])])
+def test_the_marker_of_a_store_with_tables_is_written_anew(root: Path, damage: Callable[[Path], object]) -> None:
+    marker = root / "brdfdb.json"
+    before = marker.read_bytes()
+    damage(marker)
+    with pytest.raises(StoreError, match=r"brdfdb\.json .*; `brdfdb build` (makes one|writes it anew)$"):
+        brdfdb.open(root)
+    make_store(root)
+    assert marker.read_bytes() == before
+    assert (findings(root), rho(root)) == ([], 0.75)
+
+
+def test_a_revision_that_is_superseded_and_collected_while_it_is_verified_is_no_alarm(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    check, waiting = verification.check_manifest, [1.0, 0.125]
+
+    def overtaken(*arguments: object, **keywords: object) -> object:
+        if waiting:
+            publish_dataset(root, "white", lambert(waiting.pop()))
+            collect(root, 1)
+        return check(*arguments, **keywords)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(verification, "check_manifest", overtaken)
+    assert findings(root) == []
+    assert not waiting
+    assert rho(root) == 1.0
+
+
+# What the manifest cannot know
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d.drop_attrs(deep=False), "is not a table: it lacks the attribute title"),
+        (lambda d: d.drop_vars("theta_r"), "is not a table: it lacks the coordinate theta_r"),
+        (lambda d: d.assign(brdf=d["brdf"].astype(np.float64)), "is not a table: brdf is float64, not float32"),
+    ],
+)
+def test_verify_knows_what_a_table_is(root: Path, change: Callable[[xr.Dataset], xr.Dataset], said: str) -> None:
+    publish_dataset(root, "white", change(lambert(0.5)))
+    (found,) = findings(root)
+    manifest = manifest_of(root / "materials" / "white" / "r000004")
+    assert found == f"white r000004 {said}; `rm {manifest}`, then `brdfdb build` with its recipe repairs it"
+
+
+def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(codec, "_CHUNK_VALUES", 9)
+    whole = staging.write_file
+
+    def spoil(path: Path, data: bytes, temporary: Path) -> object:
+        if path.match("brdf/c/2/0/0"):  # written wrong, so that manifest and file agree
+            data = data[:-1] + bytes([data[-1] ^ 1])
+        return whole(path, data, temporary)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(staging, "write_file", spoil)
+        publish_dataset(root, "white", lambert(0.5))
+    brdfdb.open(root).verify("white")
+    (found,) = findings(root)
+    assert found.startswith("white r000004 is damaged: chunk 2 of brdf cannot be decoded: ")
+
+
+def test_a_revision_of_another_material_is_not_adopted(root: Path) -> None:
+    publish_dataset(root, "black", lambert(0.125))
+    white, black = root / "materials" / "white", root / "materials" / "black"
+    shutil.copytree(black / "r000001", white / "r000009")
+    shutil.copyfile(manifest_of(black / "r000001"), manifest_of(white / "r000009"))
+    (white / "HEAD.json").unlink()
+    (found,) = findings(root)
+    assert "`brdfdb rollback white r000003`" in found
+    said = r"^white r000009 is damaged: r000009\.MANIFEST\.json is that of black r000001$"
+    with pytest.raises(StoreError, match=said):
+        rollback(root, "white", "r000009")
+    rollback(root, "white", "r000003")
+    assert rho(root) == 0.75
+
+
+def test_a_revision_without_its_directory_is_named_and_stays_while_a_snapshot_names_it(root: Path) -> None:
+    rollback(root, "white", "r000001")
+    snapshots.create(root, "paper")
+    rollback(root, "white", "r000003")
+    shutil.rmtree(root / "materials" / "white" / "r000001")
+    (found,) = findings(root)
+    assert found.startswith("white r000001 is damaged: its directory is missing (not the current revision); copy it")
+    collect(root, 1)
+    assert manifest_of(root / "materials" / "white" / "r000001").is_file()
+    snapshots.remove(root, "paper")
+    collect(root, 1)
+    assert findings(root) == []
+
+
+def test_a_pointer_that_is_a_pipe_is_damage_and_does_not_hang(root: Path) -> None:
+    path = root / "materials" / "white" / "HEAD.json"
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(StoreError, match=r"^white is damaged: HEAD\.json cannot be read: Not a regular file$"):
+        brdfdb.open(root)["white"]
