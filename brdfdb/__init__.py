@@ -42,7 +42,7 @@ def open(root: str | os.PathLike[str], *, snapshot: str | None = None) -> Store 
 
     Raises
     ------
-    brdfdb.store.reader.StoreError
+    brdfdb.errors.StoreError
         If there is no store at `root`, or one of another format version; if it has no such snapshot; if no service
         answers there.
     ValueError

@@ -46,7 +46,7 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
 
     Raises
     ------
-    brdfdb.store.reader.StoreError
+    brdfdb.errors.StoreError
         If there is no store at `store_dir`, or no such snapshot in it.
     ValueError
         If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.

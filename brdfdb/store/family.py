@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from brdfdb.errors import StoreError
 from brdfdb.geometry import checked_angles, checked_vectors, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, Parameter
-from brdfdb.store.manifest import StoreError, read_sealed
+from brdfdb.store.manifest import read_sealed
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table

@@ -19,10 +19,10 @@ from urllib.parse import quote, urlencode, urlsplit, urlunsplit
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, degrees, finished, spherical_angles
 from brdfdb.parameters import Floats
 from brdfdb.store.manifest import NAME
-from brdfdb.store.reader import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.table_base import Described, Stated
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from brdfdb.errors import StoreError
 from brdfdb.store.family import stale
 from brdfdb.store.manifest import (
     NAME,
@@ -18,7 +19,6 @@ from brdfdb.store.manifest import (
     SNAPSHOT_VERSION,
     Pin,
     Snapshot,
-    StoreError,
     read_snapshot,
     seal_of,
     snapshot_path,

@@ -16,8 +16,8 @@ import brdfdb
 from brdfdb.atlas import ATLAS
 from brdfdb.audit import AuditReport, MaterialAudit, audit, report
 from brdfdb.audit.findings import Asymmetry
+from brdfdb.errors import StoreError
 from brdfdb.gallery import GALLERY
-from brdfdb.store.reader import StoreError
 from brdfdb_pipelines import audit_page, audit_sentences, terminal, workers
 
 Task = Callable[[], Any]

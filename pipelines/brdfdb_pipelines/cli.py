@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _is_users(error: Exception) -> bool:
     """Whether an error is about what the user gave, not about this program."""
-    from brdfdb.store.reader import StoreError, UnknownMaterialError
+    from brdfdb.errors import StoreError, UnknownMaterialError
 
     return isinstance(
         error, StoreError | UnknownMaterialError | ValueError | OSError | MemoryError | ModuleNotFoundError

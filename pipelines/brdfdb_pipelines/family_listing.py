@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from brdfdb.store.reader import Store, StoreError
+from brdfdb.errors import StoreError
+from brdfdb.store.reader import Store
 from brdfdb_pipelines import terminal
 
 if TYPE_CHECKING:

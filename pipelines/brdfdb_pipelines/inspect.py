@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import brdfdb
-from brdfdb.store.manifest import StoreError
+from brdfdb.errors import StoreError
 from brdfdb_pipelines import family_listing, terminal
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, FailFast, Field, Tag, TypeAdapter, ValidationError
 
+from brdfdb.errors import BrdfdbError
 from brdfdb.materials import Material, presets, written_name
 from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
@@ -31,7 +32,7 @@ _MOST_MEMBERS = 100_000  # of all families of a recipe
 _MOST_SWEPT = 6  # parameters of a family: a lookup is made of two members for each, 64 in all
 
 
-class RecipeError(ValueError):
+class RecipeError(BrdfdbError, ValueError):
     """A recipe that cannot be built; str() is one sentence that names the field."""
 
 

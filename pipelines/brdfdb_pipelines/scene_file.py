@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from brdfdb.errors import BrdfdbError
 from brdfdb.parameters import closest
 from brdfdb.scenes.scene import Scene
 from brdfdb_pipelines import toml_file
@@ -14,7 +15,7 @@ from brdfdb_pipelines import toml_file
 _SHIPPED = resources.files("brdfdb_pipelines") / "scenes"
 
 
-class SceneError(ValueError):
+class SceneError(BrdfdbError, ValueError):
     """A scene that cannot be looked at; str() is one sentence that names the file and the field."""
 
 
