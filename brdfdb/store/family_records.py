@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.geometry import degrees, radians
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
@@ -25,8 +26,8 @@ from brdfdb.store.family import (
     stale,
     stencil,
 )
-from brdfdb.store.manifest import StoreError, sync_directory, write_sealed
-from brdfdb.store.reader import Store, UnknownMaterialError
+from brdfdb.store.manifest import sync_directory, write_sealed
+from brdfdb.store.reader import Store
 from brdfdb.store.staging import Lock, writing
 from brdfdb.tables import error_measurement
 from brdfdb.tables.layout import PLAIN

@@ -14,7 +14,6 @@ rewrite a shared root file, and stale metadata hides groups.
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import json
 import os
@@ -26,12 +25,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.store.manifest import (
     NAME,
     Head,
     Manifest,
     Snapshot,
-    StoreError,
     check_manifest,
     head_from,
     number_of,
@@ -56,10 +55,6 @@ __all__ = [
     "FORMAT_VERSION",
     "DamagedMarkerError",
     "Store",
-    "StoreError",
-    "UnknownFamilyError",
-    "UnknownMaterialError",
-    "UnknownRevisionError",
     "WrongSummaryError",
 ]
 
@@ -67,7 +62,6 @@ FORMAT = "brdfdb"
 FORMAT_VERSION = 2  # 1 had no digests in the first lines
 
 CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
-_SHOWN = 60  # characters of an unknown name
 
 
 class DamagedMarkerError(StoreError):
@@ -76,43 +70,6 @@ class DamagedMarkerError(StoreError):
 
 class WrongSummaryError(StoreError):
     """A pointer that says of its revision other than the manifest."""
-
-
-class UnknownMaterialError(KeyError):
-    """A name that is not in the store.
-
-    Attributes
-    ----------
-    name : str
-        What was asked for.
-    closest : list of str
-        Up to five names that are close to it.
-    """
-
-    kind = "material"
-
-    def __init__(self, name: str, names: list[str]) -> None:
-        super().__init__(name)
-        self.name = name
-        self.closest = difflib.get_close_matches(name, names, n=5, cutoff=0.4)
-
-    def __str__(self) -> str:
-        hint = f"; closest: {', '.join(self.closest)}" if self.closest else ""
-        shown = self.name if len(self.name) <= _SHOWN else f"{self.name[:_SHOWN]}..."
-        return f"no {self.kind} {shown!r} in the store{hint}"
-
-
-class UnknownFamilyError(UnknownMaterialError):
-    """A name that is not that of a family in the store."""
-
-    kind = "family"
-
-
-class UnknownRevisionError(KeyError):
-    """A revision that a material does not have; str() is one sentence."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 def _check_marker(root: Path) -> None:

@@ -28,12 +28,12 @@ from typing import IO, TYPE_CHECKING, Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import BusyError, ParameterError, StoreError
 from brdfdb.store.manifest import (
     NAME,
     Entry,
     Head,
     Manifest,
-    StoreError,
     Summary,
     check_manifest,
     manifest_of,
@@ -205,10 +205,6 @@ class Lock:
         fcntl.flock(self._handle, fcntl.LOCK_UN)  # closing is not enough where a child was forked meanwhile
         self._handle.close()
         self._handle = None
-
-
-class BusyError(Exception):
-    """Another build holds the lock of a material."""
 
 
 def directory_of(root: Path, name: str, request_sha256: str) -> Path:
@@ -472,7 +468,7 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     from brdfdb.store.codec import dataset_files
 
     if not NAME.fullmatch(name):
-        raise ValueError(f"name: {name!r} is not made of lower-case letters, digits and single hyphens")
+        raise ParameterError("name", f"{name!r} is not made of lower-case letters, digits and single hyphens", name)
     store = Path(root)
     make_store(store)
     files = dataset_files(dataset)

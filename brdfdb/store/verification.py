@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.family_records import verify_family
 from brdfdb.store.manifest import (
     Entry,
     Head,
-    StoreError,
     check_manifest,
     manifest_of,
     read_manifest,
@@ -21,7 +21,7 @@ from brdfdb.store.manifest import (
     snapshot_path,
     whole_revisions,
 )
-from brdfdb.store.reader import Store, UnknownMaterialError, WrongSummaryError, check_summary
+from brdfdb.store.reader import Store, WrongSummaryError, check_summary
 from brdfdb.store.revisions import pinned, strangers
 
 REQUIRED = ("title", "material", "table_version", "model", "model_version", "parameters", "source", "conventions")

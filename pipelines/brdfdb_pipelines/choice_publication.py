@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brdfdb.store.reader import Store, StoreError
+from brdfdb.errors import StoreError
+from brdfdb.store.reader import Store
 from brdfdb.store.staging import publish_dataset
 from brdfdb.tables import error_measurement
 from brdfdb.tables.layout import Layout

@@ -6,9 +6,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from brdfdb.errors import UnknownMaterialError
 from brdfdb.store import revisions, snapshots, verification
 from brdfdb.store.manifest import read_snapshot, seal_of, snapshot_names, snapshot_path
-from brdfdb.store.reader import Store, UnknownMaterialError
+from brdfdb.store.reader import Store
 from brdfdb_pipelines import terminal
 
 

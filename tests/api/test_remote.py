@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.geometry import unit_vector
 from brdfdb.store import http_client
-from brdfdb.store.reader import Store, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.store.reader import Store
 from tests.api.a_store import angles, publish, same, serving
 
 KEPT = ("white-tile", "r000001")

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.errors import UnknownFamilyError
 from brdfdb.materials import Material
 from brdfdb.store import family_records
 from brdfdb.store.family_records import measure
-from brdfdb.store.reader import Store, UnknownFamilyError
+from brdfdb.store.reader import Store
 from brdfdb.tables import error_measurement, tabulation
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import build as module

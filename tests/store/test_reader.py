@@ -17,11 +17,12 @@ import xarray as xr
 import zarr
 
 import brdfdb
+from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.materials import Material
 from brdfdb.store import codec
 from brdfdb.store import reader as module
 from brdfdb.store.manifest import Head, sealed, unsealed
-from brdfdb.store.reader import Store, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.store.reader import Store
 from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout

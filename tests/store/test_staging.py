@@ -19,10 +19,11 @@ import pytest
 import xarray as xr
 
 import brdfdb
+from brdfdb.errors import BusyError, StoreError
 from brdfdb.materials import Material
 from brdfdb.store import manifest, staging
-from brdfdb.store.manifest import StoreError, check_manifest, unsealed
-from brdfdb.store.staging import BusyError, Lock, planned, prepare, publish, publish_dataset, write_block, write_frame
+from brdfdb.store.manifest import check_manifest, unsealed
+from brdfdb.store.staging import Lock, planned, prepare, publish, publish_dataset, write_block, write_frame
 from brdfdb.tables import layout as layouts
 from brdfdb.tables.error_measurement import measure
 from brdfdb.tables.grids import Grid

@@ -14,9 +14,10 @@ import pytest
 import xarray as xr
 
 import brdfdb
+from brdfdb.errors import StoreError
 from brdfdb.materials import Material
 from brdfdb.store import codec, snapshots, staging, verification
-from brdfdb.store.manifest import StoreError, manifest_of, sealed, unsealed
+from brdfdb.store.manifest import manifest_of, sealed, unsealed
 from brdfdb.store.revisions import collect, history, rollback, standing
 from brdfdb.store.staging import make_store, publish_dataset
 from brdfdb.tables.grids import Grid

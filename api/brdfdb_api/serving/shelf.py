@@ -13,8 +13,9 @@ from weakref import WeakKeyDictionary
 
 import orjson
 
+from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.manifest import check_manifest, read_json
-from brdfdb.store.reader import Store, StoreError, UnknownMaterialError
+from brdfdb.store.reader import Store
 from brdfdb_api.serving.colours import swatch
 from brdfdb_api.serving.settings import Settings
 
