@@ -54,7 +54,11 @@ class TableMetadata(BaseModel):
         KnownExcess | None,
         BeforeValidator(lambda value: value or None),
         PlainSerializer(lambda known: {} if known is None else known.model_dump(mode="json")),
-    ] = Field(default=None, description="a published excess of the albedo over 1; an empty object without one")
+    ] = Field(
+        default=None,
+        description="a published excess of the albedo over 1; an empty object without one",
+        json_schema_extra={"anyOf": [{"$ref": "#/$defs/KnownExcess"}, {"type": "object", "maxProperties": 0}]},
+    )
     conventions: str | None = Field(default=None, description="the meaning of the angles and of f_r, in words")
     anisotropic: bool | None = Field(default=None, description="true if the azimuth of the light counts")
     symmetries: list[str] = Field(default_factory=list, description="what the table leaves out or repeats, in words")
