@@ -57,7 +57,7 @@ class TableMetadata(BaseModel):
     ] = Field(
         default=None,
         description="a published excess of the albedo over 1; an empty object without one",
-        json_schema_extra={"anyOf": [{"$ref": "#/$defs/KnownExcess"}, {"type": "object", "maxProperties": 0}]},
+        json_schema_extra=lambda schema: schema["anyOf"].append({"type": "object", "maxProperties": 0}),
     )
     conventions: str | None = Field(default=None, description="the meaning of the angles and of f_r, in words")
     anisotropic: bool | None = Field(default=None, description="true if the azimuth of the light counts")
