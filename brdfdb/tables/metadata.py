@@ -22,6 +22,11 @@ def _assumptions(value: Any) -> Any:
     return dict.fromkeys(value) if isinstance(value, list) else value
 
 
+def _or_empty(schema: dict[str, Any]) -> None:
+    """Let a JSON Schema allow an empty object, too."""
+    schema["anyOf"].append({"type": "object", "maxProperties": 0})
+
+
 class TableMetadata(BaseModel):
     """The attributes of a table.
 
@@ -57,7 +62,7 @@ class TableMetadata(BaseModel):
     ] = Field(
         default=None,
         description="a published excess of the albedo over 1; an empty object without one",
-        json_schema_extra=lambda schema: schema["anyOf"].append({"type": "object", "maxProperties": 0}),
+        json_schema_extra=_or_empty,
     )
     conventions: str | None = Field(default=None, description="the meaning of the angles and of f_r, in words")
     anisotropic: bool | None = Field(default=None, description="true if the azimuth of the light counts")
