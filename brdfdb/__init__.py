@@ -8,6 +8,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, overload
 
+from brdfdb.errors import ParameterError
+
 if TYPE_CHECKING:
     import os
 
@@ -52,7 +54,9 @@ def open(root: str | os.PathLike[str], *, snapshot: str | None = None) -> Store 
         from brdfdb.store.http_client import RemoteStore
 
         if snapshot is not None:
-            raise ValueError(f"snapshot: {snapshot!r} of a service is chosen there, by `brdfdb serve --snapshot`")
+            raise ParameterError(
+                "snapshot", f"{snapshot!r} of a service is chosen there, by `brdfdb serve --snapshot`", snapshot
+            )
         return RemoteStore(root)
     from brdfdb.store.reader import Store
 

@@ -35,6 +35,28 @@ class ParameterError(BrdfdbError, ValueError):
         return f"{self.parameter}: {self.sentence}"
 
 
+class MaterialError(ParameterError):
+    """A description that is not that of a material; `parameter` is the field that is at fault.
+
+    Parameters
+    ----------
+    material : str
+        Name of the material.
+    parameter, sentence, value, allowed
+        As of `ParameterError`.
+    """
+
+    def __init__(
+        self, material: str, parameter: str, sentence: str, value: object = None, allowed: object = None
+    ) -> None:
+        super().__init__(parameter, sentence, value, allowed)
+        self.args = (material, parameter, sentence, value, allowed)
+        self.material = material
+
+    def __str__(self) -> str:
+        return f"{self.material}: {super().__str__()}"
+
+
 class StoreError(BrdfdbError):
     """A store that is missing, damaged, of another version, or cannot be written."""
 

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from brdfdb.errors import ParameterError
+
 _CONTROLS = ("Cc", "Cf", "Cs")
 
 
@@ -65,7 +67,7 @@ class Assumption(BaseModel):
     @model_validator(mode="after")
     def _check_compared(self) -> Assumption:
         if (self.max_albedo is None) != (not self.alternatives):
-            raise ValueError("assumed: max_albedo and alternatives are given together, or neither")
+            raise ParameterError("assumed", "max_albedo and alternatives are given together, or neither")
         return self
 
     @property

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from brdfdb.errors import BusyError, StoreError, UnknownMaterialError
+from brdfdb.errors import BusyError, ParameterError, StoreError, UnknownMaterialError
 from brdfdb.store.manifest import (
     Summary,
     check_manifest,
@@ -185,7 +185,7 @@ def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
         If there is no store, a snapshot is damaged, or something cannot be removed.
     """
     if keep < 1:
-        raise ValueError(f"keep: {keep} is not at least 1; the current revision always stays")
+        raise ParameterError("keep", f"{keep} is not at least 1; the current revision always stays", keep)
     store = Store(root)
     collected = Collected()
     try:

@@ -28,7 +28,7 @@ from typing import IO, TYPE_CHECKING, Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import BusyError, StoreError
+from brdfdb.errors import BusyError, ParameterError, StoreError
 from brdfdb.store.manifest import (
     NAME,
     Entry,
@@ -468,7 +468,7 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     from brdfdb.store.codec import dataset_files
 
     if not NAME.fullmatch(name):
-        raise ValueError(f"name: {name!r} is not made of lower-case letters, digits and single hyphens")
+        raise ParameterError("name", f"{name!r} is not made of lower-case letters, digits and single hyphens", name)
     store = Path(root)
     make_store(store)
     files = dataset_files(dataset)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
+from brdfdb.errors import ParameterError
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Grid, check_wavelengths
@@ -50,9 +51,11 @@ class Interpolation:
 
     def __post_init__(self) -> None:
         if self.method not in _METHODS:
-            raise ValueError(f"interpolation: {self.method!r} is not one of {', '.join(_METHODS)}")
+            raise ParameterError(
+                "interpolation", f"{self.method!r} is not one of {', '.join(_METHODS)}", self.method, tuple(_METHODS)
+            )
         if self.power not in (0.0, 0.5, 1.0):
-            raise ValueError(f"power: {self.power!r} is not 0, 0.5 or 1")
+            raise ParameterError("power", f"{self.power!r} is not 0, 0.5 or 1", self.power, (0.0, 0.5, 1.0))
 
     @property
     def cubic(self) -> bool:
@@ -118,15 +121,20 @@ class Layout:
     def __post_init__(self) -> None:
         material = self.material
         if material.spectral != (self.wavelength_nm is not None):
-            raise ValueError(f"wavelengths_nm: {material.name} {'needs them' if material.spectral else 'is grey'}")
+            raise ParameterError(
+                "wavelengths_nm", f"{material.name} {'needs them' if material.spectral else 'is grey'}"
+            )
         if material.anisotropic and not self.grid.anisotropic:
-            raise ValueError(f"grid: {material.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r")
+            raise ParameterError(
+                "grid", f"{material.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r"
+            )
         if material.anisotropic and material.spec.lobe_axes is None and self.grid.copies > 1:
-            raise ValueError(f"grid: {material.name} has no symmetry of an ellipse; phi must end at 360 degrees")
+            raise ParameterError("grid", f"{material.name} has no symmetry of an ellipse; phi must end at 360 degrees")
         if material.spec.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
-            raise ValueError(
-                f"grid: theta of 90 degrees is a pole of the model {material.spec.name} ({material.name}); "
-                "end the axis below 90"
+            raise ParameterError(
+                "grid",
+                f"theta of 90 degrees is a pole of the model {material.spec.name} ({material.name}); "
+                "end the axis below 90",
             )
         if self.wavelength_nm is not None:
             object.__setattr__(self, "wavelength_nm", check_wavelengths(self.wavelength_nm))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians
 from brdfdb.parameters import Floats
 from brdfdb.tables import _kernels
@@ -289,8 +290,8 @@ class Table(Described):
         nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
         expected = (nodes.size,) if self.wavelength_nm is None else (nodes.size, self.wavelength_nm.size)
         if self.specular.shape != expected or nodes.size < 2:  # kernels do not look
-            raise ValueError(
-                f"specular: shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
+            raise ParameterError(
+                "specular", f"shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
             )
         return nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import brdfdb
-from brdfdb.errors import StoreError
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb_pipelines import family_listing, terminal
 
 if TYPE_CHECKING:
@@ -233,9 +233,9 @@ def lookup(
 
     for angle, value in zip(ANISOTROPIC_AXES, angles_deg, strict=True):
         if not math.isfinite(value):
-            raise ValueError(f"{angle}: {value} is not a number of degrees")
+            raise ParameterError(angle, f"{value} is not a number of degrees", value)
         if angle.startswith("theta") and not 0.0 <= value <= 180.0:
-            raise ValueError(f"{angle}: {value:g} is outside [0, 180] degrees")
+            raise ParameterError(angle, f"{value:g} is outside [0, 180] degrees", value, (0.0, 180.0))
     store = brdfdb.open(root, snapshot=snapshot)
     source: Table | Family
     point: dict[str, Any] = {}
@@ -248,7 +248,7 @@ def lookup(
     else:
         source = store[name]
         if settings:
-            raise ValueError(f"--set {settings[0]}: {name} is a material, whose parameters are fixed")
+            raise ParameterError(f"--set {settings[0]}", f"{name} is a material, whose parameters are fixed")
         head = {"material": name, "revision": source.revision}
         dirac = source.specular is not None
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
