@@ -67,7 +67,7 @@ def verify(root: Path, names: Sequence[str]) -> int:
         print(f"brdfdb: {finding}", file=sys.stderr)
     among = sum(name not in store for name in wanted)
     what = f"{len(wanted) - among} materials" + (f" and {among} families" if among else "")
-    damaged = len({finding.name for finding in found})
+    damaged = len({finding.name for finding in found if not finding.remark})
     print(f"{what} verified, {terminal.size(total)}: {damaged or 'none'} damaged")
     return damaged
 
