@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.figure import Curve, Figure, Map, Panel, Statement, curve_of, listed, rows
-from brdfdb.gallery._he_torrance_cuts import Surface, described, surface_of
+from brdfdb.gallery._he_torrance_cuts import Surface, parameters_text, surface_of
 from brdfdb.geometry import degrees, radians
 from brdfdb.models import he_torrance, he_torrance_jones, he_torrance_mueller
 from brdfdb.parameters import Floats
@@ -61,9 +61,9 @@ def in_plane() -> Figure:
         key="he-torrance-1991-polarisation",
         paper="he1991",
         title="Polarised light in the plane of incidence",
-        caption=f"θ_i = {LIGHT_DEG:.0f}°. Aluminum of Fig. 8: {described(aluminum)}; plastic of the table top of "
-        f"Fig. 14: {described(table)}. Stokes vectors (I, Q, U, V), Q above 0 is s-polarised. The paper gives the "
-        "equations and no figure.",
+        caption=f"θ_i = {LIGHT_DEG:.0f}°. Aluminum of Fig. 8: {parameters_text(aluminum)}; plastic of the table top of "
+        f"Fig. 14: {parameters_text(table)}. Stokes vectors (I, Q, U, V), Q above 0 is s-polarised. The paper gives "
+        "the equations and no figure.",
         panels=[
             Panel(
                 title="Unpolarised light becomes polarised, m_01",

@@ -13,8 +13,8 @@ from brdfdb.gallery._he_torrance_cuts import (
     Cut,
     Surface,
     cut_of,
-    described,
-    measured,
+    measured_cuts,
+    parameters_text,
     reflected,
     specular,
     surface_of,
@@ -35,7 +35,7 @@ SMALL = 0.1  # relative change: our reading of "somewhat"
 def fig_06() -> Figure:
     """Return the parts of the light that one surface reflects."""
     surface = surface_of("scene-plastic-table", GREEN_NM)
-    (total,) = measured(surface, np.array([PARTS_DEG]))
+    (total,) = measured_cuts(surface, np.array([PARTS_DEG]))
     parts = cut_of(lambda *angles: he_torrance_parts(*angles, **surface).directional_diffuse, PARTS_DEG)
     diffuse = cut_of(he_torrance, PARTS_DEG, **surface)
     uniform = np.full(parts.x_deg.shape, surface["a"] / np.pi)
@@ -44,9 +44,9 @@ def fig_06() -> Figure:
         key="he-torrance-1991-fig-06",
         paper="he1991",
         title="Fig. 6: the three parts of a light intensity distribution",
-        caption=f"The table top of Fig. 14 at θ_i = {PARTS_DEG:.0f}°: {described(surface)}. Fig. 6 is a sketch without "
-        "parameters. Light and receiver have cones of π/1024 sr. Beside it, how the parts share the light of surfaces "
-        "that reflect all (|F|² = 1, a = 0, τ = 5 µm), at normal incidence.",
+        caption=f"The table top of Fig. 14 at θ_i = {PARTS_DEG:.0f}°: {parameters_text(surface)}. Fig. 6 is a sketch "
+        "without parameters. Light and receiver have cones of π/1024 sr. Beside it, how the parts share the light of "
+        "surfaces that reflect all (|F|² = 1, a = 0, τ = 5 µm), at normal incidence.",
         panels=[
             _parts_panel("polar", total, parts.f_r, uniform),
             _parts_panel("curves", total, parts.f_r, uniform),

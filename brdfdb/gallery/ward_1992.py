@@ -17,10 +17,10 @@ from brdfdb.gallery._ward_slices import (
     VIEWERS_DEG,
     WIDTH,
     Array,
-    described,
     f_r_of,
     half_widths_deg,
     isotropic,
+    parameters_text,
     slice_of,
 )
 from brdfdb.gallery.ward_1992_forms import forms, lobes
@@ -52,8 +52,8 @@ def _image() -> Figure:
         key="ward-1992-fig-04",
         paper="ward1992",
         title="Fig. 4: the highlight of rolled aluminum over the hemisphere",
-        caption=f"{described(aluminum)}, lit from (theta_i, phi_i) = (30, 0) degrees, from x > 0; after Fig. 4, a "
-        "photograph. A viewer stands where its direction, projected on the surface, falls.",
+        caption=f"{parameters_text(aluminum)}, lit from (theta_i, phi_i) = (30, 0) degrees, from x > 0; after Fig. 4, "
+        "a photograph. A viewer stands where its direction, projected on the surface, falls.",
         panels=[
             Map(
                 x_label="sin(theta_r) cos(phi_r)",
@@ -122,7 +122,7 @@ def _slices() -> Figure:
         key="ward-1992-fig-06",
         paper="ward1992",
         title="Fig. 6: the elliptical Gaussian fit of unfinished aluminum, in the plane of incidence",
-        caption=f"{described(aluminum)}. Fig. 6 shows a slice at 6 angles, which the text does not name, in one "
+        caption=f"{parameters_text(aluminum)}. Fig. 6 shows a slice at 6 angles, which the text does not name, in one "
         "plane, of which it does not say how it lies to the rolling: ours are in the planes along both axes. Its "
         "measured points are not printed as numbers.",
         panels=list(panels),
@@ -196,7 +196,7 @@ def _crescent() -> Figure:
         key="ward-1992-fig-07",
         paper="ward1992",
         title="Fig. 7: the crescent of an anisotropic highlight",
-        caption=f"{described(brass)}, on a sphere with x along its meridians; a distant light "
+        caption=f"{parameters_text(brass)}, on a sphere with x along its meridians; a distant light "
         f"{_LIGHT_DEG:g} degrees above the equator, a distant camera {_CAMERA_DEG:g} degrees, on one meridian. White "
         f"is {_WHITE:g} of the peak. Beside it eq. 4 with alpha = sqrt(alpha_x alpha_y).",
         panels=list(panels),
