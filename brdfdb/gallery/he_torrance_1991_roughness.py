@@ -45,8 +45,8 @@ def fig_06() -> Figure:
         paper="he1991",
         title="Fig. 6: the three parts of a light intensity distribution",
         caption=f"The table top of Fig. 14 at θ_i = {PARTS_DEG:.0f}°: {parameters_text(surface)}. Fig. 6 is a sketch "
-        "without parameters. Light and receiver have cones of π/1024 sr. Beside it, how the parts share the light of "
-        "surfaces that reflect all (|F|² = 1, a = 0, τ = 5 µm), at normal incidence.",
+        "without parameters. Light and receiver have cones of π/1024 sr. The last panel has the shares of both "
+        "parts for surfaces that reflect all light (|F|² = 1, a = 0, τ = 5 µm), at normal incidence.",
         panels=[
             _parts_panel("polar", total, parts.f_r, uniform),
             _parts_panel("curves", total, parts.f_r, uniform),
