@@ -129,8 +129,8 @@ def fig_08() -> Figure:
                 says="For 10, 30, 45 and 60 degrees the reflected intensity is maximal at larger-than-specular angles.",
                 where="section 4, on Fig. 8",
                 seen=f"The largest values are at {listed([cut.peak_deg for cut in off])} degrees, "
-                f"{listed([cut.peak for cut in off], '.3f')} times those in the mirror direction. Without "
-                f"cones the ratio is {listed(ratios, '.3f')}, by the reference {listed(expected, '.3f')}.",
+                f"{listed([cut.peak for cut in off], '.3f')} times those in the mirror direction. Without the "
+                f"average over cones the ratio is {listed(ratios, '.3f')}, by the reference {listed(expected, '.3f')}.",
                 holds=all(cut.peak_deg > cut.theta_i_deg and cut.peak > 1.0 for cut in off)
                 and bool(np.allclose(ratios, expected, rtol=BY_HAND)),
                 threshold_from="the paper's words: larger than specular; an independent evaluation in 50 digits gives "

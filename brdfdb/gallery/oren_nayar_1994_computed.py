@@ -85,7 +85,7 @@ def _far_from_lambert(total: Floats, flat: Floats) -> Statement:
     return Statement(
         says="these radiance plots deviate substantially from Lambertian reflectance",
         where="section 4.3, Fig. 8",
-        seen=f"The radiance is {share.min():.2f} to {share.max():.2f} times the Lambertian.",
+        seen=f"The radiance is {share.min():.2f} to {share.max():.2f} times Lambert's.",
         holds=bool(share.min() < 1.0 - SMALL and share.max() > 1.0 + SMALL),
         threshold_from="our reading: substantial is more than a tenth, on both sides",
     )

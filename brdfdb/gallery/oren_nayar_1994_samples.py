@@ -127,7 +127,7 @@ def _in_plane(number: int, sample: str) -> Figure:
                 where=f"section 5, Fig. {number}",
                 seen=f"The model has no peak there: five degrees past θ_i of {listed(LIGHTS_DEG, '.0f')}° it has "
                 f"{listed(past, '.3f')} times the radiance at θ_i.",
-                threshold_from="the paper's words: the peak is not the model's, which continues to rise",
+                threshold_from="the paper's words: the model has no peak and continues to rise",
                 holds=min(past) > 1.0,
             ),
             _accurate(lines, LIGHTS_DEG),

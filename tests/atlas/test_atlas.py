@@ -1,4 +1,4 @@
-"""The atlas: every misprint has its figure, ours holds in all of them, and what fails is seen to fail."""
+"""The atlas: every misprint has its figure, our form stays within its tolerance, and the wrong form fails."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ MODULES = (oren_nayar_1994, he_torrance_1991, he_torrance_1991_vectors, ward_199
 FIGURES: dict[str, Callable[[], Figure]] = {key: made for module in MODULES for key, made in module.FIGURES.items()}
 every_figure = pytest.mark.parametrize("key", FIGURES)
 
-ROUNDED = 6e-4  # relative; worst measured 5.7e-4, the second term of Beckmann's limit; five digits leave 5e-5
-OURS_ALONE = {"ward-narrow-at-grazing"}  # where it is weakest
+ROUNDED = 6e-4  # relative error. Worst measured: 5.7e-4, the second term of Beckmann's limit; five digits leave 5e-5
+OURS_ALONE = {"ward-narrow-at-grazing"}  # figures of our form alone
 
 
 @functools.cache
@@ -30,16 +30,17 @@ def figure(key: str) -> Figure:
 
 
 def curve(key: str, role: Role) -> Curve:
-    """The only one of that role in the first panel."""
+    """Return the only curve of a role in the first panel."""
     panel = figure(key).panels[0]
     assert isinstance(panel, Panel)
-    (found,) = [each for each in panel.curves if each.role == role]
-    return found
+    (curve,) = [curve for curve in panel.curves if curve.role == role]
+    return curve
 
 
 def wrong(key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    found = curve(key, _errors.ROLES[_errors.BY_KEY[key].kind])
-    return np.array(found.x), np.array(found.y, dtype=np.float64)
+    """Return x and the errors [1] of the wrong form of a misprint."""
+    line = curve(key, _errors.ROLES[_errors.BY_KEY[key].kind])
+    return np.array(line.x), np.array(line.y, dtype=np.float64)
 
 
 def test_every_misprint_has_a_figure() -> None:
@@ -61,10 +62,10 @@ def test_a_figure_has_the_key_and_the_paper_that_it_is_listed_under(key: str) ->
 
 
 @every_figure
-def test_ours_stays_and_what_is_drawn_beside_it_fails(key: str) -> None:
-    said = [statement.says for statement in figure(key).statements]
-    assert any(re.match("(.*, )?ours(, .*)?: within ", each) for each in said)
-    assert any(": off by more than " in each for each in said) != (key in OURS_ALONE)
+def test_our_form_stays_and_the_forms_beside_it_fail(key: str) -> None:
+    sentences = [statement.says for statement in figure(key).statements]
+    assert any(re.match("(.*, )?ours(, .*)?: within ", sentence) for sentence in sentences)
+    assert any(": off by more than " in sentence for sentence in sentences) != (key in OURS_ALONE)
     for statement in figure(key).statements:
         assert statement.holds, statement
 
@@ -74,11 +75,11 @@ def test_every_point_of_ours_is_drawn(key: str) -> None:
     drawn = 0
     for panel in figure(key).panels:
         if isinstance(panel, Panel):
-            for each in panel.curves:
-                assert len(each.x) == len(each.y)
-                if each.role == "ours":
-                    assert None not in each.y
-                    drawn += len(each.y)
+            for line in panel.curves:
+                assert len(line.x) == len(line.y)
+                if line.role == "ours":
+                    assert None not in line.y
+                    drawn += len(line.y)
         elif isinstance(panel, Map) and panel.title == "ours":
             values = [value for row in panel.values for value in row]
             assert None not in values
@@ -86,7 +87,7 @@ def test_every_point_of_ours_is_drawn(key: str) -> None:
     assert drawn >= 6
 
 
-# What the printed forms are off by, where it is a closed form
+# Errors of the wrong forms that have a closed form
 
 
 def test_a_radiance_for_a_brdf_is_off_by_the_cosine_of_the_light() -> None:
@@ -109,17 +110,17 @@ def test_the_slope_for_its_arctan_is_off_by_their_ratio() -> None:
 
 
 def test_beckmanns_limit_is_off_by_a_part_in_g_at_the_peak() -> None:
-    found = curve("beckmanns-limit", "ours")
+    drawn = curve("beckmanns-limit", "ours")
     panel = figure("beckmanns-limit").panels[0]
     assert isinstance(panel, Panel)
     limit, first_order, ours = panel.curves
-    assert (limit.label, ours) == ("Beckmann's limit", found)
+    assert (limit.label, ours) == ("Beckmann's limit", drawn)
     assert first_order.role == limit.role == "textbook"
     g, off = np.array(limit.x), np.array(limit.y, dtype=np.float64)
     np.testing.assert_allclose(off[g > 1e3], 1.0 / g[g > 1e3], rtol=ROUNDED)
 
 
-# The means
+# The building blocks
 
 
 def test_a_form_that_is_off_does_not_stay_and_one_that_is_not_does_not_fail() -> None:
@@ -145,5 +146,5 @@ def test_an_error_of_zero_is_drawn_and_one_of_nan_is_a_gap_that_the_label_counts
 def test_matrices_are_compared_by_their_largest_elements() -> None:
     truth = np.array([[3.0, 0.0], [0.0, 5.0j]])
     assert _errors.relative(truth + np.array([[0.0, 0.5], [0.25, 0.0]]), truth) == 0.1
-    assert _errors.relative(3.0 * 2.0**-1000, 2.0**-999) == 0.5  # tiny ones are not squared away
+    assert _errors.relative(3.0 * 2.0**-1000, 2.0**-999) == 0.5  # Tiny values do not underflow
     assert np.isnan(_errors.relative(truth + np.diag([np.inf, 0.0]), truth))

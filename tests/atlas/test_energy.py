@@ -1,4 +1,4 @@
-"""The figures of energy: what is said of each holds, and their albedos are those of other quadratures."""
+"""The figures of energy: statements hold or fail for a known reason; albedos are those of other quadratures."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from brdfdb.materials import presets
 from brdfdb.reference import he_torrance_1991, portsmouth_2025
 
 HALF_PI = np.pi / 2
-DIGITS = 5.1e-5  # relative: curves are rounded to five digits, 5.0e-5 at most
-SCIPY = 6e-5  # relative: those digits, and 1e-6 of the quadrature; worst measured: 3.5e-5
+DIGITS = 5.1e-5  # relative error of curves, which are rounded to five digits: 5.0e-5 at most
+SCIPY = 6e-5  # relative error of these digits and of the quadrature, 1e-6. Worst measured: 3.5e-5
 
-# Every statement: the figure, and the words that it begins with; where it does not hold, why
+# The figure and the first words of every statement, with the reason where it does not hold
 HOLDING = [
     ("energy-oren-nayar", "near grazing the fit reflects more than it receives"),
     ("energy-oren-nayar", "the fit never exceeds 1 for sigma of 40 degrees and more"),
@@ -66,9 +66,9 @@ FAILING = {
     ("energy-minnaert", '"the following reflectance function"'): "Oren and Nayar 1994, section 1: the albedo is "
     "cos(theta_i)^(k - 1), without a bound for k < 1",
 }
-STATEMENTS = [pytest.param(*each, id="-".join(each)) for each in HOLDING] + [
-    pytest.param(*each, id="-".join(each), marks=pytest.mark.xfail(strict=True, reason=reason))
-    for each, reason in FAILING.items()
+STATEMENTS = [pytest.param(*phrase, id="-".join(phrase)) for phrase in HOLDING] + [
+    pytest.param(*phrase, id="-".join(phrase), marks=pytest.mark.xfail(strict=True, reason=reason))
+    for phrase, reason in FAILING.items()
 ]
 
 
@@ -78,15 +78,15 @@ def figure(key: str) -> Figure:
 
 
 def curve_of(key: str, label: str, panel: int = 0) -> dict[float, float]:
-    """One curve: albedo by angle of incidence [degree], or by alpha."""
-    found = figure(key).panels[panel]
-    assert isinstance(found, Panel)
-    (curve,) = [each for each in found.curves if each.label == label]
+    """Return the albedos [1] of a curve by the angle of incidence [degree], or by alpha."""
+    drawn = figure(key).panels[panel]
+    assert isinstance(drawn, Panel)
+    (curve,) = [curve for curve in drawn.curves if curve.label == label]
     return {x: y for x, y in zip(curve.x, curve.y, strict=True) if y is not None}
 
 
 def by_scipy(model: str, theta_i_deg: float, azimuths: int, **parameters: Any) -> float:
-    """The directional albedo without a Dirac part: scipy over theta_r, equal steps over phi_r, which is periodic."""
+    """Return the directional albedo [1] without specular part, by scipy over theta_r and equal steps over phi_r."""
     theta_i = np.deg2rad(theta_i_deg)
     phi_r = 2.0 * np.pi * (np.arange(azimuths) + 0.5) / azimuths
 
@@ -100,8 +100,8 @@ def by_scipy(model: str, theta_i_deg: float, azimuths: int, **parameters: Any) -
 
 
 @pytest.mark.parametrize(("key", "says"), STATEMENTS)
-def test_what_is_said_of_a_figure_holds(key: str, says: str) -> None:
-    (statement,) = [each for each in figure(key).statements if each.says.startswith(says)]
+def test_a_statement_holds(key: str, says: str) -> None:
+    (statement,) = [statement for statement in figure(key).statements if statement.says.startswith(says)]
     assert statement.holds, statement.seen
 
 

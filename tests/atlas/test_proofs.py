@@ -1,4 +1,4 @@
-"""The physical proofs: every entry has one, which its right form passes and its printed form fails."""
+"""The physical proofs: every entry has a proof that its right form passes and its printed form fails."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ def test_rays_in_a_groove_lit_and_seen_along_the_normal(slope_deg: float) -> Non
     cos = math.cos(slope)
     direct, bounce = (_proofs_oren_nayar.traced(0.0, 0.0, 0.0, slope, 0.7, points) for points in (0, 400))
     assert direct == pytest.approx(cos / math.pi, rel=1e-12)
-    # of what a facet sends out the other gets 1 - cos(theta_a), by crossed strings
+    # A facet sends the share 1 - cos(theta_a) to the other one, by crossed strings
     assert bounce == pytest.approx(cos * (1.0 - cos) / math.pi, rel=2e-3)
 
 
 def test_grazing_light_leaves_the_facet_that_faces_it_lit_at_the_top() -> None:
-    # light at 80 degrees, slopes of 45: 2 cos(80) cos(45) / cos(35) of the facet is lit, eq. 35
+    # Light at 80 degrees lights 2 cos(80) cos(45) / cos(35) of a facet with a slope of 45 degrees, eq. 35
     x = (np.arange(100_000) + 0.5) / 100_000
     towards = np.array([math.sin(math.radians(80.0)), 0.0, math.cos(math.radians(80.0))])
     lit = _proofs_oren_nayar._facet(x, towards, math.radians(45.0), 0.0)

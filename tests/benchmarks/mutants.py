@@ -1,4 +1,4 @@
-"""How many statements of the gallery notice each wrong model: ``python tests/benchmarks/mutants.py``.
+"""The number of statements of the gallery that notice each wrong model: ``python tests/benchmarks/mutants.py``.
 
 Plants every wrong model of a paper, computes the figures of the paper, and prints a line a wrong model; exits with 1 if
 a statement fails for none of them, or fewer than two statements notice one. About a minute in all. ``--quick`` takes
@@ -35,7 +35,7 @@ def main() -> int:
         matrix = matrix_of(keys, module.MUTANTS[:3] if arguments.quick else module.MUTANTS)
         print(f"{paper}: {matrix}", flush=True)
         for name, failing in matrix.noticed.items() if arguments.statements else ():
-            print("\n".join([name, *(f"    {said.figure}: {said.says}" for said in sorted(failing))]))
+            print("\n".join([name, *(f"    {sentence.figure}: {sentence.says}" for sentence in sorted(failing))]))
         wrong += len(matrix.overlooked) + (0 if arguments.quick else len(matrix.blind))
     return 1 if wrong else 0
 

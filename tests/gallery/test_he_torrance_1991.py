@@ -1,4 +1,4 @@
-"""The figures of He et al. 1991: curves are what captions say; what the paper says is seen, or it is known why not."""
+"""The figures of He et al. 1991: the curves have their captions, and statements hold or fail for a known reason."""
 
 from functools import cache
 from typing import Any
@@ -10,13 +10,13 @@ import pytest
 from brdfdb.figure import Curve, Figure, Panel
 from brdfdb.gallery.he_torrance_1991 import FIGURES
 from brdfdb.reference import he_torrance_1991 as reference
-from brdfdb.spectra import refractive_index
+from tests.gallery.figures import curve_of, optics, panel_of, statement_of, value_at
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
-CONE = np.pi / 1024  # of light and receiver, section 4
-DIGITS = 5e-5  # numbers of figures have five digits: half a unit of the last one is that share of 1.0000
-SLOPE = 3e-4  # 2.3e-4, from the second terms
+CONE = np.pi / 1024  # solid angle [sr] of light and receiver, section 4
+DIGITS = 5e-5  # relative error of numbers with five digits: half a unit of the last digit of 1.0000
+SLOPE = 3e-4  # absolute error of slopes. Worst measured: 2.3e-4, from the second terms
 
 
 @cache
@@ -28,26 +28,12 @@ def fig(number: int) -> Figure:
     return figure(f"he-torrance-1991-fig-{number:02d}")
 
 
-def panel(number: int, which: int = 0) -> Panel:
-    found = fig(number).panels[which]
-    assert isinstance(found, Panel)
-    return found
+def panel(number: int, index: int = 0) -> Panel:
+    return panel_of(fig(number), index)
 
 
-def curve(number: int, label: str, which: int = 0) -> Curve:
-    (found,) = (each for each in panel(number, which).curves if each.label == label)
-    return found
-
-
-def at(curve: Curve, x: float) -> float:
-    value = curve.y[curve.x.index(x)]
-    assert value is not None
-    return value
-
-
-def optics(page: str, wavelength_nm: float) -> dict[str, float]:
-    n, k = refractive_index(page, np.array(wavelength_nm))
-    return {"wavelength_nm": wavelength_nm, "n": float(n), "k": float(k)}
+def curve(number: int, label: str, index: int = 0) -> Curve:
+    return curve_of(fig(number), label, index)
 
 
 ALUMINUM = {"sigma_0_um": 0.28, "tau_um": 1.77}  # section 4
@@ -61,19 +47,19 @@ def test_a_figure_is_whole(key: str) -> None:
     assert shown.panels
     assert shown.statements
     assert Figure.model_validate_json(shown.model_dump_json()) == shown
-    for each in shown.panels:
-        assert isinstance(each, Panel)
-        assert each.curves
-        assert len({curve.label for curve in each.curves}) == len(each.curves)
-        for curve in each.curves:
+    for index in range(len(shown.panels)):
+        panel = panel_of(shown, index)
+        assert panel.curves
+        assert len({curve.label for curve in panel.curves}) == len(panel.curves)
+        for curve in panel.curves:
             assert len(curve.x) == len(curve.y) > 1
             assert np.isfinite(np.array(curve.y, dtype=np.float64)).all()
             assert (np.diff(curve.x) > 0.0).all()
-            if each.kind == "polar":
+            if panel.kind == "polar":
                 assert -90.0 <= curve.x[0] < 0.0 < curve.x[-1] <= 90.0
 
 
-# Each statement by a part of what it says that no other statement of its figure has
+# A fragment of each statement that no other statement of its figure has
 
 STATEMENTS = {
     7: ("strong specular", "both specular and directional diffuse", "angular width", "wavelength is increased"),
@@ -90,7 +76,7 @@ NOT_SEEN = {
         9,
         "is specular",
     ): "He et al. 1991, Fig. 9: with the printed sigma_0 of 2.9 wavelengths e^-g leaves nothing specular; "
-    "what emerges is the directional diffuse lobe, largest beyond the mirror direction",
+    "the directional diffuse lobe emerges instead, largest beyond the mirror direction",
     (
         9,
         "upper bound",
@@ -114,8 +100,8 @@ CASES = [case(number, fragment) for number, fragments in STATEMENTS.items() for 
 
 
 @pytest.mark.parametrize(("number", "fragment"), CASES)
-def test_what_the_paper_says_is_seen(number: int, fragment: str) -> None:
-    (statement,) = (each for each in fig(number).statements if fragment in each.says)
+def test_a_statement_of_the_paper_holds(number: int, fragment: str) -> None:
+    statement = statement_of(fig(number), fragment)
     assert statement.holds, statement.seen
 
 
@@ -125,7 +111,7 @@ def test_every_statement_is_tested() -> None:
         assert len(fragments) == len(fig(number).statements)
 
 
-# What the curves are
+# The curves
 
 
 @pytest.mark.parametrize(
@@ -133,15 +119,15 @@ def test_every_statement_is_tested() -> None:
     [(7, [10, 45, 75]), (8, [10, 30, 45, 60, 75]), (9, [10, 45, 60, 75]), (11, [15, 30, 45, 60])],
 )
 def test_the_angles_of_incidence_are_those_of_the_captions(number: int, angles: list[int]) -> None:
-    assert [each.label for each in panel(number).curves] == [f"θ_i = {angle}°" for angle in angles]
+    assert [curve.label for curve in panel(number).curves] == [f"θ_i = {angle}°" for angle in angles]
 
 
 @pytest.mark.parametrize("number", [7, 8, 9])
 def test_curves_are_over_their_value_in_the_mirror_direction(number: int) -> None:
-    """Eq. (11)."""
-    for each in panel(number).curves:
-        assert at(each, float(each.label.removeprefix("θ_i = ").removesuffix("°"))) == 1.0
-    assert at(panel(10).curves[0], 0.0) == 1.0
+    """The curves are those of eq. 11."""
+    for curve in panel(number).curves:
+        assert value_at(curve, float(curve.label.removeprefix("θ_i = ").removesuffix("°"))) == 1.0
+    assert value_at(panel(10).curves[0], 0.0) == 1.0
 
 
 def through_apertures(theta_i: float, x: float, surface: dict[str, float], a: float) -> float:
@@ -168,7 +154,7 @@ def test_curves_through_apertures_against_the_reference(
     number: int, theta_i: float, x: float, surface: dict[str, float], a: float
 ) -> None:
     expected = through_apertures(theta_i, x, surface, a) / through_apertures(theta_i, theta_i, surface, a)
-    assert at(curve(number, f"θ_i = {theta_i:g}°"), x) == pytest.approx(expected, rel=DIGITS)
+    assert value_at(curve(number, f"θ_i = {theta_i:g}°"), x) == pytest.approx(expected, rel=DIGITS)
 
 
 def test_across_the_plane_of_incidence_against_the_reference() -> None:
@@ -176,7 +162,7 @@ def test_across_the_plane_of_incidence_against_the_reference() -> None:
     angles = np.deg2rad(10.0), np.deg2rad(20.0), np.pi / 2.0
     expected = 1.0 + float(reference.directional_diffuse(*angles, **surface)) * np.pi / 0.9
     for x in (-20.0, 20.0):
-        assert at(curve(9, "θ_i = 10°", 1), x) == pytest.approx(expected, rel=DIGITS)
+        assert value_at(curve(9, "θ_i = 10°", 1), x) == pytest.approx(expected, rel=DIGITS)
 
 
 def test_sandpaper_against_the_reference() -> None:
@@ -187,9 +173,9 @@ def test_sandpaper_against_the_reference() -> None:
     for x in (-40.0, 88.0):
         theta_r = np.deg2rad(abs(x))
         ratio = reference.directional_diffuse(0.0, theta_r, 0.0, **full) / normal
-        assert at(curve(10, "σ_0 = 44 µm"), x) == pytest.approx(float(ratio), rel=DIGITS)
+        assert value_at(curve(10, "σ_0 = 44 µm"), x) == pytest.approx(float(ratio), rel=DIGITS)
         limit = reference.very_rough(0.0, theta_r, 0.0, 4.4, n, k) / reference.very_rough(0.0, 0.0, 0.0, 4.4, n, k)
-        assert at(curve(10, "σ_0/λ → ∞"), x) == pytest.approx(float(limit), rel=DIGITS)
+        assert value_at(curve(10, "σ_0/λ → ∞"), x) == pytest.approx(float(limit), rel=DIGITS)
 
 
 def test_blue_plastic_is_in_absolute_values() -> None:
@@ -197,11 +183,11 @@ def test_blue_plastic_is_in_absolute_values() -> None:
     assert panel(11).log_y
     for theta_i in (15.0, 60.0):
         drawn = curve(11, f"θ_i = {theta_i:g}°")
-        assert at(drawn, -30.0) == pytest.approx(0.15 / np.pi, rel=DIGITS)
+        assert value_at(drawn, -30.0) == pytest.approx(0.15 / np.pi, rel=DIGITS)
         for x in (theta_i, theta_i + 2.0):
             arguments = np.deg2rad(theta_i), np.deg2rad(x), np.pi, CONE, CONE
             expected = float(reference.aperture_specular(*arguments, **smooth)) + 0.15 / np.pi
-            assert at(drawn, x) == pytest.approx(expected, rel=DIGITS)
+            assert value_at(drawn, x) == pytest.approx(expected, rel=DIGITS)
 
 
 def test_cylinders_against_the_reference() -> None:
@@ -210,12 +196,12 @@ def test_cylinders_against_the_reference() -> None:
         f"({name}) σ_0 = {sigma:g} µm, τ = 3 µm"
         for name, sigma in zip("abcde", (0.18, 0.28, 0.38, 0.48, 0.58), strict=True)
     ]
-    assert [each.label for each in panel(12).curves] == [*labels, "(f) σ_0 = 2.5 µm, τ = 16 µm"]
+    assert [curve.label for curve in panel(12).curves] == [*labels, "(f) σ_0 = 2.5 µm, τ = 16 µm"]
     cylinder = {"sigma_0_um": 0.38, "tau_um": 3.0, **page}
     rho_s = reference.specular_reflectance(np.deg2rad(80.0), **cylinder)
-    assert at(curve(12, labels[2]), 80.0) == pytest.approx(float(rho_s), rel=DIGITS)
+    assert value_at(curve(12, labels[2]), 80.0) == pytest.approx(float(rho_s), rel=DIGITS)
     lobe = [reference.directional_diffuse(np.deg2rad(30.0), np.deg2rad(x), np.pi, **cylinder) for x in (50.0, 30.0)]
-    assert at(curve(12, labels[2], 1), 50.0) == pytest.approx(float(lobe[0] / lobe[1]), rel=DIGITS)
+    assert value_at(curve(12, labels[2], 1), 50.0) == pytest.approx(float(lobe[0] / lobe[1]), rel=DIGITS)
 
 
 def test_the_limiting_cases_against_the_reference() -> None:
@@ -227,17 +213,17 @@ def test_the_limiting_cases_against_the_reference() -> None:
         "(a), σ_0/λ → ∞": reference.very_rough(*angles, 2.5 / 16.0, n, k),
         "(c)": 1.0 / np.pi,
     }
-    assert [each.label for each in panel(13).curves] == list(expected)
+    assert [curve.label for curve in panel(13).curves] == list(expected)
     for label, value in expected.items():
-        assert at(curve(13, label), 50.0) == pytest.approx(float(value), rel=DIGITS)
+        assert value_at(curve(13, label), 50.0) == pytest.approx(float(value), rel=DIGITS)
     mirror = reference.smooth(np.deg2rad(80.0), n, k)
-    assert at(curve(13, "(b)", 1), 80.0) == pytest.approx(float(mirror), rel=DIGITS)
+    assert value_at(curve(13, "(b)", 1), 80.0) == pytest.approx(float(mirror), rel=DIGITS)
 
 
 def test_the_way_to_the_limits_has_the_slopes_of_their_first_terms() -> None:
-    """1 - e^-g goes as sigma_0^2; the first term left out of the very rough limit as 1 / g."""
+    """1 - e^-g is proportional to sigma_0^2, and the first term beyond the very rough limit to 1 / g."""
     for label, ends, slope in (("smooth", slice(0, 2), 2.0), ("very rough", slice(-2, None), -2.0)):
-        (drawn,) = (each for each in panel(13, 2).curves if each.label.startswith(label))
+        (drawn,) = (curve for curve in panel(13, 2).curves if curve.label.startswith(label))
         x, y = np.log10(drawn.x[ends]), np.log10(np.array(drawn.y[ends], dtype=np.float64))
         assert np.diff(y)[0] / np.diff(x)[0] == pytest.approx(slope, abs=SLOPE)
 
@@ -246,4 +232,4 @@ def test_the_images_in_plastic_against_the_reference() -> None:
     page = optics("other/ZeonexE48R/Sultanova", 550.0)
     for label, sigma_0 in (("cube", 0.0), ("table", 0.20)):
         expected = reference.specular_reflectance(np.deg2rad(75.0), sigma_0_um=sigma_0, tau_um=2.0, **page)
-        assert at(curve(14, label), 75.0) == pytest.approx(float(expected), rel=DIGITS)
+        assert value_at(curve(14, label), 75.0) == pytest.approx(float(expected), rel=DIGITS)

@@ -12,14 +12,14 @@ from brdfdb.figure import Curve, Figure, Map, Panel
 from brdfdb.gallery import he_torrance_1991_polarisation, he_torrance_1991_roughness
 from brdfdb.gallery._gaussian_profiles import SPACING, profile, reached
 from brdfdb.reference import he_torrance_1991 as reference
-from brdfdb.spectra import refractive_index
+from tests.gallery.figures import cases, curve_of, optics, panel_of, statement_of, value_at
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 
 FIGURES = {**he_torrance_1991_roughness.FIGURES, **he_torrance_1991_polarisation.FIGURES}
-DIGITS = 5e-5  # numbers of figures have five digits
+DIGITS = 5e-5  # relative error of numbers with five digits
 
-# Every statement: the figure, and a phrase of it
+# The figure and a phrase of every statement
 STATEMENTS = [
     ("fig-06", "contained within"),
     ("fig-06", "far from ideal diffuse"),
@@ -48,10 +48,6 @@ BROKEN = {
     ("mueller", "like depolarization"): "He et al. 1991, section 3.1: with F at the one normal n_b (eq. 50) the first "
     "surface leaves fully polarised light fully polarised",
 }
-CASES = [
-    pytest.param(*each, marks=[pytest.mark.xfail(strict=True, reason=BROKEN[each])] if each in BROKEN else [])
-    for each in STATEMENTS
-]
 
 
 @cache
@@ -59,35 +55,21 @@ def figure(name: str) -> Figure:
     return FIGURES[f"he-torrance-1991-{name}"]()
 
 
-def panel(name: str, which: int = 0) -> Panel:
-    shown = figure(name).panels[which]
-    assert isinstance(shown, Panel)
-    return shown
+def panel(name: str, index: int = 0) -> Panel:
+    return panel_of(figure(name), index)
 
 
-def curve(name: str, label: str, which: int = 0) -> Curve:
-    (found,) = (each for each in panel(name, which).curves if each.label == label)
-    return found
-
-
-def at(curve: Curve, x: float) -> float:
-    value = curve.y[curve.x.index(x)]
-    assert value is not None
-    return value
-
-
-def optics(page: str, wavelength_nm: float) -> dict[str, float]:
-    n, k = refractive_index(page, np.array(wavelength_nm))
-    return {"wavelength_nm": wavelength_nm, "n": float(n), "k": float(k)}
+def curve(name: str, label: str, index: int = 0) -> Curve:
+    return curve_of(figure(name), label, index)
 
 
 ALUMINUM = {"sigma_0_um": 0.28, "tau_um": 1.77}
 TABLE = {"sigma_0_um": 0.20, "tau_um": 2.0}
 
 
-@pytest.mark.parametrize(("name", "phrase"), CASES)
-def test_what_the_paper_says_is_seen(name: str, phrase: str) -> None:
-    (statement,) = [each for each in figure(name).statements if phrase in each.says]
+@pytest.mark.parametrize(("name", "phrase"), cases(STATEMENTS, BROKEN))
+def test_a_statement_of_the_paper_holds(name: str, phrase: str) -> None:
+    statement = statement_of(figure(name), phrase)
     assert statement.threshold_from
     assert statement.holds, statement.seen
 
@@ -102,10 +84,10 @@ def test_every_statement_is_tested() -> None:
 def test_a_figure_has_its_key_and_finite_curves(key: str) -> None:
     shown = figure(key.removeprefix("he-torrance-1991-"))
     assert (shown.key, shown.paper) == (key, "he1991")
-    for each in shown.panels:
-        if isinstance(each, Panel):
-            assert len({curve.label for curve in each.curves}) == len(each.curves)
-            for drawn in each.curves:
+    for panel in shown.panels:
+        if isinstance(panel, Panel):
+            assert len({curve.label for curve in panel.curves}) == len(panel.curves)
+            for drawn in panel.curves:
                 assert (np.diff(drawn.x) > 0.0).all()
                 assert sum(y is not None for y in drawn.y) > 5
 
@@ -117,13 +99,15 @@ def test_the_parts_of_the_table_top_against_the_reference() -> None:
     page = optics("other/ZeonexE48R/Sultanova", 550.0)
     angles = np.deg2rad(60.0), np.deg2rad(75.0), np.pi
     expected = reference.directional_diffuse(*angles, **TABLE, **page)
-    for which in (0, 1):
-        assert at(curve("fig-06", "directional diffuse", which), 75.0) == pytest.approx(float(expected), rel=DIGITS)
-        assert at(curve("fig-06", "uniform diffuse", which), 75.0) == pytest.approx(0.28 / np.pi, rel=DIGITS)
+    for index in (0, 1):
+        assert value_at(curve("fig-06", "directional diffuse", index), 75.0) == pytest.approx(
+            float(expected), rel=DIGITS
+        )
+        assert value_at(curve("fig-06", "uniform diffuse", index), 75.0) == pytest.approx(0.28 / np.pi, rel=DIGITS)
 
 
 def test_the_share_of_the_specular_part_is_e_to_the_minus_g() -> None:
-    """At normal incidence, of gentle slopes that reflect all: g = (4 pi sigma_0 / lambda)^2."""
+    """At normal incidence on gentle slopes that reflect all light, g is (4 pi sigma_0 / lambda)^2."""
     drawn = curve("fig-06", "specular", 2)
     for x, y in zip(drawn.x[:5], drawn.y[:5], strict=True):
         assert y == pytest.approx(np.exp(-((4.0 * np.pi * x) ** 2)), rel=1e-3)  # |F|^2 is 0.9996
@@ -137,10 +121,10 @@ def test_roughness_and_shadowing_of_the_aluminum_against_the_reference(theta_deg
     theta = np.deg2rad(theta_deg)
     sigma = reference.effective_roughness(theta, theta, 0.28, 1.77) / 0.28
     drawn = curve("effective-roughness", "aluminum of Fig. 8")
-    assert at(drawn, theta_deg) == pytest.approx(float(sigma), rel=tolerance)
+    assert value_at(drawn, theta_deg) == pytest.approx(float(sigma), rel=tolerance)
     S = reference.shadowing(theta, 0.28, 1.77) ** 2
     drawn = curve("effective-roughness", "aluminum of Fig. 8", 1)
-    assert at(drawn, theta_deg) == pytest.approx(float(S), rel=tolerance)
+    assert value_at(drawn, theta_deg) == pytest.approx(float(S), rel=tolerance)
 
 
 def test_specular_reflectance_with_either_roughness() -> None:
@@ -150,8 +134,8 @@ def test_specular_reflectance_with_either_roughness() -> None:
     g_0 = (4.0 * np.pi * 0.28 / 0.5 * np.cos(theta)) ** 2
     fixed = reference.smooth(theta, page["n"], page["k"]) * reference.shadowing(theta, 0.28, 1.77) ** 2 * np.exp(-g_0)
     drawn = panel("effective-roughness", 2).curves
-    assert at(drawn[0], 75.0) == pytest.approx(float(with_sigma), rel=DIGITS)
-    assert at(drawn[1], 75.0) == pytest.approx(float(fixed), rel=1e-4)
+    assert value_at(drawn[0], 75.0) == pytest.approx(float(with_sigma), rel=DIGITS)
+    assert value_at(drawn[1], 75.0) == pytest.approx(float(fixed), rel=1e-4)
 
 
 def test_profiles_have_the_autocorrelation_of_eq_48() -> None:
@@ -163,7 +147,7 @@ def test_profiles_have_the_autocorrelation_of_eq_48() -> None:
         assert float(np.mean(heights * shifted)) == pytest.approx(np.exp(-(lag**2)), abs=0.05)
 
 
-def test_what_a_direction_reaches_is_what_a_ray_finds_free() -> None:
+def test_a_direction_reaches_the_points_whose_rays_are_free() -> None:
     heights = profile(5)[:400]
     slope, theta = 0.3, np.deg2rad(75.0)
     steps = SPACING * np.arange(heights.size)
@@ -182,18 +166,18 @@ def test_elements_in_the_plane_and_around_the_normal_against_the_reference() -> 
     M = reference.mueller(np.deg2rad(60.0), np.deg2rad(40.0), np.pi, **aluminum)
     for row, column in ((1, 1), (2, 3), (3, 3)):
         expected = float(M[row, column] / M[0, 0])
-        assert at(curve("polarisation", f"m_{row}{column}", 1), 40.0) == pytest.approx(expected, rel=DIGITS)
+        assert value_at(curve("polarisation", f"m_{row}{column}", 1), 40.0) == pytest.approx(expected, rel=DIGITS)
     M = reference.mueller(np.deg2rad(60.0), np.deg2rad(60.0), np.deg2rad(70.0), **aluminum)
     for drawn in panel("mueller").curves:
         row, column = (int(digit) for digit in drawn.label.removeprefix("m_"))
-        assert at(drawn, 70.0) == pytest.approx(float(M[row, column] / M[0, 0]), rel=DIGITS)
+        assert value_at(drawn, 70.0) == pytest.approx(float(M[row, column] / M[0, 0]), rel=DIGITS)
 
 
 def test_plastic_with_its_uniform_part_against_the_reference() -> None:
     table = {**TABLE, **optics("other/ZeonexE48R/Sultanova", 550.0)}
     M = reference.mueller(np.deg2rad(60.0), np.deg2rad(70.0), np.pi, **table)
     drawn = curve("polarisation", "plastic with its uniform part")
-    assert at(drawn, 70.0) == pytest.approx(float(M[0, 1] / (M[0, 0] + 0.28 / np.pi)), rel=DIGITS)
+    assert value_at(drawn, 70.0) == pytest.approx(float(M[0, 1] / (M[0, 0] + 0.28 / np.pi)), rel=DIGITS)
 
 
 def test_the_map_is_the_share_of_s_that_leaves_as_p() -> None:
@@ -204,4 +188,6 @@ def test_the_map_is_the_share_of_s_that_leaves_as_p() -> None:
     x, y = shown.x[column], shown.y[row]
     J = reference.jones(np.deg2rad(60.0), np.arcsin(np.hypot(x, y)), np.arctan2(y, x), page["n"], page["k"])
     ss, ps = (abs(complex(J[row, 0])) ** 2 for row in (0, 1))
-    assert shown.values[row][column] == pytest.approx(ps / (ss + ps), rel=2e-3)  # three digits; x and y have four
+    assert shown.values[row][column] == pytest.approx(
+        ps / (ss + ps), rel=2e-3
+    )  # The map has three digits, x and y have four

@@ -1,4 +1,4 @@
-"""The figures of Oren and Nayar 1994: what each statement says holds, and curves are what their captions say."""
+"""The figures of Oren and Nayar 1994: statements hold or fail for a known reason, and curves have their captions."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from brdfdb.figure import Curve, Figure, Panel, Picture
 from brdfdb.gallery.oren_nayar_1994 import FIGURES
 from brdfdb.reference import mp, oren_nayar_1994
+from tests.gallery.figures import panel_of
 
-# Relative errors, each just above the worst measured, which stands behind it: the digits that `numbers` leaves
-FIVE_DIGITS = 4e-5  # 3.2e-5
-PIXEL = 2.5e-3  # 2.3e-3
+# Relative errors of the digits that `numbers` leaves, just above the worst measured
+FIVE_DIGITS = 4e-5  # Worst measured: 3.2e-5
+PIXEL = 2.5e-3  # Worst measured: 2.3e-3
 
 COMPUTED = {key: make() for key, make in FIGURES.items()}
 STATEMENTS = [(key, statement) for key, figure in COMPUTED.items() for statement in figure.statements]
 
-# The statements that do not hold, by the figure and a phrase of each, and why
+# The figure and a phrase of the statements that do not hold, with the reason
 BROKEN = {
     ("fig-11", "near-Lambertian"): "eq. 43 lets radiance grow by 60 % towards the horizon where shadowing and masking "
     "overlap, as they do for θ_i = 75°, σ = 40°; for θ_i of 60° and less the sentence holds",
@@ -33,19 +34,17 @@ BROKEN = {
 }
 
 
-def reason(key: str, says: str) -> str | None:
-    found = [why for (figure, phrase), why in BROKEN.items() if key.endswith(figure) and phrase in says]
-    return found[0] if found else None
-
-
 def parameter(key: str, statement: Any) -> Any:
-    why = reason(key, statement.says)
+    """Return the test case of a statement."""
+    reasons = [
+        reason for (figure, phrase), reason in BROKEN.items() if key.endswith(figure) and phrase in statement.says
+    ]
     name = f"{key.removeprefix('oren-nayar-1994-')}: {statement.says[:60]}"
-    return pytest.param(statement, id=name, marks=[pytest.mark.xfail(strict=True, reason=why)] if why else [])
+    return pytest.param(statement, id=name, marks=[pytest.mark.xfail(strict=True, reason=reason) for reason in reasons])
 
 
-@pytest.mark.parametrize("statement", [parameter(*each) for each in STATEMENTS])
-def test_what_the_paper_says_is_seen(statement: Any) -> None:
+@pytest.mark.parametrize("statement", [parameter(key, statement) for key, statement in STATEMENTS])
+def test_a_statement_of_the_paper_holds(statement: Any) -> None:
     assert statement.holds, statement.seen
 
 
@@ -76,15 +75,15 @@ def test_a_figure_has_finite_curves_and_says_something(key: str) -> None:
             assert 0.0 < min(seen) < max(seen) <= 1.0
         else:
             assert isinstance(panel, Panel)
-            assert len({each.label for each in panel.curves}) == len(panel.curves) >= 1
-            for each in panel.curves:
-                assert len(each.x) == len(each.y) > 100
-                assert np.all(np.diff(each.x) > 0.0)
-                assert None not in each.y
-                assert np.all(np.isfinite(np.array(each.y, dtype=float)))
+            assert len({curve.label for curve in panel.curves}) == len(panel.curves) >= 1
+            for curve in panel.curves:
+                assert len(curve.x) == len(curve.y) > 100
+                assert np.all(np.diff(curve.x) > 0.0)
+                assert None not in curve.y
+                assert np.all(np.isfinite(np.array(curve.y, dtype=float)))
 
 
-# What curves are
+# The curves
 
 
 def figure_of(name: str) -> Figure:
@@ -92,9 +91,7 @@ def figure_of(name: str) -> Figure:
 
 
 def curves(name: str, panel: int = 0) -> list[Curve]:
-    found = figure_of(name).panels[panel]
-    assert isinstance(found, Panel)
-    return found.curves
+    return panel_of(figure_of(name), panel).curves
 
 
 def at(curve: Curve, x: float) -> Any:
@@ -106,7 +103,7 @@ def rad(angle_deg: float) -> float:
 
 
 def line(theta_r_deg: float, delta_phi_deg: float = 0.0) -> tuple[float, float]:
-    """theta_r and phi_r - phi_i [rad] of a viewer: below 0 on the side away from the light."""
+    """Return theta_r and phi_r - phi_i [rad] of a viewer, whose angle is negative away from the light."""
     return rad(abs(theta_r_deg)), rad(delta_phi_deg + (180.0 if theta_r_deg < 0.0 else 0.0))
 
 
@@ -174,7 +171,7 @@ def test_samples_have_the_parameters_of_their_captions(number: int, caption: str
 
 
 def own_evaluation(theta_i: float, theta_r: float, delta_phi: float, rho: float, sigma: float) -> float:
-    """Eqs 24 and 49 integrated by eq. 25, the weight of eq. 26 normalised over the slope."""
+    """Return f_r [1/sr] of eqs 24 and 49 integrated by eq. 25, with eq. 26 normalised over the slope."""
     kinks = {0.0, np.pi / 2 - theta_i, np.pi / 2 - theta_r, np.pi / 2}
     x, w = np.polynomial.legendre.leggauss(20)
     total = light = 0.0
@@ -192,7 +189,7 @@ def test_fig_16_is_the_painted_sandpaper_under_the_lights_of_fig_15() -> None:
     for panel, theta_i_deg in enumerate((30.0, 45.0, 60.0)):
         evaluated, facets, functional = curves("fig-16", panel)
         assert "eqs 24 and 49" in evaluated.label
-        value, normal = (own_evaluation(rad(theta_i_deg), *line(each), *arguments) for each in (-55.0, 0.0))
+        value, normal = (own_evaluation(rad(theta_i_deg), *line(angle), *arguments) for angle in (-55.0, 0.0))
         close(at(evaluated, -55.0), value / normal)
         assert "eq. 47" in facets.label
         normal = sum(oren_nayar_1994.gaussian(rad(theta_i_deg), *line(0.0), *arguments))
@@ -214,7 +211,7 @@ def test_fig_18_leaves_the_plane_of_incidence_by_45_and_60_degrees() -> None:
 
 
 def test_fig_20_is_eq_32_with_eq_27_for_the_body() -> None:
-    weights = {"k_b": 1, "k_s": 0.085 / np.pi}  # E_0 = pi, as the preset assumes
+    weights = {"k_b": 1, "k_s": 0.085 / np.pi}  # The preset assumes E_0 = pi
     body_normal, _, surface_normal = oren_nayar_1994.body_surface(rad(45.0), *line(0.0), 0.75, rad(42.0), **weights)
     body, _, surface = oren_nayar_1994.body_surface(rad(45.0), *line(-50.0), 0.75, rad(42.0), **weights)
     both, alone = curves("fig-20", panel=1)
@@ -226,7 +223,7 @@ def test_fig_20_is_eq_32_with_eq_27_for_the_body() -> None:
 
 
 def across(light_deg: float, x: float) -> tuple[float, float, float]:
-    """theta_i, theta_r and phi_r - phi_i [rad] at x."""
+    """Return theta_i, theta_r and phi_r - phi_i [rad] at x."""
     normal = float(np.arcsin(x))
     light, viewer = rad(light_deg) - normal, -normal
     return abs(light), abs(viewer), 0.0 if light * viewer >= 0.0 else np.pi

@@ -1,4 +1,4 @@
-"""All statements of the gallery name the basis of their thresholds; the list of wrong models is that of the code."""
+"""All statements of the gallery name the basis of their thresholds, and docs/mutants.md has all wrong models."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tests.gallery.mutants.mutation import BASES
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 @pytest.mark.parametrize("key", GALLERY)
 def test_statements_name_the_basis_of_their_thresholds(key: str) -> None:
-    for each in GALLERY[key]().statements:
-        basis, _, reason = (each.threshold_from or "").partition(": ")
-        assert basis in BASES, each
-        assert reason, each
+    for statement in GALLERY[key]().statements:
+        basis, _, reason = (statement.threshold_from or "").partition(": ")
+        assert basis in BASES, statement
+        assert reason, statement
 
 
 def test_every_figure_is_covered_by_wrong_models() -> None:
@@ -26,7 +26,7 @@ def test_every_figure_is_covered_by_wrong_models() -> None:
 
 def test_twenty_wrong_models_have_names_of_their_own() -> None:
     for module in document.PAPERS.values():
-        names = [each.name for each in module.MUTANTS]
+        names = [mutant.name for mutant in module.MUTANTS]
         assert len(set(names)) == len(names)
     assert sum(len(module.MUTANTS) for module in document.PAPERS.values()) >= 20
 

@@ -1,4 +1,4 @@
-"""Figs 3, 7 and 9 of Ward 1992: statements hold or are known not to; noise, rays and pictures are what is said."""
+"""Figs 3, 7 and 9 of Ward 1992: statements hold or fail for a known reason; noise, rays and pictures are checked."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from brdfdb.figure import Figure, Panel, Picture
 from brdfdb.gallery import ward_1992_box, ward_1992_gonioreflectometer, ward_1992_sampling
 from brdfdb.gallery._ward_sphere import Points
 from brdfdb.reference import ward_1992 as reference
+from tests.gallery.figures import cases, statement_of
 
 FIGURES = {**ward_1992_gonioreflectometer.FIGURES, **ward_1992_sampling.FIGURES, **ward_1992_box.FIGURES}
 BRASS = 0.33, 0.050, 0.16  # rho_s, alpha_x, alpha_y of the table in section 6
 
-# Every statement: the figure, and a phrase of it
+# The figure and a phrase of every statement
 STATEMENTS = [
     ("fig-03", "good approximation"),
     ("fig-03", "second order"),
@@ -34,10 +35,6 @@ BROKEN = {
         "uniformly weighted",
     ): "Ward 1992, section 5.1: with weights of one, rays by eq. 7 bring 2.1 times what eq. 5a reflects at 60 degrees",
 }
-CASES = [
-    pytest.param(*each, marks=[pytest.mark.xfail(strict=True, reason=BROKEN[each])] if each in BROKEN else [])
-    for each in STATEMENTS
-]
 
 
 @cache
@@ -45,9 +42,9 @@ def figure(name: str) -> Figure:
     return FIGURES[f"ward-1992-{name}"]()
 
 
-@pytest.mark.parametrize(("name", "phrase"), CASES)
-def test_what_the_paper_says_is_seen(name: str, phrase: str) -> None:
-    (statement,) = [each for each in figure(name).statements if phrase in each.says]
+@pytest.mark.parametrize(("name", "phrase"), cases(STATEMENTS, BROKEN))
+def test_a_statement_of_the_paper_holds(name: str, phrase: str) -> None:
+    statement = statement_of(figure(name), phrase)
     assert statement.threshold_from
     assert statement.holds, statement.seen
 
@@ -61,7 +58,7 @@ def test_every_statement_is_tested() -> None:
 @pytest.mark.parametrize("key", FIGURES)
 def test_a_figure_has_its_key_and_is_the_same_each_time(key: str) -> None:
     assert (FIGURES[key]().key, FIGURES[key]().paper) == (key, "ward1992")
-    assert FIGURES[key]() == figure(key.removeprefix("ward-1992-"))  # seeds are fixed
+    assert FIGURES[key]() == figure(key.removeprefix("ward-1992-"))  # Seeds are fixed
 
 
 # Fig. 3
@@ -75,12 +72,12 @@ def test_a_camera_in_the_middle_sees_the_target_s_angles() -> None:
 
 
 def test_eq_3_points_from_the_target_to_where_the_camera_looks() -> None:
-    """By hand: up along y at 45 degrees, D = 0.2; the sphere is met at r_c of the law of cosines."""
+    """A ray along y at 45 degrees with D = 0.2 meets the sphere at r_c of the law of cosines."""
     D, root = 0.2, np.sqrt(0.5)
     r_c = D * root + np.sqrt(D**2 / 2.0 + 1.0 - D**2)
     y, z = r_c * root - 2.0 * D, r_c * root
-    found = ward_1992_gonioreflectometer.eq_3(np.array(np.pi / 4), np.array(np.pi / 2), D)
-    np.testing.assert_allclose(found, np.array([0.0, y, z]) / np.hypot(y, z), atol=1e-15)
+    direction = ward_1992_gonioreflectometer.eq_3(np.array(np.pi / 4), np.array(np.pi / 2), D)
+    np.testing.assert_allclose(direction, np.array([0.0, y, z]) / np.hypot(y, z), atol=1e-15)
 
 
 def test_traced_rays_come_from_beside_the_target() -> None:
@@ -100,18 +97,18 @@ def test_traced_rays_come_from_beside_the_target() -> None:
 
 
 def test_noise_of_strict_monte_carlo_is_that_of_a_light_that_is_hit_or_missed() -> None:
-    """p: the integral of the density of eq. 7 over the disc, at its middle; weights hardly vary over it."""
+    """The share p of rays that meet the disc is the density of eq. 7 at its middle times its solid angle."""
     (panel,) = figure("fig-07-noise").panels
     assert isinstance(panel, Panel)
     strict, hybrid, even = panel.curves
     middle = int(np.argmin(hybrid.y))
     assert strict.y[middle] is not None
     up = strict.x[middle]
-    # in the frame of the camera: the normal at that height, and the light 40 degrees up
+    # In the frame of the camera: the normal at that height, and the light at an elevation of 40 degrees
     normal = np.arcsin(up)
     light, viewer = np.deg2rad(40.0) - normal, -normal
     theta_i, theta_r = abs(light), abs(viewer)
-    assert light * viewer < 0.0  # the mirror half plane
+    assert light * viewer < 0.0  # The viewer is in the mirror half plane
     f_r = float(reference.elliptical(theta_i, 0, theta_r, np.pi, 0, *BRASS))
     h_i, tan = np.cos((light - viewer) / 2.0), np.tan((light + viewer) / 2.0)
     density = np.exp(-((tan / BRASS[1]) ** 2)) / (4 * np.pi * BRASS[1] * BRASS[2] * h_i * np.cos(np.arctan(tan)) ** 3)
@@ -120,7 +117,7 @@ def test_noise_of_strict_monte_carlo_is_that_of_a_light_that_is_hit_or_missed() 
     source = f_r * np.cos(theta_i)
     diffuse = 0.10 / np.pi * (np.cos(theta_i) + np.pi * 0.2)
     expected = source * np.sqrt((1.0 - p) / p / 16.0) / (source + diffuse)
-    assert strict.y[middle] == pytest.approx(expected, rel=0.15)  # 2000 rays meet the disc some 25 times
+    assert strict.y[middle] == pytest.approx(expected, rel=0.15)  # 2000 rays meet the disc about 25 times
     assert all(a is not None and b is not None and a <= b for a, b in zip(hybrid.y, even.y, strict=True))
 
 
@@ -132,7 +129,7 @@ def test_pictures_b_and_c_differ_by_the_highlight_alone() -> None:
         values.append(np.array(picture.radiance, dtype=np.float64))
     deterministic, strict, hybrid = values
     seen = np.isfinite(hybrid)
-    dark = seen & (np.arange(len(hybrid))[:, None] > len(hybrid) // 2)  # below the highlight
+    dark = seen & (np.arange(len(hybrid))[:, None] > len(hybrid) // 2)  # Below the highlight
     np.testing.assert_array_equal(strict[dark], hybrid[dark])
     assert np.all(hybrid[seen] >= deterministic[seen])
     assert np.mean((strict == 1.0)[seen]) < 0.5 * np.mean((hybrid == 1.0)[seen])
@@ -170,11 +167,11 @@ def test_radiance_of_the_lid_is_that_of_eq_5a_under_four_lights() -> None:
     for light, strength in zip(lights, ward_1992_box.STRENGTHS, strict=True):
         towards = light - np.array([x, y, 0.0])
         angles = [
-            each
+            angle
             for vector in (towards, viewer)
-            for each in (np.arccos(vector[2] / np.linalg.norm(vector)), np.arctan2(vector[1], vector[0]))
+            for angle in (np.arccos(vector[2] / np.linalg.norm(vector)), np.arctan2(vector[1], vector[0]))
         ]
         f_r = float(reference.elliptical(*angles, 0.10, *BRASS))
         total += strength * np.sum(light**2) / np.sum(towards**2) * f_r * np.cos(angles[0])
-    found = ward_1992_box._radiance(np.array(x), np.array(y), 0.0, BRASS[1:])
-    assert float(found) == pytest.approx(total, rel=1e-9)
+    radiance = ward_1992_box._radiance(np.array(x), np.array(y), 0.0, BRASS[1:])
+    assert float(radiance) == pytest.approx(total, rel=1e-9)

@@ -1,4 +1,4 @@
-"""Wrong forms of what only the added figures show: closed forms, single cavities, strips, Jones matrices, samplers."""
+"""Wrong forms that only the added figures show: closed forms, single cavities, strips, Jones matrices, samplers."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ Function = Callable[..., Any]
 def closed(
     sign: float = 1.0, shadows: bool = True, power: float = 1.0, bounced: float = 1.0
 ) -> dict[Function, Function]:
-    """Eqs 45 and 49, with what may be wrong in them."""
+    """Return eqs 45 and 49 with the mistakes that may be in them."""
 
     def single_slope(d: Any, rho: Any, theta_a: Any) -> tuple[Any, Any, Any]:
         tan_a, cos = np.tan(theta_a), sign * d.cos_dphi
-        a, b = (each * tan_a for each in (np.maximum(d.sin_i / d.cos_i, d.sin_r / d.cos_r),
-                                          np.minimum(d.sin_i / d.cos_i, d.sin_r / d.cos_r)))  # fmt: skip
+        tan_i, tan_r = d.sin_i / d.cos_i, d.sin_r / d.cos_r
+        a, b = np.maximum(tan_i, tan_r) * tan_a, np.minimum(tan_i, tan_r) * tan_a
         # Eq. (39)
-        critical_a, critical_b = (np.arccos(1.0 / np.maximum(each, 1.0)) * shadows for each in (a, b))
+        critical_a, critical_b = (np.arccos(1.0 / np.maximum(tangent, 1.0)) * shadows for tangent in (a, b))
         both_open = 0.5 * a * b * (1.0 - (2.0 * critical_a + np.sin(2.0 * critical_a)) / np.pi)
         # Eq. (45)
         A_1 = b * 2.0 * np.sin(critical_a) / np.pi + both_open
@@ -54,7 +54,7 @@ def closed(
 
 
 def facet(slope_i: Any, slope_r: Any, S: Any, C: Any, *, hidden: bool) -> Any:
-    """The second bounce of one facet, eqs 15 to 20; `hidden` is whether m_v and m_s are the widths hidden."""
+    """Return the second bounce of one facet, eqs 15 to 20; `hidden` tells whether m_v and m_s are the hidden widths."""
     p, q = S * slope_i, S * slope_r
     seen, lit = C + q, C - p
     shown = (seen > 0.0) & (lit > 0.0)
@@ -71,10 +71,12 @@ def facet(slope_i: Any, slope_r: Any, S: Any, C: Any, *, hidden: bool) -> Any:
 
 
 def cavity(hidden: bool) -> Function:
+    """Return the function of the second bounce of both facets of a cavity."""
     return lambda i, r, S, C: 0.5 * (facet(i, r, S, C, hidden=hidden) + facet(-i, -r, S, C, hidden=hidden))
 
 
 def direct_unshadowed(i: Any, r: Any, S: Any, C: Any) -> Any:
+    """Return the direct light of a cavity without shadowing and masking."""
     sides = (np.maximum(C + sign * S * i, 0.0) * np.maximum(C + sign * S * r, 0.0) / C for sign in (1.0, -1.0))
     return 0.5 * sum(sides)
 
@@ -88,7 +90,7 @@ OREN_NAYAR = (
               closed(bounced=0.0)),
     Mutant("critical angles of 0", "eq. 39 is 0: nothing is hidden", "both branches of eq. 39 begin there",
               closed(shadows=False)),
-    Mutant("cos^2 in eq. 44", "planes are weighted by cos^2 and sin^2", "vectors are split so",
+    Mutant("cos^2 in eq. 44", "planes are weighted by cos^2 and sin^2", "vectors are split like that",
               closed(power=2.0)),
     Mutant("widths of the words", "m_v and m_s are the widths visible and lit", "the words before eq. 15 say so",
               {surfaces.bounce_of_cavity: cavity(hidden=False)}),
@@ -96,7 +98,7 @@ OREN_NAYAR = (
               {surfaces.direct_of_cavity: direct_unshadowed}),
     Mutant("strings without a half", "view factors are twice as large", "Hottel's rule has a half to forget",
               {grooves.view_factors: lambda *arguments: 2.0 * right_factors(*arguments)}),
-    Mutant("strips without shadows", "light and viewer reach whole facets", "the first bounce is right without",
+    Mutant("strips without shadows", "light and viewer reach whole facets", "the first bounce is right without them",
               {grooves._met: lambda slope, theta_a: (right_met(slope, theta_a)[0],
                                                      np.where(right_met(slope, theta_a)[0] > 0.0, 1.0, 0.0))}),
 )  # fmt: skip
@@ -108,17 +110,20 @@ right_jones, right_amplitudes = polarised._jones, fresnel.half_sum_and_differenc
 
 
 def printed_minus(*arguments: Any) -> tuple[Any, ...]:
+    """Return the Jones matrix with the sign of M_ps as printed."""
     ss, sp, ps, pp = right_jones(*arguments)
     return ss, sp, -ps, pp
 
 
 def not_turned(directions: Any, n: Any, k: Any) -> tuple[Any, ...]:
+    """Return the Jones matrix of the facet without a turn of s and p."""
     half_sum, half_difference = right_amplitudes(he_torrance.cos_bisecting(directions), n, k)
     nothing = np.zeros_like(half_sum)
     return -(half_sum + half_difference), nothing, nothing, -(half_sum - half_difference)
 
 
 def exchanged(cos: Any, n: Any, k: Any) -> tuple[Any, Any]:
+    """Return half of the sum and of the difference of F_s and F_p, exchanged."""
     half_sum, half_difference = right_amplitudes(cos, n, k)
     return half_sum, -half_difference
 
@@ -127,15 +132,15 @@ right_specular, right_reflected = cuts.specular, cuts.reflected
 
 
 def altered(**changes: float) -> dict[Function, Function]:
-    """Specular reflectance and albedo of another surface: each change is a factor, of `a` a value."""
+    """Return specular reflectance and albedo of another surface; a change is a factor, or the value of `a`."""
 
-    def of(surface: Any) -> Any:
+    def changed(surface: Any) -> Any:
         return {key: changes.get(key, 1.0) * value if key != "a" else changes.get(key, value)
                 for key, value in surface.items()}  # fmt: skip
 
     return {
-        right_specular: lambda surface, theta: right_specular(of(surface), theta),
-        right_reflected: lambda surface, theta, **options: right_reflected(of(surface), theta, **options),
+        right_specular: lambda surface, theta: right_specular(changed(surface), theta),
+        right_reflected: lambda surface, theta, **options: right_reflected(changed(surface), theta, **options),
     }
 
 
@@ -144,16 +149,16 @@ HE_TORRANCE = (
               "the lobe is added to a mirror that is already there",
               {right_specular: lambda surface, theta: right_specular({**surface, "wavelength_nm": 1e7}, theta)}),
     Mutant("reflectances with 1.5 tau", "the autocorrelation length is 1.5 times as long",
-              "tau is read as where C(r) has fallen to a tenth", altered(tau_um=1.5)),
-    Mutant("0.8 sigma_0 of reflectances", "the rms roughness is 0.8 times as large", "R_a of workshops is that",
+              "tau is read as the distance at which C(r) has fallen to a tenth", altered(tau_um=1.5)),
+    Mutant("0.8 sigma_0 of reflectances", "the rms roughness is 0.8 times as large", "R_a of workshops is 0.8 of it",
               altered(sigma_0_um=0.8)),
-    Mutant("a of 1", "all that enters the surface returns", "nothing is known of a", altered(a=1.0)),
+    Mutant("a of 1", "all light that enters the surface returns", "no publication gives a", altered(a=1.0)),
     Mutant("M_ps without its minus", "eq. 64 as it is printed", "eq. 62 alone has the minus",
               {polarised._jones: printed_minus}),
     Mutant("s and p not turned", "the facet's s and p are taken for those of the mean surface",
               "they are the same in the plane of incidence", {polarised._jones: not_turned}),
     Mutant("F_s and F_p exchanged", "each polarisation has the amplitude of the other",
-              "books differ in what they call parallel", {right_amplitudes: exchanged}),
+              "books differ in the meaning of parallel", {right_amplitudes: exchanged}),
     Mutant("amplitudes of a real index", "k is left out of F_s and F_p", "tables list n, and k in another column",
               {right_amplitudes: lambda cos, n, k: right_amplitudes(cos, n, 0.0 * k)}),
 )  # fmt: skip
@@ -165,7 +170,7 @@ right_density, right_sample = sampling.mixture_density, sampling.ward_sample
 
 
 def without_arctan(u1: Any, angle: Any, i: Any, lobe: Any) -> Any:
-    """Eq. 7a as printed: the root is delta, not its tangent."""
+    """Return the directions of eq. 7a as printed: the root is delta, not its tangent."""
     phi = np.arctan2(lobe.alpha_y * np.sin(angle), lobe.alpha_x * np.cos(angle))
     delta = np.sqrt(-np.log(u1) / ((np.cos(phi) / lobe.alpha_x) ** 2 + (np.sin(phi) / lobe.alpha_y) ** 2))
     h = unit_vector(delta, phi)
@@ -173,20 +178,21 @@ def without_arctan(u1: Any, angle: Any, i: Any, lobe: Any) -> Any:
 
 
 def of_half_vector(lobe: Any, i: Any, r: Any) -> Any:
-    """The density of half vectors, taken for that of directions: without 1 / (4 h.i)."""
+    """Return the density of half vectors, without 1 / (4 h.i), in place of that of directions."""
     h = i + r
     h_i = np.linalg.norm(h, axis=-1) / 2.0
     return right_density(lobe, i, r) * 4.0 * h_i
 
 
 def by_cosine(u1: Any, u2: Any, wi: Any, *, rho_s: Any, alpha_x: Any, alpha_y: Any) -> Any:
+    """Return samples that follow the cosine of the viewer."""
     wr = unit_vector(np.arcsin(np.sqrt(u1)), 2.0 * np.pi * u2)
     f_r = ward_vectors(wi, wr, rho_d=0.0, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
     return sampling.Sample(wr, wr[..., 2] / np.pi, np.pi * f_r)
 
 
 def mapped(shift: float) -> Function:
-    """Eq. 3 with another distance of target and camera in place of 2 D."""
+    """Return eq. 3 with another distance of target and camera in place of 2 D."""
 
     def eq_3(theta_c: Any, phi_c: Any, D: Any) -> Any:
         sine = np.sin(phi_c) * np.sin(theta_c)
@@ -198,11 +204,13 @@ def mapped(shift: float) -> Function:
 
 
 def one_alpha(wi: Any, wr: Any, *, alpha_x: Any, alpha_y: Any, **rest: Any) -> Any:
+    """Return f_r of eq. 4 with the geometric mean of both alphas."""
     alpha = np.sqrt(alpha_x * alpha_y)
     return ward_vectors(wi, wr, alpha_x=alpha, alpha_y=alpha, **rest)
 
 
 def other_side(wi: Any, wr: Any, **surface: Any) -> Any:
+    """Return f_r for light from the other side."""
     return ward_vectors(np.asarray(wi) * [-1.0, -1.0, 1.0], wr, **surface)
 
 
@@ -218,7 +226,7 @@ WARD = (
               "eq. 7 does not name the light",
               {sampling.mirrored_in_lobe: lambda u1, angle, i, lobe: without_arctan(
                   u1, angle, np.broadcast_to([0.0, 0.0, 1.0], np.shape(i)), lobe)}),
-    Mutant("drawn by the cosine", "directions follow the cosine and not the lobe", "it is the sampler of Lambert",
+    Mutant("drawn by the cosine", "directions follow the cosine and not the lobe", "it is Lambert's sampler",
               {right_sample: by_cosine}),
     Mutant("D for 2 D", "D is taken for the distance of target and camera", "Fig. 3 draws one D",
               {gonioreflectometer.eq_3: mapped(1.0)}),

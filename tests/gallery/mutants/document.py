@@ -1,4 +1,4 @@
-"""The list of wrong models as a document of the repository."""
+"""The list of wrong models, as the page docs/mutants.md."""
 
 from __future__ import annotations
 
@@ -18,25 +18,29 @@ PAPERS: dict[str, ModuleType] = {
 _INTRODUCTION = """\
 # Wrong models
 
-The gallery holds figures of the papers against sentences of the papers. A sentence that a wrong model satisfies, too,
-says nothing. So the check plants the wrong models below, one at a time, and computes all figures of the paper again.
-Every statement that holds must fail for at least one of them. At least two statements must notice each of them.
+The gallery compares figures of the papers with sentences of the papers. A sentence that a wrong model satisfies, too,
+proves nothing. Therefore the tests plant the wrong models below, one at a time, and compute all figures of the paper
+again. Every statement that holds must fail for at least one of them. At least two statements must notice each of them.
 
-`python tests/benchmarks/mutants.py` prints how many statements notice each wrong model, and with `--statements` which.
-With `--write` it writes this list, which is tested against the code in `tests/gallery/mutants`.
+`python tests/benchmarks/mutants.py` prints the number of statements that notice each wrong model, and with
+`--statements` the statements. With `--write` it writes this list. A test compares it with `tests/gallery/mutants`.
 
 Each statement names the basis of its threshold, on the page of an audit and in `threshold_from`:
 """
 
 
 def text() -> str:
-    """Return the document."""
+    """Return the text of the page."""
     bases = [f"* *{basis}*: {meaning}" for basis, meaning in BASES.items()]
     tables = [table(paper, module) for paper, module in PAPERS.items()]
     return "\n".join([_INTRODUCTION, *bases, *tables, ""])
 
 
 def table(paper: str, module: ModuleType) -> str:
-    rows = [f"| {each.name} | {each.changes} | {each.because} |".replace("|F|", "\\|F\\|") for each in module.MUTANTS]
+    """Return the table of the wrong models of a paper."""
+    rows = [
+        f"| {mutant.name} | {mutant.changes} | {mutant.because} |".replace("|F|", "\\|F\\|")
+        for mutant in module.MUTANTS
+    ]
     head = ["", f"## {paper}", "", "| wrong model | what is wrong | why one would write it |", "|---|---|---|"]
     return "\n".join([*head, *rows])

@@ -23,33 +23,33 @@ Function = Callable[..., Any]
 
 
 def smith(sin: Any, cos: Any, slope: Any) -> Any:
-    """S_1 / cos(theta) of eqs 23 to 25."""
+    """Return S_1 / cos(theta) [1] of eqs 23 to 25."""
     return shadowing(sin, cos, slope)
 
 
 def effective(sin_i: Any, cos_i: Any, sin_r: Any, cos_r: Any, slope: Any) -> Any:
-    """(sigma / sigma_0)^2 of eqs 80 to 83."""
+    """Return (sigma / sigma_0)^2 [1] of eqs 80 to 83."""
     return variance(hidden(sin_i, cos_i, slope) + hidden(sin_r, cos_r, slope))
 
 
 def squared(directions: Any) -> tuple[Any, Any]:
-    """v_xy^2 and v_z^2 of eq. 84, unit vectors."""
+    """Return v_xy^2 and v_z^2 [1] of eq. 84 for unit vectors."""
     return model.v_squared(directions)
 
 
 def bisecting(directions: Any) -> Any:
-    """The cosine at which |F|^2 is taken."""
+    """Return the cosine [1] at which |F|^2 is taken."""
     return model.cos_bisecting(directions)
 
 
 def series(g: Any, V: Any) -> Any:
-    """The sum of eq. 78 over g."""
+    """Return the sum of eq. 78 over g [1]."""
     return diffraction_series(g, V)
 
 
 @dataclass(frozen=True)
 class Form:
-    """Eqs 71 to 84 with each of their parts as a field, so that a mutant is another value of one of them."""
+    """Eqs 71 to 84 with their parts as fields, so that a mutant changes the value of a field."""
 
     tau: float = 1.0
     sigma_0: float = 1.0
@@ -79,16 +79,19 @@ class Form:
         return self.prefactor * value * self.viewer(d.cos_r)
 
     def f_r(self, directions: Any, surface: Any, a: Any) -> Any:
+        """Return f_r [1/sr] without the specular part."""
         F2 = self.reflectance(self.bisecting(directions), surface.n, surface.k)
         uniform = self.uniform * a * self.viewer(directions.cos_r)
         return model.finished(F2 * self.diffuse(directions, surface) + uniform, directions)
 
     def parts(self, directions: Any, surface: Any, a: Any) -> Any:
+        """Return the directional and the uniform diffuse part [1/sr]."""
         directional = self.f_r(directions, surface, 0.0) + np.zeros(np.shape(a))
         uniform = self.uniform * a * self.viewer(directions.cos_r) + np.zeros(np.shape(directional))
         return limits.HeTorranceParts(directional, model.finished(uniform, directions))
 
     def rho_s(self, directions: Any, surface: Any) -> Any:
+        """Return the specular reflectance [1], eq. 73."""
         wave, _, slope = surface.features
         sin, cos, slope = directions.sin_i, directions.cos_i, slope * self.sigma_0 / self.tau
         g = 4.0 * cos**2 * wave * self.sigma_0**2 * self.variance(sin, cos, sin, cos, slope)
@@ -96,6 +99,7 @@ class Form:
         return self.reflectance(cos, surface.n, surface.k) * self.attenuation(g) * S
 
     def very_rough(self, directions: Any, slope: Any, n: Any, k: Any, a: Any) -> Any:
+        """Return f_r [1/sr] in the limit of very rough surfaces."""
         d, slope = directions, slope * self.sigma_0 / self.tau
         v_xy2, v_z2 = self.squared(d)
         tan2, slope2 = v_xy2 / v_z2, slope**2 * self.variance(d.sin_i, d.cos_i, d.sin_r, d.cos_r, slope)
@@ -105,10 +109,11 @@ class Form:
         return model.finished(value * self.viewer(d.cos_r), d)
 
     def smooth(self, directions: Any, n: Any, k: Any) -> Any:
+        """Return the reflectance [1] of a smooth surface."""
         return model.finished(self.reflectance(directions.cos_i, n, k), directions)
 
     def functions(self) -> dict[Function, Function]:
-        """All functions of the model, by this form."""
+        """Return all functions of the model with those of this form."""
         return {
             model._f_r: self.f_r,
             model.directional_diffuse: self.diffuse,
@@ -120,11 +125,12 @@ class Form:
 
 
 def without_shadow(sin: Any, cos: Any, slope: Any) -> Any:
+    """Return S_1 / cos(theta) [1] with S_1 of 1."""
     return 1.0 / (cos + 0.0 * slope)
 
 
 def without_gaussian(sin: Any, cos: Any, slope: Any) -> Any:
-    """Eqs 24 and 25 as printed."""
+    """Return S_1 / cos(theta) [1] by eqs 24 and 25 as printed."""
     cot = cos / np.maximum(sin, 1e-30)
     x = np.minimum(cot / np.maximum(2.0 * slope, 1e-30), 30.0)
     erfc = np.vectorize(math.erfc, otypes=[float])(x)
@@ -133,10 +139,12 @@ def without_gaussian(sin: Any, cos: Any, slope: Any) -> Any:
 
 
 def no_reduction(sin_i: Any, cos_i: Any, sin_r: Any, cos_r: Any, slope: Any) -> Any:
+    """Return (sigma / sigma_0)^2 of 1."""
     return np.ones_like(sin_i * sin_r * slope)
 
 
 def ten_terms(g: Any, V: Any) -> Any:
+    """Return ten terms of the sum of eq. 78 over g [1]."""
     total, factorial = 0.0, 1.0
     for m in range(1, 11):
         factorial *= m
@@ -145,24 +153,25 @@ def ten_terms(g: Any, V: Any) -> Any:
 
 
 def beckmann(g: Any, V: Any) -> Any:
-    """The limit exp(-V / g) / g of the sum, over g; nothing where nothing is rough."""
+    """Return the limit exp(-V / g) / g of the sum over g [1], 0 for smooth surfaces."""
     safe = np.maximum(g, 1e-100)
     return np.where(g > 0.0, np.exp(-np.minimum(V / safe, 700.0)) / safe / safe, 0.0)
 
 
 def backwards(directions: Any) -> tuple[Any, Any]:
-    """v^2 with the azimuth of light that travels towards the surface, as the paper counts it, for ours."""
+    """Return v_xy^2 and v_z^2 [1] for the paper's azimuth, that of light which travels towards the surface."""
     d = directions
     v_xy2 = d.sin_i**2 + d.sin_r**2 - 2.0 * d.sin_i * d.sin_r * d.cos_dphi
     return np.maximum(v_xy2, 0.0), squared(d)[1]
 
 
 def one_cone(first: Any, second: Any, apart: Any) -> Any:
-    """Solid angle [sr] of the whole receiver where its axis lies in the cone of light: it is averaged over nothing."""
+    """Return the solid angle [sr] of the whole receiver with its axis in the cone of light, without an average."""
     return np.where(apart <= first, 2.0 * np.pi * (1.0 - np.cos(second)), 0.0)
 
 
 def of(name: str, changes: str, because: str, **fields: Any) -> Mutant:
+    """Return the mutant with changed fields of `Form`."""
     return Mutant(name, changes, because, Form(**fields).functions())
 
 
@@ -170,18 +179,18 @@ UNCHANGED = (Mutant("eqs 71 to 84 anew", "nothing", "the twin that the others ch
 
 MUTANTS = (
     of("tau times 1.5", "the autocorrelation length is 1.5 times as long",
-       "C(r) falls to 1 / e at tau, eq. 48; to a tenth, which others call its length, at 1.5 tau", tau=1.5),
+       "C(r) falls to 1 / e at tau, eq. 48, and to a tenth at 1.5 tau, which others call its length", tau=1.5),
     of("sigma_0 times 0.8", "the rms roughness is 0.8 times as large",
        "the mean of abs(z), R_a of workshops, is 0.8 times the rms roughness", sigma_0=0.8),
     of("a without 1 / pi", "the uniform diffuse part is a", "eqs 8 and 72 are printed like that", uniform=1.0),
     of("v without the wave number", "v_xy of eq. 78 has no 2 pi / lambda", "eq. 84 is printed without it",
        wave_number=False),
-    of("no shadowing", "S is 1", "it is 1 at the angles that are looked at first", smith=without_shadow),
+    of("no shadowing", "S is 1", "it is 1 at small angles, which are tried first", smith=without_shadow),
     of("Smith's Lambda without its Gaussian", "exp(-x^2) is left out of eq. 25", "eq. 25 is printed like that",
        smith=without_gaussian),
     of("sigma_0 for sigma", "the effective roughness is sigma_0 at every angle", "eqs 80 to 83 need a root search",
        variance=no_reduction),
-    of("|F|^2 of 1", "nothing is absorbed", "Fresnel's factor is put off until colours are looked at",
+    of("|F|^2 of 1", "nothing is absorbed", "Fresnel's factor is added later, with the colours",
        reflectance=lambda cos, n, k: np.ones_like(cos * n * k)),
     of("|F|^2 at normal incidence", "|F|^2 does not depend on the angle", "a colour is stored in place of n and k",
        reflectance=lambda cos, n, k: fresnel.unpolarised(np.ones_like(cos), n, k)),

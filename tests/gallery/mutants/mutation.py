@@ -1,4 +1,4 @@
-"""Named wrong models, how one takes the place of the right model, and which statements of the gallery notice it."""
+"""Named wrong models, their planting in place of the right ones, and the statements that notice them."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ import numpy as np
 from brdfdb.gallery import GALLERY
 from brdfdb.models import MODELS
 
-# What `Statement.threshold_from` begins with, and its meaning
+# First words of `Statement.threshold_from`, and their meanings
 BASES = {
-    "the paper's words": "a word of the sentence sets the threshold, as *increases* or *exactly* do",
-    "the paper's number": "a number that the paper prints, within the digits that it has",
+    "the paper's words": "a word of the sentence sets the threshold, such as *increases* or *exactly*",
+    "the paper's number": "a number that the paper prints, within its digits",
     "the paper's curve": "a feature of a curve of the paper",
-    "our reading": "the sentence has a word like *nearly*, and we say which number we take it for",
-    "a limit": "what the equations tend to",
+    "our reading": "the sentence has a word such as *nearly*, and we state the number that we take it for",
+    "a limit": "the limit of the equations",
     "a closed form": "equations of the paper by hand, which share no code with the models",
     "conservation": "light that is neither made nor lost",
     "an independent evaluation": "the same quantity by other means: a plain sum, rays, random directions, 50 digits",
 }
 
 UNDRAWN = "the figure can be drawn"
-_UNTOUCHED = ("brdfdb.reference", "brdfdb.misprints")  # they judge the models, and are no part of them
+_UNTOUCHED = ("brdfdb.reference", "brdfdb.misprints")  # These modules judge the models and are no part of them
 
 
 Function = Callable[..., Any]
@@ -35,7 +35,7 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Mutant:
-    """A wrong model: functions of `brdfdb`, each with the wrong one that takes its place."""
+    """A wrong model: functions of `brdfdb` with the wrong functions that take their places."""
 
     name: str
     changes: str
@@ -45,7 +45,7 @@ class Mutant:
 
 @contextmanager
 def planted(mutant: Mutant) -> Iterator[None]:
-    """Put the wrong functions of a mutant wherever `brdfdb`, or its registry of models, names the right ones.
+    """Put the wrong functions of a mutant wherever `brdfdb` or its registry of models names the right ones.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def planted(mutant: Mutant) -> Iterator[None]:
     ]
     missed = set(mutant.functions.values()) - {wrong for _, _, wrong in places}
     if missed:
-        raise LookupError(f"{mutant.name}: no module of brdfdb names what {missed} takes the place of")
+        raise LookupError(f"{mutant.name}: no module of brdfdb names the functions that {missed} replaces")
     before = [(space, name, space[name]) for space, name, _ in places]
     specs = dict(MODELS)
     try:
@@ -82,7 +82,7 @@ def _hashable(value: object) -> bool:
     return type(value).__hash__ is not None
 
 
-class Said(NamedTuple):
+class Sentence(NamedTuple):
     """A statement by its figure and its words."""
 
     figure: str
@@ -90,14 +90,14 @@ class Said(NamedTuple):
 
 
 class Matrix(NamedTuple):
-    """The statements of a paper that hold, and of each mutant those that do not hold with it."""
+    """The statements of a paper that hold, and by mutant those that do not hold with it."""
 
-    holding: frozenset[Said]
-    noticed: dict[str, frozenset[Said]]
+    holding: frozenset[Sentence]
+    noticed: dict[str, frozenset[Sentence]]
 
     @property
-    def blind(self) -> list[Said]:
-        """The statements that hold whatever is wrong."""
+    def blind(self) -> list[Sentence]:
+        """The statements that hold with every mutant."""
         return sorted(self.holding - frozenset().union(*self.noticed.values()))
 
     @property
@@ -106,36 +106,36 @@ class Matrix(NamedTuple):
         return [name for name, failing in self.noticed.items() if len(failing) < 2]
 
     def __str__(self) -> str:
-        lines = [f"{len(self.holding)} statements hold; of them notice"]
+        lines = [f"{len(self.holding)} statements hold. Statements that notice a mutant:"]
         lines += [f"{len(failing):6d}  {name}" for name, failing in self.noticed.items()]
-        lines += [f"fails for no mutant: {said.figure}: {said.says}" for said in self.blind]
+        lines += [f"fails for no mutant: {sentence.figure}: {sentence.says}" for sentence in self.blind]
         return "\n".join(lines)
 
 
-def verdicts(keys: Sequence[str]) -> dict[Said, bool]:
-    """Return which statements of some figures hold; a figure that cannot be drawn is one statement, and does not.
+def verdicts(keys: Sequence[str]) -> dict[Sentence, bool]:
+    """Return whether the statements of figures hold; a figure that cannot be drawn is one statement that does not.
 
     Raises
     ------
     ValueError
         If two statements of a figure have the same words.
     """
-    found: dict[Said, bool] = {}
+    verdict: dict[Sentence, bool] = {}
     for key in keys:
         try:
             statements = GALLERY[key]().statements
-        except ArithmeticError:  # a lobe of 0 has no height to be divided by
-            found[Said(key, UNDRAWN)] = False
+        except ArithmeticError:  # A lobe of 0 has no height to divide by
+            verdict[Sentence(key, UNDRAWN)] = False
             continue
-        for each in statements:
-            if Said(key, each.says) in found:
-                raise ValueError(f"{key}: two statements have the same words: {each.says}")
-            found[Said(key, each.says)] = each.holds
-    return found
+        for statement in statements:
+            if Sentence(key, statement.says) in verdict:
+                raise ValueError(f"{key}: two statements have the same words: {statement.says}")
+            verdict[Sentence(key, statement.says)] = statement.holds
+    return verdict
 
 
 def calls_of(keys: Sequence[str], functions: Iterable[Function]) -> dict[str, set[Function]]:
-    """Return which of some functions each figure calls: no other figure changes with a mutant of them."""
+    """Return the functions that each figure calls; a mutant of other functions does not change the figure."""
     called: set[Function] = set()
 
     def recorded(right: Function) -> Function:
@@ -146,24 +146,24 @@ def calls_of(keys: Sequence[str], functions: Iterable[Function]) -> dict[str, se
 
         return call
 
-    found: dict[str, set[Function]] = {}
+    calls: dict[str, set[Function]] = {}
     with planted(Mutant("none", "nothing", "calls are recorded", {right: recorded(right) for right in functions})):
         for key in keys:
             called.clear()
             GALLERY[key]()
-            found[key] = set(called)
-    return found
+            calls[key] = set(called)
+    return calls
 
 
 def matrix_of(keys: Sequence[str], mutants: Sequence[Mutant]) -> Matrix:
-    """Compute some figures by the right models, and those that a mutant touches by each wrong one."""
-    holding = frozenset(said for said, holds in verdicts(keys).items() if holds)
+    """Compute figures by the right models, and the figures that a mutant touches by every wrong model."""
+    holding = frozenset(sentence for sentence, holds in verdicts(keys).items() if holds)
     calls = calls_of(keys, {right for mutant in mutants for right in mutant.functions})
-    noticed: dict[str, frozenset[Said]] = {}
+    noticed: dict[str, frozenset[Sentence]] = {}
     for mutant in mutants:
         touched = [key for key in keys if calls[key] & mutant.functions.keys()]
         with planted(mutant), np.errstate(all="ignore"):
             wrong = verdicts(touched)
-        undrawn = {said for said in wrong if said.says == UNDRAWN}
-        noticed[mutant.name] = frozenset(said for said in holding if not wrong.get(said, True)) | undrawn
+        undrawn = {sentence for sentence in wrong if sentence.says == UNDRAWN}
+        noticed[mutant.name] = frozenset(sentence for sentence in holding if not wrong.get(sentence, True)) | undrawn
     return Matrix(holding, noticed)

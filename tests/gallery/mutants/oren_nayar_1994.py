@@ -1,4 +1,4 @@
-"""Wrong forms of Oren and Nayar 1994: of the facets, of the fit to them, of the surface above."""
+"""Wrong forms of Oren and Nayar 1994: the facets, the fit to them, and the surface above."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ right_lobe = surface_part._f_r
 
 @dataclass(frozen=True)
 class Facets:
-    """Eqs 8 to 26 as a plain sum over facets, with what may be wrong in it as fields."""
+    """Eqs 8 to 26 as a plain sum over facets, with its possible mistakes as fields."""
 
     shadowing: Function = lambda light, viewer: np.minimum(1.0, np.minimum(light, viewer))  # eq. 11
     weight: Function = lambda theta_a, sigma: np.exp(-(theta_a**2) / (2.0 * sigma**2)) * np.sin(theta_a)
-    one_side: bool = False  # the facet that faces the light alone, in place of both, eq. 22
-    bounce_changes: bool = False  # else the second bounce is that of the model, which takes a tenth of the time
+    one_side: bool = False  # only the facet that faces the light, in place of both, eq. 22
+    bounce_changes: bool = False  # If false, the second bounce is the model's, which takes a tenth of the time
 
     def gaussian(self, directions: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any, Any, Any]:
-        """Direct and twice reflected light, as `oren_nayar_1994_surfaces` calls it."""
+        """Return direct and twice reflected f_r [1/sr], with the signature of `oren_nayar_1994_surfaces`."""
         d, sigma = directions, float(sigma)
         if sigma == 0.0:
             return right_facets(directions, rho, sigma, only)
@@ -64,7 +64,7 @@ class Facets:
         return rho / np.pi * direct / P.sum(), bounced, directions
 
     def direct(self, p: Any, q: Any, C: Any) -> Any:
-        """Eqs 10 and 11 over E_0 cos(theta_i) rho / pi; p and q as in `_oren_nayar_facets`."""
+        """Return eqs 10 and 11 over E_0 cos(theta_i) rho / pi [1]; p and q are those of `_oren_nayar_facets`."""
         s_a, v_a = C + p, C + q
         lit = (s_a > 0.0) & (v_a > 0.0)
         both = np.where(lit, s_a, 1.0), np.where(lit, v_a, 1.0)
@@ -72,7 +72,7 @@ class Facets:
         return 2.0 * np.where(p > 0.0, value, 0.0) if self.one_side else value
 
     def bounce(self, p: Any, q: Any, S: Any, C: Any) -> Any:
-        """Eqs 15 to 20 over E_0 cos(theta_i) rho^2 / pi, of the light on the adjacent facet."""
+        """Return eqs 15 to 20 over E_0 cos(theta_i) rho^2 / pi [1], for light on the adjacent facet."""
         s_b, v_a = C - p, C + q
         lit = (s_b > 0.0) & (v_a > 0.0)
         m_v = np.clip(-(C - q) / np.where(lit, v_a, 1.0), 0.0, 1.0)
@@ -91,12 +91,13 @@ class Facets:
 
 
 def thetas(directions: Any) -> tuple[Any, Any]:
+    """Return theta_i and theta_r [rad]."""
     return np.arctan2(directions.sin_i, directions.cos_i), np.arctan2(directions.sin_r, directions.cos_r)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Eqs 27, 28 and 30, with what may be wrong in them as fields."""
+    """Eqs 27, 28 and 30, with their possible mistakes as fields."""
 
     alpha: Function = np.maximum
     beta: Function = np.minimum
@@ -110,6 +111,7 @@ class Fit:
     irradiance: bool = False  # cos(theta_i) in f_r
 
     def fit(self, directions: Any, rho: Any, sigma: Any, interreflection: Any) -> Any:
+        """Return f_r [1/sr] of eqs 27 and 28."""
         (theta_i, theta_r), s2 = thetas(directions), (np.asarray(sigma) * self.sigma) ** 2
         cos = self.sign * directions.cos_dphi
         alpha, beta = self.alpha(theta_i, theta_r), self.beta(theta_i, theta_r)
@@ -125,6 +127,7 @@ class Fit:
         return self.finished(np.maximum(f_r, 0.0), directions)
 
     def qualitative(self, directions: Any, rho: Any, sigma: Any, offset: Any) -> Any:
+        """Return f_r [1/sr] of eq. 30."""
         (theta_i, theta_r), s2 = thetas(directions), (np.asarray(sigma) * self.sigma) ** 2
         cos = self.sign * directions.cos_dphi
         alpha, beta = self.alpha(theta_i, theta_r), self.beta(theta_i, theta_r)
@@ -156,12 +159,12 @@ class Fit:
 
 
 def facets_with(change: Function) -> dict[Function, Function]:
-    """The facets with their result, or their arguments, changed."""
+    """Return the facets with a changed function."""
     return {right_facets: change}
 
 
 def rougher(factor: float) -> dict[Function, Function]:
-    """All that depends on sigma with another one."""
+    """Return all functions of sigma with a multiple of it."""
     return {
         **Fit(sigma=factor).functions(),
         right_facets: lambda d, rho, sigma, only=None: right_facets(d, rho, factor * np.asarray(sigma), only),
@@ -170,7 +173,7 @@ def rougher(factor: float) -> dict[Function, Function]:
 
 
 def turned(directions: Any) -> Any:
-    """The same directions with the light on the other side."""
+    """Return the same directions with the light on the other side."""
     angles = thetas(directions)
     return surfaces.checked_angles(
         angles[0], 0.0, angles[1], np.arctan2(directions.sin_dphi, directions.cos_dphi) + np.pi
@@ -178,6 +181,7 @@ def turned(directions: Any) -> Any:
 
 
 def from_behind() -> dict[Function, Function]:
+    """Return all functions with the light on the other side."""
     return {
         **Fit(sign=-1.0).functions(),
         right_facets: lambda d, rho, sigma, only=None: (*right_facets(turned(d), rho, sigma, only)[:2], d),
@@ -186,6 +190,8 @@ def from_behind() -> dict[Function, Function]:
 
 
 def facets_scaled(direct: Function, bounce: Function) -> Function:
+    """Return the facets with functions of their two parts."""
+
     def gaussian(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any, Any, Any]:
         first, second, _ = right_facets(d, rho, sigma, only)
         return direct(d, first), bounce(d, second), d
@@ -202,7 +208,8 @@ def nothing(_: Any, value: Any) -> Any:
 
 
 def radiance() -> dict[Function, Function]:
-    cosine = lambda d, value: value * d.cos_i  # noqa: E731  # a function of two names in three places
+    """Return all functions with the cosine of the light in f_r."""
+    cosine = lambda d, value: value * d.cos_i  # noqa: E731  # The two arguments are those of `facets_scaled`
     return {
         **Fit(irradiance=True).functions(),
         right_facets: facets_scaled(cosine, cosine),
@@ -211,6 +218,8 @@ def radiance() -> dict[Function, Function]:
 
 
 def flat() -> dict[Function, Function]:
+    """Return Lambert's model in place of all functions."""
+
     def fit(d: Any, rho: Any) -> Any:
         return surfaces.finished(rho / np.pi + 0.0 * d.cos_i * d.cos_r * d.cos_dphi, d)
 
@@ -222,16 +231,16 @@ def flat() -> dict[Function, Function]:
 
 
 def fitted(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any, Any, Any]:
-    """The fit in place of the facets."""
+    """Return direct and twice reflected f_r [1/sr] of the fit."""
     fit = Fit()
     direct = fit.fit(d, rho, sigma, False)
     return direct, fit.fit(d, rho, sigma, True) - direct, d
 
 
 def bounce_by_eq_48(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any, Any, Any]:
-    """The second bounce of eq. 49, which is eq. 48 integrated, as the atlas draws it."""
+    """Return the facets with the second bounce of eq. 49, which is eq. 48 integrated, as in the atlas."""
     (theta_i, theta_r), azimuth = thetas(d), np.arctan2(d.sin_dphi, d.cos_dphi)
-    angles = [each[..., None] for each in np.broadcast_arrays(theta_i, 0.0, theta_r, azimuth)]
+    angles = [angle[..., None] for angle in np.broadcast_arrays(theta_i, 0.0, theta_r, azimuth)]
     x, w = np.polynomial.legendre.leggauss(SLOPES)
     theta_a = 0.5 * np.pi * 0.5 * (x + 1.0)
     if float(sigma) == 0.0:
@@ -242,16 +251,16 @@ def bounce_by_eq_48(d: Any, rho: Any, sigma: Any, only: Any = None) -> tuple[Any
 
 
 UNCHANGED = (
-    Mutant("facets anew", "nothing", "the sum that others change", Facets(bounce_changes=True).functions()),
-    Mutant("the fit anew", "nothing", "the fit that others change", Fit().functions()),
+    Mutant("facets anew", "nothing", "the sum that the other mutants change", Facets(bounce_changes=True).functions()),
+    Mutant("the fit anew", "nothing", "the fit that the other mutants change", Fit().functions()),
 )
 
 MUTANTS = (
     Mutant("sigma times 0.8", "the slopes are 0.8 times as steep",
            "the mean of abs(theta_a) is 0.8 times the standard deviation", rougher(0.8)),
     Mutant("the fit for the integral", "eqs 27 and 28 stand in place of the facets",
-           "the paper gives the fit in the same breath, and it is a thousand times as fast", facets_with(fitted)),
-    Mutant("no interreflection", "light that met two facets is left out, eqs 18 and 28",
+           "the paper gives both, and the fit is a thousand times as fast", facets_with(fitted)),
+    Mutant("no interreflection", "light that two facets reflect is left out, eqs 18 and 28",
            "the paper itself leaves it out of eq. 30",
            {**Fit(bounced=0.0).functions(), **facets_with(facets_scaled(same, nothing))}),
     Mutant("no interreflection in the fit", "eq. 28 is left out", "most renderers have eq. 27 alone",
@@ -268,11 +277,11 @@ MUTANTS = (
     Mutant("slopes without their sine", "eq. 25 is weighted by P without sin(theta_a)",
            "a Gaussian in one angle is normalised over that angle",
            Facets(weight=lambda slope, sigma: np.exp(-0.5 * (slope / sigma) ** 2), bounce_changes=True).functions()),
-    Mutant("Lambert", "f_r is rho / pi", "it is what a surface without roughness has", flat()),
+    Mutant("Lambert", "f_r is rho / pi", "it is the f_r of a surface without roughness", flat()),
     Mutant("0.57 for 0.33", "the constant of C_1 and A is 0.57", "note 7 offers it for the qualitative model",
            Fit(offset=0.57).functions()),
     Mutant("alpha and beta exchanged", "alpha is the smaller of the two angles",
-           "eq. 27 has both, and their names do not tell", Fit(alpha=np.minimum, beta=np.maximum).functions()),
+           "eq. 27 has both, and their names are alike", Fit(alpha=np.minimum, beta=np.maximum).functions()),
     Mutant("C_2 with one branch", "(2 beta / pi)^3 is left out of C_2 away from the light",
            "eq. 30 has one branch", Fit(cube=0.0).functions()),
     Mutant("no C_3", "the third term of eq. 27 is left out", "section 4.4 finds it small", Fit(third=0.0).functions()),

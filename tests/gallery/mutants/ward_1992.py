@@ -34,25 +34,25 @@ HORIZON = 6.123233995736766e-17  # cosine of the float64 nearest pi/2
 
 
 def by_vectors(f_r: Function) -> Function:
-    """The function of angles whose value a function of unit vectors gives."""
+    """Return the function of angles with the values of a function of unit vectors."""
     return lambda theta_i, phi_i, theta_r, phi_r, **surface: f_r(
         unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **surface
     )
 
 
 def each_form(by_angles: Function, by_vectors: Function | None = None) -> dict[Function, Function]:
-    """All four forms, of angles and of vectors, as a function of the right one returns them."""
-    found = {angles: by_angles(angles) for angles in FORMS}
-    return found | {vectors: (by_vectors or by_angles)(vectors) for vectors in FORMS.values()}
+    """Return all four forms, of angles and of vectors, by functions that make the wrong form from the right one."""
+    forms = {angles: by_angles(angles) for angles in FORMS}
+    return forms | {vectors: (by_vectors or by_angles)(vectors) for vectors in FORMS.values()}
 
 
 def with_surface(change: Callable[[dict[str, Any]], dict[str, Any]]) -> dict[Function, Function]:
-    """All four forms with other parameters."""
+    """Return all four forms with changed parameters."""
     return each_form(lambda right: lambda *directions, **surface: right(*directions, **change(surface)))
 
 
 def parts(lobe: float = 1.0, diffuse: float = 1.0) -> dict[Function, Function]:
-    """All four forms with factors before the lobe and before the diffuse part."""
+    """Return all four forms with factors of the lobe and of the diffuse part."""
 
     def wrong(right: Function) -> Function:
         def f_r(*directions: Any, rho_d: Any, **surface: Any) -> Any:
@@ -65,13 +65,14 @@ def parts(lobe: float = 1.0, diffuse: float = 1.0) -> dict[Function, Function]:
 
 
 def wider(factor: float) -> dict[Function, Function]:
+    """Return all four forms with a multiple of both alphas."""
     return with_surface(
         lambda surface: {**surface, **{name: surface[name] * factor for name in ("alpha_x", "alpha_y")}}
     )
 
 
 def elliptical(lobe: Function) -> dict[Function, Function]:
-    """Eq. 5a with another lobe, of tan(delta), its azimuth phi, both cosines, and alpha_x, alpha_y."""
+    """Return eq. 5a with another lobe: a function of tan(delta), azimuth phi, both cosines, and both alphas."""
 
     def vectors(wi: Any, wr: Any, *, rho_d: Any, rho_s: Any, alpha_x: Any, alpha_y: Any) -> Any:
         wi, wr = np.asarray(wi, dtype=np.float64), np.asarray(wr, dtype=np.float64)
@@ -84,13 +85,13 @@ def elliptical(lobe: Function) -> dict[Function, Function]:
 
 
 def printed(tan: Any, phi: Any, cos_i: Any, cos_r: Any, alpha_x: Any, alpha_y: Any) -> Any:
-    """The lobe of eq. 5a."""
+    """Return the lobe [1/sr] of eq. 5a."""
     exponent = tan**2 * (np.cos(phi) ** 2 / alpha_x**2 + np.sin(phi) ** 2 / alpha_y**2)
     return np.exp(-exponent) / (4.0 * np.pi * alpha_x * alpha_y * np.sqrt(cos_i * cos_r))
 
 
 def half_vector(factor: float) -> dict[Function, Function]:
-    """Eq. 5b with another factor in its exponent."""
+    """Return eq. 5b with another factor in its exponent."""
 
     def vectors(wi: Any, wr: Any, *, rho_d: Any, rho_s: Any, alpha_x: Any, alpha_y: Any) -> Any:
         wi, wr = np.asarray(wi, dtype=np.float64), np.asarray(wr, dtype=np.float64)
@@ -104,7 +105,7 @@ def half_vector(factor: float) -> dict[Function, Function]:
 
 
 def turned() -> dict[Function, Function]:
-    """Light from the other side: where the paper's d_i points along the light, ours points to it."""
+    """Return all four forms with light from the other side, as if d_i pointed along the light."""
     return each_form(
         lambda right: lambda ti, pi, tr, pr, **surface: right(ti, pi + np.pi, tr, pr, **surface),
         lambda right: lambda wi, wr, **surface: right(np.asarray(wi) * [-1.0, -1.0, 1.0], wr, **surface),
@@ -112,10 +113,12 @@ def turned() -> dict[Function, Function]:
 
 
 def taken(wrong: tuple[Function, Function], right: tuple[Function, Function]) -> dict[Function, Function]:
+    """Return the wrong functions in place of the right ones."""
     return dict(zip(right, wrong, strict=True))
 
 
 def folded() -> dict[Function, Function]:
+    """Return all four forms times the cosine of the viewer."""
     return each_form(
         lambda right: lambda ti, pi, tr, pr, **surface: right(ti, pi, tr, pr, **surface) * np.cos(tr),
         lambda right: lambda wi, wr, **surface: right(wi, wr, **surface) * np.asarray(wr)[..., 2],
@@ -123,11 +126,13 @@ def folded() -> dict[Function, Function]:
 
 
 def mean(surface: dict[str, Any]) -> dict[str, Any]:
+    """Return the parameters with the geometric mean of both alphas."""
     alpha = np.sqrt(surface["alpha_x"] * surface["alpha_y"])
     return {**surface, "alpha_x": alpha, "alpha_y": alpha}
 
 
 def swapped(surface: dict[str, Any]) -> dict[str, Any]:
+    """Return the parameters with both alphas exchanged."""
     return {**surface, "alpha_x": surface["alpha_y"], "alpha_y": surface["alpha_x"]}
 
 
@@ -135,7 +140,7 @@ UNCHANGED = (
     Mutant(
         "eqs 5a and 5b anew",
         "nothing",
-        "the twins that the others change",
+        "the twins that the other mutants change",
         {**elliptical(printed), **half_vector(factor=2.0)},
     ),
 )
@@ -192,7 +197,7 @@ MUTANTS = (
     Mutant(
         "without 4",
         "the normalisation is 1 / (pi alpha_x alpha_y)",
-        "that is the normalisation of the slopes; the 4 comes from the half vector",
+        "it is the normalisation of the slopes; the 4 comes from the half vector",
         parts(lobe=4.0),
     ),
     Mutant(
@@ -216,13 +221,13 @@ MUTANTS = (
     Mutant(
         "without the root of the cosines",
         "1 / sqrt(cos theta_i cos theta_r) is left out",
-        "it is 1 where a highlight is usually looked at",
+        "it is 1 at the usual angles of a highlight",
         elliptical(lambda tan, phi, i, r, a, b: printed(tan, phi, i, r, a, b) * np.sqrt(i * r)),
     ),
     Mutant(
         "delta for tan(delta)",
         "the exponent has delta^2",
-        "eq. 7a, as printed, draws delta as if it had",
+        "eq. 7a, as printed, draws delta like that",
         elliptical(lambda tan, phi, i, r, a, b: printed(np.arctan(tan), phi, i, r, a, b)),
     ),
     Mutant(

@@ -1,0 +1,52 @@
+"""Panels, curves, values and statements of figures, for the tests of the gallery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb.figure import Curve, Figure, Panel, Statement
+from brdfdb.spectra import refractive_index
+
+Phrase = tuple[str, str]  # name of a figure, and a phrase of one of its statements
+
+
+def cases(statements: Sequence[Phrase], broken: Mapping[Phrase, str]) -> list[Any]:
+    """Return a test case per statement; broken statements, given with their reasons, have to fail."""
+    marks = {phrase: [pytest.mark.xfail(strict=True, reason=reason)] for phrase, reason in broken.items()}
+    return [pytest.param(*phrase, marks=marks.get(phrase, [])) for phrase in statements]
+
+
+def statement_of(figure: Figure, phrase: str) -> Statement:
+    """Return the only statement of a figure that contains a phrase."""
+    (statement,) = (statement for statement in figure.statements if phrase in statement.says)
+    return statement
+
+
+def panel_of(figure: Figure, index: int = 0) -> Panel:
+    """Return a panel of curves."""
+    panel = figure.panels[index]
+    assert isinstance(panel, Panel)
+    return panel
+
+
+def curve_of(figure: Figure, label: str, index: int = 0) -> Curve:
+    """Return the curve with a label."""
+    (curve,) = (curve for curve in panel_of(figure, index).curves if curve.label == label)
+    return curve
+
+
+def value_at(curve: Curve, x: float) -> float:
+    """Return the value of a curve at one of its points."""
+    value = curve.y[curve.x.index(x)]
+    assert value is not None
+    return value
+
+
+def optics(page: str, wavelength_nm: float) -> dict[str, float]:
+    """Return the wavelength [nm] and the refractive index at it."""
+    n, k = refractive_index(page, np.array(wavelength_nm))
+    return {"wavelength_nm": wavelength_nm, "n": float(n), "k": float(k)}
