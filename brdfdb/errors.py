@@ -109,11 +109,11 @@ class BusyError(BrdfdbError):
     """A lock of the store that another build holds."""
 
 
-# Modules that each optional extra of the distribution installs
+# Modules that an optional extra of the distribution installs. The service needs those of scenes, too
 EXTRAS = {
-    "serve": ("fastapi", "uvicorn", "uvloop", "httptools", "prometheus_client", "orjson", "plotly"),
-    "report": ("matplotlib", "jinja2", "plotly", "mpmath"),
-    "scenes": ("colour", "OpenEXR", "matplotlib"),
+    "serve": ("fastapi", "uvicorn", "uvloop", "httptools", "orjson", "prometheus_client", "plotly"),
+    "scenes": ("colour", "matplotlib", "OpenEXR", "scipy"),
+    "report": ("jinja2", "matplotlib", "mpmath", "colour"),
     "dask": ("distributed",),
     "http": ("fsspec", "aiohttp"),
 }

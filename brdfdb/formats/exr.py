@@ -314,8 +314,8 @@ def _attributes(image: Slice, table: Table) -> dict[str, Any]:
     attributes: dict[str, Any] = {
         "brdf:material": str(table.name),
         "brdf:revision": str(table.revision),
-        "brdf:model": str(table.attrs["model"]),
-        "brdf:title": str(table.attrs["title"]),
+        "brdf:model": table.metadata.model or "",
+        "brdf:title": table.metadata.title or "",
         "brdf:quantity": QUANTITY,
         "brdf:unit": UNIT,
         "brdf:dirac": "none" if table.specular is None else _dirac(table.specular),

@@ -150,7 +150,7 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
     def load(number: int) -> Table:
         name = sweep.members[number]
         table = tables[name]
-        if table.attrs.get("request_sha256") != sweep.request_sha256[number]:
+        if table.metadata.request_sha256 != sweep.request_sha256[number]:
             raise StoreError(stale(sweep.name, name))
         if not _same(shared.setdefault("wavelength_nm", table.wavelength_nm), table.wavelength_nm):
             raise StoreError(f"the family {sweep.name}: {name} is at other wavelengths than another member")

@@ -24,6 +24,7 @@ from brdfdb.geometry import Directions, checked_angles, checked_vectors, degrees
 from brdfdb.parameters import Floats
 from brdfdb.store.manifest import NAME
 from brdfdb.tables.grids import Axis
+from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.table_base import Described, Stated
 
 if TYPE_CHECKING:
@@ -423,9 +424,9 @@ class RemoteStore(Mapping[str, RemoteTable]):
                 return line
         raise UnknownMaterialError(name, list(self))
 
-    def attributes(self, name: str) -> dict[str, Any]:
-        """What the current revision says of itself."""
-        return dict(self[name].attrs)
+    def metadata(self, name: str) -> TableMetadata:
+        """Return the metadata of the current revision; of the request of its build nothing."""
+        return self[name].metadata
 
     def dataset(self, name: str) -> xr.Dataset:
         """The current revision as a lazy xarray Dataset, read over HTTP as far as it is needed.

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 
     from brdfdb.store.family import Family
     from brdfdb.store.zarr_store import Whole
+    from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.table import Table
 
 __all__ = [
@@ -261,11 +262,11 @@ class Store(Mapping[str, "Table"]):
         """
         return self._pointer(name).head
 
-    def attributes(self, name: str) -> dict[str, Any]:
-        """What the current revision says of itself, without decoding its values."""
+    def metadata(self, name: str) -> TableMetadata:
+        """Return the metadata of the current revision, without decoding its values; errors as by `summary`."""
         group, digest = self.location(name)
         check_manifest(group, digest, contents=False)
-        return dict(read_json(group / "zarr.json")["attributes"])
+        return read_metadata(group)
 
     def families(self) -> list[str]:
         """Return the names of the families, sorted."""
@@ -386,6 +387,13 @@ class Store(Mapping[str, "Table"]):
         return *pointer.location, pointer.head
 
 
+def read_metadata(group: Path) -> TableMetadata:
+    """Return the metadata in the directory of a revision, whose files were checked against its manifest."""
+    from brdfdb.tables.metadata import TableMetadata
+
+    return TableMetadata.read(read_json(group / "zarr.json").get("attributes", {}))
+
+
 def check_summary(head: Head, manifest: Manifest) -> None:
     """Raise WrongSummaryError unless a pointer says of its revision what the manifest does."""
     for key, value in manifest["summary"].items():
@@ -435,9 +443,18 @@ def _decode(name: str, path: Path, files: Whole, digest: str) -> Table:
 
     try:
         group = zarr.open_group(files, mode="r")
-        arrays = {key: np.asarray(array[...]) for key, array in group.arrays()}
+        found = dict(group.arrays())
+        arrays = {key: np.asarray(array[...]) for key, array in found.items()}
     except StoreError:
         raise
     except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
         raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
-    return replace(table_from(name, path.name, arrays, dict(group.attrs)), digest=digest)
+    try:
+        table = table_from(name, path.name, arrays, dict(group.attrs))
+        variable = "brdf" if "brdf" in found else "parts"
+        dims, axes = found[variable].metadata.dimension_names or (), table.grid.names  # type: ignore[union-attr]
+        if dims[: len(axes)] != axes:
+            raise ValueError(f"{variable}: its dimensions {dims} must begin with {axes}")
+        return replace(table, digest=digest)
+    except ValueError as error:  # written by another program
+        raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error

@@ -55,7 +55,7 @@ def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
         if head["request_sha256"] == wanted:
             store.verify(name)
             return Standing("current", group.name)
-        why = difference(store.attributes(name).get("request", {}), request)
+        why = difference(store.metadata(name).request or {}, request)
     except UnknownMaterialError:
         why = "new"
     except StoreError as error:

@@ -86,7 +86,7 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
         brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
         albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)[:, np.newaxis]
     lights = theta_i_deg
-    if lights is None and table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
+    if lights is None and table.metadata.reason:  # a planner's nodes are few, and reach 90 degrees
         lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
     if lights is not None:
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
@@ -114,14 +114,11 @@ def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
 
 def material_of(table: Table) -> Material:
     """The material behind a table, from what the table says of itself."""
-    fields = ("title", "model", "parameters", "source")
-    return Material.from_table(
-        table.name,
-        {
-            **{field: table.attrs[field] for field in fields},
-            "refractive_index": table.attrs["refractive_index"] or None,
-        },
-    )
+    metadata = table.metadata
+    if metadata.model is None:
+        raise ValueError(f"model: the table of {table.name} {metadata.gaps}")
+    stated = metadata.model_dump(include={"title", "model", "parameters", "source"})
+    return Material.from_table(table.name, {**stated, "refractive_index": metadata.refractive_index or None})
 
 
 def linear_in_angles(table: Table) -> bool:

@@ -7,10 +7,11 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict
 
 from brdfdb.errors import ParameterError
 from brdfdb.materials import Material
@@ -40,6 +41,8 @@ class Interpolation:
         What is tabulated is f_r times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a
         model has at the horizon.
     """
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # where attributes of tables are read
 
     method: str = "linear"
     logarithm: bool = False

@@ -14,6 +14,7 @@ from brdfdb.geometry import Directions
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Axis
+from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.stated_error import Error, stated
 
 _MOST_KNOWN = 64  # single wavelengths that are remembered
@@ -70,9 +71,14 @@ class Described:
     wavelength_nm: Axis | None
 
     @functools.cached_property
+    def metadata(self) -> TableMetadata:
+        """The attributes as a typed record."""
+        return TableMetadata.read(self.attrs)
+
+    @property
     def error(self) -> Error | None:
         """The error that the table states; None if none was measured."""
-        return None if "error" not in self.attrs else Error.model_validate(self.attrs["error"])
+        return self.metadata.error
 
     def _stated(self, directions: Directions, brdf: Floats, wavelength_nm: ArrayLike | None) -> Floats:
         if self.error is None:

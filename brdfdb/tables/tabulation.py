@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,10 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import directions_from_half_difference, radians, unit_vector
-from brdfdb.materials import Material
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.layout import TABLE_VERSION, Layout
+from brdfdb.tables.metadata import TableMetadata
 
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
@@ -203,16 +202,7 @@ def frame(layout: Layout) -> xr.Dataset:
             ),
             {"units": "1", "long_name": "reflectance of the Dirac part, in the exact mirror direction"},
         )
-    extent = [] if wavelength_nm is None else [float(wavelength_nm[0]), float(wavelength_nm[-1])]
-    how = {"interpolation": asdict(layout.interpolation), "bits": layout.bits}
-    return xr.Dataset(
-        variables,
-        coordinates,
-        _attributes(material)
-        | {"anisotropic": grid.anisotropic, "symmetries": grid.symmetries, "wavelength_range_nm": extent}
-        | how
-        | {"reconstruction": _reconstruction(layout), "reason": layout.reason},
-    )
+    return xr.Dataset(variables, coordinates, metadata_of(layout).attributes())
 
 
 def specular_nodes(layout: Layout) -> Axis:
@@ -240,31 +230,39 @@ def _reconstruction(layout: Layout) -> str:
     return f"brdf = {value}; between nodes, parts are interpolated, {how.method}{spectrum}{beyond}"
 
 
-def _attributes(material: Material) -> dict[str, Any]:
-    spec = material.spec
+def metadata_of(layout: Layout) -> TableMetadata:
+    """Return the metadata of a table that is known before its values are: without request and stated error."""
+    material, spec, wavelength_nm = layout.material, layout.material.spec, layout.wavelength_nm
     # parameters by the names that files give them
     written = dict(zip(material.parameters, material.file_parameters(), strict=True))
-    return {
-        "title": material.title,
-        "material": material.name,
-        "table_version": TABLE_VERSION,
-        "model": spec.name,
-        "model_version": spec.version,
-        "model_title": spec.title,
-        "model_equation": spec.equation,
-        "model_reference": spec.reference,
-        "parameters": material.file_parameters(),
-        "parameter_sources": {written[name]: material.sources.get(name, material.source) for name in written},
-        "source": material.source,
-        "assumed": {written.get(name, name): each.model_dump(mode="json") for name, each in material.assumed.items()},
-        "note": material.note,
-        "refractive_index": material.refractive_index or "",
-        "known_excess": material.known_excess.model_dump() if material.known_excess else {},
-        "conventions": (
+    return TableMetadata(
+        title=material.title,
+        material=material.name,
+        table_version=TABLE_VERSION,
+        model=spec.name,
+        model_version=spec.version,
+        model_title=spec.title,
+        model_equation=spec.equation,
+        model_reference=spec.reference,
+        parameters=material.file_parameters(),
+        parameter_sources={written[name]: material.sources.get(name, material.source) for name in written},
+        source=material.source,
+        assumed={written.get(name, name): each for name, each in material.assumed.items()},
+        note=material.note,
+        refractive_index=material.refractive_index or "",
+        known_excess=material.known_excess,
+        conventions=(
             "directions point away from the surface; delta_phi = phi_r - phi_i, 0 is back towards the light, "
             "180 degrees the mirror half plane; f_r without cosine; isotropic tables are even in delta_phi"
         ),
-    }
+        anisotropic=layout.grid.anisotropic,
+        symmetries=layout.grid.symmetries,
+        wavelength_range_nm=[] if wavelength_nm is None else [float(wavelength_nm[0]), float(wavelength_nm[-1])],
+        interpolation=layout.interpolation,
+        bits=layout.bits,
+        reconstruction=_reconstruction(layout),
+        reason=layout.reason,
+    )
 
 
 _LONG_NAMES = {

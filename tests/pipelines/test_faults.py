@@ -204,7 +204,7 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
                 kills += 1
                 left = marked(root)
             store = brdfdb.open(root)
-            assert {store.attributes(name)["parameters"]["rho"] for name in store} == {number / 128}
+            assert {store.metadata(name).parameters["rho"] for name in store} == {number / 128}
             if number % 8 == 0:
                 assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
     finally:

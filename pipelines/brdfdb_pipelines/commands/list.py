@@ -48,10 +48,12 @@ def _print_materials(store: Store, root: Path) -> list[str]:
     """Print a line for each material from its pointer alone; return a sentence for each damaged one."""
     from brdfdb_pipelines import terminal
 
-    rows, damaged = [], []
+    rows, damaged, incomplete = [], [], []
     for name in store:
         try:
             head = store.summary(name)
+            if not (head["title"] and head["model"]):  # the pointer of a whole table has both
+                incomplete.append(f"{name} {head['revision']} {store.metadata(name).gaps}")
         except StoreError as error:
             damaged.append(str(error))
             continue
@@ -62,6 +64,8 @@ def _print_materials(store: Store, root: Path) -> list[str]:
         rows,
         numbers=("error (p99)",),
     )
+    for sentence in incomplete:
+        print(terminal.plain(sentence))
     return damaged
 
 

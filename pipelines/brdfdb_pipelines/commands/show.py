@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import brdfdb
 from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 
 if TYPE_CHECKING:
+    from brdfdb.materials.provenance import Assumption
     from brdfdb.store.family import Family
+    from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.stated_error import Error
     from brdfdb.tables.table import Table
 
@@ -42,27 +43,10 @@ def run(options: argparse.Namespace) -> int:
 def _print_material(table: Table, path: Path) -> None:
     from brdfdb_pipelines import terminal
 
-    attributes = table.attrs
-    lines = [
-        f"{table.name}: {attributes['title']}",
-        f"  model       {attributes['model_title']}, {attributes['model_equation']} [{attributes['model_reference']}]",
-        "  parameters",
-    ]
-    for parameter, value in attributes["parameters"].items():
-        assumed = parameter in attributes["assumed"]
-        # tables built earlier list the names alone, and have the reasons in their note
-        reason = "below" if isinstance(attributes["assumed"], Mapping) else "the note"
-        note = f"assumed, see {reason}" if assumed else attributes["parameter_sources"][parameter]
-        lines.append(f"    {parameter:<16}{value!s:<8} {note}")
-    lines.append(f"  source      {attributes['source']}")
-    if attributes["refractive_index"]:
-        lines.append(f"  n, k        {attributes['refractive_index']} of refractiveindex.info")
-    if attributes["note"]:
-        lines.append(f"  note        {attributes['note']}")
-    lines += _assumptions(attributes["assumed"])
-    if attributes["known_excess"]:
-        lines.append(f"  excess      {attributes['known_excess']['citation']}")
-    print(terminal.plain("\n".join(lines)))
+    metadata = table.metadata
+    print(terminal.plain("\n".join([f"{table.name}: {metadata.title or 'no title'}", *_origin(metadata)])))
+    if metadata.gaps:
+        print(terminal.plain(f"  incomplete  the table {metadata.gaps}"))
     _print_grid(table)
     _print_error(table.error)
     _print_albedo(table)
@@ -91,19 +75,42 @@ def _print_family(family: Family) -> None:
         print(f"  Dirac part  within {record.specular_error:.3g} of the model's reflectance")
 
 
-def _assumptions(assumed: Any) -> list[str]:
-    """Return lines on why each assumed value was chosen, with the largest albedo [1] of it and its alternatives."""
-    if not isinstance(assumed, Mapping):
-        return []
+def _origin(metadata: TableMetadata) -> list[str]:
+    """Return lines on the model, its parameters and where they come from, as far as a table states them."""
     lines = []
-    for parameter, assumption in assumed.items():
-        lines.append(f"  assumed     {parameter}: {assumption['why']}")
-        if assumption["alternatives"]:
-            lines.append(f"    {'largest albedo':<16}{assumption['max_albedo']:.3f} as tabulated")
-        for other in assumption["alternatives"]:
-            values = ", ".join(f"{name} = {value}" for name, value in other["parameters"].items())
-            excess = ", more than arrives" if other["max_albedo"] > 1.0 else ""
-            lines.append(f"    {'':<16}{other['max_albedo']:.3f} with {values}{excess}")
+    if metadata.model is not None:
+        named = ", ".join(part for part in (metadata.model_title or metadata.model, metadata.model_equation) if part)
+        reference = f" [{metadata.model_reference}]" if metadata.model_reference else ""
+        lines.append(f"  model       {named}{reference}")
+    if metadata.parameters:
+        lines.append("  parameters")
+    for parameter, value in metadata.parameters.items():
+        note = metadata.parameter_sources.get(parameter, "")
+        if parameter in metadata.assumed:
+            note = f"assumed, see {'the note' if metadata.assumed[parameter] is None else 'below'}"
+        lines.append(f"    {parameter:<16}{value!s:<8} {note}".rstrip())
+    if metadata.source is not None:
+        lines.append(f"  source      {metadata.source}")
+    if metadata.refractive_index:
+        lines.append(f"  n, k        {metadata.refractive_index} of refractiveindex.info")
+    if metadata.note:
+        lines.append(f"  note        {metadata.note}")
+    for parameter, assumption in metadata.assumed.items():
+        lines += [] if assumption is None else _assumption(parameter, assumption)
+    if metadata.known_excess is not None:
+        lines.append(f"  excess      {metadata.known_excess.citation}")
+    return lines
+
+
+def _assumption(parameter: str, assumption: Assumption) -> list[str]:
+    """Return lines on why an assumed value was chosen, with the largest albedo [1] of it and its alternatives."""
+    lines = [f"  assumed     {parameter}: {assumption.why}"]
+    if assumption.max_albedo is not None:
+        lines.append(f"    {'largest albedo':<16}{assumption.max_albedo:.3f} as tabulated")
+    for other in assumption.alternatives:
+        values = ", ".join(f"{name} = {value}" for name, value in other.parameters.items())
+        excess = ", more than arrives" if other.max_albedo > 1.0 else ""
+        lines.append(f"    {'':<16}{other.max_albedo:.3f} with {values}{excess}")
     return lines
 
 
@@ -111,7 +118,7 @@ def _print_grid(table: Table) -> None:
     """Axes, how many values are stored and how, and how f_r comes of them."""
     from brdfdb_pipelines import terminal
 
-    attributes, wavelength = table.attrs, table.wavelength_nm
+    metadata, wavelength = table.metadata, table.wavelength_nm
     print("  grid")
     for axis, nodes in table.axes_deg.items():
         print(f"    {axis:<16}{nodes.size} nodes, {nodes[0]:g} to {nodes[-1]:g} degrees")
@@ -123,14 +130,14 @@ def _print_grid(table: Table) -> None:
         print(f"    {'wavelength':<16}{wavelength.size} nodes, {wavelength[0]:g} to {wavelength[-1]:g} nm")
     if table.spectra is not None:
         print(f"    {'parts':<16}{table.spectra.shape[0]}, of which each spectrum is a sum")
-    bits = attributes.get("bits", 23)
+    bits = metadata.bits
     stored = "all 23 bits of their mantissas" if bits == 23 else f"{bits} of 23 bits of their mantissas"
     print(f"    {'values':<16}{table.values.size}, {stored}")
     print(f"    {'interpolation':<16}{_interpolation(table)}")
-    if attributes.get("reason"):
-        print(terminal.plain(f"    {'reason':<16}{attributes['reason']}"))
-    if attributes.get("reconstruction"):
-        print(terminal.plain(f"  f_r         {attributes['reconstruction']}"))
+    if metadata.reason:
+        print(terminal.plain(f"    {'reason':<16}{metadata.reason}"))
+    if metadata.reconstruction:
+        print(terminal.plain(f"  f_r         {metadata.reconstruction}"))
 
 
 def _interpolation(table: Table) -> str:

@@ -47,6 +47,6 @@ def run(options: argparse.Namespace) -> int:
         print(f"brdfdb: {finding}", file=sys.stderr)
     family_count = sum(name not in store for name in wanted)
     what = f"{len(wanted) - family_count} materials" + (f" and {family_count} families" if family_count else "")
-    damaged = len({finding.name for finding in findings})
+    damaged = len({finding.name for finding in findings if not finding.remark})
     print(f"{what} verified, {terminal.size(total)}: {damaged or 'none'} damaged")
     return REFUSED if damaged else 0
