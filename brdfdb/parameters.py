@@ -5,10 +5,12 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.lobes import Lobe
 
 Floats = NDArray[np.floating[Any]]
 
@@ -46,19 +48,6 @@ class Parameter:
                 interval = interval.replace(f"{self.low:g}, {self.high:g}", f"{self.low!r}, {self.high!r}")
             raise ValueError(f"{self.name}: {value} is outside {interval}")
         return array
-
-
-class Lobe(NamedTuple):
-    """Where a model has its lobe: what samplers and quadratures look for, not a part of the model's value.
-
-    `share` [1], in [0, 1], is about what part of the reflected light lies in the lobe around the mirror direction,
-    whose half vectors have slopes distributed about as exp(-(s_x / alpha_x)^2 - (s_y / alpha_y)^2). The rest is looked
-    for all over the hemisphere: a model with wider tails than this Gaussian leaves a tenth to that, or more.
-    """
-
-    share: Floats
-    alpha_x: Floats
-    alpha_y: Floats
 
 
 def white(_: Mapping[str, Any]) -> dict[str, float]:

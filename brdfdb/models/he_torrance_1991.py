@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
+from brdfdb.lobes import Lobe
 from brdfdb.models._he_torrance_kernels import (
     WHOLE,
     WORTH_THE_TABLE,
@@ -21,7 +22,7 @@ from brdfdb.models._he_torrance_kernels import (
 )
 from brdfdb.models._he_torrance_series import TERMS, TERMS_OF_FLOAT32, series_table
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum")
 SIGMA_0_UM = Parameter("sigma_0_um", "σ_0", "µm", 0.0, 1e4, "rms roughness; 0 is a mirror")

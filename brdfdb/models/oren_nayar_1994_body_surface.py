@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.lobes import Lobe
 from brdfdb.models import torrance_sparrow_1967
 from brdfdb.models.oren_nayar_1994 import INTERREFLECTION, RHO, SIGMA, oren_nayar, oren_nayar_vectors
 from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow, torrance_sparrow_vectors
-from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 K_B = Parameter("k_b", "k_b", "1", 0.0, 1.0, "weight of the body's reflection", default=1.0)
 K_S = Parameter("k_s", "k_s", "1", 0.0, 1.0, "weight of the surface's reflection, eq. 31 as printed")

@@ -14,7 +14,7 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.sampling import lobe_of, mirrored_in_lobe, mixture_density
 from brdfdb.materials import Material
-from brdfdb.parameters import Floats, Lobe
+from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Grid
@@ -60,7 +60,7 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
     light is mirrored in half vectors that follow `ModelSpec.lobe`, of the wavelengths in turn, or a lobe twice as wide:
-    its own Gaussian hardly ever reaches the shoulder where the lobe ends. Viewers of a model without a lobe are all
+    its own distribution hardly ever reaches the shoulder where the lobe ends. Viewers of a model without a lobe are all
     drawn over the hemisphere.
     """
     rng = np.random.default_rng(seed)
@@ -74,7 +74,9 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
     turns = np.arange(band.size) % (1 if wavelength_nm is None else wavelength_nm.size)
     spectrum = material.arguments(wavelength_nm)
     lobe = lobe_of(material.spec, wi, {name: v[turns] if np.ndim(v) else v for name, v in spectrum.items()})
-    lobes = [Lobe(np.ones(1), width * lobe.alpha_x, width * lobe.alpha_y) for width in WIDTHS]
+    lobes = [
+        lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y) for width in WIDTHS
+    ]
     which = rng.random(band.size) * 2 * len(lobes)  # one half over the hemisphere, the other among the lobes
     wr = over
     for number, drawn in enumerate(lobes):
