@@ -70,7 +70,9 @@ def nodes_of(table: Table, material: Material) -> Nodes:
 def _rows(layout: Layout) -> Iterator[slice]:
     """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    most = _SLOW.get(layout.material.model, MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
+    most = _SLOW.get(layout.source.attributes().get("model", ""), MOST_VALUES) // (
+        int(np.prod(layout.grid.shape[1:])) * wavelengths
+    )
     if most >= layout.shape[0]:
         yield from layout.blocks
         return
@@ -107,7 +109,7 @@ def _uniform(table: Table, layout: Layout) -> Iterator[str]:
 
 def _dirac(table: Table, layout: Layout) -> Iterator[str]:
     """Yield a sentence on a Dirac part that is missing, or whose nodes are not those of the layout."""
-    if layout.material.spec.specular is None:
+    if not layout.source.has_specular:
         return
     if table.specular is None:
         yield "the Dirac part of the model is not stored"

@@ -58,7 +58,7 @@ def _build(root: Path, name: str, layout: Layout) -> Built:
     error = error_measurement.measure(layout, lambda rows: values[rows])
     before = _before(store, name)
     revision, _ = publish_dataset(root, name, table.assign_attrs(error=error.model_dump(mode="json")))
-    stated = f"{layout.material.model}, whose error (p99) is {terminal.error(error.overall.p99)}"
+    stated = f"{layout.source.title}, whose error (p99) is {terminal.error(error.overall.p99)}"
     return Built(revision, f"{revision} is a table of {stated}; it {before}")
 
 
