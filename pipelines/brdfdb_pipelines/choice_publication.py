@@ -54,7 +54,8 @@ def _build(root: Path, name: str, layout: Layout) -> Built:
         return Built(store.head(name), f"{store.head(name)} of the store is this table")
     before = _before(store, name)
     revision, _, error = publish_layout(root, name, layout)
-    stated = f"{layout.source.attributes().get('model', 'a function')}, whose error (p99) is {terminal.error(error.overall.p99)}"
+    model = layout.source.attributes().get("model", "a function")
+    stated = f"{model}, whose error (p99) is {terminal.error(error.overall.p99)}"
     return Built(revision, f"{revision} is a table of {stated}; it {before}")
 
 
