@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_vectors
 from brdfdb.integrals.quadrature import named, spec_of
 from brdfdb.parameters import Floats, Lobe, ModelSpec
@@ -212,11 +213,11 @@ def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> L
 def _uniform(name: str, u: ArrayLike) -> Array:
     array = np.asarray(u)
     if array.dtype.kind not in "iuf":
-        raise ValueError(f"{name}: {u!r} is not a number in [0, 1]")
+        raise ParameterError(name, f"{u!r} is not a number in [0, 1]")
     array = array.astype(np.float64)
     bad = (array < 0.0) | (array > 1.0)
     if np.any(bad):
-        raise ValueError(f"{name}: {array[bad].flat[0]:.9g} is outside [0, 1]")
+        raise ParameterError(name, f"{array[bad].flat[0]:.9g} is outside [0, 1]", float(array[bad].flat[0]), (0.0, 1.0))
     return array
 
 

@@ -72,15 +72,17 @@ class FunctionRecord(BaseModel):
     @classmethod
     def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
         if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
-            raise ValueError(f"{list(wavelengths_nm)} must be positive and increasing")
+            raise ParameterError(
+                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
+            )
         return wavelengths_nm
 
     @model_validator(mode="after")
     def _check_symmetry(self) -> FunctionRecord:
         if self.elliptical and not self.anisotropic:
-            raise ValueError("elliptical: an isotropic function has more symmetry than an ellipse; leave it out")
+            raise ParameterError("elliptical", "an isotropic function has more symmetry than an ellipse; leave it out")
         if not self.anisotropic and self.alpha is not None and self.alpha[0] != self.alpha[1]:
-            raise ValueError(f"alpha: {self.alpha} differs along x and y, which an isotropic function cannot")
+            raise ParameterError("alpha", f"{self.alpha} differs along x and y; an isotropic function has one width")
         return self
 
     @property
@@ -327,7 +329,5 @@ def _refusal(error: ValidationError) -> ParameterError:
         return ParameterError(parameter, "missing; a function needs a name, a title and a provenance")
     if first["type"] != "value_error":
         return ParameterError(parameter, f"{first['input']!r}: {first['msg']}", first["input"])
-    sentence = str(first["ctx"]["error"])
-    if not parameter:  # a check of several parameters names the one
-        parameter, _, sentence = sentence.partition(": ")
-    return ParameterError(parameter, sentence)
+    ours = first["ctx"]["error"]
+    return ours if isinstance(ours, ParameterError) else ParameterError(parameter, str(ours), first["input"])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import brdfdb
-from brdfdb.errors import BrdfdbError
+from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.forms.catalogue import Representation, of_table
 from brdfdb.forms.tradeoff import STEPS, TIMED, chart, chart_family
 from brdfdb.forms.tradeoff_document import Chart, Charts, FamilyChart, Point
@@ -142,7 +142,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
             continue
         else:
             known = "the recipe" if recipe_path else "the built-in ones; `brdfdb list --presets` names them"
-            raise ValueError(f"{name}: no such material or family, neither in the store nor among {known}")
+            raise ParameterError(name, f"no such material or family, neither in the store nor among {known}", name)
         if table is not None and _fits(table.wavelength_nm, subject.wavelength_nm):
             title = f"table of the store, {terminal.error(table.error.overall.p99 if table.error else None)}"
             subject = subject._replace(stored=(of_table(table, "table-stored", title),))
