@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.lobes import Lobe
 
 Floats = NDArray[np.floating[Any]]
@@ -41,7 +42,9 @@ class Parameter:
         """Return `value` as float64, or raise a ValueError that names the parameter, the value and the range."""
         given = np.asarray(value)
         if given.dtype.kind not in "biuf":
-            raise ValueError(f"{self.name}: {value!r} is not a number in {self.interval}")
+            raise ParameterError(
+                self.name, f"{value!r} is not a number in {self.interval}", value, (self.low, self.high)
+            )
         array = given.astype(np.float64)
         bad = ~((array >= self.low) & (array <= self.high))  # nan too
         if np.any(bad):
@@ -50,7 +53,7 @@ class Parameter:
             if f"{first:g}" in (f"{self.low:g}", f"{self.high:g}"):  # next to an end: all digits, or they look alike
                 value = repr(float(first))
                 interval = interval.replace(f"{self.low:g}, {self.high:g}", f"{self.low!r}, {self.high!r}")
-            raise ValueError(f"{self.name}: {value} is outside {interval}")
+            raise ParameterError(self.name, f"{value} is outside {interval}", float(first), (self.low, self.high))
         return array
 
 

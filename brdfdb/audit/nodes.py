@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from brdfdb.audit.findings import Nodes
+from brdfdb.errors import ParameterError
 from brdfdb.materials import Material
 from brdfdb.tables.error_measurement import FLOOR
 from brdfdb.tables.layout import Layout
@@ -42,7 +43,12 @@ def nodes_of(table: Table, material: Material) -> Nodes:
         table.attrs.get("reason", ""),
     )
     if layout.shape != table.values.shape:
-        raise ValueError(f"{layout.variable}: shape {table.values.shape} is not {layout.shape}, that of its axes")
+        raise ParameterError(
+            layout.variable,
+            f"shape {table.values.shape} is not {layout.shape}, that of its axes",
+            table.values.shape,
+            layout.shape,
+        )
     rows, wrong, worst = 0, 0, (0.0, 0.0, 0.0)
     for some in _rows(layout):
         stored, expected = table.values[some].astype(np.float64), block(layout, some).astype(np.float64)
@@ -70,7 +76,8 @@ def nodes_of(table: Table, material: Material) -> Nodes:
 def _rows(layout: Layout) -> Iterator[slice]:
     """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    values = _MOST_SLOW if layout.material.spec.slow else MOST_VALUES
+    slow = isinstance(layout.source, Material) and layout.source.spec.slow
+    values = _MOST_SLOW if slow else MOST_VALUES
     most = values // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
     if most >= layout.shape[0]:
         yield from layout.blocks
@@ -88,7 +95,12 @@ def _refraction(table: Table, material: Material) -> Iterator[str]:
         expected = np.asarray(arguments[name])
         scale = np.hypot(arguments["n"], arguments["k"])
         if stored.shape != expected.shape:
-            raise ValueError(f"{name}: shape {stored.shape} is not {expected.shape}, that of the wavelengths")
+            raise ParameterError(
+                name,
+                f"shape {stored.shape} is not {expected.shape}, that of the wavelengths",
+                stored.shape,
+                expected.shape,
+            )
         off = np.where(np.isfinite(stored), np.abs(stored - expected), np.inf) / scale
         if np.any(off > SAME):
             worst = int(np.argmax(off))
@@ -108,7 +120,7 @@ def _uniform(table: Table, layout: Layout) -> Iterator[str]:
 
 def _dirac(table: Table, layout: Layout) -> Iterator[str]:
     """Yield a sentence on a Dirac part that is missing, or whose nodes are not those of the layout."""
-    if layout.material.spec.specular is None:
+    if not layout.source.has_specular:
         return
     if table.specular is None:
         yield "the Dirac part of the model is not stored"

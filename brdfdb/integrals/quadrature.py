@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, check_phi, check_theta, unit_vector
 from brdfdb.lobes import Lobe
 from brdfdb.models import MODELS
@@ -137,7 +138,7 @@ def directional_albedo(
 
 def _check_tolerance(tolerance: float) -> None:
     if not 1e-13 <= tolerance <= 1.0:
-        raise ValueError(f"tolerance: {tolerance:.9g} is outside [1e-13, 1]")
+        raise ParameterError("tolerance", f"{tolerance:.9g} is outside [1e-13, 1]", tolerance, (1e-13, 1.0))
 
 
 def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -155,7 +156,7 @@ def spec_of(model: ModelSpec | str) -> ModelSpec:
     if isinstance(model, ModelSpec):
         return model
     if model not in MODELS:
-        raise ValueError(f"model: {model!r} is not one of {', '.join(MODELS)}")
+        raise ParameterError("model", f"{model!r} is not one of {', '.join(MODELS)}", model, tuple(MODELS))
     return MODELS[model]
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_vectors
 from brdfdb.integrals.quadrature import named, spec_of
 from brdfdb.lobes import Lobe
@@ -16,7 +17,7 @@ from brdfdb.parameters import Floats, ModelSpec
 Array = NDArray[np.float64]
 
 _TINY = 1e-300  # u of 0 is read as this: its logarithm is finite
-_DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
+DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
 
 
 class Sample(NamedTuple):
@@ -207,17 +208,17 @@ def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> L
     for parameter in spec.parameters:
         if parameter.name in parameters:
             parameter.check(parameters[parameter.name])
-    return _DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
+    return DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
 
 
 def _uniform(name: str, u: ArrayLike) -> Array:
     array = np.asarray(u)
     if array.dtype.kind not in "iuf":
-        raise ValueError(f"{name}: {u!r} is not a number in [0, 1]")
+        raise ParameterError(name, f"{u!r} is not a number in [0, 1]")
     array = array.astype(np.float64)
     bad = (array < 0.0) | (array > 1.0)
     if np.any(bad):
-        raise ValueError(f"{name}: {array[bad].flat[0]:.9g} is outside [0, 1]")
+        raise ParameterError(name, f"{array[bad].flat[0]:.9g} is outside [0, 1]", float(array[bad].flat[0]), (0.0, 1.0))
     return array
 
 

@@ -16,8 +16,8 @@ import brdfdb
 from brdfdb.atlas import ATLAS
 from brdfdb.audit import AuditReport, MaterialAudit, audit, report
 from brdfdb.audit.findings import Asymmetry
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb.gallery import GALLERY
-from brdfdb.store.reader import StoreError
 from brdfdb_pipelines import audit_page, audit_sentences, terminal, workers
 
 Task = Callable[[], Any]
@@ -70,7 +70,12 @@ def run(
     for name in (*names, *allow):
         store.head(name)
     if unused := [name for name in allow if name not in materials]:
-        raise ValueError(f"--allow: {unused[0]} is not among the materials to audit, {', '.join(materials)}")
+        raise ParameterError(
+            "--allow",
+            f"{unused[0]} is not among the materials to audit, {', '.join(materials)}",
+            unused[0],
+            tuple(materials),
+        )
     _check_path(report_path)
     tasks: dict[str, Task] = {name: partial(_audited, root, name, name in allow) for name in materials}
     drawn = [*ATLAS, *GALLERY] if figures else []
@@ -112,7 +117,7 @@ def _check_path(report_path: Path) -> None:
         code = errno.ENOTDIR if report_path.parent.exists() else errno.ENOENT
         raise OSError(code, os.strerror(code), str(report_path))
     if report_path.suffix != ".json":
-        raise ValueError(f"--report: {report_path} does not end in .json")
+        raise ParameterError("--report", f"{report_path} does not end in .json", report_path)
 
 
 def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:

@@ -26,7 +26,6 @@ from brdfdb.lobes import Lobe
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
 from brdfdb.tables import error_measurement
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.table import Table
 from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
 
@@ -138,7 +137,7 @@ SIDES: dict[str, Callable[[Array], Any]] = {
 
 
 def smoothness(table: Table) -> Smoothness:
-    return smoothness_of(table, material_of(table), pairs_of(table, material_of(table)))
+    return smoothness_of(table, table.source, pairs_of(table, table.source))
 
 
 def by_seam(jumps: list[Jump]) -> dict[str, Jump]:
