@@ -107,7 +107,7 @@ def catalogue(
     request: Request,
     cursor: Annotated[str, Query(description="of the page before, its last name")] = "",
     limit: Annotated[int, Query(ge=1, le=MOST, description="materials on a page")] = PAGE,
-    model: Annotated[str, Query(description="only of this model, such as ward")] = "",
+    model: Annotated[str, Query(description="only of this model")] = "",
     paper: Annotated[str, Query(description="only with this in the key of the paper or in the source")] = "",
     q: Annotated[str, Query(description="only with all of these words in name, title, model or source")] = "",
 ) -> Response:
