@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from pydantic import BaseModel, Field
 
 from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of
-from brdfdb.audit.findings import EnergyVerdict, Furnace, ModelEnergy, UniformBound
-from brdfdb.figure import numbers, rows
+from brdfdb.audit.finding import STRICT
+from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.integrals.uniform_bound import a_max
@@ -17,6 +18,8 @@ from brdfdb.materials import Material
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
+
+EnergyVerdict = Literal["conserves", "loses", "known published excess", "accepted excess", "violates"]
 
 TOLERANCE = 1e-6  # absolute, of each albedo
 MOST_PANELS = 1000  # where the quadrature of one light gives up
@@ -33,6 +36,54 @@ LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
 GAIN = 1e-4  # beyond 1, of a lossless model, that is worth saying
 _ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])  # azimuths of a light over a lobe with two axes: the rest is the same
 _TURN_DEG = np.arange(0.0, 360.0, 60.0)
+
+
+class Furnace(BaseModel):
+    """The white furnace: the model made lossless, in light that is the same from everywhere; an ideal one shows 1."""
+
+    model_config = STRICT
+
+    lossless: str = Field(description="which parameters were set to what")
+    theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: grey; of many wavelengths the ends and the middle")
+    albedo: list[Numbers] = Field(description="[theta_i][wavelength], specular part included")
+    hemispherical: Numbers = Field(description="[wavelength], the mean over uniform light")
+    smallest: float | None = Field(description="null: not finite")
+    smallest_at_theta_i_deg: float
+    largest: float | None = Field(description="null: not finite")
+    largest_at_theta_i_deg: float
+
+
+class UniformBound(BaseModel):
+    """The largest uniform diffuse part a(lambda) that conserves energy at all angles, against the material's own."""
+
+    model_config = STRICT
+
+    wavelength_nm: list[float]
+    largest: Numbers
+    preset: Numbers
+    keeps: bool = Field(description="whether the material's own is no larger at any wavelength")
+
+
+class ModelEnergy(BaseModel):
+    """Directional albedo of the model behind a table, by adaptive quadrature, specular part included."""
+
+    model_config = STRICT
+
+    theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: grey")
+    albedo: list[Numbers] = Field(description="[theta_i][wavelength]; over the azimuths of the light the largest")
+    specular: list[Numbers] = Field(description="[theta_i][wavelength], the share of the specular part in it")
+    integration_error: float | None = Field(description="of the albedo, the largest estimate; null: not finite")
+    hemispherical: Numbers = Field(description="[wavelength], of light that is the same from everywhere")
+    max_albedo: float | None = Field(description="null: not finite")
+    max_at_theta_i_deg: float
+    max_at_wavelength_nm: float | None
+    exceeds_1_from_theta_i_deg: float | None = Field(description="to 0.001 degrees")
+    furnace: Furnace | None = Field(description="null: the model has no lossless parameters")
+    bound_on_a: UniformBound | None = Field(description="null: not a He-Torrance material")
+    verdict: EnergyVerdict
+    reason: str = Field(description="how much, where; of a known excess the citation")
 
 
 class _Lights(NamedTuple):

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from pydantic import Field
 
-from brdfdb.audit.findings import Nodes
+from brdfdb.audit.finding import Cell, Finding, Sentence, Subject, Verdict
 from brdfdb.materials import Material
 from brdfdb.tables.error_measurement import FLOOR
 from brdfdb.tables.layout import Layout
@@ -21,6 +22,48 @@ MOST_VALUES, _SLOW = 1 << 20, {"oren_nayar_gaussian": 1 << 15}
 _ROUNDING = 1e-11
 # n, k and the uniform part are stored as float64, and computed from the same package or parameter
 SAME = 1e-9
+
+
+class Nodes(Finding):
+    """The numbers that a table stores, beside those that its source gives at the same nodes."""
+
+    key = "nodes"
+    title = "Nodes"
+    columns = ("nodes",)
+    explanation = "What is stored against what the model gives at the same nodes: the same but for rounding."
+
+    compared: int = Field(description="of the stored numbers; of large tables those of some rows of the first axis")
+    count: int = Field(description="of the stored numbers")
+    wrong: int = Field(description="of those compared, by more than rounding")
+    stored: float | None = Field(description="the number that is furthest off; null: none is, or it is not finite")
+    expected: float | None = Field(description="what the model gives in its place")
+    beside: list[str] = Field(
+        description="a sentence each on n, k and the uniform part, where they are not those of entry and parameters"
+    )
+    verdict: Verdict
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Finding:
+        """Compare the nodes of a table with those of its source."""
+        if subject.source is None:
+            return subject.not_judged("values at nodes are compared with those of the source")
+        return nodes_of(subject.table, subject.source)
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the numbers of the table, its refractive index and its uniform part."""
+        part = "" if self.compared == self.count else f", of the {self.count} in the table,"
+        numbers = f"all {self.compared} stored values that were compared{part} are the model's"
+        if self.wrong:
+            numbers = f"{self.wrong} of {self.compared} stored values{part} are not the model's"
+            if self.expected is not None:
+                stored = "a value that is not finite" if self.stored is None else f"{self.stored:.4g}"
+                numbers += f", such as {stored} for {self.expected:.4g}"
+        return [self.sentence(self.verdict, "; ".join([numbers, *self.beside]))]
+
+    def cells(self) -> list[Cell]:
+        """Return the number of wrong values."""
+        good = "all good" if self.verdict == "passes" else "bad"
+        return [Cell(self.verdict, f"{self.wrong} bad" if self.wrong else good, self.wrong)]
 
 
 def nodes_of(table: Table, material: Material) -> Nodes:

@@ -17,7 +17,10 @@ DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
 
 
 class Pairs(NamedTuple):
-    """f_r [1/sr] at pairs of directions, all of shape (N, L): of light and viewer, and of the two exchanged."""
+    """f_r [1/sr] at pairs of directions, all of shape (N, L): of light and viewer, and of the two exchanged.
+
+    Where the source of a table is not known, `model` and `model_exchanged` are those of the table itself.
+    """
 
     drawn: Draw
     table: Floats

@@ -128,7 +128,7 @@ class Material(BaseModel):
         description="the measured error of the table against its model, by bands of theta_i; null: not measured"
     )
     audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
-        description="verdict of each finding of the audit, and whether it is of this revision; null: none"
+        description="verdict of the audit, its findings in sentences, and whether it is of this revision; null: none"
     )
     colour: str | None
     attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
