@@ -10,20 +10,22 @@ from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject
 from brdfdb.audit.findings import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.figure import Figure
-from brdfdb.tables.albedo import material_of
+from brdfdb.materials import Material, Source
 from brdfdb.tables.table import Table
 
 __all__ = ["FINDINGS", "AuditReport", "Finding", "MaterialAudit", "audit", "report"]
 
 
-def audit(table: Table, *, accept_excess: bool = False) -> MaterialAudit:
+def audit(table: Table, *, source: Source | None = None, accept_excess: bool = False) -> MaterialAudit:
     """Audit one table: each finding of `FINDINGS`, for what is looked up in the table.
 
     Parameters
     ----------
     table : Table
-        A decoded table. Where its source is not known, the table is audited alone, and findings that take a source
-        are not judged.
+        A decoded table. Where it does not give back its source, the table is audited alone, and findings that take a
+        source are not judged.
+    source : Source, optional
+        Source of the table, such as a function, which no store can give back; by default that of the table.
     accept_excess : bool
         Accept that the model reflects more than it receives at these parameters, and the table with it.
 
@@ -36,7 +38,8 @@ def audit(table: Table, *, accept_excess: bool = False) -> MaterialAudit:
         "violates" where either exceeds 1 otherwise. A table that states its error may exceed 1, or what is known, by
         what that error explains. That a model "loses" light that nothing absorbs is said, and passes.
     """
-    source = material_of(table)
+    if source is None and isinstance(table.source, Material):
+        source = table.source
     subject = Subject(table, source, accept_excess)
     sentences: list[Sentence] = []
     for key, kind in FINDINGS.items():
@@ -50,7 +53,7 @@ def audit(table: Table, *, accept_excess: bool = False) -> MaterialAudit:
     return MaterialAudit(
         material=table.name,
         revision=table.revision,
-        model="" if source is None else source.model,
+        model=source.model if isinstance(source, Material) else "",
         findings=subject.found,
         sentences=sentences,
         verdict=verdict,

@@ -21,7 +21,7 @@ from brdfdb.audit.model_energy import (
 )
 from brdfdb.audit.table_energy import TableEnergy, table_energy_of
 from brdfdb.figure import Map, Panel, number
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.tables.table import Table
 
@@ -164,15 +164,15 @@ def _of_bound(bound: UniformBound) -> Sentence:
     return Energy.sentence("inside" if bound.keeps else "outside", text, title="Uniform diffuse part")
 
 
-def energy_of(table: Table, material: Material | None, *, accept_excess: bool = False) -> Energy:
+def energy_of(table: Table, source: Source | None, *, accept_excess: bool = False) -> Energy:
     """Return the energy of a model and its table. With `accept_excess` both may exceed 1 as far as the model does."""
-    if material is None:
+    if source is None:
         stored = table_energy_of(table, None)
         verdict: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
         return Energy(model=None, table=stored, verdict=verdict, reason=stored.reason)
-    known = published_excess(material, table.wavelength_nm)
+    known = published_excess(source, table.wavelength_nm) if isinstance(source, Material) else None
     claim = str(table.attrs.get("known_excess", {}).get("citation", ""))
-    model = model_energy_of(material, table.wavelength_nm, known, claim, accept_excess=accept_excess)
+    model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess)
     # what is published, or accepted, is an excess of the model: where it has none, that of a table is the table's own
     excess = {"known published excess": known, "accepted excess": _of_model(model)}.get(model.verdict)
     accepted = model.verdict == "accepted excess"

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.audit.pairs import Pairs, pairs_of
 from brdfdb.figure import Map, Panel
-from brdfdb.materials import Material
+from brdfdb.materials import FunctionRecord, Source
 from brdfdb.tables.table import Table
 
 STRICT = ConfigDict(frozen=True, extra="forbid")
@@ -164,8 +164,9 @@ class Subject:
     ----------
     table : Table
         As a store holds it, or in memory.
-    source : Material or None
-        What gave the values of the table; None where the store cannot give it back.
+    source : Source or None
+        Material or function that gave the values of the table; None where it is not known, or a function that the
+        store knows by name only.
     accept_excess : bool
         Accept that the model reflects more than it receives.
     found : dict
@@ -173,7 +174,7 @@ class Subject:
     """
 
     table: Table
-    source: Material | None
+    source: Source | None
     accept_excess: bool = False
     found: dict[str, Finding] = field(default_factory=dict)
 
@@ -183,5 +184,14 @@ class Subject:
         return pairs_of(self.table, self.source)
 
     def not_judged(self, needs: str) -> NotJudged:
-        """Return the finding on a table without a source; `needs` says in a few words what it would take."""
-        return NotJudged(reason=f"{needs}, and the source of this table is not known")
+        """Return the finding on a table whose source does not allow it; `needs` says in a few words why."""
+        return NotJudged(reason=f"{needs}; {self.without}")
+
+    @property
+    def without(self) -> str:
+        """Say why a table is audited without a source, or without a model."""
+        if self.source is not None:
+            return f"the source of this table, {self.source.title}, is a function"
+        if isinstance(self.table.source, FunctionRecord):
+            return f"the source of this table, {self.table.source.title}, is a function, which the store does not hold"
+        return "the table does not say what its source is, or this program does not have its model"

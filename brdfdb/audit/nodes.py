@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from brdfdb.audit.finding import Cell, Finding, Sentence, Subject, Verdict
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.tables.error_measurement import FLOOR
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
@@ -66,17 +66,17 @@ class Nodes(Finding):
         return [Cell(self.verdict, f"{self.wrong} bad" if self.wrong else good, self.wrong)]
 
 
-def nodes_of(table: Table, material: Material) -> Nodes:
+def nodes_of(table: Table, source: Source) -> Nodes:
     """Return how many stored numbers are those of the model, and the one that is furthest off.
 
     Raises
     ------
     ValueError
-        If the table is not laid out as one of its material can be.
+        If the table is not laid out as one of its source can be.
     """
     bits = int(table.attrs.get("bits", 23))
     layout = Layout(
-        material,
+        source,
         table.grid,
         table.wavelength_nm,
         table.interpolation,
@@ -98,7 +98,7 @@ def nodes_of(table: Table, material: Material) -> Nodes:
         if beyond.any() and (largest := float(np.max(excess, where=beyond, initial=-np.inf))) > worst[0]:
             at = np.unravel_index(int(np.argmax(np.where(beyond, excess, -np.inf))), excess.shape)
             worst = largest, float(stored[at]), float(expected[at])
-    beside = [*_refraction(table, material), *_uniform(table, layout), *_dirac(table, layout), *_unstated(table)]
+    beside = [*_refraction(table, source), *_uniform(table, layout), *_dirac(table, layout), *_unstated(table)]
     return Nodes(
         compared=rows * (table.values.size // table.values.shape[0]),
         count=table.values.size,
@@ -113,7 +113,8 @@ def nodes_of(table: Table, material: Material) -> Nodes:
 def _rows(layout: Layout) -> Iterator[slice]:
     """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    most = _SLOW.get(layout.material.model, MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
+    model = layout.source.model if isinstance(layout.source, Material) else ""
+    most = _SLOW.get(model, MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
     if most >= layout.shape[0]:
         yield from layout.blocks
         return
@@ -121,14 +122,15 @@ def _rows(layout: Layout) -> Iterator[slice]:
         yield slice(int(row), int(row) + 1)
 
 
-def _refraction(table: Table, material: Material) -> Iterator[str]:
+def _refraction(table: Table, source: Source) -> Iterator[str]:
     """Yield a sentence on each of n and k that is not that of the entry; tables in memory may store neither."""
-    arguments = material.arguments(table.wavelength_nm)
-    for name, stored in (("n", table.n), ("k", table.k)):
-        if stored is None or table.wavelength_nm is None:
+    indices = source.refractive_indices(table.wavelength_nm)
+    if indices is None or table.wavelength_nm is None:
+        return
+    scale = np.hypot(*indices)
+    for name, stored, expected in zip(("n", "k"), (table.n, table.k), indices, strict=True):
+        if stored is None:
             continue
-        expected = np.asarray(arguments[name])
-        scale = np.hypot(arguments["n"], arguments["k"])
         if stored.shape != expected.shape:
             raise ValueError(f"{name}: shape {stored.shape} is not {expected.shape}, that of the wavelengths")
         off = np.where(np.isfinite(stored), np.abs(stored - expected), np.inf) / scale
@@ -136,7 +138,7 @@ def _refraction(table: Table, material: Material) -> Iterator[str]:
             worst = int(np.argmax(off))
             yield (
                 f"{name} is stored as {stored[worst]:.5g} at {table.wavelength_nm[worst]:g} nm, where "
-                f"{material.refractive_index} has {expected[worst]:.5g}"
+                f"{source.attributes()['refractive_index']} has {expected[worst]:.5g}"
             )
 
 
@@ -150,7 +152,7 @@ def _uniform(table: Table, layout: Layout) -> Iterator[str]:
 
 def _dirac(table: Table, layout: Layout) -> Iterator[str]:
     """Yield a sentence on a Dirac part that is missing, or whose nodes are not those of the layout."""
-    if layout.material.spec.specular is None:
+    if not layout.source.has_specular:
         return
     if table.specular is None:
         yield "the Dirac part of the model is not stored"

@@ -64,7 +64,7 @@ class Sampling(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Finding:
         """Draw samples of the model of a table."""
-        if subject.source is None:
+        if not isinstance(subject.source, Material):
             return subject.not_judged("samples are drawn from the model of the source")
         return sampling_of(subject.table, subject.source)
 

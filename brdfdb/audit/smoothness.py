@@ -14,7 +14,7 @@ from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, S
 from brdfdb.audit.pairs import Pairs
 from brdfdb.figure import number
 from brdfdb.geometry import degrees, directions_from_half_difference, radians, spherical_angles, unit_vector
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
@@ -117,7 +117,7 @@ class Smoothness(Finding):
         return [*(("model", jump) for jump in self.model), *(("table", jump) for jump in self.table)]
 
 
-def smoothness_of(table: Table, material: Material | None, pairs: Pairs) -> Smoothness:
+def smoothness_of(table: Table, source: Source | None, pairs: Pairs) -> Smoothness:
     """Return the jumps of the model, if it is known, at all wavelengths of a table, and of the table.
 
     A table may jump by the 99th percentile of the error that it states of the band of theta_i and the wavelength. A
@@ -131,7 +131,7 @@ def smoothness_of(table: Table, material: Material | None, pairs: Pairs) -> Smoo
     floor = (
         error_measurement.floor_of(pairs.model, pairs.drawn) + _TINY
     )  # far below it tables may be anything, as they may err
-    of_model = [] if material is None else _jumps_of_model(material, wavelengths, np.full_like(floor, _TINY))
+    of_model = [] if source is None else _jumps_of_model(source, wavelengths, np.full_like(floor, _TINY))
     of_table = [
         _jump(seam, looked_up, wavelengths, floor, partial(_stated, table.error)) for seam in _crossed(_of_table(table))
     ]
@@ -139,12 +139,12 @@ def smoothness_of(table: Table, material: Material | None, pairs: Pairs) -> Smoo
     return Smoothness(model=of_model, table=of_table, verdict="passes" if good else "violates")
 
 
-def _jumps_of_model(material: Material, wavelengths: Array | None, floor: Floats) -> list[Jump]:
+def _jumps_of_model(source: Source, wavelengths: Array | None, floor: Floats) -> list[Jump]:
     def model(wi: Array, wr: Array) -> Floats:
-        return error_measurement.model_values(material, wavelengths, wi, wr)
+        return error_measurement.model_values(source, wavelengths, wi, wr)
 
     jumps = [_jump(seam, model, wavelengths, floor, _rounding) for seam in _crossed(_of_model())]
-    return [*jumps, _between_methods(material, wavelengths, floor)]
+    return [*jumps, _between_methods(source, wavelengths, floor)]
 
 
 def _rounding(*_: Array) -> Floats:
@@ -233,12 +233,11 @@ def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: F
     return _largest(seam.name, relative, at, wavelength_nm, allowed(*at))
 
 
-def _between_methods(material: Material, wavelength_nm: Array | None, floor: Floats) -> Jump:
+def _between_methods(source: Source, wavelength_nm: Array | None, floor: Floats) -> Jump:
     """Between values along an azimuth, of which He-Torrance takes a sum from a table, and the same one by one."""
     theta_i, theta_r, phi_r = np.meshgrid(_THETA, _THETA, np.linspace(0.0, np.pi, _ROW), indexing="ij")
-    spectrum = [material.arguments()] if wavelength_nm is None else [material.arguments(w) for w in wavelength_nm]
     rows, single = (
-        np.stack([material.spec.evaluate(*angles, **arguments).ravel() for arguments in spectrum], axis=-1)
+        np.reshape(source.lookup(*angles, wavelength_nm), (theta_i.size, -1))
         for angles in ((theta_i[..., :1], 0.0, theta_r[..., :1], phi_r), (theta_i, 0.0, theta_r, phi_r))
     )
     at = unit_vector(theta_i, 0.0).reshape(-1, 3), unit_vector(theta_r, phi_r).reshape(-1, 3)

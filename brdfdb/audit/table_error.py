@@ -12,7 +12,7 @@ from brdfdb.audit.pairs import SEED, Pairs, representative_nm
 from brdfdb.audit.statement import Disagreement, contradictions, disagreements
 from brdfdb.figure import Map, Panel, number, rows
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
@@ -96,7 +96,7 @@ class TableError(Finding):
         return list(self.maps)
 
 
-def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Word = "passes") -> TableError:
+def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "passes") -> TableError:
     """Hold a table against what it states of its error, and draw the error at the middle of its wavelengths.
 
     `nodes` is the verdict on its nodes: what is wrong with a table is looked for where that, or its error, violates.
@@ -108,7 +108,7 @@ def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Word =
     if table.error is not None:
         contradicts = contradictions(table.error, wavelengths_of(table))
         disagree = [] if contradicts else disagreements(table.error, pairs, table.wavelength_nm)
-    specular = _specular_error(table, material)
+    specular = _specular_error(table, source)
     mirrors = specular is None or specular <= SPECULAR_TOLERANCE  # nan is not
     good = mirrors and not contradicts and not disagree
     floor = error_measurement.floor_of(pairs.model, pairs.drawn)
@@ -122,25 +122,22 @@ def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Word =
         disagreements=len(disagree),
         worst=list({each.statistic: each for each in reversed(disagree)}.values())[::-1],
         bias=bias_of(pairs),
-        likeness="" if good and nodes == "passes" else likeness_of(table, material, pairs),
-        maps=[_map(table, material, middle, *plane) for plane in _PLANES.items()],
+        likeness="" if good and nodes == "passes" else likeness_of(table, source, pairs),
+        maps=[_map(table, source, middle, *plane) for plane in _PLANES.items()],
         verdict="passes" if good else "violates",
     )
 
 
-def _specular_error(table: Table, material: Material) -> float | None:
+def _specular_error(table: Table, source: Source) -> float | None:
     """The largest difference of the stored reflectances of the Dirac part from the model's; None: there is none."""
-    if table.specular is None or material.spec.specular is None:
+    if table.specular is None or not source.has_specular:
         return None
     nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
-    arguments = material.arguments(table.wavelength_nm)
-    parameters = {name: arguments[name] for name in material.spec.specular_parameters}
-    theta_i = radians(nodes) if table.wavelength_nm is None else radians(nodes)[:, np.newaxis]
-    truth = material.spec.specular(theta_i, **parameters)
+    truth = source.specular_reflectance(radians(nodes), table.wavelength_nm)
     return float(f"{np.max(np.abs(table.specular.reshape(truth.shape) - truth)):.3g}")
 
 
-def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_deg: float) -> Map:
+def _map(table: Table, source: Source, floor: Floats, title: str, delta_phi_deg: float) -> Map:
     wavelength = representative_nm(table)
     theta_i_deg = np.append(np.arange(0.0, _LAST_DEG, _STEP_DEG), _LAST_DEG)
     theta_r_deg = np.concatenate([-theta_i_deg[:0:-1], theta_i_deg])
@@ -149,9 +146,7 @@ def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_
     wr = unit_vector(-radians(theta_r_deg), radians(delta_phi_deg))
     wi, wr = (np.reshape(w, (-1, 3)) for w in np.broadcast_arrays(wi, wr))
     found = table.lookup_vectors(wi, wr, wavelength)
-    truth = error_measurement.model_values(material, None if wavelength is None else np.array([wavelength]), wi, wr)[
-        :, 0
-    ]
+    truth = error_measurement.model_values(source, None if wavelength is None else np.array([wavelength]), wi, wr)[:, 0]
     with np.errstate(invalid="ignore"):
         error = error_measurement.relative(found, truth, floor).reshape(theta_i_deg.size, -1)
     return Map(

@@ -59,7 +59,7 @@ class Validity(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Finding:
         """Judge the parameters of the model of a table."""
-        if subject.source is None:
+        if not isinstance(subject.source, Material):
             return subject.not_judged("limits are those of the model of the source")
         return validity_of(subject.source, subject.table.wavelength_nm)
 

@@ -346,7 +346,7 @@ def _tables(
     for tolerance in dict.fromkeys(tolerances):
         percent = f"{100.0 * tolerance:g}"
         key = f"table-{percent.replace('.', '-')}"
-        layout = replace(plan(planned, wavelength_nm, tolerance), material=material)
+        layout = replace(plan(planned, wavelength_nm, tolerance), source=material)
         yield _table(layout, key, f"{table}, planned for {percent} %")
         if layout.spectra is not None and tolerance == _UNFACTORED:
             yield _table(replace(layout, spectra=None), f"{key}-unfactored", f"the {percent} % table, spectra whole")

@@ -15,7 +15,7 @@ from brdfdb.parameters import Floats, Lobe, ModelSpec
 Array = NDArray[np.float64]
 
 _TINY = 1e-300  # u of 0 is read as this: its logarithm is finite
-_DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
+DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
 
 
 class Sample(NamedTuple):
@@ -206,7 +206,7 @@ def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> L
     for parameter in spec.parameters:
         if parameter.name in parameters:
             parameter.check(parameters[parameter.name])
-    return _DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
+    return DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
 
 
 def _uniform(name: str, u: ArrayLike) -> Array:

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON
+from brdfdb.errors import BrdfdbError
 from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians
+from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables import _kernels
 from brdfdb.tables._interpolation import Axes, prepared
@@ -75,7 +77,7 @@ class Table(Described):
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
         """The table of a layout, or of a part of its grid, before it is stored: without the Dirac part."""
         return cls(
-            name=layout.material.name,
+            name=layout.source.name,
             revision="",
             attrs={},
             grid=layout.grid if grid is None else grid,
@@ -86,6 +88,19 @@ class Table(Described):
             spectra=layout.spectra,
             uniform=layout.uniform,
         )
+
+    @functools.cached_property
+    def source(self) -> Material | FunctionRecord | None:
+        """The source that the table was tabulated from, as the table keeps it: exact parameters, radians as they were.
+
+        A function comes back without its callable. None where the table does not say, or where this program does not
+        have the model.
+        """
+        document = self.attrs.get("source_record", self.attrs.get("request"))  # which older builds wrote
+        try:
+            return None if document is None else source_of(document)
+        except BrdfdbError:
+            return None
 
     @property
     def axes_deg(self) -> Mapping[str, Axis]:

@@ -25,7 +25,6 @@ from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
 from brdfdb.parameters import Lobe
 from brdfdb.tables import error_measurement
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.table import Table
 from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
 
@@ -136,7 +135,7 @@ SIDES: dict[str, Callable[[Array], Any]] = {
 
 
 def smoothness(table: Table) -> Smoothness:
-    return smoothness_of(table, material_of(table), pairs_of(table, material_of(table)))
+    return smoothness_of(table, table.source, pairs_of(table, table.source))
 
 
 def by_seam(jumps: list[Jump]) -> dict[str, Jump]:

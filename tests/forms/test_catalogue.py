@@ -354,7 +354,7 @@ def test_a_table_of_another_model_says_where_its_numbers_come_from(model: str) -
     forms, _ = of(material, TOLERANCE)
     layout = forms["table-10"].layout
     assert layout is not None
-    table = layout.material
+    table = layout.source
     assert table.model != model
     assert (table.source, table.title, table.assumed, table.note) == (
         preset.source,
