@@ -155,6 +155,14 @@ class NotJudged(Finding):
     verdict: Literal["not judged"] = "not judged"
     reason: str
 
+    def sentences(self) -> list[Sentence]:
+        """Return nothing: `audit` puts the reason under the title of the finding."""
+        return []
+
+    def cells(self) -> list[Cell]:
+        """Return nothing: there is a dash in each column of the finding."""
+        return []
+
 
 @dataclass(frozen=True, eq=False)
 class Subject:
