@@ -8,6 +8,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, overload
 
+from brdfdb.errors import ParameterError
+
 if TYPE_CHECKING:
     import os
 
@@ -42,7 +44,7 @@ def open(root: str | os.PathLike[str], *, snapshot: str | None = None) -> Store 
 
     Raises
     ------
-    brdfdb.store.reader.StoreError
+    brdfdb.errors.StoreError
         If there is no store at `root`, or one of another format version; if it has no such snapshot; if no service
         answers there.
     ValueError
@@ -52,7 +54,9 @@ def open(root: str | os.PathLike[str], *, snapshot: str | None = None) -> Store 
         from brdfdb.store.http_client import RemoteStore
 
         if snapshot is not None:
-            raise ValueError(f"snapshot: {snapshot!r} of a service is chosen there, by `brdfdb serve --snapshot`")
+            raise ParameterError(
+                "snapshot", f"{snapshot!r} of a service is chosen there, by `brdfdb serve --snapshot`", snapshot
+            )
         return RemoteStore(root)
     from brdfdb.store.reader import Store
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+
+_SHOWN = 60  # characters of an unknown name that a sentence repeats
+
 
 class BrdfdbError(Exception):
     """An error that the user can act on; str() is one sentence that says what was given and what is allowed."""
@@ -28,3 +33,75 @@ class ParameterError(BrdfdbError, ValueError):
 
     def __str__(self) -> str:
         return f"{self.parameter}: {self.sentence}"
+
+
+class MaterialError(ParameterError):
+    """A description that is not that of a material; `parameter` is the field that is at fault.
+
+    Parameters
+    ----------
+    material : str
+        Name of the material.
+    parameter, sentence, value, allowed
+        As of `ParameterError`.
+    """
+
+    def __init__(
+        self, material: str, parameter: str, sentence: str, value: object = None, allowed: object = None
+    ) -> None:
+        super().__init__(parameter, sentence, value, allowed)
+        self.args = (material, parameter, sentence, value, allowed)
+        self.material = material
+
+    def __str__(self) -> str:
+        return f"{self.material}: {super().__str__()}"
+
+
+class StoreError(BrdfdbError):
+    """A store that is missing, damaged, of another version, or cannot be written."""
+
+
+class UnknownMaterialError(BrdfdbError, KeyError):
+    """A name that is not in the store.
+
+    Parameters
+    ----------
+    name : str
+        The name that was given.
+    names : iterable of str
+        The names that exist.
+
+    Attributes
+    ----------
+    closest : list of str
+        Up to five names that are close to it.
+    """
+
+    kind = "material"
+
+    def __init__(self, name: str, names: Iterable[str] = ()) -> None:
+        super().__init__(name)
+        self.name = name
+        self.closest = difflib.get_close_matches(name, names, n=5, cutoff=0.4)
+
+    def __str__(self) -> str:
+        hint = f"; closest: {', '.join(self.closest)}" if self.closest else ""
+        shown = self.name if len(self.name) <= _SHOWN else f"{self.name[:_SHOWN]}..."
+        return f"no {self.kind} {shown!r} in the store{hint}"
+
+
+class UnknownFamilyError(UnknownMaterialError):
+    """A name that is not that of a family in the store."""
+
+    kind = "family"
+
+
+class UnknownRevisionError(BrdfdbError, KeyError):
+    """A revision that a material does not have."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class BusyError(BrdfdbError):
+    """A lock of the store that another build holds."""

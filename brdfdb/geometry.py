@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON
+from brdfdb.errors import ParameterError
 from brdfdb.parameters import Floats
 
 HALF_PI = np.pi / 2
@@ -44,7 +45,12 @@ def check_theta(name: str, theta: ArrayLike) -> Floats:
     bad = (array < 0.0) | (array > array.dtype.type(np.pi))
     if np.any(bad):
         first = np.atleast_1d(array)[np.atleast_1d(bad)][0]
-        raise ValueError(f"{name}: {first:.9g} rad ({degrees(first):.6g} degrees) is outside [0, pi] rad")
+        raise ParameterError(
+            name,
+            f"{first:.9g} rad ({degrees(first):.6g} degrees) is outside [0, pi] rad",
+            float(first),
+            (0.0, float(np.pi)),
+        )
     return array
 
 
@@ -54,14 +60,16 @@ def check_phi(name: str, phi: ArrayLike) -> Floats:
     bad = np.abs(array) > PHI_MAX
     if np.any(bad):
         first = np.atleast_1d(array)[np.atleast_1d(bad)][0]
-        raise ValueError(f"{name}: {first:.9g} rad is outside [-{PHI_MAX:g}, {PHI_MAX:g}] rad")
+        raise ParameterError(
+            name, f"{first:.9g} rad is outside [-{PHI_MAX:g}, {PHI_MAX:g}] rad", float(first), (-PHI_MAX, PHI_MAX)
+        )
     return array
 
 
 def _float_array(name: str, angle: ArrayLike) -> Floats:
     array = np.asarray(angle)
     if array.dtype.kind not in "iuf":
-        raise ValueError(f"{name}: {angle!r} is not a number of radians")
+        raise ParameterError(name, f"{angle!r} is not a number of radians")
     return array if array.dtype in (np.float32, np.float64) else array.astype(np.float64)
 
 
@@ -191,7 +199,9 @@ Directions = Angles | Vectors
 def _unit_vectors(name: str, w: ArrayLike) -> Floats:
     array = np.asarray(w)
     if array.dtype.kind not in "iuf" or array.ndim == 0 or array.shape[-1] != 3:
-        raise ValueError(f"{name}: {array.dtype} of shape {array.shape} is not an array of vectors, shape (..., 3)")
+        raise ParameterError(
+            name, f"{array.dtype} of shape {array.shape} is not an array of vectors, shape (..., 3)", array.shape
+        )
     if array.dtype not in (np.float32, np.float64):
         array = array.astype(np.float64)
     count = array.size // 3
@@ -200,7 +210,7 @@ def _unit_vectors(name: str, w: ArrayLike) -> Floats:
     bad = np.abs(length - 1.0) > UNIT_LENGTH
     if np.any(bad):
         x, y, z = some[bad][0]
-        raise ValueError(f"{name}: ({x:.9g}, {y:.9g}, {z:.9g}) has the length {length[bad][0]:.9g}, not 1")
+        raise ParameterError(name, f"({x:.9g}, {y:.9g}, {z:.9g}) has the length {length[bad][0]:.9g}, not 1", (x, y, z))
     return array
 
 

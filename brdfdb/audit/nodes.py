@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from brdfdb.audit.finding import Cell, Finding, Sentence, Subject, Verdict
+from brdfdb.errors import ParameterError
 from brdfdb.materials import Material, Source
 from brdfdb.tables.error_measurement import FLOOR
 from brdfdb.tables.layout import Layout
@@ -16,7 +17,7 @@ from brdfdb.tables.tabulation import block, rounded, specular_nodes
 
 # Values of the model that are computed for the comparison. A table with more nodes is compared at some rows of its
 # first axis, evenly spread from the first to the last. A value of the facets' integral takes 30 us, others 0.2 us
-MOST_VALUES, _SLOW = 1 << 20, {"oren_nayar_gaussian": 1 << 15}
+MOST_VALUES, _MOST_SLOW = 1 << 20, 1 << 15
 # Numbers are the same but for rounding: to the bits that are stored, and of float64 sums on another processor,
 # relative to the largest number of the table
 _ROUNDING = 1e-11
@@ -85,7 +86,12 @@ def nodes_of(table: Table, source: Source) -> Nodes:
         table.attrs.get("reason", ""),
     )
     if layout.shape != table.values.shape:
-        raise ValueError(f"{layout.variable}: shape {table.values.shape} is not {layout.shape}, that of its axes")
+        raise ParameterError(
+            layout.variable,
+            f"shape {table.values.shape} is not {layout.shape}, that of its axes",
+            table.values.shape,
+            layout.shape,
+        )
     rows, wrong, worst = 0, 0, (0.0, 0.0, 0.0)
     for some in _rows(layout):
         stored, expected = table.values[some].astype(np.float64), block(layout, some).astype(np.float64)
@@ -113,8 +119,9 @@ def nodes_of(table: Table, source: Source) -> Nodes:
 def _rows(layout: Layout) -> Iterator[slice]:
     """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    model = layout.source.model if isinstance(layout.source, Material) else ""
-    most = _SLOW.get(model, MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
+    slow = isinstance(layout.source, Material) and layout.source.spec.slow
+    values = _MOST_SLOW if slow else MOST_VALUES
+    most = values // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
     if most >= layout.shape[0]:
         yield from layout.blocks
         return
@@ -132,7 +139,12 @@ def _refraction(table: Table, source: Source) -> Iterator[str]:
         if stored is None:
             continue
         if stored.shape != expected.shape:
-            raise ValueError(f"{name}: shape {stored.shape} is not {expected.shape}, that of the wavelengths")
+            raise ParameterError(
+                name,
+                f"shape {stored.shape} is not {expected.shape}, that of the wavelengths",
+                stored.shape,
+                expected.shape,
+            )
         off = np.where(np.isfinite(stored), np.abs(stored - expected), np.inf) / scale
         if np.any(off > SAME):
             worst = int(np.argmax(off))

@@ -14,6 +14,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from brdfdb import geometry, spectra
+from brdfdb.errors import ParameterError
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -78,7 +79,9 @@ class Slice:
     def __post_init__(self) -> None:
         spectral = () if self.wavelength_nm is None else self.wavelength_nm.shape
         if self.values.ndim < 2 or self.values.shape[2:] != spectral:
-            raise ValueError(f"values: shape {self.values.shape} is not (height, width, *{spectral})")
+            raise ParameterError(
+                "values", f"shape {self.values.shape} is not (height, width, *{spectral})", self.values.shape
+            )
 
 
 def half_difference_slice(table: Table, *, phi_h_deg: float = 0.0, phi_d_deg: float = 90.0) -> Slice:
@@ -176,7 +179,7 @@ def lobe_map(table: Table, *, theta_i_deg: float = 45.0, phi_i_deg: float = 0.0)
         If `theta_i_deg` is outside [0, 90].
     """
     if not 0.0 <= theta_i_deg <= 90.0:
-        raise ValueError(f"theta_i_deg: {theta_i_deg:g} is outside [0, 90] degrees")
+        raise ParameterError("theta_i_deg", f"{theta_i_deg:g} is outside [0, 90] degrees", theta_i_deg, (0.0, 90.0))
     pitch = 180.0 / LOBE_SIZE
     x_deg = (np.arange(LOBE_SIZE) + 0.5) * pitch - 90.0
     y_deg = x_deg[::-1, np.newaxis]
@@ -311,8 +314,8 @@ def _attributes(image: Slice, table: Table) -> dict[str, Any]:
     attributes: dict[str, Any] = {
         "brdf:material": str(table.name),
         "brdf:revision": str(table.revision),
-        "brdf:model": str(table.attrs["model"]),
-        "brdf:title": str(table.attrs["title"]),
+        "brdf:model": table.metadata.model or "",
+        "brdf:title": table.metadata.title or "",
         "brdf:quantity": QUANTITY,
         "brdf:unit": UNIT,
         "brdf:dirac": "none" if table.specular is None else _dirac(table.specular),
@@ -340,5 +343,5 @@ def _spectral_channels(wavelength_nm: NDArray[Any]) -> list[str]:
     names = [f"T.{text.replace('.', ',')}nm" for text in _decimals(wavelength_nm)]
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
-        raise ValueError(f"wavelength_nm: the wavelength of channel {repeated[0]} occurs twice")
+        raise ParameterError("wavelength_nm", f"the wavelength of channel {repeated[0]} occurs twice")
     return names

@@ -9,9 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, check_phi, check_theta, unit_vector
+from brdfdb.lobes import Lobe
 from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, Lobe, ModelSpec
+from brdfdb.parameters import Floats, ModelSpec
 
 Array = NDArray[np.float64]
 Integrand = Callable[[Array, Array], Array]
@@ -136,7 +138,7 @@ def directional_albedo(
 
 def _check_tolerance(tolerance: float) -> None:
     if not 1e-13 <= tolerance <= 1.0:
-        raise ValueError(f"tolerance: {tolerance:.9g} is outside [1e-13, 1]")
+        raise ParameterError("tolerance", f"{tolerance:.9g} is outside [1e-13, 1]", tolerance, (1e-13, 1.0))
 
 
 def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -154,7 +156,7 @@ def spec_of(model: ModelSpec | str) -> ModelSpec:
     if isinstance(model, ModelSpec):
         return model
     if model not in MODELS:
-        raise ValueError(f"model: {model!r} is not one of {', '.join(MODELS)}")
+        raise ParameterError("model", f"{model!r} is not one of {', '.join(MODELS)}", model, tuple(MODELS))
     return MODELS[model]
 
 
@@ -283,8 +285,9 @@ def narrowest(spec: ModelSpec, cos_i: float, parameters: Mapping[str, Any]) -> L
     """The lobe of a model where parameters make it narrowest: panels that resolve it resolve the others."""
     if spec.lobe is None:
         return None
-    share, alpha_x, alpha_y = spec.lobe(np.asarray(cos_i), **parameters)
-    return Lobe(*(np.asarray(value) for value in (np.max(share), np.min(alpha_x), np.min(alpha_y))))
+    lobe = spec.lobe(np.asarray(cos_i), **parameters)
+    share, alpha_x, alpha_y = np.max(lobe.share), np.min(lobe.alpha_x), np.min(lobe.alpha_y)
+    return lobe._replace(share=np.asarray(share), alpha_x=np.asarray(alpha_x), alpha_y=np.asarray(alpha_y))
 
 
 def _panels_of(

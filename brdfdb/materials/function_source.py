@@ -12,9 +12,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished, radians, unit_vector
+from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Text
 from brdfdb.materials.source import Evaluate, Lossless
-from brdfdb.parameters import Floats, Lobe
+from brdfdb.parameters import Floats
 
 # (wi, wr, wavelength_nm) of shapes (N, 3), (N, 3) and (L,) -> f_r [1/sr] of shape (N, L); of a grey function the
 # wavelengths are None and the shape may be (N,)
@@ -72,15 +73,17 @@ class FunctionRecord(BaseModel):
     @classmethod
     def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
         if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
-            raise ValueError(f"{list(wavelengths_nm)} must be positive and increasing")
+            raise ParameterError(
+                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
+            )
         return wavelengths_nm
 
     @model_validator(mode="after")
     def _check_symmetry(self) -> FunctionRecord:
         if self.elliptical and not self.anisotropic:
-            raise ValueError("elliptical: an isotropic function has more symmetry than an ellipse; leave it out")
+            raise ParameterError("elliptical", "an isotropic function has more symmetry than an ellipse; leave it out")
         if not self.anisotropic and self.alpha is not None and self.alpha[0] != self.alpha[1]:
-            raise ValueError(f"alpha: {self.alpha} differs along x and y, which an isotropic function cannot")
+            raise ParameterError("alpha", f"{self.alpha} differs along x and y; an isotropic function has one width")
         return self
 
     @property
@@ -92,7 +95,8 @@ class FunctionRecord(BaseModel):
         """Return the lobe of lights with a cosine, which is the same for all; None without one."""
         if self.alpha is None:
             return None
-        return Lobe(*(np.full(np.shape(cos_i), value) for value in (_LOBE_SHARE, *self.alpha)))
+        share, alpha_x, alpha_y = (np.full(np.shape(cos_i), value) for value in (_LOBE_SHARE, *self.alpha))
+        return Lobe(share, alpha_x, alpha_y)
 
     def document(self) -> dict[str, Any]:
         """Return the record as JSON; `brdfdb.materials.source_of` reads it."""
@@ -327,7 +331,5 @@ def _refusal(error: ValidationError) -> ParameterError:
         return ParameterError(parameter, "missing; a function needs a name, a title and a provenance")
     if first["type"] != "value_error":
         return ParameterError(parameter, f"{first['input']!r}: {first['msg']}", first["input"])
-    sentence = str(first["ctx"]["error"])
-    if not parameter:  # a check of several parameters names the one
-        parameter, _, sentence = sentence.partition(": ")
-    return ParameterError(parameter, sentence)
+    ours = first["ctx"]["error"]
+    return ours if isinstance(ours, ParameterError) else ParameterError(parameter, str(ours), first["input"])

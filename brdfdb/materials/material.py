@@ -19,12 +19,14 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
+from brdfdb.errors import MaterialError, ParameterError
 from brdfdb.geometry import degrees
+from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
 from brdfdb.materials.source import Evaluate, Lossless
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, Lobe, ModelSpec
+from brdfdb.parameters import Floats, ModelSpec
 from brdfdb.spectra import refractive_index
 
 _SOURCED = ("refractive_index", "wavelengths_nm")  # what may have a source of its own, besides parameters
@@ -84,7 +86,7 @@ class Material(BaseModel):
 
     @classmethod
     def from_table(cls, name: str, table: Mapping[str, Any]) -> Material:
-        """The material that a table of a TOML file describes; ValueError with one sentence if it does not.
+        """Return the material that a table of a TOML file describes; MaterialError if it describes none.
 
         Parameters, and their names in sources and assumed, are read as `file_parameters` writes them: angles in
         degrees, under names that end in ``_deg``.
@@ -99,19 +101,26 @@ class Material(BaseModel):
                 for field in ("sources", "assumed"):
                     if isinstance(stated := table.get(field), Mapping):
                         if len(stated) > most:  # pydantic would keep an error for each of a million
-                            raise ValueError(f"{field}: {len(stated)} are given, {model} has {most} values at most")
+                            raise ParameterError(
+                                field,
+                                f"{len(stated)} are given, {model} has {most} values at most",
+                                len(stated),
+                                (0, most),
+                            )
                         fields[field] = {own.get(written, written): each for written, each in stated.items()}
             return cls.model_validate(fields)
         except ValidationError as error:
-            raise ValueError(f"{name}: {'; '.join(_sentence(item) for item in error.errors())}") from None
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
+            (field, sentence), *others = map(_field_and_sentence, error.errors())
+            sentences = [sentence, *(f"{field}: {sentence}" for field, sentence in others)]
+            raise MaterialError(name, field, "; ".join(sentences)) from None
+        except ParameterError as error:
+            raise MaterialError(name, error.parameter, error.sentence, error.value, error.allowed) from None
 
     @field_validator("model")
     @classmethod
     def _check_model(cls, model: str) -> str:
         if model not in MODELS:
-            raise ValueError(f"model: {model!r} is not one of {', '.join(MODELS)}")
+            raise ParameterError("model", f"{model!r} is not one of {', '.join(MODELS)}", model, tuple(MODELS))
         return model
 
     @field_validator("parameters")
@@ -125,16 +134,18 @@ class Material(BaseModel):
     @classmethod
     def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
         if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
-            raise ValueError(f"wavelengths_nm: {list(wavelengths_nm)} must be positive and increasing")
+            raise ParameterError(
+                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
+            )
         return wavelengths_nm
 
     @model_validator(mode="after")
     def _check_provenance(self) -> Material:
         if self.spectral and self.refractive_index is None:
-            raise ValueError(f"refractive_index: the spectral model {self.model} needs an entry, shelf/book/page")
+            raise ParameterError("refractive_index", f"the spectral model {self.model} needs an entry, shelf/book/page")
         if not self.spectral and (self.refractive_index, self.wavelengths_nm) != (None, None):
-            raise ValueError(
-                f"refractive_index, wavelengths_nm: the model {self.model} is not spectral and has neither"
+            raise ParameterError(
+                "refractive_index, wavelengths_nm", f"the model {self.model} is not spectral and has neither"
             )
         values = (*self.parameters, *_SOURCED)
         alternatives = (
@@ -148,10 +159,10 @@ class Material(BaseModel):
         ):
             for name in names:
                 if name not in allowed:
-                    raise ValueError(f"{field}: {name!r} is not one of {', '.join(allowed)}")
+                    raise ParameterError(field, f"{name!r} is not one of {', '.join(allowed)}", name, tuple(allowed))
         for name, assumption in self.assumed.items():
             if self.known_excess is not None and assumption.decides is not False:
-                raise ValueError(f"known_excess: it rests on {name!r}, which is assumed and not published")
+                raise ParameterError("known_excess", f"it rests on {name!r}, which is assumed and not published")
         return self
 
     @property
@@ -253,7 +264,7 @@ class Material(BaseModel):
         if wavelength_nm is None:
             wavelength_nm = self.wavelengths_nm
         if wavelength_nm is None:
-            raise ValueError(f"wavelength_nm: {self.name} needs wavelengths, its model {self.model} is spectral")
+            raise ParameterError("wavelength_nm", f"{self.name} needs wavelengths, its model {self.model} is spectral")
         wavelength = np.asarray(wavelength_nm, dtype=np.float64)
         n, k = refractive_index(self.refractive_index, wavelength)
         return {**self.parameters, "wavelength_nm": wavelength, "n": n, "k": k, **self._changed}
@@ -406,8 +417,9 @@ def _each(arguments: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _sentence(error: ErrorDetails) -> str:
-    """One finding of pydantic as a sentence; our own name the field themselves."""
-    if error["type"] == "value_error":
-        return str(error["ctx"]["error"])
-    return f"{'.'.join(map(str, error['loc']))}: {error['msg']}"
+def _field_and_sentence(error: ErrorDetails) -> tuple[str, str]:
+    """Return the field that pydantic finds fault with, and the sentence; our own errors name the field themselves."""
+    ours = error["ctx"]["error"] if error["type"] == "value_error" else error["msg"]
+    if isinstance(ours, ParameterError):
+        return ours.parameter, ours.sentence
+    return ".".join(map(str, error["loc"])), str(ours)

@@ -9,6 +9,7 @@ import tomllib
 from functools import cache
 from importlib import resources
 
+from brdfdb.errors import ParameterError
 from brdfdb.materials.material import Material
 
 
@@ -27,6 +28,6 @@ def _presets() -> dict[str, Material]:
     for file in sorted(files, key=lambda file: file.name):
         for name, table in tomllib.loads(file.read_text(encoding="utf-8")).items():
             if name in materials:
-                raise ValueError(f"{file.name}: the material {name!r} is in another file too")
+                raise ParameterError(file.name, f"the material {name!r} is in another file too")
             materials[name] = Material.from_table(name, table)
     return materials

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from brdfdb.errors import ParameterError
+
 MOST_NAME = 128  # characters of a name: file systems take 255 bytes
 NAME_PATTERN = r"^[a-z0-9]+(-[a-z0-9]+)*$"  # lower-case words joined by hyphens
 
@@ -68,7 +70,7 @@ class Assumption(BaseModel):
     @model_validator(mode="after")
     def _check_compared(self) -> Assumption:
         if (self.max_albedo is None) != (not self.alternatives):
-            raise ValueError("assumed: max_albedo and alternatives are given together, or neither")
+            raise ParameterError("assumed", "max_albedo and alternatives are given together, or neither")
         return self
 
     @property

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import degrees, radians
 from brdfdb.materials.provenance import Number
 from brdfdb.parameters import ModelSpec, Parameter
@@ -46,15 +47,25 @@ def completed(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Numbe
     for name, value in parameters.items():
         if name not in names:
             hint = "; wavelength_nm, n and k come from refractive_index" if spec.spectral else ""
-            raise ValueError(f"{name}: {value!r} given, but the parameters of {spec.name} are {', '.join(names)}{hint}")
+            raise ParameterError(
+                name,
+                f"{value!r} given, but the parameters of {spec.name} are {', '.join(names)}{hint}",
+                value,
+                tuple(names),
+            )
     complete: dict[str, Number] = {}
     for parameter in spec.parameters:
         value = parameters.get(parameter.name, parameter.default)
         if value is None:
-            raise ValueError(f"{parameter.name}: missing, {spec.name} needs a value in {parameter.interval}")
+            raise ParameterError(
+                parameter.name,
+                f"missing, {spec.name} needs a value in {parameter.interval}",
+                None,
+                (parameter.low, parameter.high),
+            )
         switch = isinstance(parameter.default, bool)
         if not isinstance(value, int | float) or isinstance(value, bool) != switch:
-            raise ValueError(f"{parameter.name}: {value!r} is not {'true or false' if switch else 'a number'}")
+            raise ParameterError(parameter.name, f"{value!r} is not {'true or false' if switch else 'a number'}", value)
         parameter.check(value)
         complete[parameter.name] = value
     return complete

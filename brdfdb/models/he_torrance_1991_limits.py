@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
 from brdfdb.models import he_torrance_1991 as full
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
@@ -340,7 +341,7 @@ class _Apertures(NamedTuple):
 
 def _checked_apertures(incident: ArrayLike, received: ArrayLike, rings: int) -> _Apertures:
     if isinstance(rings, bool) or not isinstance(rings, int | np.integer) or not 0 <= rings <= RINGS:
-        raise ValueError(f"rings: {rings!r} is not a whole number in [0, {RINGS}]")
+        raise ParameterError("rings", f"{rings!r} is not a whole number in [0, {RINGS}]", rings, (0, RINGS))
     return _Apertures(INCIDENT.check(incident), RECEIVED.check(received), int(rings))
 
 

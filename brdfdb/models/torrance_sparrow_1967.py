@@ -9,10 +9,12 @@ from numpy.typing import ArrayLike
 
 from brdfdb._elementary import arcsin, exp
 from brdfdb._numba import elementwise, kernel
+from brdfdb.errors import ParameterError
 from brdfdb.fresnel import unpolarised
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.lobes import Lobe
 from brdfdb.models.he_torrance_1991 import K, N
-from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
 
@@ -121,7 +123,7 @@ def _f_r(directions: Directions, sigma: ArrayLike, n: ArrayLike | None, k: Array
     if n is not None:
         lobe = lobe * unpolarised(_cosine(*pair), N.check(n), K.check(0.0 if k is None else k))
     elif k is not None:
-        raise ValueError(f"k: {k!r} is given without n, the refractive index is n + ik")
+        raise ParameterError("k", f"{k!r} is given without n, the refractive index is n + ik")
     return finished(lobe, directions)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from brdfdb.errors import ParameterError
 from brdfdb.forms.timing import ALIKE, clearly_cheaper
 from brdfdb.geometry import radians
 from brdfdb.parameters import Floats
@@ -29,8 +30,8 @@ DARK = 1e-3  # exposed radiance: relative errors of what is darker are relative 
 FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # integrals over facets are known to 1e-6
 
 
-class InfeasibleError(ValueError):
-    """The tolerance is finer than the truth is known; str() is one sentence."""
+class InfeasibleError(ParameterError):
+    """A tolerance that is finer than the truth is known."""
 
 
 class Left(NamedTuple):
@@ -201,7 +202,9 @@ def check_feasible(tolerance: Tolerance) -> None:
     """InfeasibleError if a tolerance is finer than the truth is known."""
     value, unit = tolerance.value, tolerance.unit
     if value < FINEST[unit]:
-        raise InfeasibleError(f"tolerance: {value:g} ({unit}) is finer than the truth is known, {FINEST[unit]:g}")
+        raise InfeasibleError(
+            "tolerance", f"{value:g} ({unit}) is finer than the truth is known, {FINEST[unit]:g}", value
+        )
 
 
 class Look(NamedTuple):

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, field_validator, model_validator
 
+from brdfdb.errors import ParameterError
 from brdfdb.integrals.sampling import directions, lobe_of, mixture_density
+from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
-from brdfdb.parameters import Lobe
 from brdfdb.scenes.shapes import STRICT, Array
 
 # Of the directions, how many a lobe gets at least, or few would carry all of a faint gloss, and at most, which bounds
@@ -50,14 +51,14 @@ class Environment(BaseModel):
     def _check_rows(cls, rows: list[list[float]] | None) -> list[list[float]] | None:
         if rows is not None:
             if not rows or not rows[0] or any(len(row) != len(rows[0]) for row in rows):
-                raise ValueError("rows: must be lists of numbers, all of one length")
+                raise ParameterError("rows", "must be lists of numbers, all of one length")
             _checked("rows", np.array(rows, dtype=np.float64))
         return rows
 
     @model_validator(mode="after")
     def _check(self) -> Environment:
         if (self.rows is None) == (self.file is None):
-            raise ValueError("rows, file: give one of the two")
+            raise ParameterError("rows, file", "give one of the two")
         return self
 
     def resolved(self, folder: Path) -> Environment:
@@ -78,7 +79,7 @@ class Environment(BaseModel):
             return np.array(self.rows, dtype=np.float64)
         path = Path(self.file)
         if not path.is_file():
-            raise ValueError(f"environment.file: {path}: there is no such file")
+            raise ParameterError("environment.file", f"{path}: there is no such file")
         return _read(path, path.stat().st_mtime_ns)
 
     def radiance(self, towards: Array) -> Array:
@@ -147,10 +148,12 @@ def _widest(material: Material, wavelength_nm: Array, wr: Array) -> Lobe:
     parameters = material.arguments(material.evaluated_at(wavelength_nm))
     width = np.broadcast(*parameters.values()).size
     lobe = lobe_of(material.spec, wr[:, np.newaxis], parameters)
-    share, alpha_x, alpha_y = (np.broadcast_to(each, (len(wr), width)) for each in lobe)
+    share, alpha_x, alpha_y = (
+        np.broadcast_to(each, (len(wr), width)) for each in (lobe.share, lobe.alpha_x, lobe.alpha_y)
+    )
     mean = share.mean(axis=1)
     share = np.where(mean > 0.0, np.clip(mean, _LEAST, _MOST), 0.0)
-    return Lobe(share, alpha_x.max(axis=1), alpha_y.max(axis=1))
+    return lobe._replace(share=share, alpha_x=alpha_x.max(axis=1), alpha_y=alpha_y.max(axis=1))
 
 
 def _checked(name: str, picture: Array) -> Array:
@@ -158,9 +161,11 @@ def _checked(name: str, picture: Array) -> Array:
     if np.any(bad):
         row, column = np.argwhere(bad)[0]
         value = picture[row, column]
-        raise ValueError(f"{name}: {value:g} at row {row}, column {column} must be finite and not below 0")
+        raise ParameterError(
+            name, f"{value:g} at row {row}, column {column} must be finite and not below 0", float(value)
+        )
     if not np.any(picture):
-        raise ValueError(f"{name}: radiance is 0 everywhere")
+        raise ParameterError(name, "radiance is 0 everywhere")
     return picture
 
 
@@ -169,7 +174,7 @@ def _read(path: Path, _written: int) -> Array:
     """The picture of a file, kept until it is written anew: every list of points asks for it."""
     picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
     if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
-        raise ValueError(f"environment.file: {path}: must hold numbers of shape (rows, columns)")
+        raise ParameterError("environment.file", f"{path}: must hold numbers of shape (rows, columns)")
     return _checked(f"environment.file: {path}", picture.astype(np.float64))
 
 
@@ -182,8 +187,8 @@ def _from_numpy(path: Path) -> NDArray[np.generic]:
             if "radiance" in found:
                 return np.asarray(found["radiance"])
     except (ValueError, EOFError, zipfile.BadZipFile, zlib.error):
-        raise ValueError(f"environment.file: {path}: is no .npz or .npy of numbers, or a damaged one") from None
-    raise ValueError(f"environment.file: {path}: has no array `radiance`")
+        raise ParameterError("environment.file", f"{path}: is no .npz or .npy of numbers, or a damaged one") from None
+    raise ParameterError("environment.file", f"{path}: has no array `radiance`")
 
 
 def _from_exr(path: Path) -> NDArray[np.generic]:
@@ -193,9 +198,11 @@ def _from_exr(path: Path) -> NDArray[np.generic]:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: np.asarray(each.pixels, dtype=np.float64) for name, each in file.channels().items()}
     except RuntimeError:
-        raise ValueError(f"environment.file: {path}: is no OpenEXR file, or a damaged one") from None
+        raise ParameterError("environment.file", f"{path}: is no OpenEXR file, or a damaged one") from None
     if "Y" in channels:
         return channels["Y"]
     if channels.keys() >= _LUMINANCE.keys():
         return np.asarray(sum(weight * channels[name] for name, weight in _LUMINANCE.items()))
-    raise ValueError(f"environment.file: {path}: has neither a channel Y nor R, G, B; it has {', '.join(channels)}")
+    raise ParameterError(
+        "environment.file", f"{path}: has neither a channel Y nor R, G, B; it has {', '.join(channels)}"
+    )

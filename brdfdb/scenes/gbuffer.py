@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
 from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.scene import Camera, Object, Scene
@@ -111,7 +112,7 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         _check_outside(scene, [each for each in points if each.via is None])
         unseen = [item.name for item in scene.objects if item.name not in {each.name for each in points}]
         if unseen:
-            raise ValueError(f"objects: no ray of {width} x {height} pixels meets {', '.join(unseen)}")
+            raise ParameterError("objects", f"no ray of {width} x {height} pixels meets {', '.join(unseen)}")
         view = View(points, width, height, across**2, background)
     _check_lights(scene, view.points)
     return view
@@ -287,7 +288,7 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
     )
     at = np.flatnonzero(good)
     if not at.size:
-        raise ValueError(f"{shape.file}: shows nothing: at every pixel a vector is not finite, or not 1 long")
+        raise ParameterError(shape.file, "shows nothing: at every pixel a vector is not finite, or not 1 long")
     flat = {name: unit(array.reshape(-1, height * width, 3)[:, at]) for name, array in arrays.items()}
     if "normal" in flat:
         surface = _frames(flat, scene.camera, width, height, at, item.grain_deg)
@@ -296,13 +297,14 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
         wi, irradiance = _lit(scene.model_copy(update={"shadows": False}), item, surface, wr, (0, 0))
     else:
         if scene.environment is not None:
-            raise ValueError(f"{shape.file}: has wr and wi; an environment needs normals, to know what is above them")
+            raise ParameterError(shape.file, "has wr and wi; an environment needs normals, to know what is above them")
         turn = _turned(np.eye(3)[np.newaxis], item.grain_deg)[0]
         wr, wi = flat["wr"][0] @ turn.T, flat["wi"] @ turn.T
         if len(wi) != len(scene.lights) or any(light.solid_angle_sr for light in scene.lights):
-            raise ValueError(
-                f"{shape.file}: wi has {len(wi)} lights, the scene {len(scene.lights)}; "
-                "there must be as many, and none with a solid angle"
+            raise ParameterError(
+                shape.file,
+                f"wi has {len(wi)} lights, the scene {len(scene.lights)}; "
+                "there must be as many, and none with a solid angle",
             )
         strength = np.array([light.strength for light in scene.lights])
         irradiance = np.pi * strength[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
@@ -336,14 +338,18 @@ def _height(camera: Camera, width: int, across: int) -> int:
     """Pixels from the top of a picture to its bottom; ValueError if there are too many, or none."""
     for name, value in (("width", width), ("across", across)):
         if value < 1:
-            raise ValueError(f"{name}: {value} must be at least 1")
+            raise ParameterError(name, f"{value} must be at least 1", value)
     height = max(1, round(width / camera.aspect))
     if max(width, height) > _WIDEST:
-        raise ValueError(f"width: {width} x {height} pixels are too many; either side may have {_WIDEST} at most")
+        raise ParameterError(
+            "width", f"{width} x {height} pixels are too many; either side may have {_WIDEST} at most", width
+        )
     if across * max(width, height) > _MOST:
-        raise ValueError(
-            f"across: {across} rays across each of {width} x {height} pixels are too many; either side may have "
-            f"{_MOST} rays at most"
+        raise ParameterError(
+            "across",
+            f"{across} rays across each of {width} x {height} pixels are too many; either side may have "
+            f"{_MOST} rays at most",
+            across,
         )
     return height
 
@@ -353,7 +359,7 @@ def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
     shapes = {item.name: item.shape for item in scene.objects}
     for each in points:
         if not isinstance(shapes[each.name], Plane) and np.median(each.wr[:, 2]) < _BEHIND:
-            raise ValueError(f"camera.position: is inside {each.name}, which is black from there")
+            raise ParameterError("camera.position", f"is inside {each.name}, which is black from there")
 
 
 def _check_lights(scene: Scene, points: Sequence[Points]) -> None:
@@ -362,8 +368,9 @@ def _check_lights(scene: Scene, points: Sequence[Points]) -> None:
     for number, light in enumerate(scene.lights):
         stop = start + len(light.towards())
         if not any(np.any(each.irradiance[start:stop]) for each in points):
-            raise ValueError(
-                f"lights.{number}: falls on nothing that is seen: it is below the horizon of every visible point, or "
-                "stands behind another object"
+            raise ParameterError(
+                f"lights.{number}",
+                "falls on nothing that is seen: it is below the horizon of every visible point, or "
+                "stands behind another object",
             )
         start = stop

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
+from brdfdb.errors import ParameterError
 from brdfdb.scenes.shapes import STRICT, Array
 
 WANTED = "neither `normal`, nor `wr` and `wi`, of shape (height, width, 3)"
@@ -47,20 +48,20 @@ class Recorded(BaseModel):
         """
         path = Path(self.file)
         if not path.is_file():
-            raise ValueError(f"{path}: there is no such file")
+            raise ParameterError(str(path), "there is no such file")
         arrays = _from_exr(path) if path.suffix == ".exr" else _from_npz(path)
         if "normal" not in arrays and not {"wr", "wi"} <= arrays.keys():
-            raise ValueError(f"{path}: has {WANTED}; it has {', '.join(arrays) or 'no vectors'}")
+            raise ParameterError(str(path), f"has {WANTED}; it has {', '.join(arrays) or 'no vectors'}")
         first = "normal" if "normal" in arrays else "wr"
         pixels = arrays[first].shape[:2]
         for name, array in arrays.items():
             lights = array.shape[:1] if name == "wi" else ()
             if array.shape != (*lights, *pixels, 3):
                 wanted = "(lights, height, width, 3)" if name == "wi" else "(height, width, 3)"
-                said = (
-                    f"{path}: {name} has the shape {array.shape}, which is not that of a picture of vectors, {wanted}"
-                )
-                raise ValueError(said if name == first else f"{said}, of as many pixels as {first} has, {pixels}")
+                sentence = f"{name} has the shape {array.shape}, which is not that of a picture of vectors, {wanted}"
+                if name != first:
+                    sentence += f", of as many pixels as {first} has, {pixels}"
+                raise ParameterError(str(path), sentence, array.shape)
         return arrays
 
 
@@ -69,9 +70,9 @@ def _from_npz(path: Path) -> dict[str, Array]:
         with np.load(path) as file:
             found = {name: file[name] for name in ("normal", "tangent", "wr", "wi") if name in file}
     except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
-        raise ValueError(f"{path}: is no .npz of numbers, or a damaged one") from None
+        raise ParameterError(str(path), "is no .npz of numbers, or a damaged one") from None
     if any(array.dtype.kind not in "iuf" for array in found.values()):
-        raise ValueError(f"{path}: has {WANTED}: what has these names is not made of numbers")
+        raise ParameterError(str(path), f"has {WANTED}: what has these names is not made of numbers")
     return {name: array.astype(np.float64) for name, array in found.items()}
 
 
@@ -82,7 +83,7 @@ def _from_exr(path: Path) -> dict[str, Array]:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels: dict[str, NDArray[np.floating]] = {name: c.pixels for name, c in file.channels().items()}
     except RuntimeError:
-        raise ValueError(f"{path}: is no OpenEXR file, or a damaged one") from None
+        raise ParameterError(str(path), "is no OpenEXR file, or a damaged one") from None
     found = {name: vector for name in ("normal", "tangent", "wr") if (vector := _vector(channels, name)) is not None}
     lights: list[Array] = []
     while (light := _vector(channels, f"wi{len(lights)}")) is not None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.materials import Material
@@ -51,9 +52,10 @@ class Reflector:
         self.material = material
         self.wavelength_nm = material.evaluated_at(wavelength_nm)
         if material.wavelengths_nm is not None and not _VISIBLE_NM[0] <= material.wavelengths_nm[0] <= _VISIBLE_NM[1]:
-            raise ValueError(
-                f"{material.name}: its parameters are stated for {material.wavelengths_nm[0]:g} nm, outside the "
-                f"visible, {_VISIBLE_NM[0]:g} to {_VISIBLE_NM[1]:g} nm"
+            raise ParameterError(
+                material.name,
+                f"its parameters are stated for {material.wavelengths_nm[0]:g} nm, outside the "
+                f"visible, {_VISIBLE_NM[0]:g} to {_VISIBLE_NM[1]:g} nm",
             )
         self._parameters = material.arguments(self.wavelength_nm)
         self._brdf = material.brdf_at(self.wavelength_nm)
@@ -154,9 +156,10 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
             reflected = np.asarray(f_r(points.wi[light, start + number], points.wr[start + number], wavelength))
             shapes = (number.size, wavelength.size), (number.size, 1)
             if reflected.shape not in shapes:
-                raise ValueError(
-                    f"f_r of {points.material}: {number.size} pairs of directions at {wavelength.size} wavelengths "
-                    f"gave the shape {reflected.shape}; must be {shapes[0]} or {shapes[1]}"
+                raise ParameterError(
+                    f"f_r of {points.material}",
+                    f"{number.size} pairs of directions at {wavelength.size} wavelengths "
+                    f"gave the shape {reflected.shape}; must be {shapes[0]} or {shapes[1]}",
                 )
             first = np.flatnonzero(np.diff(number, prepend=-1))
             sums = np.add.reduceat(reflected * irradiance[number, light][:, np.newaxis], first)
@@ -206,7 +209,12 @@ def render(
     replaced = {} if brdfs is None else brdfs
     for name in replaced:
         if name not in scene.materials:
-            raise ValueError(f"brdfs: {name!r} is not one of the scene's materials: {', '.join(scene.materials)}")
+            raise ParameterError(
+                "brdfs",
+                f"{name!r} is not one of the scene's materials: {', '.join(scene.materials)}",
+                name,
+                tuple(scene.materials),
+            )
     lists = []
     for points in view.points:
         lists.append(radiance(scene, points, known[points.material], replaced.get(points.material)))

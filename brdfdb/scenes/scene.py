@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, Field, field_validator, model_validator
 
+from brdfdb.errors import MaterialError, ParameterError
 from brdfdb.geometry import radians
 from brdfdb.materials import Material, presets
 from brdfdb.parameters import closest
@@ -85,10 +86,10 @@ class Camera(BaseModel):
     @model_validator(mode="after")
     def _check(self) -> Camera:
         if (self.fov_deg is None) == (self.height is None):
-            raise ValueError("fov_deg, height: give one of the two")
+            raise ParameterError("fov_deg, height", "give one of the two")
         forward = np.subtract(self.target, self.position)
         if np.linalg.norm(np.cross(forward, self.up)) <= 1e-9 * np.linalg.norm(forward) * np.linalg.norm(self.up):
-            raise ValueError("target: the camera must look at another place than its own, and not along `up`")
+            raise ParameterError("target", "the camera must look at another place than its own, and not along `up`")
         return self
 
     def covered(self, distance: Array) -> Array:
@@ -146,7 +147,7 @@ class Tolerance(BaseModel):
     @model_validator(mode="after")
     def _check(self) -> Tolerance:
         if (self.relative is None) == (self.ciede2000 is None):
-            raise ValueError("relative, ciede2000: give one of the two")
+            raise ParameterError("relative, ciede2000", "give one of the two")
         return self
 
     @property
@@ -202,19 +203,21 @@ class Scene(BaseModel):
     @classmethod
     def _check_wavelengths(cls, wavelengths_nm: list[float]) -> list[float]:
         if not covers_visible(wavelengths_nm):
-            raise ValueError("wavelengths_nm: must increase from 420 or less to 680 or more in steps of at most 20 nm")
+            raise ParameterError(
+                "wavelengths_nm", "must increase from 420 or less to 680 or more in steps of at most 20 nm"
+            )
         return wavelengths_nm
 
     @model_validator(mode="after")
     def _check(self) -> Scene:
         if not self.lights and not self.ambient and self.environment is None:
-            raise ValueError("lights, ambient, environment: there is no light")
+            raise ParameterError("lights, ambient, environment", "there is no light")
         names = [item.name for item in self.objects]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(f"objects: {name!r} is the name of two")
+                raise ParameterError("objects", f"{name!r} is the name of two")
         if any(isinstance(item.shape, Recorded) for item in self.objects) and len(names) > 1:
-            raise ValueError("objects: one that is recorded is the whole picture, and stands alone")
+            raise ParameterError("objects", "one that is recorded is the whole picture, and stands alone")
         _materials(self)
         return self
 
@@ -237,16 +240,19 @@ def _materials(scene: Scene) -> dict[str, Material]:
     known: dict[str, Material] = presets()
     for name, table in scene.define.items():
         if name in known:
-            raise ValueError(f"define.{name}: is the name of a built-in material; give yours another")
+            raise ParameterError(f"define.{name}", "is the name of a built-in material; give yours another")
         try:
             known[name] = Material.from_table(name, table)
-        except ValueError as error:
-            raise ValueError(f"define.{error}") from None
+        except MaterialError as error:
+            raise ParameterError(f"define.{name}", f"{error.parameter}: {error.sentence}") from None
     found = {}
     for item in scene.objects:
         if item.material not in known:
-            raise ValueError(
-                f"objects.{item.name}.material: {item.material!r} is unknown{closest(item.material, known)}"
+            raise ParameterError(
+                f"objects.{item.name}.material",
+                f"{item.material!r} is unknown{closest(item.material, known)}",
+                item.material,
+                tuple(known),
             )
         found[item.material] = known[item.material]
     return found

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ def unit(vectors: Array) -> Array:
 def check_direction(name: str, vector: Vector) -> Vector:
     """The vector, or a ValueError if it points nowhere."""
     if not np.linalg.norm(vector) > 1e-6:
-        raise ValueError(f"{name}: {list(vector)} points nowhere")
+        raise ParameterError(name, f"{list(vector)} points nowhere", list(vector))
     return vector
 
 
@@ -153,7 +154,7 @@ class Revolution(Shape):
     def _check_profile(self) -> Revolution:
         radius, height = np.array(self.profile).T
         if np.any(radius <= 0.0) or np.any(np.diff(height) <= 0.0):
-            raise ValueError("profile: needs radii above 0 and heights that increase")
+            raise ParameterError("profile", "needs radii above 0 and heights that increase")
         return self
 
     def radius_at(self, z: Array) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from zarr.codecs import BloscCodec, Crc32cCodec
 from zarr.core.buffer import Buffer
 from zarr.storage import MemoryStore
 
-from brdfdb.store.manifest import StoreError
+from brdfdb.errors import StoreError
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import VARIABLES
 

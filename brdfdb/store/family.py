@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb.geometry import checked_angles, checked_vectors, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, Parameter
-from brdfdb.store.manifest import StoreError, read_sealed
+from brdfdb.store.manifest import read_sealed
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
@@ -149,7 +150,7 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
     def load(number: int) -> Table:
         name = sweep.members[number]
         table = tables[name]
-        if table.attrs.get("request_sha256") != sweep.request_sha256[number]:
+        if table.metadata.request_sha256 != sweep.request_sha256[number]:
             raise StoreError(stale(sweep.name, name))
         if not _same(shared.setdefault("wavelength_nm", table.wavelength_nm), table.wavelength_nm):
             raise StoreError(f"the family {sweep.name}: {name} is at other wavelengths than another member")
@@ -409,15 +410,22 @@ class Family:
         names = list(self.axes)
         for name in parameters:
             if name not in names:
-                raise ValueError(
-                    f"{name}: {parameters[name]!r} given, but the parameters of the family {self.name} are "
-                    f"{', '.join(names)}"
+                raise ParameterError(
+                    name,
+                    f"{parameters[name]!r} given, but the parameters of the family {self.name} are {', '.join(names)}",
+                    parameters[name],
+                    tuple(names),
                 )
         around = []
         cubic = self.record.interpolation.method == "cubic"
         for limits, nodes, power in zip(self._limits, self.axes.values(), self._powers, strict=True):
             if limits.name not in parameters:
-                raise ValueError(f"{limits.name}: missing, {self.name} needs a value in {limits.interval}")
+                raise ParameterError(
+                    limits.name,
+                    f"missing, {self.name} needs a value in {limits.interval}",
+                    None,
+                    (limits.low, limits.high),
+                )
             first, weights = stencil(nodes, _checked(limits, nodes, parameters[limits.name]), power, cubic=cubic)
             around.append([(first + k, w) for k, w in enumerate(weights) if w != 0.0])
         shape = [nodes.size for nodes in self.axes.values()]
@@ -431,7 +439,9 @@ class Family:
 def _checked(limits: Parameter, nodes: Axis, value: Any) -> float:
     """One number within limits, that of a node if it is one but for rounding, as of degrees to radians."""
     if np.ndim(value) != 0:
-        raise ValueError(f"{limits.name}: {value!r} is not one number in {limits.interval}")
+        raise ParameterError(
+            limits.name, f"{value!r} is not one number in {limits.interval}", value, (limits.low, limits.high)
+        )
     given: NDArray[Any] = np.asarray(value)
     if given.dtype.kind in "iuf":
         nearest = nodes[np.argmin(np.abs(nodes - given))]

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.geometry import degrees, radians
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
@@ -25,8 +26,8 @@ from brdfdb.store.family import (
     stale,
     stencil,
 )
-from brdfdb.store.manifest import StoreError, sync_directory, write_sealed
-from brdfdb.store.reader import Store, UnknownMaterialError
+from brdfdb.store.manifest import sync_directory, write_sealed
+from brdfdb.store.reader import Store
 from brdfdb.store.staging import Lock, writing
 from brdfdb.tables import error_measurement
 from brdfdb.tables.layout import PLAIN
@@ -156,7 +157,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
 def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, floor: Floats) -> Between:
     """Measure the error between the wavelengths of the members, at fewer directions."""
     first = member_loader(sweep, tables)(0)
-    material, stored = Material.model_validate(first.attrs["request"]["material"]), first.wavelength_nm
+    material, stored = _requested(first), first.wavelength_nm
     assert stored is not None
     pairs = error_measurement.draw(material, stored, _SEARCHED, seed)
     wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
@@ -170,6 +171,14 @@ def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, fl
     return Between(wavelength_nm=at.tolist(), bands=bands)
 
 
+def _requested(member: Table) -> Material:
+    """Return the material that a member of a family was built for; StoreError if it does not state its request."""
+    request = member.metadata.request
+    if request is None:
+        raise StoreError(f"{member.name} {member.revision} does not state its request; build it anew")
+    return Material.model_validate(request["material"])
+
+
 def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[np.float64] | None = None) -> _Measured:
     """Return the model and the members around, at directions of their own at each point.
 
@@ -178,7 +187,7 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[n
     nodes = sweep.nodes
     shape = tuple(values.size for values in nodes.values())
     member = member_loader(sweep, tables)
-    base = Material.model_validate(member(0).attrs["request"]["material"])
+    base = _requested(member(0))
     wavelength_nm = member(0).wavelength_nm if at_nm is None else at_nm
     points = parameter_points(shape, seed)
     stencils = tuple(min(_width(shape), nodes) for nodes in shape)

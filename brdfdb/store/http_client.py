@@ -19,11 +19,12 @@ from urllib.parse import quote, urlencode, urlsplit, urlunsplit
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError, StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, degrees, finished, spherical_angles
 from brdfdb.parameters import Floats
 from brdfdb.store.manifest import NAME
-from brdfdb.store.reader import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.tables.grids import Axis
+from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.table_base import Described, Stated
 
 if TYPE_CHECKING:
@@ -64,13 +65,20 @@ class Service:
             split = urlsplit(url)
             host, port = split.hostname, split.port
         except ValueError as error:
-            raise ValueError(f"url: {url!r} is not an address: {error}") from None
+            raise ParameterError("url", f"{url!r} is not an address: {error}", url) from None
         if split.scheme not in ("http", "https") or not host or "@" in split.netloc or split.query or split.fragment:
-            raise ValueError(f"url: {url!r} is not an address such as http://127.0.0.1:8000")
+            raise ParameterError("url", f"{url!r} is not an address such as http://127.0.0.1:8000", url)
         if not re.fullmatch("[!-~]+", url):
-            raise ValueError(f"url: {url!r} is not an address: it has characters other than those of ASCII, or spaces")
+            raise ParameterError(
+                "url", f"{url!r} is not an address: it has characters other than those of ASCII, or spaces", url
+            )
         if not 0.0 < timeout_s <= threading.TIMEOUT_MAX:
-            raise ValueError(f"timeout_s: {timeout_s:g} is outside (0, {threading.TIMEOUT_MAX:g}] s")
+            raise ParameterError(
+                "timeout_s",
+                f"{timeout_s:g} is outside (0, {threading.TIMEOUT_MAX:g}] s",
+                timeout_s,
+                (0.0, threading.TIMEOUT_MAX),
+            )
         self._path, self.timeout_s = split.path.rstrip("/"), timeout_s
         self.url = urlunsplit((split.scheme, split.netloc, self._path, "", ""))
         self._kind = http.client.HTTPSConnection if split.scheme == "https" else http.client.HTTPConnection
@@ -116,7 +124,7 @@ class Service:
         ------
         StoreError
             If there is no service at the address, it cannot read its store, or it fails.
-        UnknownMaterialError, UnknownRevisionError, ValueError
+        UnknownMaterialError, UnknownRevisionError, ParameterError
             As the store itself raises them.
         """
         response, answer = self._answer(path, body, media)
@@ -135,8 +143,8 @@ class Service:
             raise UnknownMaterialError(path.split("/")[3], problem["closest"])
         if status == 404 and problem.get("parameter") == "revision":
             raise UnknownRevisionError(detail)
-        if status == 422 and detail:
-            raise ValueError(detail)
+        if status == 422 and isinstance(parameter := problem.get("parameter"), str):
+            raise ParameterError(parameter, detail.removeprefix(f"{parameter}: "))
         if status == 503 and detail:
             raise StoreError(detail)
         why = f": {detail}" if detail else ", and does not say why"
@@ -416,9 +424,9 @@ class RemoteStore(Mapping[str, RemoteTable]):
                 return line
         raise UnknownMaterialError(name, list(self))
 
-    def attributes(self, name: str) -> dict[str, Any]:
-        """What the current revision says of itself."""
-        return dict(self[name].attrs)
+    def metadata(self, name: str) -> TableMetadata:
+        """Return the metadata of the current revision; of the request of its build nothing."""
+        return self[name].metadata
 
     def dataset(self, name: str) -> xr.Dataset:
         """The current revision as a lazy xarray Dataset, read over HTTP as far as it is needed.

@@ -14,15 +14,13 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypedDict, cast
 
+from brdfdb.errors import StoreError
+
 # Of a material, a family or a snapshot: what does not match is never joined to a path. Files may have names of 255
 # characters
 NAME = re.compile(r"(?!.{129})[a-z0-9]+(-[a-z0-9]+)*")
 SNAPSHOT_FORMAT, SNAPSHOT_VERSION = "brdfdb-snapshot", 1
 _SEAL = re.compile(rb'\{"sha256": "([0-9a-f]{64})",\n')
-
-
-class StoreError(Exception):
-    """A store that is missing, damaged, of another version, or cannot be written; str() is one sentence."""
 
 
 class Entry(TypedDict):

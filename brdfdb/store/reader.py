@@ -14,7 +14,6 @@ rewrite a shared root file, and stale metadata hides groups.
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import json
 import os
@@ -26,12 +25,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.store.manifest import (
     NAME,
     Head,
     Manifest,
     Snapshot,
-    StoreError,
     check_manifest,
     head_from,
     number_of,
@@ -49,6 +48,7 @@ if TYPE_CHECKING:
 
     from brdfdb.store.family import Family
     from brdfdb.store.zarr_store import Whole
+    from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.table import Table
 
 __all__ = [
@@ -56,10 +56,6 @@ __all__ = [
     "FORMAT_VERSION",
     "DamagedMarkerError",
     "Store",
-    "StoreError",
-    "UnknownFamilyError",
-    "UnknownMaterialError",
-    "UnknownRevisionError",
     "WrongSummaryError",
 ]
 
@@ -67,7 +63,6 @@ FORMAT = "brdfdb"
 FORMAT_VERSION = 2  # 1 had no digests in the first lines
 
 CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
-_SHOWN = 60  # characters of an unknown name
 
 
 class DamagedMarkerError(StoreError):
@@ -76,43 +71,6 @@ class DamagedMarkerError(StoreError):
 
 class WrongSummaryError(StoreError):
     """A pointer that says of its revision other than the manifest."""
-
-
-class UnknownMaterialError(KeyError):
-    """A name that is not in the store.
-
-    Attributes
-    ----------
-    name : str
-        What was asked for.
-    closest : list of str
-        Up to five names that are close to it.
-    """
-
-    kind = "material"
-
-    def __init__(self, name: str, names: list[str]) -> None:
-        super().__init__(name)
-        self.name = name
-        self.closest = difflib.get_close_matches(name, names, n=5, cutoff=0.4)
-
-    def __str__(self) -> str:
-        hint = f"; closest: {', '.join(self.closest)}" if self.closest else ""
-        shown = self.name if len(self.name) <= _SHOWN else f"{self.name[:_SHOWN]}..."
-        return f"no {self.kind} {shown!r} in the store{hint}"
-
-
-class UnknownFamilyError(UnknownMaterialError):
-    """A name that is not that of a family in the store."""
-
-    kind = "family"
-
-
-class UnknownRevisionError(KeyError):
-    """A revision that a material does not have; str() is one sentence."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 def _check_marker(root: Path) -> None:
@@ -304,11 +262,11 @@ class Store(Mapping[str, "Table"]):
         """
         return self._pointer(name).head
 
-    def attributes(self, name: str) -> dict[str, Any]:
-        """What the current revision says of itself, without decoding its values."""
+    def metadata(self, name: str) -> TableMetadata:
+        """Return the metadata of the current revision, without decoding its values; errors as by `summary`."""
         group, digest = self.location(name)
         check_manifest(group, digest, contents=False)
-        return dict(read_json(group / "zarr.json")["attributes"])
+        return read_metadata(group)
 
     def families(self) -> list[str]:
         """Return the names of the families, sorted."""
@@ -429,6 +387,13 @@ class Store(Mapping[str, "Table"]):
         return *pointer.location, pointer.head
 
 
+def read_metadata(group: Path) -> TableMetadata:
+    """Return the metadata in the directory of a revision, whose files were checked against its manifest."""
+    from brdfdb.tables.metadata import TableMetadata
+
+    return TableMetadata.read(read_json(group / "zarr.json").get("attributes", {}))
+
+
 def check_summary(head: Head, manifest: Manifest) -> None:
     """Raise WrongSummaryError unless a pointer says of its revision what the manifest does."""
     for key, value in manifest["summary"].items():
@@ -478,9 +443,18 @@ def _decode(name: str, path: Path, files: Whole, digest: str) -> Table:
 
     try:
         group = zarr.open_group(files, mode="r")
-        arrays = {key: np.asarray(array[...]) for key, array in group.arrays()}
+        found = dict(group.arrays())
+        arrays = {key: np.asarray(array[...]) for key, array in found.items()}
     except StoreError:
         raise
     except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
         raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
-    return replace(table_from(name, path.name, arrays, dict(group.attrs)), digest=digest)
+    try:
+        table = table_from(name, path.name, arrays, dict(group.attrs))
+        variable = "brdf" if "brdf" in found else "parts"
+        dims, axes = found[variable].metadata.dimension_names or (), table.grid.names  # type: ignore[union-attr]
+        if dims[: len(axes)] != axes:
+            raise ValueError(f"{variable}: its dimensions {dims} must begin with {axes}")
+        return replace(table, digest=digest)
+    except ValueError as error:  # written by another program
+        raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error

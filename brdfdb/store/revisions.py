@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from brdfdb.errors import BusyError, ParameterError, StoreError, UnknownMaterialError
 from brdfdb.store.manifest import (
     Summary,
     check_manifest,
@@ -19,8 +20,8 @@ from brdfdb.store.manifest import (
     snapshot_names,
     whole_revisions,
 )
-from brdfdb.store.reader import Store, StoreError, UnknownMaterialError
-from brdfdb.store.staging import BusyError, Lock, adoptable, known_manifests, point_to, writing
+from brdfdb.store.reader import Store
+from brdfdb.store.staging import Lock, adoptable, known_manifests, point_to, writing
 from brdfdb.tables.layout import digest
 
 SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turns; no material has such a name
@@ -54,7 +55,7 @@ def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
         if head["request_sha256"] == wanted:
             store.verify(name)
             return Standing("current", group.name)
-        why = difference(store.attributes(name).get("request", {}), request)
+        why = difference(store.metadata(name).request or {}, request)
     except UnknownMaterialError:
         why = "new"
     except StoreError as error:
@@ -184,7 +185,7 @@ def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
         If there is no store, a snapshot is damaged, or something cannot be removed.
     """
     if keep < 1:
-        raise ValueError(f"keep: {keep} is not at least 1; the current revision always stays")
+        raise ParameterError("keep", f"{keep} is not at least 1; the current revision always stays", keep)
     store = Store(root)
     collected = Collected()
     try:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store.family import stale
 from brdfdb.store.manifest import (
     NAME,
@@ -18,7 +19,6 @@ from brdfdb.store.manifest import (
     SNAPSHOT_VERSION,
     Pin,
     Snapshot,
-    StoreError,
     read_snapshot,
     seal_of,
     snapshot_path,
@@ -50,7 +50,9 @@ def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) ->
         If the store has a snapshot of this name, or no material; if a material is damaged or a family out of date.
     """
     if not NAME.fullmatch(name):
-        raise ValueError(f"snapshot: {name[:60]!r} is not made of lower-case letters, digits and single hyphens")
+        raise ParameterError(
+            "snapshot", f"{name[:60]!r} is not made of lower-case letters, digits and single hyphens", name
+        )
     store, path = Store(root), snapshot_path(root, name)
     with Lock(root, SNAPSHOTS) as lock:
         if path.exists():

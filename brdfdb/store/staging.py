@@ -28,18 +28,17 @@ from typing import IO, TYPE_CHECKING, Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import BusyError, ParameterError, StoreError
 from brdfdb.store.manifest import (
     NAME,
     Entry,
     Head,
     Manifest,
-    StoreError,
     Summary,
     check_manifest,
     manifest_of,
     number_of,
     read_head,
-    read_json,
     read_manifest,
     read_sealed,
     sealed,
@@ -51,9 +50,10 @@ from brdfdb.store.manifest import (
     write_json,
     write_sealed,
 )
-from brdfdb.store.reader import FORMAT, FORMAT_VERSION, DamagedMarkerError, Store
+from brdfdb.store.reader import FORMAT, FORMAT_VERSION, DamagedMarkerError, Store, read_metadata
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
+from brdfdb.tables.stated_error import Error
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -207,10 +207,6 @@ class Lock:
         self._handle = None
 
 
-class BusyError(Exception):
-    """Another build holds the lock of a material."""
-
-
 def directory_of(root: Path, name: str, request_sha256: str) -> Path:
     """Where a request is staged."""
     return root / ".staging" / name / request_sha256[:16]
@@ -329,9 +325,9 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
     request = read_sealed(directory / "request.json", table.source.name)
     with writing(directory.parent.parent.parent, table.source.name):
         write_file(directory / "table" / table.variable / "zarr.json", array_metadata(table), directory)
-    frame = tabulation.frame(table).assign_attrs(
-        request=request, request_sha256=digest(request), **_measured(table, directory / "table")
-    )
+    measured = {"request": request, "request_sha256": digest(request), "error": _measured(table, directory / "table")}
+    metadata = tabulation.metadata_of(table).model_copy(update=measured)
+    frame = tabulation.frame(table).assign_attrs(metadata.attributes())
     with writing(directory.parent.parent.parent, table.source.name):
         return {
             name: write_file(directory / "table" / name, data, directory)
@@ -339,8 +335,8 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
         }
 
 
-def _measured(layout: Layout, table: Path) -> dict[str, Any]:
-    """Attributes that only the finished blocks in the group `table` can tell: the error against the model."""
+def _measured(layout: Layout, table: Path) -> Error:
+    """Return the error of a table against its model, from the finished blocks in the group `table`."""
     from brdfdb.store.codec import chunk_name, decoded
     from brdfdb.tables.error_measurement import measure
 
@@ -354,7 +350,7 @@ def _measured(layout: Layout, table: Path) -> dict[str, Any]:
         blocks = np.concatenate([block(number) for number in range(first, last + 1)])
         return blocks[rows.start - start : rows.stop - start]
 
-    return {"error": measure(layout, read).model_dump(mode="json")}
+    return measure(layout, read)
 
 
 def publish(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) -> tuple[str, int]:
@@ -379,14 +375,14 @@ def publish(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) ->
         for path in table.rglob("*"):
             if path.is_file() and path.relative_to(table).as_posix() not in files:
                 path.unlink()
-        attributes = read_json(table / "zarr.json")["attributes"]
+        metadata = read_metadata(table)
         stored = sum(entry["size"] for entry in files.values())
         summary: Summary = {
-            "title": attributes.get("title", ""),
-            "model": attributes.get("model", ""),
-            "model_version": attributes.get("model_version", 0),
-            "request_sha256": attributes.get("request_sha256", ""),
-            "error_p99": attributes.get("error", {}).get("overall", {}).get("p99"),
+            "title": metadata.title or "",
+            "model": metadata.model or "",
+            "model_version": metadata.model_version or 0,
+            "request_sha256": metadata.request_sha256 or "",
+            "error_p99": None if metadata.error is None else metadata.error.overall.p99,
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "bytes": stored,
         }
@@ -472,7 +468,7 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     from brdfdb.store.codec import dataset_files
 
     if not NAME.fullmatch(name):
-        raise ValueError(f"name: {name!r} is not made of lower-case letters, digits and single hyphens")
+        raise ParameterError("name", f"{name!r} is not made of lower-case letters, digits and single hyphens", name)
     store = Path(root)
     make_store(store)
     files = dataset_files(dataset)

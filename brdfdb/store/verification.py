@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.store.family_records import verify_family
 from brdfdb.store.manifest import (
     Entry,
     Head,
-    StoreError,
     check_manifest,
     manifest_of,
     read_manifest,
@@ -21,24 +21,28 @@ from brdfdb.store.manifest import (
     snapshot_path,
     whole_revisions,
 )
-from brdfdb.store.reader import Store, UnknownMaterialError, WrongSummaryError, check_summary
+from brdfdb.store.reader import Store, WrongSummaryError, check_summary, read_metadata
 from brdfdb.store.revisions import pinned, strangers
 
-REQUIRED = ("title", "material", "table_version", "model", "model_version", "parameters", "source", "conventions")
 _BUILD = "`brdfdb build` with its recipe repairs it"
 _BUILD_ANEW = "`brdfdb build` with its recipe makes it anew, then `brdfdb gc --damaged` removes this revision"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Damage of a material, a family or a snapshot, and the command that repairs it."""
+    """Damage of a material, a family or a snapshot, and the command that repairs it; a remark has no such command."""
 
     name: str
     sentence: str
     repair: str
 
+    @property
+    def remark(self) -> bool:
+        """True if nothing is damaged: the sentence says what a table does not state of itself."""
+        return not self.repair
+
     def __str__(self) -> str:
-        return f"{self.sentence}; {self.repair}"
+        return self.sentence if self.remark else f"{self.sentence}; {self.repair}"
 
 
 class WrongTableError(StoreError):
@@ -65,7 +69,7 @@ def material(root: Path, name: str) -> tuple[int, list[Finding]]:
         except StoreError as error:
             return 0, [Finding(name, str(error), _pointer_repair(store.root / "materials" / name))]
         try:
-            size, found = _current(name, group, digest, head), []
+            size, found = _current(name, group, digest, head), _remarks(name, group)
         except StoreError as error:
             if _moved(store, name, group, digest):
                 continue
@@ -74,6 +78,12 @@ def material(root: Path, name: str) -> tuple[int, list[Finding]]:
             repair = f"`rm {manifest_of(group)}`, then {_BUILD}" if isinstance(error, WrongTableError) else _BUILD_ANEW
             size, found = 0, [Finding(name, str(error), repair)]
         return size, found + _strange(name, group, digest) + _others(store, group, head)
+
+
+def _remarks(name: str, group: Path) -> list[Finding]:
+    """Return what the metadata of a revision lacks: a table that another program published can be looked up still."""
+    gaps = read_metadata(group).gaps
+    return [Finding(name, f"{name} {group.name} {gaps}", "")] if gaps else []
 
 
 def _moved(store: Store, name: str, group: Path, digest: str) -> bool:
@@ -184,9 +194,8 @@ def _current(name: str, group: Path, digest: str, head: Head) -> int:
         raise
     except Exception as error:
         raise WrongTableError(f"{where} is not a table: its metadata cannot be read: {error}") from error
-    attributes = dict(opened.attrs)
-    if missing := [key for key in REQUIRED if key not in attributes]:
-        raise WrongTableError(f"{where} is not a table: it lacks the attribute {missing[0]}")
+    if "brdf" not in arrays and "parts" not in arrays:
+        raise WrongTableError(f"{where} is not a table: it has no array brdf or parts")
     sizes: dict[str, int] = {}
     for key, array in arrays.items():
         _check_array(where, key, array, sizes)

@@ -10,7 +10,8 @@ from zarr.abc.store import ByteRequest
 from zarr.core.buffer import Buffer, BufferPrototype
 from zarr.storage import LocalStore
 
-from brdfdb.store.manifest import Entry, StoreError, manifest_of
+from brdfdb.errors import StoreError
+from brdfdb.store.manifest import Entry, manifest_of
 
 
 class Whole(LocalStore):

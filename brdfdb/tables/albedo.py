@@ -8,8 +8,9 @@ import numpy as np
 
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
+from brdfdb.lobes import Lobe
 from brdfdb.materials import Source
-from brdfdb.parameters import Floats, Lobe
+from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.table import Table
 
@@ -87,7 +88,7 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
         brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
         albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)[:, np.newaxis]
     lights = theta_i_deg
-    if lights is None and table.attrs.get("reason"):  # a planner's nodes are few, and reach 90 degrees
+    if lights is None and table.metadata.reason:  # a planner's nodes are few, and reach 90 degrees
         lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
     if lights is not None:
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)

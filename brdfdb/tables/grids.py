@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import directions_from_half_difference, radians
 
 Axis = NDArray[np.float64]
@@ -73,7 +74,7 @@ class Grid:
     def __init__(self, axes: Mapping[str, Any]) -> None:
         names = tuple(axes)
         if names not in KINDS:
-            raise ValueError(f"grid axes: {names} is none of {', '.join(map(str, KINDS))}")
+            raise ParameterError("grid axes", f"{names} is none of {', '.join(map(str, KINDS))}", names, tuple(KINDS))
         object.__setattr__(self, "axes", {name: _checked(names, name, nodes) for name, nodes in axes.items()})
 
     @property
@@ -171,23 +172,32 @@ def axes_among(names: Iterable[Any]) -> tuple[str, ...]:
     for kind in reversed(KINDS):
         if set(kind) <= known:
             return kind
-    raise ValueError(f"grid axes: none of {', '.join(map(str, KINDS))} is among {', '.join(sorted(map(str, known)))}")
+    raise ParameterError(
+        "grid axes", f"none of {', '.join(map(str, KINDS))} is among {', '.join(sorted(map(str, known)))}"
+    )
 
 
 def _checked(names: tuple[str, ...], name: str, nodes: Any) -> Axis:
     """The nodes of an axis [degree] as float64, or a ValueError saying what is wrong with them."""
     axis = np.array(nodes, dtype=np.float64)
     if axis.ndim != 1 or axis.size < 2:
-        raise ValueError(f"{name}: needs a list of at least two nodes, got an array of shape {axis.shape}")
+        raise ParameterError(
+            name, f"needs a list of at least two nodes, got an array of shape {axis.shape}", axis.shape
+        )
     if not np.all(np.diff(axis) > 0.0):
-        raise ValueError(f"{name}: the nodes must increase strictly")
+        raise ParameterError(name, "the nodes must increase strictly")
     if axis[0] != 0.0:
-        raise ValueError(f"{name}: starts at {axis[0]:g} degrees, must start at 0")
+        raise ParameterError(name, f"starts at {axis[0]:g} degrees, must start at 0", float(axis[0]), 0.0)
     ends = _AZIMUTHS[names].get(name)
     if ends is not None and axis[-1] not in ends:
-        raise ValueError(f"{name}: ends at {axis[-1]:g} degrees, must end at {' or '.join(f'{end:g}' for end in ends)}")
+        raise ParameterError(
+            name,
+            f"ends at {axis[-1]:g} degrees, must end at {' or '.join(f'{end:g}' for end in ends)}",
+            float(axis[-1]),
+            ends,
+        )
     if ends is None and not axis[-1] <= 90.0:
-        raise ValueError(f"{name}: ends at {axis[-1]:g} degrees, must end at or below 90")
+        raise ParameterError(name, f"ends at {axis[-1]:g} degrees, must end at or below 90", float(axis[-1]))
     return axis
 
 
@@ -195,5 +205,5 @@ def check_wavelengths(nodes: Any) -> Axis:
     """Return wavelengths [nm] as float64, or raise a ValueError saying what is wrong with them."""
     axis = np.array(nodes, dtype=np.float64)
     if axis.ndim != 1 or axis.size == 0 or not (axis[0] > 0.0 and np.all(np.diff(axis) > 0.0)):
-        raise ValueError("wavelengths_nm: must be positive and increase strictly")
+        raise ParameterError("wavelengths_nm", "must be positive and increase strictly")
     return axis

@@ -8,12 +8,13 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict
 
-from brdfdb.errors import BrdfdbError
+from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.materials import Material, Source, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Grid, check_wavelengths
@@ -42,6 +43,8 @@ class Interpolation:
         model has at the horizon.
     """
 
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # where attributes of tables are read
+
     method: str = "linear"
     logarithm: bool = False
     offset: float = 0.0
@@ -49,9 +52,11 @@ class Interpolation:
 
     def __post_init__(self) -> None:
         if self.method not in _METHODS:
-            raise ValueError(f"interpolation: {self.method!r} is not one of {', '.join(_METHODS)}")
+            raise ParameterError(
+                "interpolation", f"{self.method!r} is not one of {', '.join(_METHODS)}", self.method, tuple(_METHODS)
+            )
         if self.power not in (0.0, 0.5, 1.0):
-            raise ValueError(f"power: {self.power!r} is not 0, 0.5 or 1")
+            raise ParameterError("power", f"{self.power!r} is not 0, 0.5 or 1", self.power, (0.0, 0.5, 1.0))
 
     @property
     def cubic(self) -> bool:
@@ -120,13 +125,15 @@ class Layout:
     def __post_init__(self) -> None:
         source = self.source
         if source.spectral != (self.wavelength_nm is not None):
-            raise ValueError(f"wavelengths_nm: {source.name} {'needs them' if source.spectral else 'is grey'}")
+            raise ParameterError("wavelengths_nm", f"{source.name} {'needs them' if source.spectral else 'is grey'}")
         if source.anisotropic and not self.grid.anisotropic:
-            raise ValueError(f"grid: {source.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r")
+            raise ParameterError(
+                "grid", f"{source.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r"
+            )
         if source.anisotropic and not source.elliptical and self.grid.copies > 1:
-            raise ValueError(f"grid: {source.name} has no symmetry of an ellipse; phi must end at 360 degrees")
+            raise ParameterError("grid", f"{source.name} has no symmetry of an ellipse; phi must end at 360 degrees")
         if source.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
-            raise ValueError(f"grid: theta of 90 degrees is a pole of {source.name}; end the axis below 90")
+            raise ParameterError("grid", f"theta of 90 degrees is a pole of {source.name}; end the axis below 90")
         if self.wavelength_nm is not None:
             object.__setattr__(self, "wavelength_nm", check_wavelengths(self.wavelength_nm))
             source.brdf_at(self.wavelength_nm)

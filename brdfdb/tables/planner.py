@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
@@ -122,7 +123,7 @@ class _Task(NamedTuple):
 def check_tolerance(tolerance: float) -> None:
     """ValueError if no table is planned for a tolerance."""
     if not 1e-4 <= tolerance <= 0.5:
-        raise ValueError(f"tolerance: {tolerance:g} is outside [0.0001, 0.5]")
+        raise ParameterError("tolerance", f"{tolerance:g} is outside [0.0001, 0.5]", tolerance, (1e-4, 0.5))
 
 
 def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout:
@@ -168,8 +169,10 @@ def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: f
         finished = None if layout is None else _finished(layout, wavelength_nm, tolerance)
         if finished is not None:
             return replace(finished, reason=_reason(finished, tolerance, candidates))
-    raise ValueError(
-        f"tolerance: {tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for more error"
+    raise ParameterError(
+        "tolerance",
+        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for more error",
+        tolerance,
     )
 
 

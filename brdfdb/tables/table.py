@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON
-from brdfdb.errors import BrdfdbError
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians
-from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables import _kernels
 from brdfdb.tables._interpolation import Axes, prepared
-from brdfdb.tables.grids import Axis, Grid, axes_among
+from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout
+from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.table_base import Described, Stated
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
@@ -88,19 +88,6 @@ class Table(Described):
             spectra=layout.spectra,
             uniform=layout.uniform,
         )
-
-    @functools.cached_property
-    def source(self) -> Material | FunctionRecord | None:
-        """The source that the table was tabulated from, as the table keeps it: exact parameters, radians as they were.
-
-        A function comes back without its callable. None where the table does not say, or where this program does not
-        have the model.
-        """
-        document = self.attrs.get("source_record", self.attrs.get("request"))  # which older builds wrote
-        try:
-            return None if document is None else source_of(document)
-        except BrdfdbError:
-            return None
 
     @property
     def axes_deg(self) -> Mapping[str, Axis]:
@@ -303,8 +290,8 @@ class Table(Described):
         nodes = radians(self.axes_deg["theta_i"] if at_deg is None else at_deg)
         expected = (nodes.size,) if self.wavelength_nm is None else (nodes.size, self.wavelength_nm.size)
         if self.specular.shape != expected or nodes.size < 2:  # kernels do not look
-            raise ValueError(
-                f"specular: shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
+            raise ParameterError(
+                "specular", f"shape {self.specular.shape} of {self.name} is not {expected}, two nodes or more"
             )
         return nodes, np.ascontiguousarray(self.specular.reshape(nodes.size, -1))
 
@@ -346,21 +333,32 @@ def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
 
 def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], attrs: Mapping[str, Any]) -> Table:
     """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
-    how = dict(attrs.get("interpolation", {}))
+    metadata = TableMetadata.read(attrs)
+    if "interpolation" in metadata.strange:
+        raise ValueError(f"interpolation: {metadata.strange['interpolation']}")
     variable = "brdf" if "brdf" in arrays else "parts"
-    specular = arrays.get("specular_reflectance")
-    uniform = arrays.get("uniform")
+    if variable not in arrays:
+        raise ValueError(f"brdf: neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
+    grid = Grid({axis: arrays[axis] for axis in axes_among(arrays)})
+    specular, uniform = arrays.get("specular_reflectance"), arrays.get("uniform")
+    wavelength_nm, spectra = arrays.get("wavelength"), arrays.get("spectra")
+    spectrum = () if wavelength_nm is None else check_wavelengths(wavelength_nm).shape
+    channels = spectrum if spectra is None else spectra.shape[:1]
+    if arrays[variable].shape != (*grid.shape, *channels):  # kernels do not look
+        raise ValueError(f"{variable}: shape {arrays[variable].shape} is not {(*grid.shape, *channels)}, of its axes")
+    if spectra is not None and spectra.shape != (*channels, *spectrum):
+        raise ValueError(f"spectra: shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths")
     return Table(
         name=name,
         revision=revision,
         attrs=attrs,
-        grid=Grid({axis: arrays[axis] for axis in axes_among(arrays)}),
-        wavelength_nm=arrays.get("wavelength"),
+        grid=grid,
+        wavelength_nm=wavelength_nm,
         values=arrays[variable],
         specular=None if specular is None else specular.astype(np.float32),
         specular_theta_deg=arrays.get("specular_theta_i"),
-        interpolation=Interpolation(**how),
-        spectra=arrays.get("spectra"),
+        interpolation=metadata.interpolation,
+        spectra=spectra,
         uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),
         n=arrays.get("n"),
         k=arrays.get("k"),

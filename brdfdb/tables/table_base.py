@@ -9,10 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import Directions
+from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Axis
+from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.stated_error import Error, stated
 
 _MOST_KNOWN = 64  # single wavelengths that are remembered
@@ -69,13 +72,31 @@ class Described:
     wavelength_nm: Axis | None
 
     @functools.cached_property
+    def metadata(self) -> TableMetadata:
+        """The attributes as a typed record."""
+        return TableMetadata.read(self.attrs)
+
+    @functools.cached_property
+    def source(self) -> Material | FunctionRecord | None:
+        """The source that the table was tabulated from, as the table keeps it: exact parameters, radians as they were.
+
+        A function comes back without its callable. None where the table does not say, or where this program does not
+        have the model.
+        """
+        document = self.metadata.source_record or self.metadata.request  # of builds before tables kept their source
+        try:
+            return None if document is None else source_of(document)
+        except BrdfdbError:
+            return None
+
+    @property
     def error(self) -> Error | None:
         """The error that the table states; None if none was measured."""
-        return None if "error" not in self.attrs else Error.model_validate(self.attrs["error"])
+        return self.metadata.error
 
     def _stated(self, directions: Directions, brdf: Floats, wavelength_nm: ArrayLike | None) -> Floats:
         if self.error is None:
-            raise ValueError(f"with_error: the table of {self.name} states no error; build it anew")
+            raise ParameterError("with_error", f"the table of {self.name} states no error; build it anew")
         return self.stated_by(self.error, directions, brdf, wavelength_nm)
 
     def stated_by(
@@ -92,9 +113,10 @@ class Described:
         if error.between is None and at.size and at.column.max() >= len(error.floor):
             assert self.wavelength_nm is not None
             below = int(at.column.max()) - len(error.floor)
-            raise ValueError(
-                f"with_error: the error of {self.name} was not measured between its wavelengths of "
-                f"{self.wavelength_nm[below]:g} and {self.wavelength_nm[below + 1]:g} nm; build it anew"
+            raise ParameterError(
+                "with_error",
+                f"the error of {self.name} was not measured between its wavelengths of "
+                f"{self.wavelength_nm[below]:g} and {self.wavelength_nm[below + 1]:g} nm; build it anew",
             )
         values = brdf if at.tail else np.asarray(brdf)[..., np.newaxis]
         errors = stated(error, directions, values, at.column)
@@ -128,20 +150,25 @@ class Described:
         stored = self.wavelength_nm
         given = np.asarray(wavelength_nm)
         if given.size and given.dtype.kind not in "iuf":
-            raise ValueError(f"wavelength_nm: {wavelength_nm!r} is not a number of nanometres")
+            raise ParameterError("wavelength_nm", f"{wavelength_nm!r} is not a number of nanometres", wavelength_nm)
         wanted = given.astype(np.float64)
         if wanted.ndim > 1:
-            raise ValueError(f"wavelength_nm: {wanted.ndim} axes; allowed are a number and a list of numbers")
+            raise ParameterError("wavelength_nm", f"{wanted.ndim} axes; allowed are a number and a list of numbers")
         flat = wanted.reshape(-1)
         good = (flat > 0.0) & np.isfinite(flat)
         if not np.all(good):
-            raise ValueError(f"wavelength_nm: {flat[~good][0]:g} is not a positive number of nanometres")
+            raise ParameterError(
+                "wavelength_nm", f"{flat[~good][0]:g} is not a positive number of nanometres", float(flat[~good][0])
+            )
         if stored is None:
             return _on_axis(np.zeros(1), np.zeros(flat.size), wanted.shape)
         outside = (flat < stored[0]) | (flat > stored[-1])
         if np.any(outside):
-            raise ValueError(
-                f"wavelength_nm: {flat[outside][0]:.9g} is outside [{stored[0]:g}, {stored[-1]:g}] nm of {self.name}"
+            raise ParameterError(
+                "wavelength_nm",
+                f"{flat[outside][0]:.9g} is outside [{stored[0]:g}, {stored[-1]:g}] nm of {self.name}",
+                float(flat[outside][0]),
+                (float(stored[0]), float(stored[-1])),
             )
         return _on_axis(stored, flat, wanted.shape)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,10 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import directions_from_half_difference, radians, unit_vector
-from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.layout import TABLE_VERSION, Layout
+from brdfdb.tables.metadata import TableMetadata
 
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
@@ -198,16 +197,7 @@ def frame(layout: Layout) -> xr.Dataset:
             source.specular_reflectance(radians(theta_i_deg), wavelength_nm),
             {"units": "1", "long_name": "reflectance of the Dirac part, in the exact mirror direction"},
         )
-    extent = [] if wavelength_nm is None else [float(wavelength_nm[0]), float(wavelength_nm[-1])]
-    how = {"interpolation": asdict(layout.interpolation), "bits": layout.bits}
-    return xr.Dataset(
-        variables,
-        coordinates,
-        _attributes(source)
-        | {"anisotropic": grid.anisotropic, "symmetries": grid.symmetries, "wavelength_range_nm": extent}
-        | how
-        | {"reconstruction": _reconstruction(layout), "reason": layout.reason},
-    )
+    return xr.Dataset(variables, coordinates, metadata_of(layout).attributes())
 
 
 def specular_nodes(layout: Layout) -> Axis:
@@ -235,16 +225,25 @@ def _reconstruction(layout: Layout) -> str:
     return f"brdf = {value}; between nodes, parts are interpolated, {how.method}{spectrum}{beyond}"
 
 
-def _attributes(source: Source) -> dict[str, Any]:
-    return {
-        "table_version": TABLE_VERSION,
+def metadata_of(layout: Layout) -> TableMetadata:
+    """Return the metadata of a table that is known before its values are: without request and stated error."""
+    source, wavelength_nm = layout.source, layout.wavelength_nm
+    return TableMetadata(
+        table_version=TABLE_VERSION,
         **source.attributes(),
-        "source_record": source.document(),
-        "conventions": (
+        source_record=source.document(),
+        conventions=(
             "directions point away from the surface; delta_phi = phi_r - phi_i, 0 is back towards the light, "
             "180 degrees the mirror half plane; f_r without cosine; isotropic tables are even in delta_phi"
         ),
-    }
+        anisotropic=layout.grid.anisotropic,
+        symmetries=layout.grid.symmetries,
+        wavelength_range_nm=[] if wavelength_nm is None else [float(wavelength_nm[0]), float(wavelength_nm[-1])],
+        interpolation=layout.interpolation,
+        bits=layout.bits,
+        reconstruction=_reconstruction(layout),
+        reason=layout.reason,
+    )
 
 
 _LONG_NAMES = {

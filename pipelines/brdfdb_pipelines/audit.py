@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import brdfdb
 from brdfdb.atlas import ATLAS
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb.gallery import GALLERY
-from brdfdb.store.reader import StoreError
 from brdfdb_pipelines import audit_page, terminal, workers
 
 Task = Callable[[], Any]
@@ -69,7 +69,12 @@ def run(
     for name in (*names, *allow):
         store.head(name)
     if unused := [name for name in allow if name not in materials]:
-        raise ValueError(f"--allow: {unused[0]} is not among the materials to audit, {', '.join(materials)}")
+        raise ParameterError(
+            "--allow",
+            f"{unused[0]} is not among the materials to audit, {', '.join(materials)}",
+            unused[0],
+            tuple(materials),
+        )
     _check_path(report_path)
     tasks: dict[str, Task] = {name: partial(_audited, root, name, name in allow) for name in materials}
     drawn = [*ATLAS, *GALLERY] if figures else []
@@ -111,7 +116,7 @@ def _check_path(report_path: Path) -> None:
         code = errno.ENOTDIR if report_path.parent.exists() else errno.ENOENT
         raise OSError(code, os.strerror(code), str(report_path))
     if report_path.suffix != ".json":
-        raise ValueError(f"--report: {report_path} does not end in .json")
+        raise ParameterError("--report", f"{report_path} does not end in .json", report_path)
 
 
 def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from brdfdb.errors import BusyError, StoreError
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
-from brdfdb.store.manifest import Entry, StoreError, read_manifest
+from brdfdb.store.manifest import Entry, read_manifest
 from brdfdb.store.staging import (
     Block,
-    BusyError,
     Lock,
     discard,
     make_store,

@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from brdfdb.errors import ParameterError
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import terminal
 
@@ -56,8 +57,8 @@ def machine_memory() -> int:
 def check_memory(what: str, need: int, memory: int | None) -> None:
     """ValueError if a task needs more memory [byte] than is allowed; None allows any."""
     if memory is not None and need > memory:
-        raise ValueError(
-            f"memory: {what} takes about {terminal.size(need)}, more than the {terminal.size(memory)} allowed"
+        raise ParameterError(
+            "memory", f"{what} takes about {terminal.size(need)}, more than the {terminal.size(memory)} allowed", memory
         )
 
 
@@ -66,8 +67,8 @@ def check_disk(need: int, directory: Path) -> None:
     there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
     free = shutil.disk_usage(there).free
     if need > free:
-        raise ValueError(
-            f"disk: the tables take up to {terminal.size(need)}, {directory} has {terminal.size(free)} free"
+        raise ParameterError(
+            "disk", f"the tables take up to {terminal.size(need)}, {directory} has {terminal.size(free)} free"
         )
 
 

@@ -6,8 +6,9 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from brdfdb.errors import BusyError
 from brdfdb.store.revisions import Standing, standing
-from brdfdb.store.staging import BusyError, Lock, directory_of, planned, prepare
+from brdfdb.store.staging import Lock, directory_of, planned, prepare
 from brdfdb.tables.layout import Layout, digest
 from brdfdb_pipelines import build_resources
 from brdfdb_pipelines.recipe_file import Job

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from brdfdb.errors import StoreError
 from brdfdb.store.publication import publish_layout
-from brdfdb.store.reader import Store, StoreError
+from brdfdb.store.reader import Store
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import frame
 from brdfdb_pipelines import terminal

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from brdfdb.errors import ParameterError
 from brdfdb.forms import timing
 from brdfdb.scenes import image, sample_positions
 from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Look, Seen, check_feasible, choose
@@ -76,10 +77,10 @@ def run(
         check_feasible(scene.tolerance)  # before minutes of work, as the store
         made = store is not None and make_store(store)
         return _run(scene, name, out, width, weigh, store, tolerances)
-    except ValueError as error:
+    except ParameterError as error:
         if made and store is not None:
             remove_begun(store)
-        raise SceneError(f"{name}: {error}") from None
+        raise SceneError(name, error.parameter, error.sentence) from None
 
 
 def _run(

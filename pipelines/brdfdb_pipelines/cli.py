@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from brdfdb.errors import ParameterError
+
 # Exit codes: an error in one sentence; an audit that found a new violation; Ctrl-C
 FAILED, VIOLATED, INTERRUPTED = 2, 1, 130
 # Threads or processes; pixels across a picture, and rays across a pixel: a picture of more takes tens of gigabytes
@@ -50,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _is_users(error: Exception) -> bool:
     """Whether an error is about what the user gave, not about this program."""
-    from brdfdb.store.reader import StoreError, UnknownMaterialError
+    from brdfdb.errors import StoreError, UnknownMaterialError
 
     return isinstance(
         error, StoreError | UnknownMaterialError | ValueError | OSError | MemoryError | ModuleNotFoundError
@@ -376,7 +378,7 @@ def _snapshot(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import maintain
 
     if options.remove and options.name is None:
-        raise ValueError("snapshot: --remove needs the NAME of a snapshot")
+        raise ParameterError("snapshot", "--remove needs the NAME of a snapshot")
     if options.remove:
         maintain.remove_snapshot(options.store, options.name)
     elif options.name is not None:
@@ -429,7 +431,7 @@ def _export(options: argparse.Namespace) -> int:
     from brdfdb_pipelines import export
 
     if bool(options.names) == options.all:
-        raise ValueError("export: name materials, or give --all")
+        raise ParameterError("export", "name materials, or give --all")
     export.run_exr(options.store, options.names, options.out, half=options.half)
     return 0
 

@@ -19,6 +19,7 @@ from brdfdb.models import MODELS
 from brdfdb.scenes.choice_document import Choice
 from brdfdb.scenes.scene import Scene
 from brdfdb.store.family import FamilyRecord
+from brdfdb.tables.metadata import TableMetadata
 from brdfdb_pipelines.recipe_file import Recipe
 
 SCHEMAS: dict[str, type[BaseModel]] = {
@@ -29,6 +30,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "material": Material,
     "recipe": Recipe,
     "scene": Scene,
+    "table": TableMetadata,
 }
 
 TABLE_BEGIN, TABLE_END = "<!-- generated: models -->", "<!-- end -->"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from brdfdb.store.reader import Store, StoreError
+from brdfdb.errors import ParameterError, StoreError
+from brdfdb.store.reader import Store
 from brdfdb_pipelines import terminal
 
 if TYPE_CHECKING:
@@ -77,17 +78,19 @@ def written(family: Family, settings: Sequence[str]) -> dict[str, float]:
     for setting in settings:
         name, _, text = setting.partition("=")
         if name not in axes:
-            raise ValueError(f"--set {setting}: the parameters of {family.name} are {', '.join(axes)}")
+            raise ParameterError(
+                f"--set {setting}", f"the parameters of {family.name} are {', '.join(axes)}", setting, tuple(axes)
+            )
         try:
             found[name] = float(text)
         except ValueError:
-            raise ValueError(f"--set {setting}: give a number, such as {name}={axes[name][0]:g}") from None
+            raise ParameterError(f"--set {setting}", f"give a number, such as {name}={axes[name][0]:g}") from None
     for name, values in axes.items():
         low, high = values[0], values[-1]
         if name not in found:
-            raise ValueError(f"--set: {name} is missing, {family.name} needs a value in [{low:g}, {high:g}]")
+            raise ParameterError("--set", f"{name} is missing, {family.name} needs a value in [{low:g}, {high:g}]")
         if not low <= found[name] <= high:
-            raise ValueError(f"--set {name}={found[name]:.9g}: outside [{low:g}, {high:g}] of {family.name}")
+            raise ParameterError(f"--set {name}={found[name]:.9g}", f"outside [{low:g}, {high:g}] of {family.name}")
     return {name: found[name] for name in axes}
 
 

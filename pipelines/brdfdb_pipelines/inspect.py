@@ -5,16 +5,18 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import brdfdb
-from brdfdb.store.manifest import StoreError
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb_pipelines import family_listing, terminal
 
 if TYPE_CHECKING:
+    from brdfdb.materials.provenance import Assumption
     from brdfdb.store.family import Family
+    from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.stated_error import Error
     from brdfdb.tables.table import Table
 
@@ -24,10 +26,12 @@ ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 def list_store(root: Path, *, snapshot: str | None = None) -> None:
     """Print a line for each material of a store, or of a snapshot of it, and for each family."""
     store = brdfdb.open(root, snapshot=snapshot)
-    rows, damaged = [], []
+    rows, damaged, incomplete = [], [], []
     for name in store:
         try:
             head = store.summary(name)
+            if not (head["title"] and head["model"]):  # the pointer of a whole table has both
+                incomplete.append(f"{name} {head['revision']} {store.metadata(name).gaps}")
         except StoreError as error:
             damaged.append(str(error))
             continue
@@ -38,6 +42,8 @@ def list_store(root: Path, *, snapshot: str | None = None) -> None:
         rows,
         numbers=("error (p99)",),
     )
+    for sentence in incomplete:
+        print(terminal.plain(sentence))
     damaged += family_listing.print_list(store)
     if damaged:
         raise StoreError("; ".join(damaged))
@@ -61,52 +67,57 @@ def show(root: Path, name: str, *, snapshot: str | None = None) -> None:
         family_listing.show_worst(family)
         return
     table = store[name]
-    attributes = table.attrs
-    lines = [
-        f"{name}: {attributes['title']}",
-        f"  model       {attributes['model_title']}, {attributes['model_equation']} [{attributes['model_reference']}]",
-        "  parameters",
-    ]
-    for parameter, value in attributes["parameters"].items():
-        assumed = parameter in attributes["assumed"]
-        # tables built earlier list the names alone, and have the reasons in their note
-        reason = "below" if isinstance(attributes["assumed"], Mapping) else "the note"
-        note = f"assumed, see {reason}" if assumed else attributes["parameter_sources"][parameter]
-        lines.append(f"    {parameter:<16}{value!s:<8} {note}")
-    lines.append(f"  source      {attributes['source']}")
-    if attributes["refractive_index"]:
-        lines.append(f"  n, k        {attributes['refractive_index']} of refractiveindex.info")
-    if attributes["note"]:
-        lines.append(f"  note        {attributes['note']}")
-    lines += _assumptions(attributes["assumed"])
-    if attributes["known_excess"]:
-        lines.append(f"  excess      {attributes['known_excess']['citation']}")
-    print(terminal.plain("\n".join(lines)))
+    print(terminal.plain("\n".join([f"{name}: {table.metadata.title or 'no title'}", *_origin(table.metadata)])))
+    if table.metadata.gaps:
+        print(terminal.plain(f"  incomplete  the table {table.metadata.gaps}"))
     _print_grid(table)
     _print_error(table.error)
     _print_albedo(table)
     print(f"  files       {store.path(name)} (zarr v3, {terminal.size(_stored(store.path(name)))})")
 
 
-def _assumptions(assumed: Any) -> list[str]:
-    """Return lines on why each assumed value was chosen, with the largest albedo [1] of it and its alternatives."""
-    if not isinstance(assumed, Mapping):
-        return []
+def _origin(metadata: TableMetadata) -> list[str]:
+    """Return lines on the model, its parameters and where they come from, as far as a table states them."""
     lines = []
-    for parameter, assumption in assumed.items():
-        lines.append(f"  assumed     {parameter}: {assumption['why']}")
-        if assumption["alternatives"]:
-            lines.append(f"    {'largest albedo':<16}{assumption['max_albedo']:.3f} as tabulated")
-        for other in assumption["alternatives"]:
-            values = ", ".join(f"{name} = {value}" for name, value in other["parameters"].items())
-            excess = ", more than arrives" if other["max_albedo"] > 1.0 else ""
-            lines.append(f"    {'':<16}{other['max_albedo']:.3f} with {values}{excess}")
+    if metadata.model is not None:
+        named = ", ".join(part for part in (metadata.model_title or metadata.model, metadata.model_equation) if part)
+        reference = f" [{metadata.model_reference}]" if metadata.model_reference else ""
+        lines.append(f"  model       {named}{reference}")
+    if metadata.parameters:
+        lines.append("  parameters")
+    for parameter, value in metadata.parameters.items():
+        note = metadata.parameter_sources.get(parameter, "")
+        if parameter in metadata.assumed:
+            note = f"assumed, see {'the note' if metadata.assumed[parameter] is None else 'below'}"
+        lines.append(f"    {parameter:<16}{value!s:<8} {note}".rstrip())
+    if metadata.source is not None:
+        lines.append(f"  source      {metadata.source}")
+    if metadata.refractive_index:
+        lines.append(f"  n, k        {metadata.refractive_index} of refractiveindex.info")
+    if metadata.note:
+        lines.append(f"  note        {metadata.note}")
+    for parameter, assumption in metadata.assumed.items():
+        lines += [] if assumption is None else _assumption(parameter, assumption)
+    if metadata.known_excess is not None:
+        lines.append(f"  excess      {metadata.known_excess.citation}")
+    return lines
+
+
+def _assumption(parameter: str, assumption: Assumption) -> list[str]:
+    """Return lines on why an assumed value was chosen, with the largest albedo [1] of it and its alternatives."""
+    lines = [f"  assumed     {parameter}: {assumption.why}"]
+    if assumption.max_albedo is not None:
+        lines.append(f"    {'largest albedo':<16}{assumption.max_albedo:.3f} as tabulated")
+    for other in assumption.alternatives:
+        values = ", ".join(f"{name} = {value}" for name, value in other.parameters.items())
+        excess = ", more than arrives" if other.max_albedo > 1.0 else ""
+        lines.append(f"    {'':<16}{other.max_albedo:.3f} with {values}{excess}")
     return lines
 
 
 def _print_grid(table: Table) -> None:
     """Axes, how many values are stored and how, and how f_r comes of them."""
-    attributes, wavelength = table.attrs, table.wavelength_nm
+    metadata, wavelength = table.metadata, table.wavelength_nm
     print("  grid")
     for axis, nodes in table.axes_deg.items():
         print(f"    {axis:<16}{nodes.size} nodes, {nodes[0]:g} to {nodes[-1]:g} degrees")
@@ -118,14 +129,14 @@ def _print_grid(table: Table) -> None:
         print(f"    {'wavelength':<16}{wavelength.size} nodes, {wavelength[0]:g} to {wavelength[-1]:g} nm")
     if table.spectra is not None:
         print(f"    {'parts':<16}{table.spectra.shape[0]}, of which each spectrum is a sum")
-    bits = attributes.get("bits", 23)
+    bits = metadata.bits
     stored = "all 23 bits of their mantissas" if bits == 23 else f"{bits} of 23 bits of their mantissas"
     print(f"    {'values':<16}{table.values.size}, {stored}")
     print(f"    {'interpolation':<16}{_interpolation(table)}")
-    if attributes.get("reason"):
-        print(terminal.plain(f"    {'reason':<16}{attributes['reason']}"))
-    if attributes.get("reconstruction"):
-        print(terminal.plain(f"  f_r         {attributes['reconstruction']}"))
+    if metadata.reason:
+        print(terminal.plain(f"    {'reason':<16}{metadata.reason}"))
+    if metadata.reconstruction:
+        print(terminal.plain(f"  f_r         {metadata.reconstruction}"))
 
 
 def _interpolation(table: Table) -> str:
@@ -222,9 +233,9 @@ def lookup(
 
     for angle, value in zip(ANISOTROPIC_AXES, angles_deg, strict=True):
         if not math.isfinite(value):
-            raise ValueError(f"{angle}: {value} is not a number of degrees")
+            raise ParameterError(angle, f"{value} is not a number of degrees", value)
         if angle.startswith("theta") and not 0.0 <= value <= 180.0:
-            raise ValueError(f"{angle}: {value:g} is outside [0, 180] degrees")
+            raise ParameterError(angle, f"{value:g} is outside [0, 180] degrees", value, (0.0, 180.0))
     store = brdfdb.open(root, snapshot=snapshot)
     source: Table | Family
     point: dict[str, Any] = {}
@@ -237,7 +248,7 @@ def lookup(
     else:
         source = store[name]
         if settings:
-            raise ValueError(f"--set {settings[0]}: {name} is a material, whose parameters are fixed")
+            raise ParameterError(f"--set {settings[0]}", f"{name} is a material, whose parameters are fixed")
         head = {"material": name, "revision": source.revision}
         dirac = source.specular is not None
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)

@@ -6,9 +6,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from brdfdb.errors import UnknownMaterialError
 from brdfdb.store import revisions, snapshots, verification
 from brdfdb.store.manifest import read_snapshot, seal_of, snapshot_names, snapshot_path
-from brdfdb.store.reader import Store, UnknownMaterialError
+from brdfdb.store.reader import Store
 from brdfdb_pipelines import terminal
 
 
@@ -66,7 +67,7 @@ def verify(root: Path, names: Sequence[str]) -> int:
         print(f"brdfdb: {finding}", file=sys.stderr)
     among = sum(name not in store for name in wanted)
     what = f"{len(wanted) - among} materials" + (f" and {among} families" if among else "")
-    damaged = len({finding.name for finding in found})
+    damaged = len({finding.name for finding in found if not finding.remark})
     print(f"{what} verified, {terminal.size(total)}: {damaged or 'none'} damaged")
     return damaged
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, FailFast, Field, Tag, TypeAdapter, ValidationError
 
+from brdfdb.errors import MaterialError, ParameterError
 from brdfdb.materials import Material, presets, written_name
 from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
@@ -31,8 +32,19 @@ _MOST_MEMBERS = 100_000  # of all families of a recipe
 _MOST_SWEPT = 6  # parameters of a family: a lookup is made of two members for each, 64 in all
 
 
-class RecipeError(ValueError):
-    """A recipe that cannot be built; str() is one sentence that names the field."""
+class RecipeError(ParameterError):
+    """A recipe that cannot be built; `parameter` is its field, with the tables around it, and may be "".
+
+    Attributes
+    ----------
+    file : str
+        Path of the recipe; "" of a recipe that was not read from a file.
+    """
+
+    file = ""
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.file, self.parameter, self.sentence) if part)
 
 
 class Range(BaseModel):
@@ -48,9 +60,9 @@ class Range(BaseModel):
         """The numbers; RecipeError if the step does not lead from start to stop."""
         count = (self.stop - self.start) / self.step
         if count >= _MOST_NODES:
-            raise RecipeError(f"{name}: steps of {self.step:g} make more than the {_MOST_NODES} nodes an axis may have")
+            raise RecipeError(name, f"steps of {self.step:g} make more than the {_MOST_NODES} nodes an axis may have")
         if not count >= 0.0 or abs(count - round(count)) > 1e-6:
-            raise RecipeError(f"{name}: steps of {self.step:g} from {self.start:g} do not end at {self.stop:g}")
+            raise RecipeError(name, f"steps of {self.step:g} from {self.start:g} do not end at {self.stop:g}")
         return np.linspace(self.start, self.stop, round(count) + 1)
 
 
@@ -66,7 +78,7 @@ def _nodes(name: str, parts: list[float | Range]) -> Axis:
         pieces.append(part.nodes(name) if isinstance(part, Range) else np.array([part]))
         count += pieces[-1].size
         if count > _MOST_NODES:
-            raise RecipeError(f"{name}: the list makes more than the {_MOST_NODES} nodes an axis may have")
+            raise RecipeError(name, f"the list makes more than the {_MOST_NODES} nodes an axis may have")
     return np.concatenate(pieces)
 
 
@@ -159,12 +171,12 @@ class Job:
         return plan(self.material, self.wavelength_nm, self.tolerance)
 
     def check(self) -> None:
-        """Raise the ValueError that `layout` would raise for what does not suit the material."""
+        """Raise the ParameterError that `layout` would raise for what does not suit the material."""
         grid = coarsest(self.material) if self.grid is None else self.grid
         layout = Layout(self.material, grid, self.wavelength_nm)
         if layout.size > _MOST_VALUES:
             shape = " x ".join(map(str, layout.shape))
-            raise ValueError(f"{shape} are {layout.size:.3g} values, more than the {_MOST_VALUES:.3g} of a table")
+            raise RecipeError("", f"{shape} are {layout.size:.3g} values, more than the {_MOST_VALUES:.3g} of a table")
 
     @property
     def request(self) -> dict[str, Any]:
@@ -214,14 +226,14 @@ class Recipe(BaseModel):
             If a name matches nothing, or a material, grid or wavelength is not what it must be.
         """
         if (self.tolerance is None) == (self.grids is None):
-            raise RecipeError("tolerance, grids: give one of the two")
+            raise RecipeError("tolerance, grids", "give one of the two")
         if self.interpolation is not None and self.grids is None:
-            raise RecipeError("interpolation: goes with grids; to a tolerance, the planner chooses")
+            raise RecipeError("interpolation", "goes with grids; to a tolerance, the planner chooses")
         grids = {} if self.grids is None else {name: self._grid(self.grids, name) for name in Grids.model_fields}
         try:
             wavelengths = check_wavelengths(_nodes("wavelengths_nm", self.wavelengths_nm))
-        except ValueError as error:
-            raise RecipeError(str(error)) from None
+        except ParameterError as error:
+            raise RecipeError(error.parameter, error.sentence) from None
         jobs = []
         for material, family in self._selected():
             wavelength_nm = None
@@ -233,9 +245,9 @@ class Recipe(BaseModel):
             job = Job(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear", family)
             try:
                 job.check()
-            except ValueError as error:
+            except ParameterError as error:
                 where = "" if job.grid is None else f" on grids.{kind}"
-                raise RecipeError(f"{material.name}{where}: {error}") from None
+                raise RecipeError(f"{material.name}{where}", str(error)) from None
             jobs.append(job)
         return jobs
 
@@ -244,12 +256,11 @@ class Recipe(BaseModel):
         try:
             axes = {field.removesuffix("_deg"): _nodes(field, nodes) for field, nodes in parts.items()}
         except RecipeError as error:
-            raise RecipeError(f"grids.{name}.{error}") from None
+            raise RecipeError(f"grids.{name}.{error.parameter}", error.sentence) from None
         try:
             return Grid(axes)
-        except ValueError as error:
-            axis, _, said = str(error).partition(":")
-            raise RecipeError(f"grids.{name}.{axis}_deg:{said}") from None
+        except ParameterError as error:
+            raise RecipeError(f"grids.{name}.{error.parameter}_deg", error.sentence) from None
 
     def sweeps(self, jobs: Sequence[Job]) -> list[Sweep]:
         """The families all of whose members are among the jobs."""
@@ -275,25 +286,26 @@ class Recipe(BaseModel):
         known: dict[str, tuple[Material, dict[str, Any] | None]] = {n: (m, None) for n, m in presets().items()}
         for name, table in self.define.items():
             if name in known:
-                raise RecipeError(f"define.{name}: is the name of a built-in material; give yours another")
+                raise RecipeError(f"define.{name}", "is the name of a built-in material; give yours another")
             try:
                 known[name] = Material.from_table(name, table), None
-            except ValueError as error:
-                raise RecipeError(f"define.{error}") from None
+            except MaterialError as error:
+                raise RecipeError(f"define.{name}", f"{error.parameter}: {error.sentence}") from None
         families: dict[str, list[str]] = {}
         count = 0
         for name, table in self.sweep.items():  # before the first member of the first family is made
             count += math.prod(map(len, _swept(name, table).values()))
             if count > _MOST_MEMBERS:
                 raise RecipeError(
-                    f"sweep.{name}.parameters: the lists make {count} members, more than the {_MOST_MEMBERS} that all "
-                    "families of a recipe may have"
+                    f"sweep.{name}.parameters",
+                    f"the lists make {count} members, more than the {_MOST_MEMBERS} that all "
+                    "families of a recipe may have",
                 )
         for name, table in self.sweep.items():
             members = {material.name: (material, family) for material, family in _members(name, table)}
             for taken in (name, *members):
                 if taken in known or taken in families:
-                    raise RecipeError(f"sweep.{name}: {taken!r} is the name of another material or family")
+                    raise RecipeError(f"sweep.{name}", f"{taken!r} is the name of another material or family")
             known |= members
             families[name] = list(members)
         chosen: dict[str, tuple[Material, dict[str, Any] | None]] = {}
@@ -302,7 +314,7 @@ class Recipe(BaseModel):
             for family in fnmatch.filter(families, pattern):
                 matches += families[family]
             if not matches:
-                raise RecipeError(f"materials: {pattern!r} matches no material; `brdfdb list --presets` names them")
+                raise RecipeError("materials", f"{pattern!r} matches no material; `brdfdb list --presets` names them")
             chosen |= {name: known[name] for name in matches}
         return list(chosen.values())
 
@@ -313,9 +325,9 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
     where = f"sweep.{name}.parameters"
     lists = {x: v for x, v in parameters.items() if isinstance(v, list)} if isinstance(parameters, dict) else {}
     if not lists:
-        raise RecipeError(f"{where}: give a list of numbers for one of them at least")
+        raise RecipeError(where, "give a list of numbers for one of them at least")
     if len(lists) > _MOST_SWEPT:
-        raise RecipeError(f"{where}: {len(lists)} are lists, at most {_MOST_SWEPT} may be")
+        raise RecipeError(where, f"{len(lists)} are lists, at most {_MOST_SWEPT} may be")
     known = [written_name(p) for p in MODELS[model].parameters] if isinstance(model, str) and model in MODELS else []
     axes = {}
     for x in sorted(lists, key=lambda x: known.index(x) if x in known else len(known)):
@@ -323,12 +335,12 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
             parts = _VALUES.validate_python(lists[x])
         except ValidationError as error:
             field, said = _first(error)
-            raise RecipeError(f"{where}.{x}{field and f'.{field}'}: {said}") from None
+            raise RecipeError(f"{where}.{x}{field and f'.{field}'}", said) from None
         values = [float(f"{value:.12g}") for value in _nodes(f"{where}.{x}", parts)]  # 0.3, not 0.1 + 0.1 + 0.1
         if len(values) < 2:
-            raise RecipeError(f"{where}.{x}: needs a list of at least two values")
+            raise RecipeError(f"{where}.{x}", "needs a list of at least two values")
         if not all(low < high for low, high in itertools.pairwise(values)):
-            raise RecipeError(f"{where}.{x}: the values must increase strictly")
+            raise RecipeError(f"{where}.{x}", "the values must increase strictly")
         axes[x] = values
     return axes
 
@@ -345,14 +357,13 @@ def _members(name: str, table: Mapping[str, Any]) -> list[tuple[Material, dict[s
             fields["title"] = ", ".join([title, *(f"{x} {value:.12g}" for x, value in at.items())])
         try:
             members.append((Material.from_table(member, fields), {"name": name, "parameters": at}))
-        except ValueError as error:
-            said = str(error).removeprefix(f"{member}: ")
-            field = said.partition(":")[0]
+        except MaterialError as error:
             written = (
                 [written_name(p) for p in MODELS[table["model"]].parameters] if table.get("model") in MODELS else []
             )
-            inside = ".parameters." if field in (*table["parameters"], *written) else ": "
-            raise RecipeError(f"sweep.{name}{inside}{said}") from None
+            if error.parameter in (*table["parameters"], *written):
+                raise RecipeError(f"sweep.{name}.parameters.{error.parameter}", error.sentence) from None
+            raise RecipeError(f"sweep.{name}", f"{error.parameter}: {error.sentence}") from None
     return members
 
 
@@ -367,19 +378,20 @@ def load(path: Path | None = None) -> Recipe:
     source = resources.files("brdfdb_pipelines") / "recipes" / "default.toml" if path is None else path
     try:
         content = toml_file.read(source)
-    except OSError as error:
-        raise RecipeError(f"{source}: {error.strerror}") from None
-    except ValueError as error:
-        raise RecipeError(f"{source}: {error}") from None
-    try:
         recipe = Recipe.model_validate(content)
         recipe.jobs()
-    except RecipeError as error:
-        raise RecipeError(f"{source}: {error}") from None
+    except OSError as error:
+        refusal = RecipeError("", error.strerror or str(error))
+    except toml_file.TomlError as error:
+        refusal = RecipeError("", str(error))
     except ValidationError as error:
-        field, said = _first(error)
-        raise RecipeError(f"{source}: {field}: {said}") from None
-    return recipe
+        refusal = RecipeError(*_first(error))
+    except RecipeError as error:
+        refusal = error
+    else:
+        return recipe
+    refusal.file = str(source)
+    raise refusal from None
 
 
 def _first(error: ValidationError) -> tuple[str, str]:

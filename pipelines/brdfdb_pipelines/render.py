@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from brdfdb.errors import ParameterError
 from brdfdb.scenes import image
 from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.recorded_directions import Recorded
@@ -18,13 +19,13 @@ def run(name: str, directory: Path, *, width: int | None = None, across: int | N
     """Render a scene by its file or name, write NAME.png and NAME.exr, and say where they are."""
     scene = load(name)
     if isinstance(scene.objects[0].shape, Recorded) and (width is not None or across is not None):
-        raise SceneError(f"{name}: is recorded, and has the pixels of its file; leave out --width and --across")
+        raise SceneError(name, "", "is recorded, and has the pixels of its file; leave out --width and --across")
     try:
         with terminal.progress(counted=False, transient=True) as bar:
             bar.add_task("tracing rays", total=None)
             view, materials = gather(scene, width or WIDTH, across=across or 1), reflectors(scene)
-    except ValueError as error:
-        raise SceneError(f"{name}: {error}") from None
+    except ParameterError as error:
+        raise SceneError(name, error.parameter, error.sentence) from None
     with terminal.progress() as bar:
         task = bar.add_task("rendering", total=len(view.points))
         radiance = render(scene, view, materials=materials, progress=lambda: bar.advance(task))

@@ -10,11 +10,17 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from brdfdb.errors import BrdfdbError
+
 MOST_BYTES = 4_000_000  # of a file: tomllib reads about a megabyte a second
 MOST_KEY_PARTS = 64  # of a dotted key: tomllib takes memory that grows with their square
 
 _PART = r"""(?:"[^"\n]*"|'[^'\n]*'|[\w-]++)"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_KEY_PARTS}}}")
+
+
+class TomlError(BrdfdbError):
+    """A file that is not the TOML it should be; str() is a phrase without the name of the file."""
 
 
 def read(source: Path | Traversable) -> dict[str, Any]:
@@ -34,22 +40,22 @@ def read(source: Path | Traversable) -> dict[str, Any]:
     ------
     OSError
         If the file cannot be read.
-    ValueError
-        If it is no regular file, is larger than `MOST_BYTES`, or is not TOML: one phrase without the file's name.
+    TomlError
+        If it is no regular file, is larger than `MOST_BYTES`, or is not TOML.
     """
     content = _bounded(source) if isinstance(source, Path) else source.read_bytes()
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise ValueError(f"not TOML: {error}") from None
+        raise TomlError(f"not TOML: {error}") from None
     if _LONG_KEY.search(text):
-        raise ValueError(f"a key has more than {MOST_KEY_PARTS} parts between dots")
+        raise TomlError(f"a key has more than {MOST_KEY_PARTS} parts between dots")
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ValueError("values are nested too deeply") from None
+        raise TomlError("values are nested too deeply") from None
     except ValueError as error:  # after a semicolon, int() tells programmers how to allow more digits
-        raise ValueError(f"not TOML: {str(error).partition(';')[0]}") from None
+        raise TomlError(f"not TOML: {str(error).partition(';')[0]}") from None
 
 
 def _bounded(path: Path) -> bytes:
@@ -60,8 +66,8 @@ def _bounded(path: Path) -> bytes:
         if stat.S_ISDIR(status.st_mode):
             raise IsADirectoryError(21, "Is a directory", str(path))
         if not stat.S_ISREG(status.st_mode):
-            raise ValueError("is no regular file; give the path of a file on a disk")
+            raise TomlError("is no regular file; give the path of a file on a disk")
         content = file.read(MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
-        raise ValueError(f"has more than the {MOST_BYTES // 10**6} MB that a file may have")
+        raise TomlError(f"has more than the {MOST_BYTES // 10**6} MB that a file may have")
     return content

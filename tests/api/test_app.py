@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 
 import brdfdb_api
-from brdfdb.store.reader import StoreError
+from brdfdb.errors import StoreError
 from brdfdb_api.http.app import create_app, openapi_json
 from brdfdb_api.server import serve
 from brdfdb_api.serving.settings import Settings

@@ -16,7 +16,7 @@ from brdfdb_api.http import pages
 from brdfdb_api.http.app import create_app
 from brdfdb_api.serving.settings import Settings
 
-FOLDER = Path(pages.__file__).with_name("explorer")
+FOLDER = Path(pages.__file__).parents[1] / "explorer"
 NAMES = sorted(path.name for path in FOLDER.iterdir())
 PLOTLY = f"/explorer/plotly.js?{importlib.metadata.version('plotly')}"
 OUTSIDE = re.compile(r"(?:https?:)?//[a-z0-9-]+\.[a-z0-9.-]+[^\s\"']*")

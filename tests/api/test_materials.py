@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from brdfdb.store.reader import Store
+from brdfdb.store.staging import publish_dataset
 from brdfdb_api.http.app import create_app
 from brdfdb_api.serving.settings import Settings
 from brdfdb_api.serving.shelf import Shelf
@@ -33,11 +35,12 @@ def test_catalogue(client: Client, store: Store) -> None:
         "name": "copper-foil",
         "title": "Test copper-foil",
         "model": "he_torrance",
-        "model_title": store.attributes("copper-foil")["model_title"],
+        "model_title": store.metadata("copper-foil").model_title,
         "paper": "he1991",
         "source": "no paper, copper-foil",
         "anisotropic": False,
         "wavelength_range_nm": [400.0, 700.0],
+        "incomplete": None,
         "error_p99": head["error_p99"],
         "verdict": None,
         "colour": materials["copper-foil"]["colour"],
@@ -49,6 +52,19 @@ def test_catalogue(client: Client, store: Store) -> None:
     assert materials["grey-felt"]["wavelength_range_nm"] is None
     assert materials["brushed-metal"]["anisotropic"] is True
     assert client.get(materials["grey-felt"]["href"]).status_code == 200
+
+
+def test_a_table_of_another_program_is_served_with_a_sentence_on_what_it_lacks(own: Path) -> None:
+    publish_dataset(own, "bare-tile", xr.open_zarr(Store(own).path("white-tile"))[["brdf"]].drop_attrs(deep=False))
+    client = client_of(own)
+    lines = {line["name"]: line for line in client.get("/v1/materials?q=tile").json()["materials"]}
+    assert list(lines) == ["bare-tile", "white-tile"]
+    sentence = lines["bare-tile"]["incomplete"]
+    assert sentence.startswith("does not state its title, material, table version, model")
+    document = client.get("/v1/materials/bare-tile").json()
+    assert (document["title"], document["parameters"], document["incomplete"]) == ("", [], sentence)
+    brdf = client.get("/v1/materials/bare-tile/lookup?theta_i=20&theta_r=70").json()["brdf"]
+    assert brdf == client.get("/v1/materials/white-tile/lookup?theta_i=20&theta_r=70").json()["brdf"]
 
 
 def test_colours_of_the_catalogue(own: Path) -> None:

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.geometry import unit_vector
 from brdfdb.store import http_client
-from brdfdb.store.reader import Store, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.store.reader import Store
 from tests.api.a_store import angles, publish, same, serving
 
 KEPT = ("white-tile", "r000001")
@@ -51,11 +52,11 @@ def test_what_lists_show(opened: Any) -> None:
     assert (line["title"], line["model"], line["revision"]) == ("Test grey-felt", "oren_nayar", "r000001")
     assert opened.head("grey-felt") == "r000001"
     assert opened.revisions("grey-felt") == ["r000001"]
-    assert opened.attributes("grey-felt")["parameters"]["sigma_deg"] == 20.0
+    assert opened.metadata("grey-felt").parameters["sigma_deg"] == 20.0
     assert opened["grey-felt"].attrs["source"] == "no paper, grey-felt"
 
 
-@pytest.mark.parametrize("ask", ["__getitem__", "summary", "head", "attributes", "revisions", "dataset"])
+@pytest.mark.parametrize("ask", ["__getitem__", "summary", "head", "metadata", "revisions", "dataset"])
 @pytest.mark.parametrize("name", ["grey-fell", "GREY-FELT", "..", "grey-felt/..", ""])
 def test_an_unknown_material_names_the_closest(opened: Any, ask: str, name: str) -> None:
     with pytest.raises(UnknownMaterialError, match=r"^no material '.*' in the store") as raised:
@@ -207,7 +208,7 @@ def test_a_damaged_material_is_an_error_of_the_store(own: Path) -> None:
         there = brdfdb.open(url)
         assert "grey-felt" in there
         assert "grey-felt" in there.summary("grey-felt")["damaged"]
-        for ask in (there.__getitem__, there.attributes, there.head):
+        for ask in (there.__getitem__, there.metadata, there.head):
             with pytest.raises(StoreError, match=r"^grey-felt r000001 is damaged: "):
                 ask("grey-felt")
         assert there["white-tile"].lookup(0.5, 0.0, 0.5, 0.0) > 0.0

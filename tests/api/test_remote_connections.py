@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.errors import StoreError
 from brdfdb.store import http_client
-from brdfdb.store.reader import StoreError
 from tests.api.a_store import angles, npy, same, serving
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from brdfdb import spectra
 from brdfdb.formats import exr
 from brdfdb.geometry import unit_vector
+from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.stated_error import Error, Overall
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class FakeTable:
     specular: Floats | None = None
 
     def __init__(self, lobe: Lobe, wavelength_nm: Floats | None, spectrum: Floats | None) -> None:
-        self.attrs: dict[str, Any] = {"model": "ward", "title": "Fake brass"}
+        self.metadata = TableMetadata(model="ward", title="Fake brass")
         self.lobe = lobe
         self.wavelength_nm = wavelength_nm
         self.spectrum = spectrum

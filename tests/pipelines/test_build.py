@@ -18,8 +18,9 @@ import pytest
 import xarray as xr
 
 import brdfdb
+from brdfdb.errors import StoreError
 from brdfdb.store import manifest
-from brdfdb.store.reader import Store, StoreError
+from brdfdb.store.reader import Store
 from brdfdb.store.staging import Lock
 from brdfdb.tables import layout as layouts
 from brdfdb.tables import tabulation

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
+from brdfdb.scenes import image
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
 from brdfdb_pipelines import choice_picture
@@ -58,15 +59,15 @@ def panels(data: bytes) -> list[Array]:
     return [whole[top : top + down, left : left + across] for top in tops for left in lefts]
 
 
-def blocks(image: Array) -> Array:
-    return image.repeat(SCALE, axis=0).repeat(SCALE, axis=1)
+def blocks(picture: Array) -> Array:
+    return picture.repeat(SCALE, axis=0).repeat(SCALE, axis=1)
 
 
 def test_pixels_are_squares_of_one_colour(seen: Seen) -> None:
     choice, cheaper = 0.5 * seen.truth, 0.25 * seen.truth
     drawn = panels(choice_picture.png(seen, choice, cheaper))[:3]
-    for panel, image in zip(drawn, (seen.truth, choice, cheaper), strict=True):
-        np.testing.assert_allclose(panel, blocks(image.srgb(seen.scene, image)), atol=ROUNDED)
+    for panel, picture in zip(drawn, (seen.truth, choice, cheaper), strict=True):
+        np.testing.assert_allclose(panel, blocks(image.srgb(seen.scene, picture)), atol=ROUNDED)
 
 
 def test_colours_of_differences_run_to_twice_the_tolerance_and_what_is_more_has_its_own(seen: Seen) -> None:

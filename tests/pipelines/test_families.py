@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.errors import UnknownFamilyError
 from brdfdb.materials import Material
 from brdfdb.store import family_records
 from brdfdb.store.family_records import measure
-from brdfdb.store.reader import Store, UnknownFamilyError
+from brdfdb.store.reader import Store
 from brdfdb.tables import error_measurement, tabulation
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import build as module
@@ -136,9 +137,9 @@ def test_the_record_says_what_the_family_is(copper: Path) -> None:
     assert content["axes"] == {"sigma_0_um": [0.1, 0.12], "tau_um": [1.0, 1.2]}
     assert content["members"] == list(store) == [f"rough-copper-{number:03d}" for number in range(1, 5)]
     assert content["request_sha256"] == [store.summary(name)["request_sha256"] for name in store]
-    last = store.attributes("rough-copper-003")
-    assert last["title"] == "Rough copper, sigma_0_um 0.12, tau_um 1"
-    assert last["request"]["family"] == {"name": "rough-copper", "parameters": {"sigma_0_um": 0.12, "tau_um": 1.0}}
+    last = store.metadata("rough-copper-003")
+    assert last.title == "Rough copper, sigma_0_um 0.12, tau_um 1"
+    assert last.request["family"] == {"name": "rough-copper", "parameters": {"sigma_0_um": 0.12, "tau_um": 1.0}}
     assert store["rough-copper-003"].error is not None
 
 

@@ -61,11 +61,12 @@ NURSERY = """
 import os, sys
 from pathlib import Path
 import numpy, numba, xarray, zarr, zarr.codecs
-from brdfdb import chunks, layout, staging, tabulate
-from brdfdb_pipelines import build, cli, recipe
-jobs = recipe.load(Path(sys.argv[1])).jobs()
-tabulate.block(jobs[0].layout(), slice(0, 1))
-tabulate.frame(jobs[0].layout())
+from brdfdb.store import codec, staging
+from brdfdb.tables import layout, tabulation
+from brdfdb_pipelines import build, cli, recipe_file
+jobs = recipe_file.load(Path(sys.argv[1])).jobs()
+tabulation.block(jobs[0].layout(), slice(0, 1))
+tabulation.frame(jobs[0].layout())
 print("warm", flush=True)
 for line in sys.stdin:
     recipe_path, root, out = line.split()
@@ -203,7 +204,7 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
                 kills += 1
                 left = marked(root)
             store = brdfdb.open(root)
-            assert {store.attributes(name)["parameters"]["rho"] for name in store} == {number / 128}
+            assert {store.metadata(name).parameters["rho"] for name in store} == {number / 128}
             if number % 8 == 0:
                 assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
     finally:

@@ -37,7 +37,7 @@ def test_history_is_a_line_a_revision(root: Path, capsys: Captured) -> None:
     assert head.split() == ["revision", "built", "model", "version", "stored", "request"]
     assert first.split()[::2][:2] == ["r000001", "oren_nayar_body_surface"]
     assert second.split()[-1] == "current"
-    digest = brdfdb.open(root).attributes("foam")["request_sha256"]
+    digest = brdfdb.open(root).metadata("foam").request_sha256
     assert second.split()[-2] == digest[:8]
 
 

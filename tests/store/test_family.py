@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from brdfdb import models
+from brdfdb.errors import StoreError
 from brdfdb.forms.catalogue import of_family, of_table
 from brdfdb.materials import Material
 from brdfdb.store.family import Family, FamilyRecord, Sweep, blended, path_of, read_record, stencil
 from brdfdb.store.family_records import POINTS, measure, parameter_points
-from brdfdb.store.manifest import StoreError, sealed
+from brdfdb.store.manifest import sealed
 from brdfdb.tables import error_measurement
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout

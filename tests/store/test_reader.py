@@ -17,11 +17,12 @@ import xarray as xr
 import zarr
 
 import brdfdb
+from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.materials import Material
 from brdfdb.store import codec
 from brdfdb.store import reader as module
 from brdfdb.store.manifest import Head, sealed, unsealed
-from brdfdb.store.reader import Store, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.store.reader import Store
 from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
@@ -121,7 +122,7 @@ def test_a_store_is_a_mapping(root: Path) -> None:
     assert store.get("grey") is None
     assert store.head("white") == "r000001"
     assert store.path("white") == root / "materials" / "white" / "r000001"
-    assert store.attributes("copper")["title"] == "Rakić's copper"
+    assert store.metadata("copper").title == "Rakić's copper"
     assert (store["copper"].name, store["copper"].revision) == ("copper", "r000001")
 
 
@@ -369,7 +370,7 @@ def test_a_store_of_a_relative_path_stays_where_it_was_opened(root: Path, monkey
 def test_damaged_attributes_are_not_served(root: Path, damage: Callable[[Path], None]) -> None:
     damage(root / "materials" / "white" / "r000001" / "zarr.json")
     with pytest.raises(StoreError, match=r"^white r000001 is damaged: .*zarr\.json"):
-        brdfdb.open(root).attributes("white")
+        brdfdb.open(root).metadata("white")
 
 
 def test_any_flipped_bit_of_a_chunk_is_found(root: Path) -> None:
@@ -406,7 +407,7 @@ def test_any_flipped_bit_of_a_chunk_is_found(root: Path) -> None:
         {"material": "black"},
     ],
 )
-@pytest.mark.parametrize("ask", [Store.__getitem__, Store.verify, Store.attributes, Store.dataset])
+@pytest.mark.parametrize("ask", [Store.__getitem__, Store.verify, Store.metadata, Store.dataset])
 def test_a_pointer_that_was_changed_is_not_followed(root: Path, content: bytes | dict[str, Any], ask: Any) -> None:
     """Not even one that was sealed again."""
     if isinstance(content, dict):
@@ -448,7 +449,7 @@ def test_another_version_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["whit", "../x", "../materials/white", "white/", "white/r000001", ".", "..", "", "/"])
 @pytest.mark.parametrize(
-    "ask", [Store.__getitem__, Store.head, Store.path, Store.attributes, Store.dataset, Store.verify]
+    "ask", [Store.__getitem__, Store.head, Store.path, Store.metadata, Store.dataset, Store.verify]
 )
 def test_names_are_matched_and_never_joined_to_a_path(root: Path, name: str, ask: Any) -> None:
     shutil.copytree(root / "materials" / "white", root / "x")

@@ -12,10 +12,10 @@ import pytest
 import xarray as xr
 
 import brdfdb
+from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.materials import Material
 from brdfdb.store import revisions
-from brdfdb.store.manifest import StoreError, manifest_of
-from brdfdb.store.reader import UnknownMaterialError
+from brdfdb.store.manifest import manifest_of
 from brdfdb.store.revisions import collect, difference, history, rollback, standing
 from brdfdb.store.staging import Lock, publish_dataset
 from brdfdb.tables.grids import Grid

@@ -15,12 +15,12 @@ import pytest
 import xarray as xr
 
 import brdfdb
+from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.materials import Material
 from brdfdb.store import snapshots, verification
 from brdfdb.store.family import Sweep
 from brdfdb.store.family_records import write_family
-from brdfdb.store.manifest import StoreError, snapshot_path
-from brdfdb.store.reader import UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.store.manifest import snapshot_path
 from brdfdb.store.revisions import collect
 from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.grids import Grid

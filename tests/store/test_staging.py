@@ -19,10 +19,11 @@ import pytest
 import xarray as xr
 
 import brdfdb
+from brdfdb.errors import BusyError, StoreError
 from brdfdb.materials import Material
 from brdfdb.store import manifest, staging
-from brdfdb.store.manifest import StoreError, check_manifest, unsealed
-from brdfdb.store.staging import BusyError, Lock, planned, prepare, publish, publish_dataset, write_block, write_frame
+from brdfdb.store.manifest import check_manifest, unsealed
+from brdfdb.store.staging import Lock, planned, prepare, publish, publish_dataset, write_block, write_frame
 from brdfdb.tables import layout as layouts
 from brdfdb.tables.error_measurement import measure
 from brdfdb.tables.grids import Grid
@@ -182,13 +183,13 @@ import os, signal, sys
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from brdfdb import chunks, manifest, staging
+from brdfdb.store import manifest, staging
 
 def die(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 
 root, place, step = sys.argv[1:]
-setattr({"staging": staging, "chunks": chunks, "manifest": manifest, "Path": Path}[place], step, die)
+setattr({"staging": staging, "manifest": manifest, "Path": Path}[place], step, die)
 values = np.full((2, 2), 9.0, dtype=np.float32)
 staging.publish_dataset(root, "white", xr.Dataset({"brdf": (("theta_i", "theta_r"), values)}))
 """

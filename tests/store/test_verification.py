@@ -14,9 +14,10 @@ import pytest
 import xarray as xr
 
 import brdfdb
+from brdfdb.errors import StoreError
 from brdfdb.materials import Material
 from brdfdb.store import codec, snapshots, staging, verification
-from brdfdb.store.manifest import StoreError, manifest_of, sealed, unsealed
+from brdfdb.store.manifest import manifest_of, sealed, unsealed
 from brdfdb.store.revisions import collect, history, rollback, standing
 from brdfdb.store.staging import make_store, publish_dataset
 from brdfdb.tables.grids import Grid
@@ -188,7 +189,7 @@ def test_a_revision_that_is_superseded_and_collected_while_it_is_verified_is_no_
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda d: d.drop_attrs(deep=False), "is not a table: it lacks the attribute title"),
+        (lambda d: d.rename(brdf="rho"), "is not a table: it has no array brdf or parts"),
         (lambda d: d.drop_vars("theta_r"), "is not a table: it lacks the coordinate theta_r"),
         (lambda d: d.assign(brdf=d["brdf"].astype(np.float64)), "is not a table: brdf is float64, not float32"),
     ],
@@ -198,6 +199,18 @@ def test_verify_knows_what_a_table_is(root: Path, change: Callable[[xr.Dataset],
     (found,) = findings(root)
     manifest = manifest_of(root / "materials" / "white" / "r000004")
     assert found == f"white r000004 {said}; `rm {manifest}`, then `brdfdb build` with its recipe repairs it"
+
+
+def test_verify_remarks_on_what_a_table_does_not_state(root: Path) -> None:
+    publish_dataset(root, "white", lambert(0.5).drop_attrs(deep=False).assign_attrs(title="White", bits=99))
+    size, (remark,) = verification.material(root, "white")
+    assert remark.remark
+    assert size > 0
+    assert str(remark) == (
+        "white r000004 does not state its material, table version, model, model version, parameters, source, "
+        "conventions, and states its bits wrongly (Input should be less than or equal to 23)"
+    )
+    assert rho(root) == 0.5
 
 
 def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from brdfdb.store.reader import StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb_api.http.files import files
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.http.pages import pages

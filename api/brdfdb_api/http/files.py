@@ -10,8 +10,8 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
+from brdfdb.errors import StoreError
 from brdfdb.store.manifest import check_manifest, manifest_of, sha256_of
-from brdfdb.store.reader import StoreError
 from brdfdb_api.http.openapi_notes import answers
 from brdfdb_api.http.responses import RequestError, cache_headers, not_modified
 from brdfdb_api.http.routes import both, query_names, shelf_of

@@ -14,6 +14,7 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
 from brdfdb_api.http.responses import RequestError
 
@@ -25,6 +26,8 @@ ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 REQUIRED = ("theta_i", "theta_r")
 FIELDS = (*ANGLES, "wavelength_nm")
 OPTIONS = ("from", "error", "output", "illuminant", "format")
+# Names of the library's parameters, and those of a request
+_PARAMETERS = {**{name: name for name in (*FIELDS, "illuminant")}, "with_error": "error"}
 
 Source = Literal["table", "model"]
 Output = Literal["spectrum", "xyz", "linear-srgb"]
@@ -229,7 +232,7 @@ def evaluate(points: Points, options: Options, table: Table, *, specular: bool =
         if options.output != "spectrum":
             return _coloured(points, options, table, source if specular else None, spectra)
         return Values(*spectra(points.angles), source.specular_reflectance(points.angles[0], at) if specular else None)
-    except ValueError as error:
+    except ParameterError as error:
         refusal = _refusal(error)
         if refusal is None:
             raise
@@ -270,12 +273,10 @@ def _coloured(
     )
 
 
-def _refusal(error: ValueError) -> RequestError | None:
-    """The answer (422) to a ValueError of the library that starts with the name of a parameter; None to any other."""
-    name = str(error).partition(":")[0]
-    if name == "with_error":
-        return RequestError(422, f"error{str(error)[len(name) :]}", "error")
-    return RequestError(422, str(error), name) if name in (*FIELDS, "illuminant") else None
+def _refusal(error: ParameterError) -> RequestError | None:
+    """Return the answer (422) to an error about a parameter of the request; None for any other."""
+    name = _PARAMETERS.get(error.parameter)
+    return None if name is None else RequestError(422, f"{name}: {error.sentence}", name)
 
 
 def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list[str]]:

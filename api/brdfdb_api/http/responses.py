@@ -89,6 +89,7 @@ class Summary(BaseModel):
     revision: str = ""
     created: str | None = None
     bytes: int | None = None
+    incomplete: str | None = Field(default=None, description="what the table does not state of itself; null: nothing")
     damaged: str | None = Field(default=None, description="what is wrong with its files")
     href: str
 
@@ -127,6 +128,7 @@ class Material(BaseModel):
     error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
         description="the measured error of the table against its model, by bands of theta_i; null: not measured"
     )
+    incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
     audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
         description="verdict of the audit, its findings in sentences, and whether it is of this revision; null: none"
     )

@@ -41,6 +41,7 @@ from brdfdb_api.http.responses import (
 from brdfdb_api.serving.shelf import Shelf
 
 if TYPE_CHECKING:
+    from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.table import Table
 
 T = TypeVar("T")
@@ -106,7 +107,7 @@ def catalogue(
     request: Request,
     cursor: Annotated[str, Query(description="of the page before, its last name")] = "",
     limit: Annotated[int, Query(ge=1, le=MOST, description="materials on a page")] = PAGE,
-    model: Annotated[str, Query(description="only of this model, such as ward")] = "",
+    model: Annotated[str, Query(description="only of this model")] = "",
     paper: Annotated[str, Query(description="only with this in the key of the paper or in the source")] = "",
     q: Annotated[str, Query(description="only with all of these words in name, title, model or source")] = "",
 ) -> Response:
@@ -170,21 +171,22 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
     here = f"/v1/materials/{name}" + ("" if revision is None else f"/revisions/{revision}")
-    attributes = table.attrs
+    metadata = table.metadata
     document = {
         "name": table.name,
         "revision": table.revision,
-        "title": attributes["title"],
-        "model": attributes["model"],
-        "parameters": _parameters(attributes),
+        "title": metadata.title or "",
+        "model": metadata.model or "",
+        "parameters": _parameters(metadata),
         "anisotropic": table.anisotropic,
         "wavelength_nm": table.wavelength_nm,
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,
-        "error": attributes.get("error"),
+        "error": None if table.error is None else table.attrs["error"],
+        "incomplete": metadata.gaps or None,
         "audit": None if verdict is None else _verdicts(verdict.finding, verdict.when, table.revision),
         "colour": shelf.swatch(table),
-        "attributes": {key: value for key, value in attributes.items() if key not in ("error", "request")},
+        "attributes": {key: value for key, value in table.attrs.items() if key not in ("error", "request")},
         "revisions": revisions,
         "links": {
             "self": here,
@@ -197,24 +199,23 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
     return json_response(document, headers)
 
 
-def _parameters(attributes: Any) -> list[dict[str, Any]]:
+def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
     """The parameters as files write them: value, unit, meaning, source."""
     from brdfdb.materials import written_name
     from brdfdb.models import MODELS
 
-    spec = MODELS.get(attributes["model"])
+    spec = MODELS.get(metadata.model or "")
     meanings = {} if spec is None else {written_name(each): each for each in spec.parameters}
-    sources, assumed = attributes.get("parameter_sources", {}), attributes.get("assumed", ())
     return [
         {
             "name": name,
             "value": value,
             "unit": ("degree" if meanings[name].unit == "rad" else meanings[name].unit) if name in meanings else "",
             "meaning": meanings[name].meaning if name in meanings else "",
-            "source": sources.get(name, attributes["source"]),
-            "assumed": name in assumed,
+            "source": metadata.parameter_sources.get(name, metadata.source or ""),
+            "assumed": name in metadata.assumed,
         }
-        for name, value in attributes["parameters"].items()
+        for name, value in metadata.parameters.items()
     ]
 
 

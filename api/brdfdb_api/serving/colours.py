@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.parameters import Floats
 from brdfdb.spectra import check_illuminant, colour_science, covers_visible, srgb_weights, xyz_weights
@@ -33,13 +34,16 @@ def weights(colour: Colour, wavelength_nm: NDArray[np.float64] | None, illuminan
     """
     check_illuminant(illuminant)
     if wavelength_nm is not None and wavelength_nm.size > _WAVELENGTHS:
-        raise ValueError(
-            f"wavelength_nm: {wavelength_nm.size} wavelengths are more than the {_WAVELENGTHS} that a colour is of"
+        raise ParameterError(
+            "wavelength_nm",
+            f"{wavelength_nm.size} wavelengths are more than the {_WAVELENGTHS} that a colour is of",
+            wavelength_nm.size,
+            (1, _WAVELENGTHS),
         )
     if wavelength_nm is not None and not covers_visible(wavelength_nm):
-        raise ValueError(
-            "wavelength_nm: a colour needs increasing wavelengths from 420 nm or less to 680 nm or more in steps of at "
-            "most 20 nm"
+        raise ParameterError(
+            "wavelength_nm",
+            "a colour needs increasing wavelengths from 420 nm or less to 680 nm or more in steps of at most 20 nm",
         )
     # a grey material is a flat spectrum: any wavelengths sum to the same
     at = (380.0, 780.0) if wavelength_nm is None else tuple(wavelength_nm.tolist())

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self, cast, get_args
 
+from brdfdb.errors import ParameterError
+
 LogLevel = Literal["info", "warning", "error"]
 
 
@@ -63,12 +65,17 @@ class Settings:
         """
         level = environ.get("BRDFDB_LOG_LEVEL", cls.log_level)
         if level not in get_args(LogLevel):
-            raise ValueError(f"BRDFDB_LOG_LEVEL: {level!r} is not one of {', '.join(get_args(LogLevel))}")
+            raise ParameterError(
+                "BRDFDB_LOG_LEVEL",
+                f"{level!r} is not one of {', '.join(get_args(LogLevel))}",
+                level,
+                get_args(LogLevel),
+            )
         origins = [origin.strip() for origin in environ.get("BRDFDB_CORS_ORIGINS", "").split(",")]
         for origin in origins:
             if origin not in ("", "*") and not re.fullmatch("https?://[^/]+", origin):
-                raise ValueError(
-                    f"BRDFDB_CORS_ORIGINS: {origin!r} is neither * nor an origin such as https://example.org"
+                raise ParameterError(
+                    "BRDFDB_CORS_ORIGINS", f"{origin!r} is neither * nor an origin such as https://example.org", origin
                 )
         return cls(
             store=Path(environ.get("BRDFDB_STORE", cls.store)),
@@ -85,5 +92,5 @@ class Settings:
 def _positive(environ: Mapping[str, str], variable: str, default: int) -> int:
     text = environ.get(variable, str(default))
     if not (text.isascii() and text.isdecimal() and int(text) > 0):
-        raise ValueError(f"{variable}: {text!r} is not a positive whole number")
+        raise ParameterError(variable, f"{text!r} is not a positive whole number", text)
     return int(text)

@@ -13,8 +13,9 @@ from weakref import WeakKeyDictionary
 
 import orjson
 
-from brdfdb.store.manifest import check_manifest, read_json
-from brdfdb.store.reader import Store, StoreError, UnknownMaterialError
+from brdfdb.errors import StoreError, UnknownMaterialError
+from brdfdb.store.manifest import check_manifest
+from brdfdb.store.reader import Store, read_metadata
 from brdfdb_api.serving.colours import swatch
 from brdfdb_api.serving.settings import Settings
 
@@ -213,16 +214,17 @@ class Shelf:
 def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> dict[str, Any]:
     """A line of a list, of one revision."""
     check_manifest(group, digest, contents=False)
-    attributes = read_json(group / "zarr.json")["attributes"]
+    metadata = read_metadata(group)
     return {
         "name": name,
-        "title": attributes["title"],
-        "model": attributes["model"],
-        "model_title": attributes.get("model_title", attributes["model"]),
-        "paper": attributes.get("model_reference", ""),
-        "source": attributes["source"],
-        "anisotropic": attributes["anisotropic"],
-        "wavelength_range_nm": attributes["wavelength_range_nm"] or None,
+        "title": metadata.title or "",
+        "model": metadata.model or "",
+        "model_title": metadata.model_title or metadata.model or "",
+        "paper": metadata.model_reference or "",
+        "source": metadata.source or "",
+        "anisotropic": metadata.anisotropic,
+        "wavelength_range_nm": metadata.wavelength_range_nm or None,
+        "incomplete": metadata.gaps or None,
         "error_p99": head.get("error_p99"),
         "revision": group.name,
         "created": head.get("created"),

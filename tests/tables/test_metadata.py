@@ -1,0 +1,85 @@
+"""Metadata of tables: one record, read from whatever attributes a table has, and written back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from brdfdb.materials import presets
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.metadata import REQUIRED, TableMetadata
+from brdfdb.tables.table import table_from
+from brdfdb.tables.tabulation import metadata_of, tabulate
+
+SCHEMA = json.loads((Path(__file__).parents[2] / "schemas" / "table.schema.json").read_text(encoding="utf-8"))
+GRID = Grid({"theta_i": [0, 45, 85], "theta_r": [0, 45, 85], "delta_phi": [0, 90, 180]})
+ISOTROPIC = [material for material in presets().values() if not material.anisotropic]
+
+
+def layout(name: str) -> Layout:
+    material = presets()[name]
+    return Layout(material, GRID, np.array([500.0, 600.0]) if material.spectral else None)
+
+
+@pytest.mark.parametrize("name", [material.name for material in ISOTROPIC])
+def test_what_is_written_is_read_back_and_fits_the_schema(name: str) -> None:
+    written = metadata_of(layout(name))
+    attributes = json.loads(json.dumps(written.attributes(), allow_nan=False))
+    jsonschema.validate(attributes, SCHEMA)
+    read = TableMetadata.read(attributes)
+    assert (read, read.gaps) == (written, "")
+    assert read.attributes() == attributes
+
+
+def test_the_attributes_of_a_table_are_its_metadata() -> None:
+    assert tabulate(layout("clay-vase")).attrs == metadata_of(layout("clay-vase")).attributes()
+
+
+def test_no_attributes_are_no_error_but_a_phrase() -> None:
+    bare = TableMetadata.read({})
+    assert (bare.title, bare.error, bare.parameters, bare.interpolation) == (None, None, {}, Interpolation())
+    assert bare.missing == list(REQUIRED)
+    assert bare.gaps == (
+        "does not state its title, material, table version, model, model version, parameters, source, conventions"
+    )
+
+
+def test_a_strange_attribute_is_named_and_leaves_the_others() -> None:
+    read = TableMetadata.read({"title": ["White"], "model": "lambert", "note": None, "colour": "white"})
+    assert (read.title, read.model, read.note) == (None, "lambert", "")
+    assert set(read.strange) == {"title", "note"}
+    assert "title" not in read.missing
+    assert "states its title wrongly (Input should be a valid string)" in read.gaps
+
+
+def test_assumptions_of_earlier_tables_are_names_alone() -> None:
+    assert TableMetadata.read({"assumed": ["rho"]}).assumed == {"rho": None}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"brdf": np.zeros((3, 3, 2), np.float32)}, r"^brdf: shape \(3, 3, 2\) is not \(3, 3, 3\), of its axes$"),
+        ({"brdf": None, "rho": np.zeros(3)}, r"^brdf: neither it nor parts is among the arrays "),
+        ({"wavelength": np.zeros(())}, r"^wavelengths_nm: must be positive and increase strictly$"),
+        ({"theta_i": None}, r"^grid axes: none of "),
+    ],
+)
+def test_arrays_that_make_no_table_are_refused_with_a_sentence(change: dict[str, np.ndarray], said: str) -> None:
+    dataset = tabulate(layout("clay-vase"))
+    arrays = {str(key): variable.values for key, variable in dataset.variables.items()} | change
+    with pytest.raises(ValueError, match=said):
+        table_from("odd", "r000001", {key: array for key, array in arrays.items() if array is not None}, {})
+
+
+def test_an_interpolation_that_this_program_does_not_know_is_refused() -> None:
+    dataset = tabulate(layout("clay-vase"))
+    arrays = {str(key): variable.values for key, variable in dataset.variables.items()}
+    for how in ({"method": "quintic"}, {"method": "cubic", "knots": 3}):
+        with pytest.raises(ValueError, match=r"^interpolation: "):
+            table_from("odd", "r000001", arrays, {"interpolation": how})

@@ -1,0 +1,146 @@
+"""The dependencies: the core works without the extras, and a cap stands only where the inside of a package is used."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import inspect
+import os
+import re
+import subprocess
+import tomllib
+import venv
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+import brdfdb
+import brdfdb_api
+import brdfdb_pipelines
+from brdfdb import _numba
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
+# Packages with an upper bound that follows a reason; "<next major" alone needs none
+CAPPED = ("numba", "uvicorn")
+
+
+def _numba_is_used_inside() -> None:
+    compiled = _numba.kernel(_square)
+    file = compiled._cache._cache_file  # type: ignore[attr-defined]
+    assert file._source_stamp.endswith(_numba._shared_digest())
+    assert "_source_stamp" in inspect.getsource(_numba)
+
+
+def _square(x: float) -> float:
+    return x * x
+
+
+def _uvicorn_is_used_inside() -> None:
+    from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+    from brdfdb_api.http.protocol import BoundedProtocol
+
+    own = {name for name in vars(BoundedProtocol) if not name.startswith("_")}
+    assert own <= set(dir(HttpToolsProtocol))
+    assert {"send_400_response", "shutdown", "data_received", "on_headers_complete", "on_body"} <= set(
+        dir(HttpToolsProtocol)
+    )
+
+
+REASONS: dict[str, Callable[[], None]] = {"numba": _numba_is_used_inside, "uvicorn": _uvicorn_is_used_inside}
+
+
+def _requirements() -> list[Requirement]:
+    lines = [*PROJECT["dependencies"], *(line for name in EXTRAS if name != "test" for line in EXTRAS[name])]
+    return [Requirement(line) for line in lines]
+
+
+def test_every_cap_below_the_next_major_version_has_a_reason() -> None:
+    capped = {
+        requirement.name
+        for requirement in _requirements()
+        for specifier in requirement.specifier
+        if specifier.operator == "<" and "." in specifier.version
+    }
+    assert capped == set(REASONS) == set(CAPPED)
+
+
+@pytest.mark.parametrize("name", CAPPED)
+def test_the_reason_for_a_cap_still_stands(name: str) -> None:
+    # a newer version that passes here may be allowed; one whose inside is no longer used needs no cap
+    REASONS[name]()
+
+
+def test_all_is_every_extra() -> None:
+    (line,) = EXTRAS["all"]
+    assert set(Requirement(line).extras) == set(EXTRAS) - {"all", "test"}
+
+
+def _closure(names: list[str]) -> set[str]:
+    """Return the distributions that some need, themselves included."""
+    found: set[str] = set()
+    todo = list(names)
+    while todo:
+        name = re.sub(r"[-_.]+", "-", todo.pop()).lower()
+        if name in found:
+            continue
+        found.add(name)
+        for line in importlib.metadata.requires(name) or ():
+            requirement = Requirement(line)
+            if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
+                todo.append(requirement.name)
+    return found
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A fresh environment that holds the core's dependencies alone, each a link to the installed one."""
+    home = tmp_path_factory.mktemp("core")
+    venv.create(home, symlinks=True)
+    (site,) = home.glob("lib/python*/site-packages")
+    for name in _closure([Requirement(line).name for line in PROJECT["dependencies"]]):
+        distribution = importlib.metadata.distribution(name)
+        for top in {file.parts[0] for file in distribution.files or () if file.parts[0] not in ("..", "__pycache__")}:
+            if not (site / top).exists():
+                (site / top).symlink_to(Path(str(distribution.locate_file(top))).resolve())
+    for package in (brdfdb, brdfdb_pipelines, brdfdb_api):
+        assert package.__file__ is not None
+        (site / package.__name__).symlink_to(Path(package.__file__).parent)
+    return home
+
+
+def _run(core: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    # -I: neither PYTHONPATH nor the directory of the tests
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    return subprocess.run(
+        [str(core / "bin" / "python"), "-I", *arguments], capture_output=True, text=True, check=False, env=environment
+    )
+
+
+RECIPE = """
+materials = ["rolled-brass"]
+wavelengths_nm = [550]
+tolerance = 0.1
+"""
+LOOKUP = """
+import sys
+import brdfdb
+table = brdfdb.open(sys.argv[1])["rolled-brass"]
+print(table.lookup(0.5, 0.0, 0.5, 3.14159))
+print(sorted(set(sys.modules) & {"fastapi", "matplotlib", "colour", "OpenEXR", "jinja2", "mpmath", "distributed"}))
+"""
+
+
+def test_the_core_alone_tabulates_and_looks_up(core: Path, tmp_path: Path) -> None:
+    recipe, store = tmp_path / "recipe.toml", tmp_path / "store"
+    recipe.write_text(RECIPE, encoding="utf-8")
+    built = _run(core, "-m", "brdfdb_pipelines.cli", "build", str(recipe), "--store", str(store))
+    assert built.returncode == 0, built.stderr
+    found = _run(core, "-c", LOOKUP, str(store))
+    assert found.returncode == 0, found.stderr
+    value, loaded = found.stdout.splitlines()
+    assert float(value) == pytest.approx(float(brdfdb.open(store)["rolled-brass"].lookup(0.5, 0.0, 0.5, 3.14159)))
+    assert loaded == "[]"
