@@ -12,9 +12,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished, radians, unit_vector
+from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Text
 from brdfdb.materials.source import Evaluate, Lossless
-from brdfdb.parameters import Floats, Lobe
+from brdfdb.parameters import Floats
 
 # (wi, wr, wavelength_nm) of shapes (N, 3), (N, 3) and (L,) -> f_r [1/sr] of shape (N, L); of a grey function the
 # wavelengths are None and the shape may be (N,)
@@ -94,7 +95,8 @@ class FunctionRecord(BaseModel):
         """Return the lobe of lights with a cosine, which is the same for all; None without one."""
         if self.alpha is None:
             return None
-        return Lobe(*(np.full(np.shape(cos_i), value) for value in (_LOBE_SHARE, *self.alpha)))
+        share, alpha_x, alpha_y = (np.full(np.shape(cos_i), value) for value in (_LOBE_SHARE, *self.alpha))
+        return Lobe(share, alpha_x, alpha_y)
 
     def document(self) -> dict[str, Any]:
         """Return the record as JSON; `brdfdb.materials.source_of` reads it."""

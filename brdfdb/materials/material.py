@@ -21,11 +21,12 @@ from pydantic_core import ErrorDetails
 
 from brdfdb.errors import MaterialError, ParameterError
 from brdfdb.geometry import degrees
+from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
 from brdfdb.materials.source import Evaluate, Lossless
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, Lobe, ModelSpec
+from brdfdb.parameters import Floats, ModelSpec
 from brdfdb.spectra import refractive_index
 
 _SOURCED = ("refractive_index", "wavelengths_nm")  # what may have a source of its own, besides parameters

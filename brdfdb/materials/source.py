@@ -8,7 +8,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.parameters import Floats, Lobe
+from brdfdb.lobes import Lobe
+from brdfdb.parameters import Floats
 
 # Function of unit vectors (N, 3) of light and viewer that gives f_r [1/sr], shape (N, L)
 Evaluate = Callable[[Floats, Floats], Floats]

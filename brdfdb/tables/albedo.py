@@ -8,8 +8,9 @@ import numpy as np
 
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
+from brdfdb.lobes import Lobe
 from brdfdb.materials import Source
-from brdfdb.parameters import Floats, Lobe
+from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.table import Table
 

@@ -14,7 +14,7 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.materials import Source
-from brdfdb.parameters import Floats, Lobe
+from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Grid
@@ -60,8 +60,8 @@ def draw(source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, 
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
     light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
-    its own Gaussian hardly ever reaches the shoulder where the lobe ends. Viewers of a source without a lobe are all
-    drawn over the hemisphere.
+    its own distribution hardly ever reaches the shoulder where the lobe ends. Without a lobe, all viewers are drawn
+    over the hemisphere.
     """
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
@@ -73,7 +73,9 @@ def draw(source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, 
     lobe = source.lobe(wi[:, 2], in_turn)
     if lobe is None:
         return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), np.zeros(band.size, dtype=bool))
-    lobes = [Lobe(np.ones(1), width * lobe.alpha_x, width * lobe.alpha_y) for width in WIDTHS]
+    lobes = [
+        lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y) for width in WIDTHS
+    ]
     which = rng.random(band.size) * 2 * len(lobes)  # one half over the hemisphere, the other among the lobes
     wr = over
     for number, drawn in enumerate(lobes):

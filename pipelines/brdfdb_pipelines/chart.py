@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import brdfdb
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb.forms.catalogue import Representation, of_table
+from brdfdb.forms.catalogue import Form, of_table
 from brdfdb.forms.tradeoff import STEPS, TIMED, chart, chart_family
 from brdfdb.forms.tradeoff_document import Chart, Charts, FamilyChart, Point
 from brdfdb.materials import Material
@@ -33,7 +33,7 @@ class _Subject(NamedTuple):
 
     material: Material
     wavelength_nm: NDArray[np.float64] | None
-    stored: tuple[Representation, ...] = ()
+    stored: tuple[Form, ...] = ()
 
 
 class _Family(NamedTuple):
