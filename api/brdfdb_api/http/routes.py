@@ -16,6 +16,7 @@ from starlette.responses import Response
 from starlette.types import Scope
 
 from brdfdb_api.http import middleware, openapi_notes
+from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import FIELDS, OPTIONS, Options, Points, evaluate, parsed
 from brdfdb_api.http.openapi_notes import BODY, ERROR, NPY_ANSWER, POINT, WAVELENGTHS, answers
 from brdfdb_api.http.responses import (
@@ -28,7 +29,6 @@ from brdfdb_api.http.responses import (
     Health,
     Lookup,
     Material,
-    RequestError,
     cache_headers,
     json_bytes,
     json_response,
