@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, overload
+from typing import TYPE_CHECKING, Any, NoReturn
 from urllib.parse import quote, urlencode, urlsplit, urlunsplit
 
 import numpy as np
@@ -25,7 +25,7 @@ from brdfdb.parameters import Floats
 from brdfdb.store.manifest import NAME
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.table_base import Described, Stated
+from brdfdb.tables.table_base import BaseTable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -204,7 +204,7 @@ def _exchange(
 
 
 @dataclass(frozen=True, eq=False)
-class RemoteTable(Described):
+class RemoteTable(BaseTable):
     """The table of one revision of one material, looked up by a service; methods as of `brdfdb.tables.table.Table`.
 
     Answers are those of the revision that it was opened with, also when the service has a newer one. They are
@@ -233,7 +233,6 @@ class RemoteTable(Described):
     _specular: bool = field(repr=False)
     _service: Service = field(repr=False)
 
-    @overload
     def lookup(
         self,
         theta_i: ArrayLike,
@@ -241,66 +240,19 @@ class RemoteTable(Described):
         theta_r: ArrayLike,
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-    ) -> Floats: ...
-
-    @overload
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[True],
-    ) -> Stated: ...
-
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: bool = False,
-    ) -> Floats | Stated:
-        """Interpolate f_r: parameters, shapes [1/sr] and errors as by `brdfdb.tables.table.Table.lookup`."""
+    ) -> Floats:
         self._wavelengths(wavelength_nm)  # what is wrong is refused in the order of a table, before anything is sent
         np.broadcast_shapes(*(np.shape(angle) for angle in (theta_i, phi_i, theta_r, phi_r)))
         given = checked_angles(theta_i, phi_i, theta_r, phi_r)
-        brdf = self._looked_up((given.theta_i, given.phi_i, given.theta_r, given.phi_r), given, wavelength_nm)
-        return Stated(brdf, self._stated(given, brdf, wavelength_nm)) if with_error else brdf
+        return self._looked_up((given.theta_i, given.phi_i, given.theta_r, given.phi_r), given, wavelength_nm)
 
-    @overload
-    def lookup_vectors(
-        self,
-        wi: ArrayLike,
-        wr: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-    ) -> Floats: ...
-
-    @overload
-    def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: Literal[True]
-    ) -> Stated: ...
-
-    def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: bool = False
-    ) -> Floats | Stated:
-        """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         self._wavelengths(wavelength_nm)
         given = checked_vectors(wi, wr)
         (theta_i, phi_i), (theta_r, phi_r) = spherical_angles(given.w_i), spherical_angles(given.w_r)
-        brdf = self._looked_up((theta_i, phi_i, theta_r, phi_r), given, wavelength_nm)
-        return Stated(brdf, self._stated(given, brdf, wavelength_nm)) if with_error else brdf
+        return self._looked_up((theta_i, phi_i, theta_r, phi_r), given, wavelength_nm)
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Interpolate the Dirac part: parameters, shapes [1] and errors as by `Table.specular_reflectance`."""
         count, tail = self._asked(wavelength_nm)
         given = checked_angles(theta_i, 0.0, 0.0, 0.0)
         values = np.zeros((given.theta_i.size, count))

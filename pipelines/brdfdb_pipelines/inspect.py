@@ -254,7 +254,7 @@ def lookup(
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
     error = None
     if with_error:
-        stated = source.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, with_error=True, **point)
+        stated = source.lookup_with_error(theta_i, phi_i, theta_r, phi_r, wavelength_nm, **point)
         brdf, error = (np.atleast_1d(values) for values in stated)
     else:
         brdf = np.atleast_1d(source.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, **point))
