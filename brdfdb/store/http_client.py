@@ -380,24 +380,18 @@ class RemoteStore(Mapping[str, RemoteTable]):
         """Return the metadata of the current revision; of the request of its build nothing."""
         return self[name].metadata
 
-    def dataset(self, name: str) -> xr.Dataset:
-        """The current revision as a lazy xarray Dataset, read over HTTP as far as it is needed.
+    def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
+        """Return a revision, by default the current one, as a lazy Dataset that is read over HTTP as far as needed.
 
         Raises
         ------
-        UnknownMaterialError
-            If the store has no such material.
+        UnknownMaterialError, UnknownRevisionError
+            If the store has no such material, or it no such revision.
         StoreError
             If fsspec and aiohttp, which read zarr over HTTP, are not installed.
         """
-        if find_spec("fsspec") is None or find_spec("aiohttp") is None:
-            raise StoreError("a dataset over HTTP needs fsspec and aiohttp: pip install 'brdfdb[http]'")
-        import xarray as xr
-
-        from brdfdb.tables.xarray_view import with_brdf
-
-        path = f"/v1/store/materials/{name}/{self.head(name)}"
-        return with_brdf(xr.open_zarr(f"{self.url}{path}", chunks=None))
+        document = self._material(name, "" if revision is None else f"/revisions/{quote(revision, safe='')}")
+        return remote_dataset(f"{self.url}/v1/store/materials/{name}/{document['revision']}")
 
     def families(self) -> NoReturn:
         """Not served: a StoreError that says so."""
@@ -432,6 +426,18 @@ class RemoteStore(Mapping[str, RemoteTable]):
             _specular=document["specular"],
             _service=self._service,
         )
+
+
+def remote_dataset(url: str) -> xr.Dataset:
+    """Return the lazy Dataset of a revision at the address of its files; StoreError if an extra is not installed."""
+    if find_spec("fsspec") is None or find_spec("aiohttp") is None:
+        raise StoreError("a dataset over HTTP needs fsspec and aiohttp: pip install 'brdfdb[http]'")
+    from brdfdb.tables.xarray_view import opened
+
+    try:
+        return opened(url)
+    except FileNotFoundError:
+        raise StoreError(f"no revision at {url}") from None
 
 
 def _sendable(angle: NDArray[Any]) -> NDArray[np.float64]:

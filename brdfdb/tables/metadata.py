@@ -108,6 +108,12 @@ class TableMetadata(BaseModel):
         """The required attributes that the table does not have."""
         return [key for key in REQUIRED if key not in self.model_fields_set and key not in self.strange]
 
+    def known_interpolation(self) -> Interpolation:
+        """Return the interpolation; ValueError if it is one that this program does not know."""
+        if "interpolation" in self.strange:
+            raise ValueError(f"interpolation: {self.strange['interpolation']}")
+        return self.interpolation
+
     @property
     def gaps(self) -> str:
         """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""

@@ -239,9 +239,7 @@ def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
 
 def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], attrs: Mapping[str, Any]) -> Table:
     """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
-    metadata = TableMetadata.read(attrs)
-    if "interpolation" in metadata.strange:
-        raise ValueError(f"interpolation: {metadata.strange['interpolation']}")
+    interpolation = TableMetadata.read(attrs).known_interpolation()
     variable = "brdf" if "brdf" in arrays else "parts"
     if variable not in arrays:
         raise ValueError(f"brdf: neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
@@ -263,7 +261,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         values=arrays[variable],
         specular=None if specular is None else specular.astype(np.float32),
         specular_theta_deg=arrays.get("specular_theta_i"),
-        interpolation=metadata.interpolation,
+        interpolation=interpolation,
         spectra=spectra,
         uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),
         n=arrays.get("n"),

@@ -179,7 +179,7 @@ def frame(layout: Layout) -> xr.Dataset:
         coordinates["wavelength"] = (
             "wavelength",
             wavelength_nm,
-            {"units": "nm", "long_name": "wavelength in vacuum"},
+            {"units": "nm", "long_name": "wavelength in vacuum", "standard_name": "radiation_wavelength"},
         )
         for name, meaning in (("n", "refractive index"), ("k", "extinction coefficient")):
             variables[name] = ("wavelength", arguments[name], {"units": "1", "long_name": meaning})
