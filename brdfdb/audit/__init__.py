@@ -16,8 +16,10 @@ from brdfdb.audit.smoothness import smoothness_of
 from brdfdb.audit.table_error import table_error_of
 from brdfdb.audit.validity import validity_of
 from brdfdb.audit.values import values_of
+from brdfdb.errors import BrdfdbError
 from brdfdb.figure import Figure
-from brdfdb.tables.albedo import linear_in_angles, material_of
+from brdfdb.materials import Material
+from brdfdb.tables.albedo import linear_in_angles
 from brdfdb.tables.table import Table
 
 __all__ = ["AuditReport", "MaterialAudit", "audit", "report"]
@@ -42,7 +44,9 @@ def audit(table: Table, *, accept_excess: bool = False) -> MaterialAudit:
         "violates" where either exceeds 1 otherwise. A table that states its error may exceed 1, or what is known, by
         what that error explains. That a model "loses" light that nothing absorbs is said, and passes.
     """
-    material = material_of(table)
+    material = table.source
+    if not isinstance(material, Material):
+        raise BrdfdbError(f"{table.name}: the table does not name a model that is known here, so it cannot be audited")
     pairs = pairs_of(table, material)
     energy = energy_of(table, material, accept_excess=accept_excess)
     reciprocity = reciprocity_of(table, pairs)

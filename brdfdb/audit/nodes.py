@@ -16,7 +16,7 @@ from brdfdb.tables.tabulation import block, rounded, specular_nodes
 
 # Values of the model that are computed for the comparison. A table with more nodes is compared at some rows of its
 # first axis, evenly spread from the first to the last. A value of the facets' integral takes 30 us, others 0.2 us
-MOST_VALUES, _SLOW = 1 << 20, {"oren_nayar_gaussian": 1 << 15}
+MOST_VALUES, _MOST_SLOW = 1 << 20, 1 << 15
 # Numbers are the same but for rounding: to the bits that are stored, and of float64 sums on another processor,
 # relative to the largest number of the table
 _ROUNDING = 1e-11
@@ -76,7 +76,8 @@ def nodes_of(table: Table, material: Material) -> Nodes:
 def _rows(layout: Layout) -> Iterator[slice]:
     """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    most = _SLOW.get(layout.material.model, MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
+    slow = isinstance(layout.source, Material) and layout.source.spec.slow
+    most = (_MOST_SLOW if slow else MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
     if most >= layout.shape[0]:
         yield from layout.blocks
         return
@@ -118,7 +119,7 @@ def _uniform(table: Table, layout: Layout) -> Iterator[str]:
 
 def _dirac(table: Table, layout: Layout) -> Iterator[str]:
     """Yield a sentence on a Dirac part that is missing, or whose nodes are not those of the layout."""
-    if layout.material.spec.specular is None:
+    if not layout.source.has_specular:
         return
     if table.specular is None:
         yield "the Dirac part of the model is not stored"

@@ -25,7 +25,7 @@ class Cost(BaseModel):
 
 
 class Form(BaseModel):
-    """A representation, and what it costs."""
+    """A form, and what it costs."""
 
     model_config = _STRICT
 
@@ -51,7 +51,7 @@ class Saving(BaseModel):
 
 
 class Point(Form):
-    """A representation: errors are relative to the truth, at the worst wavelength."""
+    """A form: errors are relative to the truth, at the worst wavelength."""
 
     l1: float = Field(description="mean of abs(f_r - truth) over that of the truth, weighted with the cosine")
     p99: float = Field(description="99th percentile of abs(f_r - truth) / max(truth, floor)")
@@ -124,7 +124,7 @@ class Chart(BaseModel):
 
 
 class Curve(Form):
-    """A representation along a family: errors as those of a point, bytes and cost those of one member."""
+    """A form along a family: errors as those of a point, bytes and cost those of one member."""
 
     timed: str = Field(description="the member: of those that have this form, the one next to the middle of the family")
     l1: list[float | None] = Field(description="of each member; null where there is no such form")

@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_vectors
 from brdfdb.integrals.quadrature import named, spec_of
-from brdfdb.parameters import Floats, Lobe, ModelSpec
+from brdfdb.lobes import Lobe
+from brdfdb.parameters import Floats, ModelSpec
 
 Array = NDArray[np.float64]
 
 _TINY = 1e-300  # u of 0 is read as this: its logarithm is finite
-_DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
+DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
 
 
 class Sample(NamedTuple):
@@ -207,7 +208,7 @@ def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> L
     for parameter in spec.parameters:
         if parameter.name in parameters:
             parameter.check(parameters[parameter.name])
-    return _DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
+    return DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
 
 
 def _uniform(name: str, u: ArrayLike) -> Array:
@@ -232,8 +233,8 @@ def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
 
 
 def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
-    """The light mirrored in a half vector drawn by Ward's eq. 7, in slopes: tan(delta) times cos(phi) and sin(phi)."""
-    radius = np.sqrt(-np.log(u1))
+    """Return the light (..., 3) mirrored in half vectors whose slopes follow the distribution of the lobe."""
+    radius = lobe.distribution.radius(u1)
     s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
     s_x, s_y = np.broadcast_arrays(s_x, s_y)
     h = np.stack([s_x, s_y, np.ones_like(s_x)], axis=-1)
@@ -256,7 +257,8 @@ def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
     x, y, z = (i[..., axis] + r[..., axis] for axis in range(3))
     length2 = x * x + y * y + z * z
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        exponent = ((x / lobe.alpha_x) ** 2 + (y / lobe.alpha_y) ** 2) / (z * z)
-        gaussian = np.exp(-exponent) * length2 / (2.0 * np.pi * lobe.alpha_x * lobe.alpha_y * np.abs(z) ** 3)
-    gaussian = np.where((np.abs(z) < 1e-100) | (exponent > 700.0), 0.0, gaussian)  # half vectors that are not drawn
-    return np.asarray(lobe.share * gaussian + (1.0 - lobe.share) * cosine)
+        t2 = ((x / lobe.alpha_x) ** 2 + (y / lobe.alpha_y) ** 2) / (z * z)
+        slopes = lobe.distribution.density(t2)
+        mirrored = slopes * length2 / (2.0 * np.pi * lobe.alpha_x * lobe.alpha_y * np.abs(z) ** 3)
+    mirrored = np.where(np.abs(z) < 1e-100, 0.0, mirrored)  # no half vector is drawn there
+    return np.asarray(lobe.share * mirrored + (1.0 - lobe.share) * cosine)

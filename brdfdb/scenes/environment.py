@@ -14,8 +14,8 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 
 from brdfdb.errors import ParameterError
 from brdfdb.integrals.sampling import directions, lobe_of, mixture_density
+from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
-from brdfdb.parameters import Lobe
 from brdfdb.scenes.shapes import STRICT, Array
 
 # Of the directions, how many a lobe gets at least, or few would carry all of a faint gloss, and at most, which bounds
@@ -148,10 +148,12 @@ def _widest(material: Material, wavelength_nm: Array, wr: Array) -> Lobe:
     parameters = material.arguments(material.evaluated_at(wavelength_nm))
     width = np.broadcast(*parameters.values()).size
     lobe = lobe_of(material.spec, wr[:, np.newaxis], parameters)
-    share, alpha_x, alpha_y = (np.broadcast_to(each, (len(wr), width)) for each in lobe)
+    share, alpha_x, alpha_y = (
+        np.broadcast_to(each, (len(wr), width)) for each in (lobe.share, lobe.alpha_x, lobe.alpha_y)
+    )
     mean = share.mean(axis=1)
     share = np.where(mean > 0.0, np.clip(mean, _LEAST, _MOST), 0.0)
-    return Lobe(share, alpha_x.max(axis=1), alpha_y.max(axis=1))
+    return lobe._replace(share=share, alpha_x=alpha_x.max(axis=1), alpha_y=alpha_y.max(axis=1))
 
 
 def _checked(name: str, picture: Array) -> Array:

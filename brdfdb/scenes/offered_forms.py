@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.forms.catalogue import Representation, representations
+from brdfdb.forms import catalogue
+from brdfdb.forms.catalogue import Form
 from brdfdb.geometry import radians
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
@@ -28,7 +29,7 @@ class Candidate:
     `wavelength_nm` is None of a grey form; between its wavelengths f_r is interpolated on straight lines.
     """
 
-    form: Representation
+    form: Form
     wavelength_nm: NDArray[np.float64] | None
 
     def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
@@ -59,7 +60,7 @@ def candidates(
     Raises
     ------
     ValueError
-        As `brdfdb.forms.catalogue.representations` does.
+        As `brdfdb.forms.catalogue.forms` does.
     """
     if tolerances is None and wavelength_nm is None:
         tolerances = GREY_TOLERANCES
@@ -76,13 +77,13 @@ def candidates(
 
 def _offered(
     material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None
-) -> list[Representation]:
+) -> list[Form]:
     """Return all forms of a material, and its tables a second time, with the truth at limbs."""
-    forms = representations(material, wavelength_nm, tolerances)
+    forms = catalogue.forms(material, wavelength_nm, tolerances)
     return [*forms, *(_with_true_limbs(form, forms[0]) for form in forms if form.kind == "table")]
 
 
-def _with_true_limbs(form: Representation, truth: Representation) -> Representation:
+def _with_true_limbs(form: Form, truth: Form) -> Form:
     """Return a form that leaves directions beyond `LIMB_DEG`, of light or viewer, to the truth."""
     least = np.cos(radians(LIMB_DEG))
 
@@ -103,7 +104,7 @@ def _with_true_limbs(form: Representation, truth: Representation) -> Representat
     )
 
 
-def _between(form: Representation, few: Array, wavelength_nm: Array) -> Representation:
+def _between(form: Form, few: Array, wavelength_nm: Array) -> Form:
     """A form at a few wavelengths, interpolated to all of them."""
     weights = np.stack([np.interp(wavelength_nm, few, one) for one in np.eye(few.size)]).astype(form.dtype)
 

@@ -77,7 +77,7 @@ class Table(BaseTable):
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
         """The table of a layout, or of a part of its grid, before it is stored: without the Dirac part."""
         return cls(
-            name=layout.material.name,
+            name=layout.source.name,
             revision="",
             attrs={},
             grid=layout.grid if grid is None else grid,

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors
+from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Axis
@@ -159,6 +160,19 @@ class BaseTable(ABC):
     def metadata(self) -> TableMetadata:
         """The attributes as a typed record."""
         return TableMetadata.read(self.attrs)
+
+    @functools.cached_property
+    def source(self) -> Material | FunctionRecord | None:
+        """The source that the table was tabulated from, as the table keeps it: exact parameters, radians as they were.
+
+        A function comes back without its callable. None where the table does not say, or where this program does not
+        have the model.
+        """
+        document = self.metadata.source_record or self.metadata.request  # of builds before tables kept their source
+        try:
+            return None if document is None else source_of(document)
+        except BrdfdbError:
+            return None
 
     @property
     def error(self) -> Error | None:

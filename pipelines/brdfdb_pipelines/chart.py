@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import brdfdb
-from brdfdb.errors import ParameterError
-from brdfdb.forms.catalogue import Representation, of_table
+from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.forms.catalogue import Form, of_table
 from brdfdb.forms.tradeoff import STEPS, TIMED, chart, chart_family
 from brdfdb.forms.tradeoff_document import Chart, Charts, FamilyChart, Point
 from brdfdb.materials import Material
 from brdfdb.store.family import Family, Sweep
 from brdfdb.store.family_records import recorded
 from brdfdb.store.reader import Store
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.planner import check_tolerance
+from brdfdb.tables.table import Table
 from brdfdb_pipelines import family_plot, recipe_file, terminal, tradeoff_plot
 from brdfdb_pipelines.plot_panels import percent
 
@@ -33,7 +33,7 @@ class _Subject(NamedTuple):
 
     material: Material
     wavelength_nm: NDArray[np.float64] | None
-    stored: tuple[Representation, ...] = ()
+    stored: tuple[Form, ...] = ()
 
 
 class _Family(NamedTuple):
@@ -127,7 +127,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
         if name in jobs:
             subject = _Subject(jobs[name].material, jobs[name].wavelength_nm)
         elif table is not None:
-            subject = _Subject(material_of(table), table.wavelength_nm)
+            subject = _Subject(_material_of(table), table.wavelength_nm)
         elif name in sweeps:
             members = [jobs[member] for member in sweeps[name].members]
             materials = [job.material for job in members]
@@ -137,7 +137,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
             continue
         elif store is not None and name in store.families():
             family = store.family(name)
-            materials = [material_of(store[member]) for member in family.record.members]
+            materials = [_material_of(store[member]) for member in family.record.members]
             subjects.append(_Family(family.record, materials, family.wavelength_nm, family))
             continue
         else:
@@ -148,6 +148,13 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
             subject = subject._replace(stored=(of_table(table, "table-stored", title),))
         subjects.append(subject)
     return subjects
+
+
+def _material_of(table: Table) -> Material:
+    """Return the material behind a table; BrdfdbError where the table does not say."""
+    if not isinstance(table.source, Material):
+        raise BrdfdbError(f"{table.name}: the table does not name a model that is known here, so it cannot be charted")
+    return table.source
 
 
 def _fits(stored: NDArray[np.float64] | None, wanted: NDArray[np.float64] | None) -> bool:

@@ -11,7 +11,6 @@ import pytest
 
 from brdfdb.spectra import srgb_weights, xyz_weights
 from brdfdb.store.reader import Store
-from brdfdb.tables.albedo import material_of
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, npy, read_npy
 
 FOIL, FELT, TILE, METAL = (
@@ -36,7 +35,7 @@ def test_the_model_itself(client: Client, store: Store, name: str, wavelengths: 
     params = {**POINT, "from": "model"} | ({} if wavelengths is None else {"wavelength_nm": wavelengths})
     answer = client.get(f"/v1/materials/{name}/lookup", params=params).json()
     assert answer["source"] == "model"
-    material = material_of(table)
+    material = table.source
     np.testing.assert_allclose(answer["brdf"], material.lookup(*RADIANS, at), **EXACT)
     np.testing.assert_allclose(answer["specular_reflectance"], material.specular_reflectance(RADIANS[0], at), **EXACT)
 
@@ -64,7 +63,7 @@ def test_colours(client: Client, store: Store, output: str, weights: Any, illumi
     assert (answer["output"], answer["illuminant"]) == (output, illuminant or "D65")
     of = weights(tuple(VISIBLE_NM.tolist()), illuminant or "D65")
     table = store["copper-foil"]
-    spectrum = table.lookup(*RADIANS) if source == "table" else material_of(table).lookup(*RADIANS, VISIBLE_NM)
+    spectrum = table.lookup(*RADIANS) if source == "table" else table.source.lookup(*RADIANS, VISIBLE_NM)
     np.testing.assert_allclose(answer["brdf"], spectrum @ of, **EXACT)
     if source == "table":
         specular = table.specular_reflectance(RADIANS[0])

@@ -22,11 +22,10 @@ from brdfdb.audit.validity import validity_of
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import Albedo
 from brdfdb.integrals.sampling import lobe_of
+from brdfdb.lobes import Lobe
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
-from brdfdb.parameters import Lobe
 from brdfdb.tables import error_measurement
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.table import Table
 from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
 
@@ -95,8 +94,9 @@ def test_what_is_said_of_weights_is_said_of_a_lambertian_in_closed_form() -> Non
 @pytest.mark.parametrize("alpha", [(0.05, 0.15), (1e-4, 1e-4), (2.0, 0.3)])
 def test_bins_hold_the_shares_of_a_gaussian_of_slopes(alpha: tuple[float, float]) -> None:
     lobe = Lobe(np.ones(()), np.asarray(alpha[0]), np.asarray(alpha[1]))
-    shares = sampling._shares(unit_vector(0.8, 0.3), lobe, np.array(alpha))
-    exact = -np.diff(np.exp(-(sampling._T_EDGES**2))) / (sampling._PSI_EDGES.size - 1)
+    t_edges = sampling._t_edges(lobe)
+    shares = sampling._shares(unit_vector(0.8, 0.3), lobe, np.array(alpha), t_edges)
+    exact = -np.diff(np.exp(-(t_edges**2))) / (sampling._PSI_EDGES.size - 1)
     np.testing.assert_allclose(shares, np.broadcast_to(exact[:, np.newaxis], shares.shape), atol=SHARES)
 
 
@@ -137,7 +137,7 @@ SIDES: dict[str, Callable[[Array], Any]] = {
 
 
 def smoothness(table: Table) -> Smoothness:
-    return smoothness_of(table, material_of(table), pairs_of(table, material_of(table)))
+    return smoothness_of(table, table.source, pairs_of(table, table.source))
 
 
 def by_seam(jumps: list[Jump]) -> dict[str, Jump]:

@@ -276,7 +276,7 @@ def test_a_family_with_a_member_that_failed_is_not_measured(tmp_path: Path, monk
     block = tabulation.block
 
     def fail(layout: Layout, rows: slice) -> Any:
-        if layout.material.name == "grey-003":
+        if layout.source.name == "grey-003":
             raise RuntimeError("no idea")
         return block(layout, rows)
 

@@ -124,9 +124,11 @@ def test_what_is_no_table_is_refused_with_a_sentence(root: Path, tmp_path: Path)
         opened(root, material="clay", revision="r000009")
     with pytest.raises(StoreError, match=r"^no table at .*empty: name a revision, a material of a store, or"):
         opened(tmp_path / "empty")
-    xr.Dataset({"rho": ("theta", [0.5, 0.25])}).to_zarr(tmp_path / "odd", consolidated=False)
-    with pytest.raises(StoreError, match=r"odd is no table: brdf: neither it nor parts is among the arrays rho$"):
-        opened(tmp_path / "odd")
+    publish_dataset(tmp_path / "other", "odd", xr.Dataset({"rho": ("theta", [0.5, 0.25])}))
+    copy = shutil.copytree(tmp_path / "other" / "materials" / "odd" / "r000001", tmp_path / "copy")
+    for place in (tmp_path / "other" / "materials" / "odd", copy):
+        with pytest.raises(StoreError, match=r"is no table: brdf: neither it nor parts is among the arrays rho$"):
+            opened(place)
 
 
 def test_a_damaged_chunk_is_an_error_when_it_is_read(root: Path, tmp_path: Path) -> None:

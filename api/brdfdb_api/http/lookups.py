@@ -214,11 +214,14 @@ def evaluate(points: Points, options: Options, table: Table, *, specular: bool =
         source: Table | Material = table
         at = points.wavelength_nm
         if options.source == "model":
-            from brdfdb.tables.albedo import material_of
+            from brdfdb.materials import Material
 
             at = points.wavelengths(table)
             table.specular_reflectance(0.0, at)  # no further than the table reaches
-            source = material_of(table)
+            if not isinstance(table.source, Material):
+                said = f"the table of {table.name} keeps no model; ask for from=table"
+                raise RequestError(422, f"from: {said}", "from")
+            source = table.source
 
         def spectra(angles: Angles) -> tuple[Any, Any]:
             if options.error:
