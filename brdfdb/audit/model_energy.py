@@ -12,7 +12,7 @@ from brdfdb.audit.findings import EnergyVerdict, Furnace, ModelEnergy, UniformBo
 from brdfdb.figure import numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import spectral_albedo
-from brdfdb.integrals.uniform_bound import a_max
+from brdfdb.integrals.uniform_bound import largest_uniform_beside
 from brdfdb.materials import Material
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
@@ -89,7 +89,7 @@ def model_energy_of(
         max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
         exceeds_1_from_theta_i_deg=first,
         furnace=furnace,
-        bound_on_a=_bound(material, arguments, lights, found) if material.model == "he_torrance" else None,
+        bound_on_a=_bound(material, arguments, lights, found),
         verdict=verdict,
         reason=reason,
     )
@@ -264,11 +264,17 @@ def _furnace(
     )
 
 
-def _bound(material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected) -> UniformBound:
-    """The largest a: what reflects with a uniform part of a reflects as much less without it, at every light."""
-    a = float(material.parameters["a"])
-    surfaces = {name: value for name, value in arguments.items() if name != "a"}
-    largest = a_max(radians(lights.theta_i_deg), found.largest - a, surfaces, BOUND_TOLERANCE)
+def _bound(material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected) -> UniformBound | None:
+    """Return the largest albedo of a uniform part that only energy bounds; None of other models.
+
+    With a uniform part of a, a surface reflects as much more than without it, at every light.
+    """
+    spec = material.spec
+    if spec.uniform_bound_cosine is None or spec.uniform is None:
+        return None
+    a = float(material.parameters[spec.uniform])
+    surfaces = {name: value for name, value in arguments.items() if name != spec.uniform}
+    largest = largest_uniform_beside(spec, radians(lights.theta_i_deg), found.largest - a, surfaces, BOUND_TOLERANCE)
     wavelength_nm = np.ravel(arguments["wavelength_nm"])
     return UniformBound(
         wavelength_nm=wavelength_nm.tolist(),

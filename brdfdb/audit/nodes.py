@@ -77,7 +77,8 @@ def _rows(layout: Layout) -> Iterator[slice]:
     """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
     slow = isinstance(layout.source, Material) and layout.source.spec.slow
-    most = (_MOST_SLOW if slow else MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
+    values = _MOST_SLOW if slow else MOST_VALUES
+    most = values // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
     if most >= layout.shape[0]:
         yield from layout.blocks
         return

@@ -25,7 +25,7 @@ from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import POLE_END_DEG
 
-Kind = FormKind | Literal["table"]
+Kind = Literal[FormKind, "table"]
 Evaluate = Callable[[Floats, Floats], Floats]
 
 TOLERANCES = (0.1, 0.01, 0.001)

@@ -15,6 +15,7 @@ from brdfdb.forms.tradeoff_document import (
     Chart,
     Cost,
     Curve,
+    Diagnostic,
     FamilyChart,
     Fronts,
     Point,
@@ -206,7 +207,7 @@ def chart_family(
         model=sweep.model,
         axes=sweep.axes,
         members=sweep.members,
-        g=_g(materials, wavelength_nm),
+        diagnostic=_diagnostic(materials, wavelength_nm),
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         truth=timed[0].key,
         curves=[
@@ -229,12 +230,14 @@ def chart_family(
     )
 
 
-def _g(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> list[float] | None:
-    """Eq. 79 of He et al. along the normal, where nothing is hidden and sigma is sigma_0; None of other models."""
-    if materials[0].model != "he_torrance" or wavelength_nm is None:
+def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:
+    """Return what the model of a family names as its diagnostic, for each member; None if it names none."""
+    found = materials[0].spec.diagnostic
+    if found is None:
         return None
-    middle_um = 1e-3 * float(wavelength_nm[wavelength_nm.size // 2])
-    return [float(f"{(4.0 * np.pi * m.parameters['sigma_0_um'] / middle_um) ** 2:.3g}") for m in materials]
+    middle = None if wavelength_nm is None else wavelength_nm[wavelength_nm.size // 2]
+    values = [float(f"{found.value(material.arguments(middle)):.3g}") for material in materials]
+    return Diagnostic(symbol=found.symbol, title=found.title, values=values)
 
 
 def _timed(

@@ -60,8 +60,8 @@ def draw(source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, 
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
     light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
-    its own distribution hardly ever reaches the shoulder where the lobe ends. Without a lobe, all viewers are drawn
-    over the hemisphere.
+    its own distribution hardly ever reaches the shoulder where the lobe ends. Viewers of a source without a lobe are
+    all drawn over the hemisphere.
     """
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)

@@ -209,8 +209,8 @@ def _print_family(whole: FamilyChart) -> None:
                 cells.append("-" if middle is None else f"{'*' if chosen else ''}{percent(middle)}")
             rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
         columns = [f"{value:g}" for value in values]
-        if whole.g is not None and len(whole.axes) == 1:
-            rows.insert(0, ("", "g along the normal", "", *map(terminal.count, whole.g)))
+        if whole.diagnostic is not None and len(whole.axes) == 1:
+            rows.insert(0, ("", whole.diagnostic.title, "", *map(terminal.count, whole.diagnostic.values)))
         title = f"{whole.family}: {whole.title}. Mean error along {axis}; * is worth having"
         terminal.print_table(title, ("key", "form", "ns a value", *columns), rows, numbers=("ns a value", *columns))
     print(f"  times are those of one member, {whole.curves[0].timed} for most")
@@ -236,8 +236,8 @@ def _where(whole: FamilyChart, members: Sequence[int]) -> str:
         inside = [points[index][number] for index in members]
         least, most = min(inside), max(inside)
         spans.append(f"{axis} {least:g} to {most:g}" if least < most else f"{axis} {least:g}")
-    if whole.g is not None:
-        inside = [whole.g[index] for index in members]
+    if whole.diagnostic is not None:
+        symbol, inside = whole.diagnostic.symbol, [whole.diagnostic.values[index] for index in members]
         least, most = min(inside), max(inside)
-        spans.append(f"g {least:g} to {most:g}" if least < most else f"g {least:g}")
+        spans.append(f"{symbol} {least:g} to {most:g}" if least < most else f"{symbol} {least:g}")
     return f"at {len(members)} of {len(points)} members, {', '.join(spans)}"
