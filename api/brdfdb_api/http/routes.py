@@ -220,13 +220,11 @@ def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
 
 
 def _verdicts(finding: dict[str, Any], when: str, revision: str) -> dict[str, Any]:
-    """The verdict of an audit, and of each finding that has one."""
-    each = {key: value["verdict"] for key, value in finding.items() if isinstance(value, dict) and "verdict" in value}
+    """Return the verdict of an audit, and its findings in sentences."""
     return {
         "verdict": finding["verdict"],
-        "findings": each,
-        "reason": finding["energy"]["reason"],
-        "validity": finding["validity"]["standing"],
+        "model": finding["model"],
+        "sentences": finding["sentences"],
         "revision": finding["revision"],
         "current": finding["revision"] == revision,
         "when": when,
