@@ -23,7 +23,7 @@ from brdfdb.forms.tradeoff_document import (
     Saving,
     Work,
 )
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 from brdfdb.store.family import Family, Sweep
 from brdfdb.tables import error_measurement
@@ -38,21 +38,21 @@ SHARE, CONFIDENCE = 0.99, 0.95  # the percentile that is charted, and the confid
 
 
 def chart(
-    material: Material,
+    source: Source,
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float] | None = None,
     *,
     also: Sequence[Form] = (),
     tick: Callable[[], None] = lambda: None,
 ) -> Chart:
-    """Measure error and cost of every form of a material.
+    """Measure error and cost of every form of a source.
 
     Parameters
     ----------
-    material : Material
-        Of any model.
+    source : Source
+        Material, function, or table of a store.
     wavelength_nm : array of shape (L,) [nm], or None
-        For spectral materials, and only for them.
+        For spectral sources, and only for them.
     tolerances : sequence of float, optional
         Of planned tables, as `catalogue.forms` takes them.
     also : sequence of Form
@@ -70,9 +70,9 @@ def chart(
     ValueError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
     """
-    forms = [*catalogue.forms(material, wavelength_nm, tolerances), *also]
+    forms = [*catalogue.forms(source, wavelength_nm, tolerances), *also]
     tick()
-    drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+    drawn = error_measurement.draw(source, wavelength_nm, DIRECTIONS, SEED)
     errors = _errors(forms, drawn)
     tick()
     batch, block, single = _timed(forms, drawn, tick)
@@ -81,7 +81,7 @@ def chart(
     middle = None if wavelength_nm is None else float(wavelength_nm[wavelength_nm.size // 2])
     samplers = [
         Sampler(key=key, title=sampler_efficiency.SAMPLERS[key], albedo=_work(albedo), sphere=_work(sphere))
-        for key, (albedo, sphere) in sampler_efficiency.works(material, middle).items()
+        for key, (albedo, sphere) in sampler_efficiency.works(source, middle).items()
     ]
     tick()
     seconds = np.stack([each.seconds for each in batch], axis=1)
@@ -91,10 +91,10 @@ def chart(
         return _front(forms, [error["l1"] for error in errors], costs)
 
     return Chart(
-        material=material.name,
-        title=material.title,
-        model=material.model,
-        parameters=material.file_parameters(),
+        material=source.name,
+        title=source.title,
+        model=source.model if isinstance(source, Material) else "function",
+        parameters=source.file_parameters() if isinstance(source, Material) else {},
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         directions=int(np.count_nonzero(drawn.above)),
         truth=forms[0].key,
