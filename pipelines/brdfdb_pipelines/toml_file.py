@@ -14,7 +14,7 @@ from brdfdb.errors import BrdfdbError
 
 MOST_BYTES = 4_000_000  # of a file: tomllib reads about a megabyte a second
 MOST_KEY_PARTS = 64  # of a dotted key: tomllib takes memory that grows with their square
-_MOST_BITS = 8192  # of an integer: far above what any field takes
+_MOST_BITS = 14_000  # of an integer: Python prints no more than 4300 digits
 
 _PART = r"""(?:"[^"\n]*"|'[^'\n]*'|[\w-]++)"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_KEY_PARTS}}}")
