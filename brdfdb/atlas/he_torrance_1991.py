@@ -25,7 +25,7 @@ from brdfdb.atlas._errors import (
 from brdfdb.figure import Figure
 from brdfdb.geometry import unit_vector
 from brdfdb.misprints import HE
-from brdfdb.models._he_torrance_series import diffraction_series
+from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
 
 CLOSED = 1e-10  # as the models promise; worst measured: 8.8e-13, with the sum of eq. 78, 8e-16 without

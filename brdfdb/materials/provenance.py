@@ -9,6 +9,9 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from brdfdb.errors import ParameterError
 
+MOST_NAME = 128  # characters of a name: file systems take 255 bytes
+NAME_PATTERN = r"^[a-z0-9]+(-[a-z0-9]+)*$"  # lower-case words joined by hyphens
+
 _CONTROLS = ("Cc", "Cf", "Cs")
 
 

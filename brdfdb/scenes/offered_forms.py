@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.forms.catalogue import Representation, representations
+from brdfdb.forms import catalogue
+from brdfdb.forms.catalogue import Form
 from brdfdb.geometry import radians
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.scenes.shapes import Array
 
@@ -28,7 +29,7 @@ class Candidate:
     `wavelength_nm` is None of a grey form; between its wavelengths f_r is interpolated on straight lines.
     """
 
-    form: Representation
+    form: Form
     wavelength_nm: NDArray[np.float64] | None
 
     def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
@@ -38,14 +39,14 @@ class Candidate:
 
 
 def candidates(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
+    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
 ) -> list[Candidate]:
     """Forms to choose from, the truth first: at all wavelengths, and of spectral materials at fewer.
 
     Parameters
     ----------
-    material : Material
-        Of any model.
+    source : Source
+        Material, or table of a store.
     wavelength_nm : array of shape (L,) [nm], or None
         Those of the scene, for spectral materials, and only for them.
     tolerances : sequence of float, optional
@@ -59,30 +60,28 @@ def candidates(
     Raises
     ------
     ValueError
-        As `brdfdb.forms.catalogue.representations` does.
+        As `brdfdb.forms.catalogue.forms` does.
     """
     if tolerances is None and wavelength_nm is None:
         tolerances = GREY_TOLERANCES
-    found = [Candidate(form, wavelength_nm) for form in _offered(material, wavelength_nm, tolerances)]
+    found = [Candidate(form, wavelength_nm) for form in _offered(source, wavelength_nm, tolerances)]
     for count in SAMPLINGS if wavelength_nm is not None else ():
         assert wavelength_nm is not None
         if count < wavelength_nm.size:
             few = wavelength_nm[np.round(np.linspace(0, wavelength_nm.size - 1, count)).astype(np.int64)]
-            found += [
-                Candidate(_between(form, few, wavelength_nm), few) for form in _offered(material, few, tolerances)
-            ]
+            found += [Candidate(_between(form, few, wavelength_nm), few) for form in _offered(source, few, tolerances)]
     return [each for each in found if each.form.kind != "other model" and not each.form.rounded]
 
 
 def _offered(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None
-) -> list[Representation]:
+    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None
+) -> list[Form]:
     """Return all forms of a material, and its tables a second time, with the truth at limbs."""
-    forms = representations(material, wavelength_nm, tolerances)
+    forms = catalogue.forms(source, wavelength_nm, tolerances)
     return [*forms, *(_with_true_limbs(form, forms[0]) for form in forms if form.kind == "table")]
 
 
-def _with_true_limbs(form: Representation, truth: Representation) -> Representation:
+def _with_true_limbs(form: Form, truth: Form) -> Form:
     """Return a form that leaves directions beyond `LIMB_DEG`, of light or viewer, to the truth."""
     least = np.cos(radians(LIMB_DEG))
 
@@ -103,7 +102,7 @@ def _with_true_limbs(form: Representation, truth: Representation) -> Representat
     )
 
 
-def _between(form: Representation, few: Array, wavelength_nm: Array) -> Representation:
+def _between(form: Form, few: Array, wavelength_nm: Array) -> Form:
     """A form at a few wavelengths, interpolated to all of them."""
     weights = np.stack([np.interp(wavelength_nm, few, one) for one in np.eye(few.size)]).astype(form.dtype)
 

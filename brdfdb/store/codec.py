@@ -63,7 +63,7 @@ def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
         If the checksum is not that of the bytes.
     """
     if google_crc32c.value(data[:-4]) != int.from_bytes(data[-4:], "little"):
-        raise StoreError(f"{layout.material.name}: the checksum of {chunk_name(layout, number)} is wrong")
+        raise StoreError(f"{layout.source.name}: the checksum of {chunk_name(layout, number)} is wrong")
     rows = layout.blocks[number]
     whole = np.frombuffer(_BLOSC.decode(data[:-4]), dtype="<f4").reshape(layout.block_rows, *layout.shape[1:])
     return whole[: rows.stop - rows.start]

@@ -254,7 +254,7 @@ def _layout(text: str) -> Layout:
     document = json.loads(text)
     layout = Layout.from_document(document)
     if json.loads(json.dumps(layout.document())) != document:
-        raise StoreError(f"{layout.material.name}: the table was laid out by another version of this program")
+        raise StoreError(f"{layout.source.name}: the table was laid out by another version of this program")
     return layout
 
 
@@ -285,7 +285,7 @@ def write_block(staging: str, layout: str, number: int) -> Block:
     if (entry := _kept(marker, path, layout)) is not None:
         return {"name": name, "entry": entry, "kept": True}
     data = encoded(table, number, tabulation.block(table, table.blocks[number]))
-    with writing(directory.parent.parent.parent, table.material.name):
+    with writing(directory.parent.parent.parent, table.source.name):
         entry = write_file(path, data, directory)
         write_json(marker, {**entry, "layout": _short(layout)}, directory)
     return {"name": name, "entry": entry, "kept": False}
@@ -322,13 +322,13 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
 
     directory = Path(staging)
     table = _layout(layout)
-    request = read_sealed(directory / "request.json", table.material.name)
-    with writing(directory.parent.parent.parent, table.material.name):
+    request = read_sealed(directory / "request.json", table.source.name)
+    with writing(directory.parent.parent.parent, table.source.name):
         write_file(directory / "table" / table.variable / "zarr.json", array_metadata(table), directory)
     measured = {"request": request, "request_sha256": digest(request), "error": _measured(table, directory / "table")}
     metadata = tabulation.metadata_of(table).model_copy(update=measured)
     frame = tabulation.frame(table).assign_attrs(metadata.attributes())
-    with writing(directory.parent.parent.parent, table.material.name):
+    with writing(directory.parent.parent.parent, table.source.name):
         return {
             name: write_file(directory / "table" / name, data, directory)
             for name, data in frame_files(table, frame).items()

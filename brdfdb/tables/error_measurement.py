@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.sampling import lobe_of, mirrored_in_lobe, mixture_density
-from brdfdb.materials import Material
-from brdfdb.parameters import Floats, Lobe
+from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
+from brdfdb.materials import Source
+from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Grid
@@ -33,7 +33,7 @@ _IN_PLACES, _BETWEEN, _BETWEEN_IN_PLACES = 1 / 10, 1 / 6, 1 / 15
 _WITHIN, _CONFIDENCE = 0.98, 0.98  # share of the values within a limit, and how sure that is
 _SEARCHED, _SEARCHED_AT = (9, 400), 40  # wavelengths of an interval, of all; directions of a band: for the worst
 _WINDOW = 1 << 21  # values of a table that are held at a time
-_MODEL = 1 << 16  # directions at which the model is evaluated at a time
+_EVALUATED = 1 << 16  # directions at which the source is evaluated at a time
 
 
 class Draw(NamedTuple):
@@ -55,13 +55,13 @@ class Draw(NamedTuple):
         return np.asarray(self.weight > 0.0)
 
 
-def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int) -> Draw:
-    """`count` pairs of directions a band, half of the viewers over the hemisphere and half in the lobe.
+def draw(source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int) -> Draw:
+    """Draw `count` pairs of directions a band, half of the viewers over the hemisphere and half in the lobe.
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
-    light is mirrored in half vectors that follow `ModelSpec.lobe`, of the wavelengths in turn, or a lobe twice as wide:
-    its own Gaussian hardly ever reaches the shoulder where the lobe ends. Viewers of a model without a lobe are all
-    drawn over the hemisphere.
+    light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
+    its own distribution hardly ever reaches the shoulder where the lobe ends. Viewers of a source without a lobe are
+    all drawn over the hemisphere.
     """
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
@@ -69,12 +69,13 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
     wi = unit_vector(theta_i, rng.uniform(0.0, 2.0 * np.pi, band.size))
     u, angle = 1.0 - rng.random(band.size), rng.uniform(0.0, 2.0 * np.pi, band.size)
     over = unit_vector(np.arccos(u), angle)
-    if material.spec.lobe is None:
+    in_turn = None if wavelength_nm is None else wavelength_nm[np.arange(band.size) % wavelength_nm.size]
+    lobe = source.lobe(wi[:, 2], in_turn)
+    if lobe is None:
         return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), np.zeros(band.size, dtype=bool))
-    turns = np.arange(band.size) % (1 if wavelength_nm is None else wavelength_nm.size)
-    spectrum = material.arguments(wavelength_nm)
-    lobe = lobe_of(material.spec, wi, {name: v[turns] if np.ndim(v) else v for name, v in spectrum.items()})
-    lobes = [Lobe(np.ones(1), width * lobe.alpha_x, width * lobe.alpha_y) for width in WIDTHS]
+    lobes = [
+        lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y) for width in WIDTHS
+    ]
     which = rng.random(band.size) * 2 * len(lobes)  # one half over the hemisphere, the other among the lobes
     wr = over
     for number, drawn in enumerate(lobes):
@@ -84,12 +85,12 @@ def draw(material: Material, wavelength_nm: NDArray[np.float64] | None, count: i
     return Draw(wi, wr, band, np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density, which < len(lobes))
 
 
-def model_values(material: Material, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:
-    """f_r [1/sr] of the model, of shape (N, L), L = 1 for a grey material."""
-    brdf = material.brdf_at(wavelength_nm)
+def model_values(source: Source, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:
+    """Return f_r [1/sr] of a source, of shape (N, L), L = 1 for a grey one."""
+    brdf = source.brdf_at(wavelength_nm)
     values = np.empty((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
-    for start in range(0, len(wi), _MODEL):
-        some = slice(start, start + _MODEL)
+    for start in range(0, len(wi), _EVALUATED):
+        some = slice(start, start + _EVALUATED)
         values[some] = brdf(wi[some], wr[some])
     return values
 
@@ -148,10 +149,10 @@ def measure(
     if count is None:
         several = layout.wavelength_nm is not None and layout.wavelength_nm.size > _FEW
         count = _FEWER_DIRECTIONS if several else DIRECTIONS
-    drawn = draw(layout.material, layout.wavelength_nm, count, seed)
+    drawn = draw(layout.source, layout.wavelength_nm, count, seed)
     pairs = places.draw(math.ceil(count * _IN_PLACES), seed)
     wi, wr = np.concatenate([drawn.wi, pairs.wi]), np.concatenate([drawn.wr, pairs.wr])
-    truth = model_values(layout.material, layout.wavelength_nm, wi, wr)
+    truth = model_values(layout.source, layout.wavelength_nm, wi, wr)
     found = _looked_up(layout, read, wi, wr, layout.wavelength_nm)
     own = len(drawn.wi)
     error = compare(found[:own], truth[:own], drawn, seed)
@@ -176,12 +177,12 @@ def _between(
     assert layout.wavelength_nm is not None
     few = _first(drawn.band, min(count, _SEARCHED_AT)) & drawn.above
     at = worst_wavelengths(
-        layout.material, layout.wavelength_nm, layout.interpolation, drawn.wi[few], drawn.wr[few], floor
+        layout.source, layout.wavelength_nm, layout.interpolation, drawn.wi[few], drawn.wr[few], floor
     )
     some = _first(drawn.band, math.ceil(count * _BETWEEN)) & drawn.above
     fewer = pairs.some(_first(pairs.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
     wi, wr = np.concatenate([drawn.wi[some], fewer.wi]), np.concatenate([drawn.wr[some], fewer.wr])
-    found, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.material, at, wi, wr)
+    found, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.source, at, wi, wr)
     error = relative(truth, found, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
     own = np.count_nonzero(some)
     return Between(
@@ -192,9 +193,9 @@ def _between(
 
 
 def worst_wavelengths(
-    material: Material, stored: NDArray[np.float64], how: Interpolation, wi: Floats, wr: Floats, floor: Floats
+    source: Source, stored: NDArray[np.float64], how: Interpolation, wi: Floats, wr: Floats, floor: Floats
 ) -> NDArray[np.float64]:
-    """Return the wavelength [nm] inside each interval where interpolation of the model itself is worst.
+    """Return the wavelength [nm] inside each interval where interpolation of the source itself is worst.
 
     Nine or more wavelengths of an interval are tried, at a few pairs of directions `wi`, `wr`. `floor` is that of the
     `stored` wavelengths, `how` the interpolation of the table.
@@ -204,11 +205,11 @@ def worst_wavelengths(
     share = np.arange(1, within + 1) / (within + 1)
     at = (stored[:-1, np.newaxis] + np.diff(stored)[:, np.newaxis] * share).reshape(-1)
     mu = np.maximum(wi[:, 2], COS_HORIZON) * np.maximum(wr[:, 2], COS_HORIZON)
-    numbers = how.numbers(model_values(material, stored, wi, wr), mu)
+    numbers = how.numbers(model_values(source, stored, wi, wr), mu)
     nodes, weight = weights_of_nodes(stored, at)
     error = relative(
         np.maximum(how.f_r(np.sum(numbers[:, nodes] * weight, axis=-1), mu), 0.0),
-        model_values(material, at, wi, wr),
+        model_values(source, at, wi, wr),
         np.repeat(np.maximum(floor[1:], floor[:-1]), within),
     )
     worst = np.percentile(error, 95.0, axis=0).reshape(intervals, within).argmax(axis=1)

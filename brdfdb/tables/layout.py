@@ -1,7 +1,8 @@
-"""What a table is going to be: its material, grid and wavelengths, decided and checked before anything is computed."""
+"""Layouts: the source, grid and wavelengths of a table, decided and checked before anything is computed."""
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import math
@@ -13,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from brdfdb.errors import ParameterError
-from brdfdb.materials import Material
+from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.materials import Material, Source, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Grid, check_wavelengths
 
@@ -83,16 +84,19 @@ PLAIN = Interpolation()
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A table that is still to be computed: plain data that travels to workers and into a staging directory.
+    """A table that is still to be computed.
+
+    The layout of a material is plain data that travels to workers and into a staging directory. That of a function
+    stays in this process.
 
     Parameters
     ----------
-    material : Material
-        Model, parameters and where they come from.
+    source : Source
+        Material or function to tabulate.
     grid : Grid
-        Angles [degree]; anisotropic for anisotropic materials.
+        Angles [degree]; anisotropic for anisotropic sources.
     wavelength_nm : array of shape (L,) [nm], optional
-        For spectral materials, and only for them.
+        For spectral sources, and only for them.
     interpolation : Interpolation
         How the numbers of the table become f_r between its nodes; by default they are f_r, and linear.
     spectra : array of shape (parts, L), optional
@@ -105,12 +109,12 @@ class Layout:
     Raises
     ------
     ValueError
-        If grid or wavelengths do not suit the material: no wavelengths for a spectral one, an isotropic grid for an
+        If grid or wavelengths do not suit the source: no wavelengths for a spectral one, an isotropic grid for an
         anisotropic one, an azimuth of 90 or 180 degrees for a surface without the symmetry of an ellipse, a node at 90
-        degrees where the model has a pole.
+        degrees where f_r has a pole.
     """
 
-    material: Material
+    source: Source
     grid: Grid
     wavelength_nm: NDArray[np.float64] | None = None
     interpolation: Interpolation = PLAIN
@@ -119,41 +123,35 @@ class Layout:
     reason: str = ""
 
     def __post_init__(self) -> None:
-        material = self.material
-        if material.spectral != (self.wavelength_nm is not None):
+        source = self.source
+        if source.spectral != (self.wavelength_nm is not None):
+            raise ParameterError("wavelengths_nm", f"{source.name} {'needs them' if source.spectral else 'is grey'}")
+        if source.anisotropic and not self.grid.anisotropic:
             raise ParameterError(
-                "wavelengths_nm", f"{material.name} {'needs them' if material.spectral else 'is grey'}"
+                "grid", f"{source.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r"
             )
-        if material.anisotropic and not self.grid.anisotropic:
-            raise ParameterError(
-                "grid", f"{material.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r"
-            )
-        if material.anisotropic and material.spec.lobe_axes is None and self.grid.copies > 1:
-            raise ParameterError("grid", f"{material.name} has no symmetry of an ellipse; phi must end at 360 degrees")
-        if material.spec.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
-            raise ParameterError(
-                "grid",
-                f"theta of 90 degrees is a pole of the model {material.spec.name} ({material.name}); "
-                "end the axis below 90",
-            )
+        if source.anisotropic and not source.elliptical and self.grid.copies > 1:
+            raise ParameterError("grid", f"{source.name} has no symmetry of an ellipse; phi must end at 360 degrees")
+        if source.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
+            raise ParameterError("grid", f"theta of 90 degrees is a pole of {source.name}; end the axis below 90")
         if self.wavelength_nm is not None:
             object.__setattr__(self, "wavelength_nm", check_wavelengths(self.wavelength_nm))
-            material.arguments(self.wavelength_nm)
+            source.brdf_at(self.wavelength_nm)
 
     @property
     def plain(self) -> bool:
         """Whether the stored numbers are f_r itself."""
         return self.interpolation.plain and self.spectra is None
 
-    @property
-    def apart(self) -> str | None:
-        """The parameter whose part of f_r, the same in all directions, is not in the table but beside it."""
-        return None if self.plain else self.material.spec.uniform
+    @functools.cached_property
+    def tabulated(self) -> Source:
+        """The source whose f_r is in the table: without its uniform part, unless the stored numbers are f_r itself."""
+        return self.source if self.plain else self.source.without_uniform()
 
     @property
     def uniform(self) -> NDArray[np.float64] | None:
-        """That part [1/sr], of shape (1,)."""
-        return None if self.apart is None else np.array([self.material.parameters[self.apart] / np.pi])
+        """The uniform part [1/sr], of shape (1,), where it is beside the table and not in it."""
+        return None if self.plain or self.source.uniform is None else np.array([self.source.uniform])
 
     @property
     def variable(self) -> str:
@@ -196,11 +194,10 @@ class Layout:
         ]
 
     def document(self) -> dict[str, Any]:
-        """All that decides the values, ready for JSON; `from_document` makes the same layout of it."""
+        """Return all that decides the values, as JSON, but for the function of a source that is one."""
         return {
             "table_version": TABLE_VERSION,
-            "model_version": self.material.spec.version,
-            "material": self.material.model_dump(mode="json"),
+            **self.source.document(),
             "grid": {name: nodes.tolist() for name, nodes in self.grid.axes.items()},
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
             "interpolation": asdict(self.interpolation),
@@ -211,12 +208,24 @@ class Layout:
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Layout:
-        """The layout that a document describes."""
+        """Return the layout that a document describes.
+
+        Raises
+        ------
+        BrdfdbError
+            If its source is a function, which a document cannot hold.
+        """
+        source = source_of(document)
+        if not isinstance(source, Material):
+            raise BrdfdbError(
+                f"{source.name}: is a function, which no other process can read from a file; tabulate it in this one, "
+                "with brdfdb.store.publication.publish"
+            )
         arrays = {
             name: None if document[name] is None else np.array(document[name]) for name in ("wavelength_nm", "spectra")
         }
         return cls(
-            Material.model_validate(document["material"]),
+            source,
             Grid(document["grid"]),
             interpolation=Interpolation(**document["interpolation"]),
             bits=document["bits"],

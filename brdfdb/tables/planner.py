@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement, tabulation
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -111,9 +111,9 @@ _Candidate = tuple[float, Layout, dict[str, _Need]]
 
 
 class _Task(NamedTuple):
-    """What is planned: a material at a few wavelengths, directions, the model there, and the tolerance."""
+    """A plan to make: a source at a few wavelengths, directions, f_r there, and the tolerance."""
 
-    material: Material
+    source: Source
     wavelength_nm: NDArray[np.float64] | None
     drawn: error_measurement.Draw
     truth: Floats
@@ -126,19 +126,19 @@ def check_tolerance(tolerance: float) -> None:
         raise ParameterError("tolerance", f"{tolerance:g} is outside [0.0001, 0.5]", tolerance, (1e-4, 0.5))
 
 
-def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout:
-    """The smallest table that keeps to a tolerance.
+def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout:
+    """Return the layout of the smallest table that keeps to a tolerance.
 
     Parameters
     ----------
-    material : Material
-        What is to be tabulated.
+    source : Source
+        Material or function to tabulate.
     wavelength_nm : array of shape (L,) [nm], or None
-        For spectral materials, and only for them.
+        For spectral sources, and only for them.
     tolerance : float
-        The 99th percentile of the relative error of f_r against the model, over the directions that `accuracy.draw`
-        describes, at the worst wavelength; in [1e-4, 0.5]. The l1 error keeps to it, too, and each band of theta_i to
-        thirty times as much.
+        The 99th percentile of the relative error of f_r against the source, at the worst wavelength, over the
+        directions of `brdfdb.tables.error_measurement.draw`; in [1e-4, 0.5]. The l1 error keeps to it, too, and each
+        band of theta_i to thirty times as much.
 
     Returns
     -------
@@ -158,9 +158,9 @@ def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, toleranc
     that promise the fewest values are tabulated, measured, and made coarser or finer until they keep to the tolerance.
     """
     check_tolerance(tolerance)
-    task = _task(material, wavelength_nm, tolerance)
+    task = _task(source, wavelength_nm, tolerance)
     if not task.truth.any():
-        return Layout(material, coarsest(material), wavelength_nm, reason="f_r is 0: all light is in the Dirac part")
+        return Layout(source, coarsest(source), wavelength_nm, reason="f_r is 0: all light is in the Dirac part")
     candidates = tried = list(_candidates(task))
     for stricter in _STRICTER:
         layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
@@ -171,7 +171,7 @@ def plan(material: Material, wavelength_nm: NDArray[np.float64] | None, toleranc
             return replace(finished, reason=_reason(finished, tolerance, candidates))
     raise ParameterError(
         "tolerance",
-        f"{tolerance:g} takes more than {MOST_VALUES} values of {material.name}; ask for more error",
+        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for more error",
         tolerance,
     )
 
@@ -222,62 +222,61 @@ def _kind(layout: Layout) -> str:
     return f"{how.method} in {what}{weight} over {', '.join(layout.grid.names)}"
 
 
-def _task(material: Material, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> _Task:
+def _task(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> _Task:
     some = wavelength_nm
     if wavelength_nm is not None and wavelength_nm.size > _WAVELENGTHS:
         some = wavelength_nm[np.round(np.linspace(0, wavelength_nm.size - 1, _WAVELENGTHS)).astype(int)]
-    drawn = error_measurement.draw(material, some, _DRAWS, _SEED)
-    return _Task(material, some, drawn, error_measurement.model_values(material, some, drawn.wi, drawn.wr), tolerance)
+    drawn = error_measurement.draw(source, some, _DRAWS, _SEED)
+    return _Task(source, some, drawn, error_measurement.model_values(source, some, drawn.wi, drawn.wr), tolerance)
 
 
-def offset_of(material: Material, wavelength_nm: NDArray[np.float64] | None) -> float:
+def offset_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> float:
     """What is added to f_r [1/sr] before logarithms are taken: half the floor of its relative error."""
-    return _offset(_task(material, wavelength_nm, 0.01))
+    return _offset(_task(source, wavelength_nm, 0.01))
 
 
 def _offset(task: _Task) -> float:
     return float(max(0.5 * error_measurement.floor_of(task.truth, task.drawn).min(), 1e-12))
 
 
-def coarsest(material: Material) -> Grid:
-    """The smallest grid that suits a material."""
-    names = ANISOTROPIC_AXES if material.anisotropic else ISOTROPIC_AXES
-    ends = {name: _end(material, name) for name in names}
-    if material.spec.grazing_pole:
+def coarsest(source: Source) -> Grid:
+    """Return the smallest grid that suits a source."""
+    names = ANISOTROPIC_AXES if source.anisotropic else ISOTROPIC_AXES
+    ends = {name: _end(source, name) for name in names}
+    if source.grazing_pole:
         ends |= {"theta_i": POLE_END_DEG, "theta_r": POLE_END_DEG}
     return Grid({name: [0.0, end] for name, end in ends.items()})
 
 
-def _end(material: Material, name: str) -> float:
-    """Where an axis ends [degree], of which symmetry leaves out what it may."""
-    elliptical = material.spec.lobe_axes is not None
+def _end(source: Source, name: str) -> float:
+    """Return the end of an axis [degree]; symmetry leaves out what it may."""
     if name in ("phi_i", "phi_h"):
-        return 90.0 if elliptical else 360.0
-    if name == "phi_d" and material.anisotropic:
+        return 90.0 if source.elliptical else 360.0
+    if name == "phi_d" and source.anisotropic:
         return 180.0
     return _LINE[name][0]
 
 
 def _candidates(task: _Task) -> Iterator[_Candidate]:
     """Kinds of tables, each with the number of values that it is likely to take; simple ones first."""
-    material, spec = task.material, task.material.spec
+    source = task.source
     offset = _offset(task)
     kinds: list[tuple[str, ...]]
-    if material.anisotropic:
-        kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if spec.lobe_axes else [ANISOTROPIC_AXES]
+    if source.anisotropic:
+        kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if source.elliptical else [ANISOTROPIC_AXES]
     else:
-        kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if spec.lobe else [ISOTROPIC_AXES]
+        kinds = [ISOTROPIC_AXES, HALF_DIFFERENCE_AXES] if source.has_lobe else [ISOTROPIC_AXES]
     fewest = float(MOST_VALUES)
     for names in kinds:
-        for power in (0.5, 1.0, 0.0) if spec.grazing_pole else (0.0,):
+        for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
             # what goes on beyond the horizon may fall below 0, which a logarithm does not
             for logarithm in (True,) if "theta_h" in names else (True, False):
-                ends = {name: _end(material, name) for name in names}
-                if spec.grazing_pole and power == 0.0:
+                ends = {name: _end(source, name) for name in names}
+                if source.grazing_pole and power == 0.0:
                     ends |= {name: POLE_END_DEG for name in ("theta_i", "theta_r") if name in names}
                 grid = Grid({name: [0.0, end] for name, end in ends.items()})
                 layout = Layout(
-                    material,
+                    source,
                     grid,
                     task.wavelength_nm,
                     interpolation=Interpolation("linear", logarithm, offset if logarithm else 0.0, power),
@@ -288,7 +287,7 @@ def _candidates(task: _Task) -> Iterator[_Candidate]:
                     needs: dict[str, _Need] = {}
                     size = 1.0
                     for axis, name in enumerate(names):
-                        if name == "theta_r" and not material.anisotropic:
+                        if name == "theta_r" and not source.anisotropic:
                             needs[name] = needs["theta_i"]  # reciprocity
                         else:
                             if name not in lines:
@@ -429,9 +428,8 @@ def _finished(layout: Layout, wavelength_nm: NDArray[np.float64] | None, toleran
 
     None if not even all parts and bits keep to the tolerance.
     """
-    material = layout.material
-    drawn = error_measurement.draw(material, wavelength_nm, _FINAL_DRAWS, _SEED + 1)
-    truth = error_measurement.model_values(material, wavelength_nm, drawn.wi, drawn.wr)
+    drawn = error_measurement.draw(layout.source, wavelength_nm, _FINAL_DRAWS, _SEED + 1)
+    truth = error_measurement.model_values(layout.source, wavelength_nm, drawn.wi, drawn.wr)
     goal = _MARGIN * tolerance
     reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
     layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason)

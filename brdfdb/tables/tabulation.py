@@ -1,4 +1,4 @@
-"""From a material and a grid to a table: an xarray Dataset in memory that says where every number comes from."""
+"""Tabulation: from a layout to a table, an xarray Dataset in memory that says where every number comes from."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
         here = slice(start, min(start + step, rows.stop))
         at = slice(here.start - rows.start, here.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
-            for last, arguments in _spectrum(layout):
-                index: tuple[Any, ...] = (at, ..., *last)
-                values[index] = _evaluated(layout, here, arguments)
+            for number, wavelength in enumerate(_wavelengths(layout)):
+                index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
+                values[index] = _evaluated(layout, here, wavelength)
         else:
             numbers = node_numbers(layout, here)
             if layout.spectra is not None:
@@ -69,26 +69,27 @@ def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
     return ((whole + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
 
 
-def _spectrum(layout: Layout) -> list[tuple[tuple[int, ...], dict[str, Any]]]:
-    """The arguments of the model at each wavelength, and where their values go in the last dimension."""
-    if layout.wavelength_nm is None:
-        return [((), layout.material.arguments())]
-    return [((w,), layout.material.arguments(one)) for w, one in enumerate(layout.wavelength_nm)]
+def _wavelengths(layout: Layout) -> list[float | None]:
+    """Return the wavelengths [nm] of a table, one by one; None stands for those of a grey one."""
+    return [None] if layout.wavelength_nm is None else list(layout.wavelength_nm)
 
 
-def _evaluated(layout: Layout, rows: slice, arguments: dict[str, Any]) -> Floats:
-    """The model at some rows of the first axis; on a reciprocal grid with the smaller theta always the light's.
+def _evaluated(layout: Layout, rows: slice, wavelength_nm: float | None) -> Floats:
+    """Return f_r [1/sr] at some rows of the first axis; on a reciprocal grid with the smaller theta always the light's.
 
     There a table is its own transpose to the last bit, in whatever pieces it is computed.
     """
-    evaluate = layout.material.spec.evaluate
+
+    def evaluate(theta_i: Floats, phi_i: Floats, theta_r: Floats, phi_r: Floats) -> Floats:
+        return layout.tabulated.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+
     if not layout.grid.reciprocal:
-        return evaluate(*layout.grid.directions(rows), **arguments)
+        return evaluate(*layout.grid.directions(rows))
     theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
     here, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
     values = np.empty((here.size, theta.size, delta_phi.size))
-    values[:, rows.start :] = evaluate(*_spread(here, right, delta_phi), **arguments)
-    swapped = evaluate(*_spread(left, here, delta_phi), **arguments)
+    values[:, rows.start :] = evaluate(*_spread(here, right, delta_phi))
+    swapped = evaluate(*_spread(left, here, delta_phi))
     smaller = left < here[:, np.newaxis]
     np.copyto(values[:, : rows.stop], np.swapaxes(swapped, 0, 1), where=smaller[..., np.newaxis])
     return values
@@ -110,13 +111,12 @@ def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
         Unit vectors, at the horizon or above.
     """
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
-    return _numbers(layout, lambda arguments: layout.material.spec.vectors(wi, wr, **arguments), mu)
+    return _numbers(layout, lambda wavelength: layout.tabulated.lookup_vectors(wi, wr, wavelength), mu)
 
 
-def _numbers(layout: Layout, evaluate: Callable[[dict[str, Any]], Floats], mu: Floats) -> Floats:
-    """Numbers from f_r at the wavelengths of a layout, mu = cos theta_i cos theta_r."""
-    without = {} if layout.apart is None else {layout.apart: 0.0}
-    f_r = [evaluate(arguments | without) for _, arguments in _spectrum(layout)]
+def _numbers(layout: Layout, evaluate: Callable[[float | None], Floats], mu: Floats) -> Floats:
+    """Return numbers from f_r at the wavelengths of a layout, mu = cos theta_i cos theta_r."""
+    f_r = [evaluate(wavelength) for wavelength in _wavelengths(layout)]
     return layout.interpolation.numbers(np.stack(f_r, axis=-1).astype(np.float64), mu)
 
 
@@ -130,7 +130,7 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        return _numbers(layout, lambda arguments: _evaluated(layout, rows, arguments), mu)
+        return _numbers(layout, lambda wavelength: _evaluated(layout, rows, wavelength), mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
     axes[0] = axes[0][rows]
     nodes = np.ix_(*axes)
@@ -141,7 +141,7 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
 def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
     """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
     lowest = 0.0  # cosine of light and viewer
-    if layout.material.spec.grazing_pole and layout.interpolation.power == 0.0:
+    if layout.source.grazing_pole and layout.interpolation.power == 0.0:
         end = radians(POLE_END_DEG)
         lowest, theta_h = float(np.cos(end)), np.minimum(theta_h, end)
     # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
@@ -169,37 +169,32 @@ def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats
 
 def frame(layout: Layout) -> xr.Dataset:
     """All of a table but its values: coordinates, Dirac part, how to rebuild f_r, refractive indices, attributes."""
-    material, grid, wavelength_nm = layout.material, layout.grid, layout.wavelength_nm
-    spec = material.spec
+    source, grid, wavelength_nm = layout.source, layout.grid, layout.wavelength_nm
     spectral = () if wavelength_nm is None else ("wavelength",)
     coordinates: dict[str, Any] = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
     variables: dict[str, Any] = {}
-    arguments = material.arguments(wavelength_nm)
     if wavelength_nm is not None:
         coordinates["wavelength"] = (
             "wavelength",
             wavelength_nm,
-            {"units": "nm", "long_name": "wavelength in vacuum"},
+            {"units": "nm", "long_name": "wavelength in vacuum", "standard_name": "radiation_wavelength"},
         )
-        for name, meaning in (("n", "refractive index"), ("k", "extinction coefficient")):
-            variables[name] = ("wavelength", arguments[name], {"units": "1", "long_name": meaning})
+    if (indices := source.refractive_indices(wavelength_nm)) is not None:
+        for name, meaning, values in zip("nk", ("refractive index", "extinction coefficient"), indices, strict=True):
+            variables[name] = ("wavelength", values, {"units": "1", "long_name": meaning})
     if layout.spectra is not None:
         parts = np.arange(float(len(layout.spectra)))
         coordinates["part"] = ("part", parts, {"units": "1", "long_name": "number of a part"})
         variables["spectra"] = (("part", "wavelength"), layout.spectra, VARIABLES["spectra"])
     if layout.uniform is not None:
         variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])
-    if spec.specular is not None:
+    if source.has_specular:
         theta_i_deg = specular_nodes(layout)
         name = "specular_theta_i" if theta_i_deg is SPECULAR_THETA_DEG else "theta_i"
         coordinates[name] = _coordinate(name, theta_i_deg)
-        theta_i = radians(theta_i_deg)
         variables["specular_reflectance"] = (
             (name, *spectral),
-            spec.specular(
-                theta_i[:, np.newaxis] if spectral else theta_i,
-                **{name: arguments[name] for name in spec.specular_parameters},
-            ),
+            source.specular_reflectance(radians(theta_i_deg), wavelength_nm),
             {"units": "1", "long_name": "reflectance of the Dirac part, in the exact mirror direction"},
         )
     return xr.Dataset(variables, coordinates, metadata_of(layout).attributes())
@@ -232,25 +227,11 @@ def _reconstruction(layout: Layout) -> str:
 
 def metadata_of(layout: Layout) -> TableMetadata:
     """Return the metadata of a table that is known before its values are: without request and stated error."""
-    material, spec, wavelength_nm = layout.material, layout.material.spec, layout.wavelength_nm
-    # parameters by the names that files give them
-    written = dict(zip(material.parameters, material.file_parameters(), strict=True))
+    source, wavelength_nm = layout.source, layout.wavelength_nm
     return TableMetadata(
-        title=material.title,
-        material=material.name,
         table_version=TABLE_VERSION,
-        model=spec.name,
-        model_version=spec.version,
-        model_title=spec.title,
-        model_equation=spec.equation,
-        model_reference=spec.reference,
-        parameters=material.file_parameters(),
-        parameter_sources={written[name]: material.sources.get(name, material.source) for name in written},
-        source=material.source,
-        assumed={written.get(name, name): each for name, each in material.assumed.items()},
-        note=material.note,
-        refractive_index=material.refractive_index or "",
-        known_excess=material.known_excess,
+        **source.attributes(),
+        source_record=source.document(),
         conventions=(
             "directions point away from the surface; delta_phi = phi_r - phi_i, 0 is back towards the light, "
             "180 degrees the mirror half plane; f_r without cosine; isotropic tables are even in delta_phi"

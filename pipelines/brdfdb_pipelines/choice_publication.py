@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from brdfdb.errors import StoreError
+from brdfdb.store.publication import publish_layout
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import publish_dataset
-from brdfdb.tables import error_measurement
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import frame, tabulate
+from brdfdb.tables.tabulation import frame
 from brdfdb_pipelines import terminal
 
 
@@ -54,12 +53,10 @@ def _build(root: Path, name: str, layout: Layout) -> Built:
     store = Store(root)
     if _is_there(store, name, layout):
         return Built(store.head(name), f"{store.head(name)} of the store is this table")
-    table = tabulate(layout)
-    values = table[layout.variable].to_numpy()
-    error = error_measurement.measure(layout, lambda rows: values[rows])
     before = _before(store, name)
-    revision, _ = publish_dataset(root, name, table.assign_attrs(error=error.model_dump(mode="json")))
-    stated = f"{layout.material.model}, whose error (p99) is {terminal.error(error.overall.p99)}"
+    revision, _, error = publish_layout(root, name, layout)
+    model = layout.source.attributes().get("model", "a function")
+    stated = f"{model}, whose error (p99) is {terminal.error(error.overall.p99)}"
     return Built(revision, f"{revision} is a table of {stated}; it {before}")
 
 

@@ -55,7 +55,7 @@ def svg(chart: Chart | FamilyChart) -> str:
         text = io.StringIO()
         _canvas(chart).savefig(text, format="svg", metadata=_BLANK)
     opening, rest = figure_svg.kept_ids(figure_svg.shortened(text.getvalue()), "c").split(">", 1)
-    described = html.escape(f"{chart.title}: error of each representation over its cost")
+    described = html.escape(f"{chart.title}: error of each form over its cost")
     plate = '<rect width="100%" height="100%" fill="#fff"/>'
     return f'{opening} font-family="sans-serif" role="img" aria-label="{described}">{plate}{rest}\n'
 

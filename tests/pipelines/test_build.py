@@ -61,7 +61,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, name: str, error: BaseException) ->
     block = tabulation.block
 
     def fail(layout: Layout, rows: slice) -> Any:
-        if layout.material.name == name:
+        if layout.source.name == name:
             raise error
         return block(layout, rows)
 
@@ -376,8 +376,8 @@ def test_a_second_build_of_a_material_waits_and_then_has_nothing_to_do(
     block = tabulation.block
 
     def slow(layout: Layout, rows: slice) -> Any:
-        computed.append(layout.material.name)
-        if layout.material.name == "foam":
+        computed.append(layout.source.name)
+        if layout.source.name == "foam":
             began.set()
             assert go.wait(30)
         return block(layout, rows)

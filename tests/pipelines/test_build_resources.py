@@ -42,7 +42,7 @@ def layout(name: str, half: bool, how: Interpolation, nodes: int, rows: int) -> 
 def test_a_task_takes_at_most_the_memory_that_is_expected_and_not_a_tenth_of_it(table: Layout, tmp_path: Path) -> None:
     staging.make_store(tmp_path / "store")
     text = json.dumps(table.document())
-    directory = str(staging.prepare(tmp_path / "store", table.material.name, {"asked": "by a test"}, text))
+    directory = str(staging.prepare(tmp_path / "store", table.source.name, {"asked": "by a test"}, text))
     for number in range(len(table.blocks)):  # the first time kernels are compiled
         staging.write_block(directory, text, number)
     staging.write_frame(directory, text)

@@ -77,8 +77,8 @@ def test_a_table_that_answers_is_left_whatever_it_was_chosen_for(store: Path) ->
     choice_publication.build(store, {NAME: with_reason(layout(10), "table", "spheres")})
     same = choice_publication.build(store, {NAME: with_reason(layout(10), "table", "clay-vase")})
     assert same[NAME] == Built("r000001", "r000001 of the store is this table")
-    retitled = layout(10).material.model_copy(update={"title": "Another"})
-    other = choice_publication.build(store, {NAME: replace(layout(10), material=retitled)})
+    retitled = layout(10).source.model_copy(update={"title": "Another"})
+    other = choice_publication.build(store, {NAME: replace(layout(10), source=retitled)})
     assert other[NAME].revision == "r000002"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from brdfdb.forms.catalogue import representations
+from brdfdb.forms import catalogue
 from brdfdb.materials import presets
 from brdfdb.scenes.offered_forms import candidates
 
@@ -27,7 +27,7 @@ def test_a_spectrum_at_a_few_wavelengths_is_joined_by_straight_lines() -> None:
 def test_forms_that_differ_from_another_in_rounding_alone_are_not_offered(name: str) -> None:
     material = presets()[name]
     wavelength = np.array([550.0]) if material.spectral else None
-    rounded = {form.key for form in representations(material, wavelength, ()) if form.rounded}
+    rounded = {form.key for form in catalogue.forms(material, wavelength, ()) if form.rounded}
     offered = {each.form.key: each.form for each in candidates(material, wavelength, ())}
     assert rounded
     assert not rounded & set(offered)

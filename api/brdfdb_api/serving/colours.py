@@ -62,18 +62,17 @@ def swatch(table: Table) -> str:
 
     Grey where its wavelengths make no colour. To look at: the albedo is a mean over few directions.
     """
-    from brdfdb.integrals.sampling import sample
-    from brdfdb.tables.albedo import material_of
+    from brdfdb.integrals.sampling import DIFFUSE, directions, mixture_density
 
-    material = material_of(table)
     wi = unit_vector(radians(_LIGHT_DEG), 0.0)
     number = np.arange(_SAMPLES) + 0.5
-    spectrum = material.arguments(table.wavelength_nm)
-    middle = {name: np.ravel(value)[np.size(value) // 2] for name, value in spectrum.items()}
-    drawn = sample(material.spec, number / _SAMPLES, number * _GOLDEN % 1.0, wi, **middle)
-    cosine = np.maximum(drawn.wr[:, 2], 0.0)
-    weight = np.divide(cosine, drawn.pdf, out=np.zeros(_SAMPLES), where=drawn.pdf > 0.0) / _SAMPLES
-    f_r = np.asarray(table.lookup_vectors(wi, drawn.wr)).reshape(_SAMPLES, -1)
+    middle = None if table.wavelength_nm is None else np.array(table.wavelength_nm[table.wavelength_nm.size // 2])
+    lobe = None if table.source is None else table.source.lobe(wi[2], middle)
+    wr = directions(lobe or DIFFUSE, number / _SAMPLES, number * _GOLDEN % 1.0, wi)
+    density = mixture_density(lobe or DIFFUSE, wi, wr)
+    cosine = np.maximum(wr[:, 2], 0.0)
+    weight = np.divide(cosine, density, out=np.zeros(_SAMPLES), where=density > 0.0) / _SAMPLES
+    f_r = np.asarray(table.lookup_vectors(wi, wr)).reshape(_SAMPLES, -1)
     reflected = weight @ f_r + np.ravel(table.specular_reflectance(radians(_LIGHT_DEG)))
     if table.wavelength_nm is not None and covers_visible(table.wavelength_nm):
         rgb = reflected @ srgb_weights(tuple(table.wavelength_nm.tolist()))
