@@ -14,7 +14,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from brdfdb import geometry, spectra
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, WriteError
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -292,7 +292,7 @@ def write(path: str | os.PathLike[str], image: Slice, table: Table, half: bool =
         OpenEXR.File(header, channels).write(str(temporary))
         os.replace(temporary, path)
     except RuntimeError as error:  # what OpenEXR raises for a missing directory and for a full disk alike
-        raise OSError(f"cannot write {path}: {error}") from error
+        raise WriteError(f"cannot write {path}: {error}") from error
     finally:
         with contextlib.suppress(OSError):  # there only after a failure
             temporary.unlink()

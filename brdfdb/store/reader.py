@@ -25,7 +25,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.errors import ParameterError, StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.store.manifest import (
     NAME,
     Head,
@@ -455,7 +455,7 @@ def _decode(name: str, path: Path, files: Whole, digest: str) -> Table:
         variable = "brdf" if "brdf" in found else "parts"
         dims, axes = found[variable].metadata.dimension_names or (), table.grid.names  # type: ignore[union-attr]
         if dims[: len(axes)] != axes:
-            raise ValueError(f"{variable}: its dimensions {dims} must begin with {axes}")
+            raise ParameterError(variable, f"its dimensions {dims} must begin with {axes}")
         return replace(table, digest=digest)
     except ValueError as error:  # written by another program
         raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error
