@@ -100,7 +100,7 @@ def _run(
         task = bar.add_task("tabulating, timing", total=2 * len(materials))
         offered, prices = {}, {}
         for key, reflector in materials.items():
-            offered[key] = candidates(reflector.material, reflector.wavelength_nm, tolerances)
+            offered[key] = candidates(reflector.source, reflector.wavelength_nm, tolerances)
             bar.advance(task)
             prices[key] = _prices(offered[key], *_pairs(view, key), weigh)
             bar.advance(task)

@@ -14,8 +14,8 @@ import scipy.optimize
 from brdfdb import fresnel
 from brdfdb.audit import energy as joined
 from brdfdb.audit.excess import published_excess
-from brdfdb.audit.findings import EnergyVerdict, ModelEnergy, TableEnergy
-from brdfdb.audit.model_energy import BOUND_TOLERANCE, TOLERANCE, model_energy_of
+from brdfdb.audit.model_energy import BOUND_TOLERANCE, TOLERANCE, EnergyVerdict, ModelEnergy, model_energy_of
+from brdfdb.audit.table_energy import TableEnergy
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.uniform_bound import largest_uniform
 from brdfdb.materials import Material, presets

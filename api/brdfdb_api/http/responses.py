@@ -105,7 +105,7 @@ class Material(BaseModel):
     )
     incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
     audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
-        description="verdict of each finding of the audit, and whether it is of this revision; null: none"
+        description="verdict of the audit, its findings in sentences, and whether it is of this revision; null: none"
     )
     colour: str | None
     attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(

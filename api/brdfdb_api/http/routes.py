@@ -15,6 +15,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
 
+from brdfdb.formats import EXPORTERS
 from brdfdb_api.http import middleware, openapi_notes
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import FIELDS, OPTIONS, Options, Points, evaluate, parsed
@@ -190,7 +191,8 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "revisions": revisions,
         "links": {
             "self": here,
-            **{key: f"{here}/{key}" for key in ("lookup", "albedo", "lobe", "slice.exr", "audit", "download.zarr")},
+            **{key: f"{here}/{key}" for key in ("lookup", "albedo", "lobe", "audit", "download.zarr")},
+            **{f"export/{file_format}": f"{here}/export/{file_format}" for file_format in EXPORTERS},
             "store": f"/v1/store/materials/{name}/{table.revision}",
             "revision": f"/v1/materials/{name}/revisions/{table.revision}",
             "materials": "/v1/materials",
@@ -220,13 +222,11 @@ def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
 
 
 def _verdicts(finding: dict[str, Any], when: str, revision: str) -> dict[str, Any]:
-    """The verdict of an audit, and of each finding that has one."""
-    each = {key: value["verdict"] for key, value in finding.items() if isinstance(value, dict) and "verdict" in value}
+    """Return the verdict of an audit, and its findings in sentences."""
     return {
         "verdict": finding["verdict"],
-        "findings": each,
-        "reason": finding["energy"]["reason"],
-        "validity": finding["validity"]["standing"],
+        "model": finding["model"],
+        "sentences": finding["sentences"],
         "revision": finding["revision"],
         "current": finding["revision"] == revision,
         "when": when,
