@@ -116,7 +116,9 @@ def _run(
     forms = {key: offered[key][decision.pick.chosen].form for key, decision in chosen.items()}
     wanted = f"{Path(name).stem}, {within(scene.tolerance)}"
     layouts = {
-        key: with_reason(form.layout, form.title, wanted) for key, form in forms.items() if form.layout is not None
+        key: with_reason(form.layout, form.title, wanted)
+        for key, form in forms.items()
+        if form.layout is not None and key not in scene.stored
     }
     built = build(store, layouts) if store is not None and layouts else {}
     described = describe(
