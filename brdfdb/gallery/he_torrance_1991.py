@@ -13,6 +13,8 @@ from brdfdb.gallery._he_torrance_cuts import (
     CONE_SR,
     HALF_ANGLE_DEG,
     HIGHEST_DEG,
+    Cut,
+    Surface,
     cut_of,
     described,
     lobe_at,
@@ -24,6 +26,7 @@ from brdfdb.gallery._he_torrance_cuts import (
     surface_of,
 )
 from brdfdb.models import he_torrance, he_torrance_parts, he_torrance_very_rough
+from brdfdb.parameters import Floats
 
 # Over how many degrees two equal small cones share half of their solid angle or more. Of axes 2 u half angles apart it
 # is half where 2 arccos(u) - 2 u sqrt(1 - u^2) = pi / 2.
@@ -156,14 +159,7 @@ def fig_09() -> Figure:
     thetas = np.array([10.0, 45.0, 60.0, 75.0])
     cuts = measured(surface, thetas)
     uniform = surface["a"] / np.pi
-    first_surface = reflected({**surface, "a": 0.0}, thetas)
-    fresnel = by_hand.fresnel(thetas, surface["n"], surface["k"])
-    mirror = np.array([cut.mirror for cut in cuts]) / uniform
-    rho_s = specular(surface, thetas)
-    wavelengths = surface["sigma_0_um"] * 1000.0 / surface["wavelength_nm"]
-    spread = float(cuts[0].f_r.max() / cuts[0].f_r.min())
     across = [cut_of(he_torrance, theta, np.pi / 2.0, **surface) for theta in thetas.tolist()]
-    excess = [float(cut.f_r.max()) / uniform - 1.0 for cut in across]
     return Figure(
         key="he-torrance-1991-fig-09",
         paper="he1991",
@@ -181,61 +177,89 @@ def fig_09() -> Figure:
             ),
         ],
         statements=[
-            Statement(
-                says="This surface shows nearly uniform diffuse behavior at 10 degrees.",
-                where="section 4, on Fig. 9",
-                seen=f"f_r is the same within a factor of {spread:.2f} in the plane of incidence, and "
-                f"{1.0 - first_surface[0] / (first_surface[0] + surface['a']):.0%} of the light is uniform diffuse.",
-                holds=spread < 2.0 and bool(first_surface[0] < 0.1 * surface["a"]),
-                threshold_from="our reading: nearly uniform is within a factor of 2 that a polar plot shows, with less "
-                "than a tenth of the light from the first surface",
-            ),
-            Statement(
-                says="Subsurface scattering has a relatively stronger role as compared to the aluminum surface: a "
-                "strong uniform diffuse pattern.",
-                where="section 4, on Fig. 9",
-                seen=f"The first surface reflects {listed(first_surface, '.3f')} at {listed(thetas)} degrees. |F|² is "
-                f"{listed(fresnel, '.3f')}; the uniform part is {surface['a']:g}.",
-                holds=bool(np.all(first_surface < surface["a"]) and abs(first_surface[0] / fresnel[0] - 1.0) < 0.05),
-                threshold_from="the paper's number: a of 0.9; and conservation: at 10 degrees the first surface "
-                "reflects |F|², within 5 % for slopes that turn it",
-            ),
-            Statement(
-                says="The surface displays an emerging peak as the angle of incidence is increased.",
-                where="section 4, on Fig. 9, of both materials",
-                seen=f"In the mirror direction f_r is {listed(mirror)} times the uniform part at {listed(thetas)} "
-                "degrees.",
-                holds=bool(np.all(np.diff(mirror) > 0.0)),
-                threshold_from="the paper's words: emerging as the angle is increased",
-            ),
-            Statement(
-                says="The peak that emerges for larger angles of incidence is specular.",
-                where='section 4, "an emerging specular peak for larger values of θ_i"; caption of Fig. 9',
-                seen="It is the directional diffuse lobe, largest at "
-                f"{listed([cut.peak_deg for cut in cuts])} degrees. The specular part falls as e^-g, and is "
-                f"{rho_s[-1]:.0e} of the light at 75 degrees: σ_0 is {wavelengths:.1f} wavelengths.",
-                holds=all(cut.peak_deg == cut.theta_i_deg for cut in cuts[1:]) and bool(rho_s[-1] > 1e-3),
-                threshold_from="our reading: a thousandth of the light is the least that is seen as a mirror image",
-            ),
-            Statement(
-                says="The a(λ) of Fig. 9 keeps to the upper bound that energy conservation gives.",
-                where="section 3.2.3",
-                seen=f"With a = {surface['a']:g}, ρ_dh is {listed(first_surface + surface['a'], '.3f')} at "
-                f"{listed(thetas)} degrees: there is no room for the first surface at larger angles.",
-                holds=bool(np.all(first_surface + surface["a"] <= 1.0)),
-                threshold_from="conservation: no more light than is received",
-            ),
-            Statement(
-                says="Subsurface scattered light is approximated as uniform-diffuse (i.e., Lambertian).",
-                where="section 3.2.3",
-                seen="Across the plane of incidence f_r is above a/π by at most "
-                f"{listed(excess[1:], '.2g')} of it at {listed(thetas[1:])} degrees. At 10 degrees the lobe reaches "
-                f"there: {excess[0]:.2g}.",
-                holds=0.0 < max(excess[1:]) < 0.05,
-                threshold_from="our reading: approximated is within 5 %, and a lobe that is nowhere 0 adds something",
-            ),
+            *_of_the_diffuse_pattern(surface, thetas, cuts),
+            *_of_the_emerging_peak(surface, thetas, cuts),
+            *_of_the_uniform_part(surface, thetas, across),
         ],
     )
+
+
+def _of_the_diffuse_pattern(surface: Surface, thetas: Floats, cuts: list[Cut]) -> list[Statement]:
+    """Return the statements of Fig. 9 on the pattern of the uniform diffuse part."""
+    first_surface = reflected({**surface, "a": 0.0}, thetas)
+    fresnel = by_hand.fresnel(thetas, surface["n"], surface["k"])
+    spread = float(cuts[0].f_r.max() / cuts[0].f_r.min())
+    return [
+        Statement(
+            says="This surface shows nearly uniform diffuse behavior at 10 degrees.",
+            where="section 4, on Fig. 9",
+            seen=f"f_r is the same within a factor of {spread:.2f} in the plane of incidence, and "
+            f"{1.0 - first_surface[0] / (first_surface[0] + surface['a']):.0%} of the light is uniform diffuse.",
+            holds=spread < 2.0 and bool(first_surface[0] < 0.1 * surface["a"]),
+            threshold_from="our reading: nearly uniform is within a factor of 2 that a polar plot shows, with less "
+            "than a tenth of the light from the first surface",
+        ),
+        Statement(
+            says="Subsurface scattering has a relatively stronger role as compared to the aluminum surface: a "
+            "strong uniform diffuse pattern.",
+            where="section 4, on Fig. 9",
+            seen=f"The first surface reflects {listed(first_surface, '.3f')} at {listed(thetas)} degrees. |F|² is "
+            f"{listed(fresnel, '.3f')}; the uniform part is {surface['a']:g}.",
+            holds=bool(np.all(first_surface < surface["a"]) and abs(first_surface[0] / fresnel[0] - 1.0) < 0.05),
+            threshold_from="the paper's number: a of 0.9; and conservation: at 10 degrees the first surface "
+            "reflects |F|², within 5 % for slopes that turn it",
+        ),
+    ]
+
+
+def _of_the_emerging_peak(surface: Surface, thetas: Floats, cuts: list[Cut]) -> list[Statement]:
+    """Return the statements of Fig. 9 on the peak in the mirror direction."""
+    mirror = np.array([cut.mirror for cut in cuts]) / (surface["a"] / np.pi)
+    rho_s = specular(surface, thetas)
+    wavelengths = surface["sigma_0_um"] * 1000.0 / surface["wavelength_nm"]
+    return [
+        Statement(
+            says="The surface displays an emerging peak as the angle of incidence is increased.",
+            where="section 4, on Fig. 9, of both materials",
+            seen=f"In the mirror direction f_r is {listed(mirror)} times the uniform part at {listed(thetas)} degrees.",
+            holds=bool(np.all(np.diff(mirror) > 0.0)),
+            threshold_from="the paper's words: emerging as the angle is increased",
+        ),
+        Statement(
+            says="The peak that emerges for larger angles of incidence is specular.",
+            where='section 4, "an emerging specular peak for larger values of θ_i"; caption of Fig. 9',
+            seen="It is the directional diffuse lobe, largest at "
+            f"{listed([cut.peak_deg for cut in cuts])} degrees. The specular part falls as e^-g, and is "
+            f"{rho_s[-1]:.0e} of the light at 75 degrees: σ_0 is {wavelengths:.1f} wavelengths.",
+            holds=all(cut.peak_deg == cut.theta_i_deg for cut in cuts[1:]) and bool(rho_s[-1] > 1e-3),
+            threshold_from="our reading: a thousandth of the light is the least that is seen as a mirror image",
+        ),
+    ]
+
+
+def _of_the_uniform_part(surface: Surface, thetas: Floats, across: list[Cut]) -> list[Statement]:
+    """Return the statements on the uniform diffuse part of Fig. 9: its bound, and its shape across the plane."""
+    first_surface = reflected({**surface, "a": 0.0}, thetas)
+    excess = [float(cut.f_r.max()) / (surface["a"] / np.pi) - 1.0 for cut in across]
+    return [
+        Statement(
+            says="The a(λ) of Fig. 9 keeps to the upper bound that energy conservation gives.",
+            where="section 3.2.3",
+            seen=f"With a = {surface['a']:g}, ρ_dh is {listed(first_surface + surface['a'], '.3f')} at "
+            f"{listed(thetas)} degrees: there is no room for the first surface at larger angles.",
+            holds=bool(np.all(first_surface + surface["a"] <= 1.0)),
+            threshold_from="conservation: no more light than is received",
+        ),
+        Statement(
+            says="Subsurface scattered light is approximated as uniform-diffuse (i.e., Lambertian).",
+            where="section 3.2.3",
+            seen="Across the plane of incidence f_r is above a/π by at most "
+            f"{listed(excess[1:], '.2g')} of it at {listed(thetas[1:])} degrees. At 10 degrees the lobe reaches "
+            f"there: {excess[0]:.2g}.",
+            holds=0.0 < max(excess[1:]) < 0.05,
+            threshold_from="our reading: approximated is within 5 %, and a lobe that is nowhere 0 adds something",
+        ),
+    ]
 
 
 def fig_10() -> Figure:
