@@ -157,7 +157,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
 def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, floor: Floats) -> Between:
     """Measure the error between the wavelengths of the members, at fewer directions."""
     first = member_loader(sweep, tables)(0)
-    material, stored = _requested(first), first.wavelength_nm
+    material, stored = _material(first), first.wavelength_nm
     assert stored is not None
     pairs = error_measurement.draw(material, stored, _SEARCHED, seed)
     wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
@@ -171,12 +171,11 @@ def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, fl
     return Between(wavelength_nm=at.tolist(), bands=bands)
 
 
-def _requested(member: Table) -> Material:
-    """Return the material that a member of a family was built for; StoreError if it does not state its request."""
-    request = member.metadata.request
-    if request is None:
-        raise StoreError(f"{member.name} {member.revision} does not state its request; build it anew")
-    return Material.model_validate(request["material"])
+def _material(member: Table) -> Material:
+    """Return the material that a member of a family was tabulated from; StoreError if the table does not state it."""
+    if not isinstance(member.source, Material):
+        raise StoreError(f"{member.name} {member.revision} does not state its material; build it anew")
+    return member.source
 
 
 def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[np.float64] | None = None) -> _Measured:
@@ -187,7 +186,7 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[n
     nodes = sweep.nodes
     shape = tuple(values.size for values in nodes.values())
     member = member_loader(sweep, tables)
-    base = _requested(member(0))
+    base = _material(member(0))
     wavelength_nm = member(0).wavelength_nm if at_nm is None else at_nm
     points = parameter_points(shape, seed)
     stencils = tuple(min(_width(shape), nodes) for nodes in shape)
