@@ -8,8 +8,10 @@ from pathlib import Path
 
 from brdfdb.errors import UnknownMaterialError
 from brdfdb.store import revisions, snapshots, verification
-from brdfdb.store.manifest import read_snapshot, seal_of, snapshot_names, snapshot_path
+from brdfdb.store.paths import snapshot_path
 from brdfdb.store.reader import Store
+from brdfdb.store.sealed_json import seal_of
+from brdfdb.store.snapshot_record import read_snapshot, snapshot_names
 from brdfdb_pipelines import terminal
 
 

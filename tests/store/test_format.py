@@ -15,7 +15,7 @@ import zarr
 import brdfdb
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import presets
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.planner import plan
