@@ -18,7 +18,7 @@ import orjson
 import uvicorn
 
 import brdfdb
-from brdfdb.errors import ParameterError
+from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb_api.http.protocol import BoundedProtocol
 from brdfdb_api.serving.settings import Settings
 
@@ -27,6 +27,10 @@ GRACE_S = 10  # for requests that are being answered when the server is told to 
 
 LOG = logging.getLogger("brdfdb.server")
 OTHERS = ("uvicorn", LOG.name, "py.warnings")  # loggers beside that of requests
+
+
+class ServerError(BrdfdbError):
+    """A service that cannot listen, or whose worker failed."""
 
 
 def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str | None = None) -> None:
@@ -49,9 +53,9 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
     ------
     brdfdb.errors.StoreError
         If there is no store at `store_dir`, or no such snapshot in it.
-    ValueError
+    ParameterError
         If the port is out of range, or a variable ``BRDFDB_*`` has a value that is not allowed.
-    OSError
+    ServerError
         If `host` is not an address of this machine or the port is taken; or if a worker fails.
     """
     if not 0 <= port <= 65535:
@@ -76,7 +80,7 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
 
 
 async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
-    """Keep so many workers until told to stop; ChildProcessError where one ends by an error of its own."""
+    """Keep so many workers until told to stop; ServerError where one ends by an error of its own."""
     loop, stopping = asyncio.get_running_loop(), asyncio.Event()
     command = (sys.executable, "-P", "-m", "brdfdb_api.server", str(listener.fileno()))
     environment = {**os.environ, "PROMETHEUS_MULTIPROC_DIR": counts}
@@ -114,7 +118,7 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
         loop.add_signal_handler(number, stop)
     status = max(await asyncio.gather(*(place() for _ in range(workers))))
     if status > 0:
-        raise ChildProcessError(f"a worker ended with status {status}; its log says why")
+        raise ServerError(f"a worker ended with status {status}; its log says why")
 
 
 def _work(descriptor: int) -> None:
@@ -171,7 +175,7 @@ def _ended_by_signals() -> Iterator[None]:
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    """A socket that listens; OSError, in one sentence, where that is not possible."""
+    """Return a socket that listens; ServerError where that is not possible."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     # asyncio sends small answers at once (TCP_NODELAY) only on a socket that names its protocol: else each takes 40 ms.
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
@@ -179,9 +183,10 @@ def _listening(host: str, port: int) -> socket.socket:
     try:
         listener.bind((host, port))
         listener.listen(1024)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:  # the latter of a name with a label that is empty or too long
         listener.close()
-        raise OSError(f"cannot listen on {host}, port {port}: {error.strerror}") from error
+        reason = error.strerror if isinstance(error, OSError) else "not the name of a machine"
+        raise ServerError(f"cannot listen on {host}, port {port}: {reason}") from error
     return listener
 
 

@@ -22,7 +22,7 @@ from brdfdb.atlas._albedos import (
 from brdfdb.atlas._errors import lobe
 from brdfdb.figure import Figure, Panel, Role, Statement
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.sampling import ward_sample
+from brdfdb.integrals.sampling import sample
 from brdfdb.reference import mp
 
 _WARD_FORMS: tuple[tuple[str, str, Role], ...] = (
@@ -180,7 +180,16 @@ def _ward_samples() -> Figure:
     alpha = 0.1
     u = (np.arange(128.0) + 0.5) / 128.0
     lights = unit_vector(radians(THETA_DEG), 0.0)
-    drawn = ward_sample(u[:, np.newaxis, np.newaxis], u[:, np.newaxis], lights, rho_s=1.0, alpha_x=alpha, alpha_y=alpha)
+    drawn = sample(
+        "ward",
+        u[:, np.newaxis, np.newaxis],
+        u[:, np.newaxis],
+        lights,
+        rho_d=0.0,
+        rho_s=1.0,
+        alpha_x=alpha,
+        alpha_y=alpha,
+    )
     weighted = drawn.weight.mean(axis=(0, 1))
     uniform = (drawn.wr[..., 2] > 0.0).mean(axis=(0, 1))
     albedo = albedo_of("ward", **lobe(alpha))

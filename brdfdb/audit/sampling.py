@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from brdfdb.audit.findings import Sampling
+from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import SEED, representative_nm
-from brdfdb.figure import numbers
+from brdfdb.figure import Numbers, number, numbers
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
@@ -36,6 +37,75 @@ _PSI_EDGES = np.linspace(-np.pi, np.pi, 13)
 _NODES = 12  # of Gauss's rule, along each side of a bin
 
 Array = NDArray[np.float64]
+
+
+class Sampling(Finding):
+    """The sampler of the model at the parameters of the material, for some lights."""
+
+    key = "sampling"
+    title = "Sampling"
+    columns = ("sampling",)
+    explanation = (
+        "p is the chance of a histogram worse than that of the samples if their density is what the model says. The "
+        "weight of a sample is f_r cos theta_r over that density."
+    )
+
+    samples: int = Field(description="of each light")
+    theta_i_deg: list[float]
+    phi_i_deg: float
+    wavelength_nm: float | None
+    chi_square_p: Numbers = Field(description="probability of a worse histogram if the density is right")
+    largest_weight: Numbers
+    weight_spread: Numbers = Field(description="standard deviation of the weights over their mean")
+    monte_carlo: Numbers = Field(description="albedo without the specular part")
+    monte_carlo_error: Numbers = Field(description="its standard error")
+    quadrature: Numbers
+    verdict: Verdict
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Finding:
+        """Draw samples of the model of a table."""
+        if not isinstance(subject.source, Material):
+            return subject.not_judged("samples are drawn from the model of the source")
+        return sampling_of(subject.table, subject.source)
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the least likely histogram."""
+        if self._smallest is None:
+            text = "no bins to compare"
+        else:
+            text = f"the smallest p of {len(self.theta_i_deg)} lights is {_probability(self._smallest)}"
+        if self.verdict == "violates":
+            text = f"samples of the model do not have the density or the albedo that they should; {text}"
+        return [self.sentence(self.verdict, text)]
+
+    def cells(self) -> list[Cell]:
+        """Return the smallest p."""
+        sort = 1.0 if self._smallest is None else self._smallest
+        return [Cell(self.verdict, f"p {_probability(self._smallest)}", sort)]
+
+    def tables(self) -> list[NumberTable]:
+        """Return the samples of each light."""
+        columns = (self.largest_weight, self.weight_spread, self.monte_carlo, self.monte_carlo_error, self.quadrature)
+        rows = [
+            (f"{theta:.4g}°", _probability(p), *(number(value) for value in rest))
+            for theta, p, *rest in zip(self.theta_i_deg, self.chi_square_p, *columns, strict=True)
+        ]
+        at = "" if self.wavelength_nm is None else f" at {self.wavelength_nm:g} nm"
+        caption = f"Sampling: {self.samples} samples of each light{at}"
+        headings = ("light", "p", "largest weight", "spread", "diffuse albedo, sampled", "standard error", "integrated")
+        return [NumberTable(caption, headings, rows)]
+
+    @property
+    def _smallest(self) -> float | None:
+        return min((p for p in self.chi_square_p if p is not None), default=None)
+
+
+def _probability(value: float | None) -> str:
+    """Return a probability for people, without digits that mean nothing."""
+    if value is None:
+        return "–"
+    return "below 0.001" if value < 0.001 else f"{value:.3f}"
 
 
 class _Light(NamedTuple):

@@ -15,6 +15,7 @@ from brdfdb.forms.tradeoff_document import (
     Chart,
     Cost,
     Curve,
+    Diagnostic,
     FamilyChart,
     Fronts,
     Point,
@@ -22,7 +23,7 @@ from brdfdb.forms.tradeoff_document import (
     Saving,
     Work,
 )
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 from brdfdb.store.family import Family, Sweep
 from brdfdb.tables import error_measurement
@@ -37,21 +38,21 @@ SHARE, CONFIDENCE = 0.99, 0.95  # the percentile that is charted, and the confid
 
 
 def chart(
-    material: Material,
+    source: Source,
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float] | None = None,
     *,
     also: Sequence[Form] = (),
     tick: Callable[[], None] = lambda: None,
 ) -> Chart:
-    """Measure error and cost of every form of a material.
+    """Measure error and cost of every form of a source.
 
     Parameters
     ----------
-    material : Material
-        Of any model.
+    source : Source
+        Material, function, or table of a store.
     wavelength_nm : array of shape (L,) [nm], or None
-        For spectral materials, and only for them.
+        For spectral sources, and only for them.
     tolerances : sequence of float, optional
         Of planned tables, as `catalogue.forms` takes them.
     also : sequence of Form
@@ -69,9 +70,9 @@ def chart(
     ValueError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
     """
-    forms = [*catalogue.forms(material, wavelength_nm, tolerances), *also]
+    forms = [*catalogue.forms(source, wavelength_nm, tolerances), *also]
     tick()
-    drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+    drawn = error_measurement.draw(source, wavelength_nm, DIRECTIONS, SEED)
     errors = _errors(forms, drawn)
     tick()
     batch, block, single = _timed(forms, drawn, tick)
@@ -80,7 +81,7 @@ def chart(
     middle = None if wavelength_nm is None else float(wavelength_nm[wavelength_nm.size // 2])
     samplers = [
         Sampler(key=key, title=sampler_efficiency.SAMPLERS[key], albedo=_work(albedo), sphere=_work(sphere))
-        for key, (albedo, sphere) in sampler_efficiency.works(material, middle).items()
+        for key, (albedo, sphere) in sampler_efficiency.works(source, middle).items()
     ]
     tick()
     seconds = np.stack([each.seconds for each in batch], axis=1)
@@ -90,10 +91,10 @@ def chart(
         return _front(forms, [error["l1"] for error in errors], costs)
 
     return Chart(
-        material=material.name,
-        title=material.title,
-        model=material.model,
-        parameters=material.file_parameters(),
+        material=source.name,
+        title=source.title,
+        model=source.model if isinstance(source, Material) else "function",
+        parameters=source.file_parameters() if isinstance(source, Material) else {},
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         directions=int(np.count_nonzero(drawn.above)),
         truth=forms[0].key,
@@ -206,7 +207,7 @@ def chart_family(
         model=sweep.model,
         axes=sweep.axes,
         members=sweep.members,
-        g=_g(materials, wavelength_nm),
+        diagnostic=_diagnostic(materials, wavelength_nm),
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         truth=timed[0].key,
         curves=[
@@ -229,12 +230,14 @@ def chart_family(
     )
 
 
-def _g(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> list[float] | None:
-    """Eq. 79 of He et al. along the normal, where nothing is hidden and sigma is sigma_0; None of other models."""
-    if materials[0].model != "he_torrance" or wavelength_nm is None:
+def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:
+    """Return what the model of a family names as its diagnostic, for each member; None if it names none."""
+    found = materials[0].spec.diagnostic
+    if found is None:
         return None
-    middle_um = 1e-3 * float(wavelength_nm[wavelength_nm.size // 2])
-    return [float(f"{(4.0 * np.pi * m.parameters['sigma_0_um'] / middle_um) ** 2:.3g}") for m in materials]
+    middle = None if wavelength_nm is None else wavelength_nm[wavelength_nm.size // 2]
+    values = [float(f"{found.value(material.arguments(middle)):.3g}") for material in materials]
+    return Diagnostic(symbol=found.symbol, title=found.title, values=values)
 
 
 def _timed(

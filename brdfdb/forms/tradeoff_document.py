@@ -138,6 +138,16 @@ class Between(Form):
     p99: float
 
 
+class Diagnostic(BaseModel):
+    """A number that tells in which regime the model of a member is, at the middle wavelength."""
+
+    model_config = _STRICT
+
+    symbol: str
+    title: str
+    values: list[float] = Field(description="of each member")
+
+
 class FamilyChart(BaseModel):
     """A family: which form is right where in it."""
 
@@ -148,9 +158,7 @@ class FamilyChart(BaseModel):
     model: str
     axes: dict[str, list[float]] = Field(description="values of each swept parameter, as in the record of a family")
     members: list[str] = Field(description="names of the materials; the last axis runs fastest")
-    g: list[float] | None = Field(
-        description="of He-Torrance, for each member: eq. 79 along the normal, at the middle wavelength"
-    )
+    diagnostic: Diagnostic | None = Field(description="null unless the model names one")
     wavelength_nm: list[float] | None
     truth: str = Field(description="key of the curve that the others are compared with")
     curves: list[Curve]

@@ -143,7 +143,7 @@ def _traced(
     """Return the points that rays meet, directly and in mirrors, and the background of each of `count` pixels."""
     points, surfaces, missed = _seen(scene, *rays, pixels)
     for number, surface in enumerate(surfaces):
-        if scene.materials[points[number].material].spec.specular is not None:
+        if scene.materials[points[number].material].has_specular:
             points += _mirrored(scene, points, number, surface)
     return points, _background(scene, rays[1][missed], pixels[missed], count)
 
@@ -196,7 +196,7 @@ def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface
     found, surfaces, _ = _seen(scene, origins, directions, facing, number, surface.away[facing])
     for each, shown in zip(found, surfaces, strict=True):
         points[number].beyond[each.at] = 0.0
-        if scene.materials[each.material].spec.specular is not None:  # what its mirror would show is not traced
+        if scene.materials[each.material].has_specular:  # what its mirror would show is not traced
             each.beyond[np.isfinite(_trace(scene, _lifted(scene.camera, shown), _mirror(shown))[0])] = 0.0
     return found
 

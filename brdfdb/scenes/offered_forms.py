@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brdfdb.forms import catalogue
 from brdfdb.forms.catalogue import Form
 from brdfdb.geometry import radians
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.scenes.shapes import Array
 
@@ -39,14 +39,14 @@ class Candidate:
 
 
 def candidates(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
+    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
 ) -> list[Candidate]:
     """Forms to choose from, the truth first: at all wavelengths, and of spectral materials at fewer.
 
     Parameters
     ----------
-    material : Material
-        Of any model.
+    source : Source
+        Material, or table of a store.
     wavelength_nm : array of shape (L,) [nm], or None
         Those of the scene, for spectral materials, and only for them.
     tolerances : sequence of float, optional
@@ -64,22 +64,20 @@ def candidates(
     """
     if tolerances is None and wavelength_nm is None:
         tolerances = GREY_TOLERANCES
-    found = [Candidate(form, wavelength_nm) for form in _offered(material, wavelength_nm, tolerances)]
+    found = [Candidate(form, wavelength_nm) for form in _offered(source, wavelength_nm, tolerances)]
     for count in SAMPLINGS if wavelength_nm is not None else ():
         assert wavelength_nm is not None
         if count < wavelength_nm.size:
             few = wavelength_nm[np.round(np.linspace(0, wavelength_nm.size - 1, count)).astype(np.int64)]
-            found += [
-                Candidate(_between(form, few, wavelength_nm), few) for form in _offered(material, few, tolerances)
-            ]
+            found += [Candidate(_between(form, few, wavelength_nm), few) for form in _offered(source, few, tolerances)]
     return [each for each in found if each.form.kind != "other model" and not each.form.rounded]
 
 
 def _offered(
-    material: Material, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None
+    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None
 ) -> list[Form]:
     """Return all forms of a material, and its tables a second time, with the truth at limbs."""
-    forms = catalogue.forms(material, wavelength_nm, tolerances)
+    forms = catalogue.forms(source, wavelength_nm, tolerances)
     return [*forms, *(_with_true_limbs(form, forms[0]) for form in forms if form.kind == "table")]
 
 

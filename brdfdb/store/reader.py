@@ -330,13 +330,14 @@ class Store(Mapping[str, "Table"]):
         known = self._pointers.get(name)
         if known is None and not NAME.fullmatch(name):
             return None
-        path = f"{self.root}/materials/{name}/HEAD.json"
+        material = material_path(self.root, name) if known is None else known.material
+        path = pointer_path(material)
         try:
             at = os.stat(path)
             seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
             if known is None or known.seen != seen:
-                head = head_from(Path(path), regular_bytes(path))
-                known = self._pointers[name] = _Pointer(seen, self.root / "materials" / name, head)
+                head = head_from(path, regular_bytes(path))
+                known = self._pointers[name] = _Pointer(seen, material, head)
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:

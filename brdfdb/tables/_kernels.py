@@ -16,9 +16,7 @@ from brdfdb.tables._interpolation import Axes, locate, tricubic, trilinear, weig
 
 Array = NDArray[np.float64]
 
-PI = np.pi
-TURN = 2.0 * np.pi
-HALF_PI = np.pi / 2.0
+PI, TURN, HALF_PI = np.pi, 2.0 * np.pi, np.pi / 2.0
 PHI_MAX = 1e15
 
 
@@ -421,9 +419,9 @@ def specular(
     horizon: float,
     out: Array,
 ) -> bool:
-    """Write the specular part [1], linear between its nodes `theta_nodes` [rad].
+    """Write the specular part [1], linear between its nodes `theta_nodes` [rad]; else as `by_angles`.
 
-    `out` stays as it is if there are no nodes. Wavelengths, directions below the horizon and the result are as by `by_angles`.
+    `out` stays as it is if there are no nodes.
     """
     wavelengths = nodes.shape[0]
     last = theta_nodes.size - 1

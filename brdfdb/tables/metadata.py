@@ -40,7 +40,7 @@ class TableMetadata(BaseModel):
     title: str | None = Field(default=None, description="one line that names the material for people")
     material: str | None = Field(default=None, description="name of the material")
     table_version: int | None = Field(default=None, description="version of the variables, dimensions and attributes")
-    model: str | None = Field(default=None, description="name of the model, such as ward")
+    model: str | None = Field(default=None, description="name of the model")
     model_version: int | None = Field(default=None, description="raised when the values of the model change")
     model_title: str | None = Field(default=None, description="authors and subject of the model")
     model_equation: str | None = Field(default=None, description="equations of the paper that are evaluated")

@@ -6,12 +6,11 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from brdfdb.errors import BusyError, StoreError
+from brdfdb.errors import BusyError, ParameterError, StoreError
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
 from brdfdb.store.files import Entry
@@ -22,11 +21,11 @@ from brdfdb.store.paths import material_path, revision_path
 from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_staged
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
-from brdfdb_pipelines import build_resources, terminal, workers
-from brdfdb_pipelines.build_progress import Bars, Event, Lines, Tally
+from brdfdb_pipelines import build_resources, workers
+from brdfdb_pipelines.build_progress import Event, Tally
 from brdfdb_pipelines.build_survey import Survey, head_of, survey
-from brdfdb_pipelines.recipe_file import Job, Recipe, load
-from brdfdb_pipelines.workers import Workers
+from brdfdb_pipelines.recipe_file import Job, Recipe
+from brdfdb_pipelines.workers import Workers, WorkersError
 
 _LOOK_S = 2.0  # between looks at workers that say nothing
 _POLL_S = 0.1  # between looks at a lock that another build holds
@@ -109,7 +108,7 @@ def build(
     ------
     RecipeError
         Before anything is written, if the recipe cannot be built.
-    ValueError
+    ParameterError
         If a single task does not fit into `memory`, or the tables do not fit on the disk. A store that was made for
         them is removed again.
     StoreError
@@ -125,7 +124,7 @@ def build(
         return _Builder(
             jobs, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory
         ).run()
-    except ValueError:
+    except ParameterError:
         if made:
             remove_begun(root)
             if existed:
@@ -401,64 +400,7 @@ class _Builder:
         if isinstance(error, StoreError | OSError | MemoryError) or not isinstance(error, Exception):
             raise error
         if workers.lost(error):
-            raise ChildProcessError("the workers are gone, killed or out of memory; build again to resume") from error
+            raise WorkersError("the workers are gone, killed or out of memory; build again to resume") from error
         self.error = self.error or error
         self.report({"event": "failed", "material": name, "error": str(error)})
         return None
-
-
-def run(
-    recipe_path: Path | None,
-    root: Path,
-    *,
-    jobs: int,
-    processes: bool = False,
-    scheduler: str | None = None,
-    memory: int | None = None,
-    as_json: bool = False,
-) -> None:
-    """Build a recipe file, by default the built-in one; show progress and what came out."""
-    recipe = load(recipe_path)
-    start = time.perf_counter()
-    if memory is None and scheduler is None:
-        memory = build_resources.machine_memory()
-    at: AbstractContextManager[Workers] = (
-        workers.cluster(scheduler) if scheduler else (workers.processes if processes else workers.threads)(jobs)
-    )
-    with at as opened, Lines() if as_json else Bars() as report:
-        built = build(recipe, root, opened, report, memory=memory)
-    if not as_json:
-        _print(built, root, time.perf_counter() - start)
-
-
-def _print(built: list[Built], root: Path, seconds: float) -> None:
-    """What came out: a line for each table that is not as it was before."""
-    changed = [b for b in built if b.state != "unchanged"]
-    if changed:
-        values = sum(_size(b.shape) for b in changed)
-        terminal.print_table(
-            f"{len(changed)} tables, {values / 1e6:.1f} million values, in {seconds:.1f} s",
-            ("material", "model", "shape", "revision", "stored", "why"),
-            [
-                (
-                    b.job.material.name,
-                    b.job.material.model,
-                    " x ".join(map(str, b.shape)),
-                    b.revision,
-                    terminal.size(b.stored_bytes),
-                    f"{b.why}; {b.revision} is current again" if b.state == "adopted" else b.why,
-                )
-                for b in changed
-            ],
-            numbers=("shape", "stored"),
-        )
-    if len(changed) < len(built):
-        print(f"{len(built) - len(changed)} tables unchanged")
-    print(f"{terminal.size(sum(b.stored_bytes for b in built))} in {root}")
-
-
-def _size(shape: tuple[int, ...]) -> int:
-    count = 1 if shape else 0
-    for nodes in shape:
-        count *= nodes
-    return count

@@ -18,20 +18,21 @@ from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.forms.catalogue import Form, of_table
 from brdfdb.forms.tradeoff import STEPS, TIMED, chart, chart_family
 from brdfdb.forms.tradeoff_document import Chart, Charts, FamilyChart, Point
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.store.family import Family, Sweep
 from brdfdb.store.family_records import recorded
 from brdfdb.store.reader import Store
 from brdfdb.tables.planner import check_tolerance
 from brdfdb.tables.table import Table
+from brdfdb.tables.table_source import source_of_table
 from brdfdb_pipelines import family_plot, recipe_file, terminal, tradeoff_plot
 from brdfdb_pipelines.plot_panels import percent
 
 
 class _Subject(NamedTuple):
-    """What is charted: a material at its wavelengths, and its table in a store."""
+    """A source to chart at its wavelengths, and its table in a store."""
 
-    material: Material
+    source: Source
     wavelength_nm: NDArray[np.float64] | None
     stored: tuple[Form, ...] = ()
 
@@ -91,9 +92,9 @@ def run(
                 members = (subject.sweep, subject.materials, subject.wavelength_nm)
                 families.append(chart_family(*members, tolerances, family=subject.stored, tick=tick))
                 continue
-            task = bar.add_task(subject.material.name, total=STEPS)
+            task = bar.add_task(subject.source.name, total=STEPS)
             tick = functools.partial(bar.advance, task)
-            found.append(chart(subject.material, subject.wavelength_nm, tolerances, also=subject.stored, tick=tick))
+            found.append(chart(subject.source, subject.wavelength_nm, tolerances, also=subject.stored, tick=tick))
     charts = Charts(
         brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=terminal.machine(), charts=found, families=families
     )
@@ -127,7 +128,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
         if name in jobs:
             subject = _Subject(jobs[name].material, jobs[name].wavelength_nm)
         elif table is not None:
-            subject = _Subject(_material_of(table), table.wavelength_nm)
+            subject = _Subject(source_of_table(table), table.wavelength_nm)
         elif name in sweeps:
             members = [jobs[member] for member in sweeps[name].members]
             materials = [job.material for job in members]
@@ -153,7 +154,9 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
 def _material_of(table: Table) -> Material:
     """Return the material behind a table; BrdfdbError where the table does not say."""
     if not isinstance(table.source, Material):
-        raise BrdfdbError(f"{table.name}: the table does not name a model that is known here, so it cannot be charted")
+        raise BrdfdbError(
+            f"{table.name}: the table does not name a model that is known here, so its family cannot be charted"
+        )
     return table.source
 
 
@@ -209,8 +212,8 @@ def _print_family(whole: FamilyChart) -> None:
                 cells.append("-" if middle is None else f"{'*' if chosen else ''}{percent(middle)}")
             rows.append((curve.key, curve.title, terminal.count(curve.batch.ns), *cells))
         columns = [f"{value:g}" for value in values]
-        if whole.g is not None and len(whole.axes) == 1:
-            rows.insert(0, ("", "g along the normal", "", *map(terminal.count, whole.g)))
+        if whole.diagnostic is not None and len(whole.axes) == 1:
+            rows.insert(0, ("", whole.diagnostic.title, "", *map(terminal.count, whole.diagnostic.values)))
         title = f"{whole.family}: {whole.title}. Mean error along {axis}; * is worth having"
         terminal.print_table(title, ("key", "form", "ns a value", *columns), rows, numbers=("ns a value", *columns))
     print(f"  times are those of one member, {whole.curves[0].timed} for most")
@@ -236,8 +239,8 @@ def _where(whole: FamilyChart, members: Sequence[int]) -> str:
         inside = [points[index][number] for index in members]
         least, most = min(inside), max(inside)
         spans.append(f"{axis} {least:g} to {most:g}" if least < most else f"{axis} {least:g}")
-    if whole.g is not None:
-        inside = [whole.g[index] for index in members]
+    if whole.diagnostic is not None:
+        symbol, inside = whole.diagnostic.symbol, [whole.diagnostic.values[index] for index in members]
         least, most = min(inside), max(inside)
-        spans.append(f"g {least:g} to {most:g}" if least < most else f"g {least:g}")
+        spans.append(f"{symbol} {least:g} to {most:g}" if least < most else f"{symbol} {least:g}")
     return f"at {len(members)} of {len(points)} members, {', '.join(spans)}"

@@ -101,7 +101,7 @@ def _run(
         task = bar.add_task("tabulating, timing", total=2 * len(materials))
         offered, prices = {}, {}
         for key, reflector in materials.items():
-            offered[key] = candidates(reflector.material, reflector.wavelength_nm, tolerances)
+            offered[key] = candidates(reflector.source, reflector.wavelength_nm, tolerances)
             bar.advance(task)
             prices[key] = _prices(offered[key], *_pairs(view, key), weigh)
             bar.advance(task)
@@ -117,7 +117,9 @@ def _run(
     forms = {key: offered[key][decision.pick.chosen].form for key, decision in chosen.items()}
     wanted = f"{Path(name).stem}, {within(scene.tolerance)}"
     layouts = {
-        key: with_reason(form.layout, form.title, wanted) for key, form in forms.items() if form.layout is not None
+        key: with_reason(form.layout, form.title, wanted)
+        for key, form in forms.items()
+        if form.layout is not None and key not in scene.stored
     }
     built = build(store, layouts) if store is not None and layouts else {}
     described = describe(

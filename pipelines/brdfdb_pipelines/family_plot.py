@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import OffsetFrom
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from brdfdb.forms.tradeoff_document import Between, Curve, FamilyChart, Form
+from brdfdb.forms.tradeoff_document import Between, Curve, Diagnostic, FamilyChart, Form
 from brdfdb_pipelines import figure_svg, terminal
 from brdfdb_pipelines.plot_panels import (
     BELOW,
@@ -43,7 +43,7 @@ from brdfdb_pipelines.plot_panels import (
 _FAMILY_COLUMNS = (18.0, 250.0, 330.0, 410.0, 490.0, 580.0, 670.0, 760.0, 850.0, 988.0)
 CLOSE = 0.01  # mean error of what the truth need not be evaluated for
 _MEAN, _NAMES, _TAIL = 216.0, 172.0, 150.0  # widths: panel of means, names beside it, panel of the 99th percentile
-_FAMILY_ABOVE, _FAMILY_ROW = 76.0, 310.0  # below the title, room for g; from one parameter to the next
+_FAMILY_ABOVE, _FAMILY_ROW = 76.0, 310.0  # below the title, room for a diagnostic; from one parameter to the next
 _HIGHEST = 10.0  # of errors drawn: ten times the light that there is
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)))
 _APART = 26.0  # of ticks that are numbers of their own
@@ -81,10 +81,10 @@ def drawn(whole: FamilyChart) -> Canvas:
         _sweep(mean, whole, axis, lambda curve: curve.l1, None if whole.between is None else whole.between.l1)
         mean.set_ylabel("mean error against the truth")
         _named(mean, whole, axis)
-        if whole.g is None or len(whole.axes) > 1:
+        if whole.diagnostic is None or len(whole.axes) > 1:
             headed(mean, "mean error")
         else:
-            _heights(mean, whole.axes[axis], whole.g)
+            _diagnostic(mean, whole.axes[axis], whole.diagnostic)
         high = canvas.add_axes(box(tail, top, _TAIL))
         _sweep(high, whole, axis, lambda curve: curve.p99, None if whole.between is None else whole.between.p99)
         headed(high, "99th percentile")
@@ -140,18 +140,18 @@ def headed(axes: Axes, text: str) -> None:
     axes.set_title(text, fontsize=8, color=figure_svg.MUTED, loc="left")
 
 
-def _heights(axes: Axes, x: list[float], g: list[float]) -> None:
-    """The g of members above the panel, of as many as there is room for."""
+def _diagnostic(axes: Axes, x: list[float], diagnostic: Diagnostic) -> None:
+    """Write the diagnostic of members above the panel, of as many as there is room for."""
     shown = [len(x) - 1]
     for index in range(len(x) - 1, -1, -1):
         at, after = (axes.transData.transform((x[i], 1.0))[0] for i in (index, shown[-1]))
         if after - at > _APART * mpl.rcParams["figure.dpi"] / 72.0:
             shown.append(index)
     above = axes.secondary_xaxis("top")
-    labels = [terminal.count(float(f"{g[index]:.2g}")) for index in shown]
+    labels = [terminal.count(float(f"{diagnostic.values[index]:.2g}")) for index in shown]
     above.set_xticks([x[index] for index in shown], labels=labels)
     above.xaxis.set_minor_locator(NullLocator())
-    above.set_xlabel("g along the normal, eq. 79")
+    above.set_xlabel(diagnostic.title)
     above.tick_params(length=0)
     above.spines["top"].set_visible(False)
 

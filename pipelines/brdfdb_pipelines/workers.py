@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import logging
 import multiprocessing
 import os
@@ -16,8 +15,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from brdfdb.errors import BrdfdbError, import_extra
+
 _CONNECT_S = 10  # for the scheduler to answer
 _ASK_S = 1.0  # how often a cluster is asked for its size: it may grow
+
+
+class WorkersError(BrdfdbError):
+    """Workers or a scheduler that do not answer."""
 
 
 @dataclass(frozen=True)
@@ -61,21 +66,16 @@ def cluster(address: str) -> Iterator[Workers]:
 
     Raises
     ------
-    ConnectionError
-        If nothing answers there.
-    ChildProcessError
-        From `slots`, if the scheduler is gone.
-    ValueError
+    WorkersError
+        If nothing answers there; from `slots`, if the scheduler is gone.
+    MissingExtraError
         If dask is not installed.
     """
-    try:
-        distributed: Any = importlib.import_module("distributed")
-    except ImportError:
-        raise ValueError("--scheduler needs dask: pip install 'brdfdb[dask]'") from None
+    distributed: Any = import_extra("distributed")
     try:
         client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise ConnectionError(f"no dask scheduler answers at {address}") from error
+        raise WorkersError(f"no dask scheduler answers at {address}") from error
     # a scheduler that dies is one sentence of ours; dask gives its loggers levels of their own
     for name in ("distributed", "distributed.client", "distributed.core", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -87,7 +87,7 @@ def cluster(address: str) -> Iterator[Workers]:
             try:
                 known = sum(client.nthreads().values())
             except OSError as error:
-                raise ChildProcessError(f"the dask scheduler at {address} is gone; build again to resume") from error
+                raise WorkersError(f"the dask scheduler at {address} is gone; build again to resume") from error
             asked = time.monotonic()
         return known
 

@@ -14,7 +14,7 @@ import pytest
 import brdfdb_api
 from brdfdb.errors import StoreError
 from brdfdb_api.http.app import create_app, openapi_json
-from brdfdb_api.server import serve
+from brdfdb_api.server import ServerError, serve
 from brdfdb_api.serving.settings import Settings
 from tests.api.a_store import Client
 
@@ -140,7 +140,7 @@ def test_serve_on_a_port_that_is_taken(root: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(OSError, match=f"^cannot listen on 127.0.0.1, port {port}: Address already in use$"):
+        with pytest.raises(ServerError, match=f"^cannot listen on 127.0.0.1, port {port}: Address already in use$"):
             serve(root, "127.0.0.1", port)
 
 

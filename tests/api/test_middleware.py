@@ -13,7 +13,8 @@ from unittest.mock import AsyncMock
 import httpx
 import pytest
 
-from brdfdb_api.http.app import create_app, problem_of
+from brdfdb_api.http.app import create_app
+from brdfdb_api.http.errors import problem_of
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.serving.settings import Settings
 from tests.api.a_store import Client, client_of, npy

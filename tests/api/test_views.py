@@ -192,14 +192,14 @@ def test_a_bad_slice_names_the_parameter(client: Client, query: str) -> None:
 
 def report(root: Path, revision: str = "r000001", when: str = "2026-11-21T12:00:00Z") -> dict[str, Any]:
     """Write what an audit of the white tile would, as far as the service reads it."""
-    passes = {"verdict": "passes"}
+    sentence = {"finding": "energy", "title": "Energy", "word": "conserves", "text": "it reflects 1 at all angles"}
     finding = {
         "material": "white-tile",
         "revision": revision,
+        "model": "lambert",
         "verdict": "passes",
-        "energy": {"verdict": "conserves", "reason": "it reflects 1 at all angles"},
-        "reciprocity": passes,
-        "validity": {"standing": "inside", "limits": []},
+        "findings": {"energy": {"verdict": "conserves"}},
+        "sentences": [sentence],
     }
     document = {"format": "brdfdb-audit", "when": when, "materials": [finding]}
     (root / "audit.json").write_text(json.dumps(document), encoding="utf-8")
@@ -221,9 +221,8 @@ def test_the_verdict_of_the_last_audit(own: Path) -> None:
     assert client.get(f"{TILE}/revisions/r000001/audit").json() == answer
     assert client.get(TILE).json()["audit"] == {
         "verdict": "passes",
-        "findings": {"energy": "conserves", "reciprocity": "passes"},
-        "reason": "it reflects 1 at all angles",
-        "validity": "inside",
+        "model": "lambert",
+        "sentences": finding["sentences"],
         "revision": "r000001",
         "current": True,
         "when": "2026-11-21T12:00:00Z",

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from brdfdb.audit import sampling
-from brdfdb.audit.findings import Jump, Limit, Sampling, Smoothness
 from brdfdb.audit.pairs import pairs_of
-from brdfdb.audit.sampling import sampling_of
-from brdfdb.audit.smoothness import MODEL_TOLERANCE, smoothness_of
-from brdfdb.audit.validity import validity_of
+from brdfdb.audit.sampling import Sampling, sampling_of
+from brdfdb.audit.smoothness import MODEL_TOLERANCE, Jump, Smoothness, smoothness_of
+from brdfdb.audit.validity import Limit, validity_of
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import Albedo
 from brdfdb.integrals.sampling import lobe_of
@@ -201,7 +200,7 @@ def limits(made_up: Material, wavelength_nm: Array | None = None) -> dict[str, L
     ],
 )
 def test_where_the_materials_of_the_papers_stand(name: str, standing: str) -> None:
-    assert validity_of(presets()[name], np.array([400.0, 700.0])).standing == standing
+    assert validity_of(presets()[name], np.array([400.0, 700.0])).verdict == standing
 
 
 def test_a_very_rough_surface_needs_no_gentle_slopes_for_its_integrals() -> None:
@@ -255,4 +254,4 @@ def test_the_gaussian_of_slopes_reaches_beyond_90_degrees() -> None:
 
 def test_what_a_material_does_not_say_is_unknown_and_decides_nothing() -> None:
     found = validity_of(material("oren_nayar_single_slope", PARAMETERS["oren_nayar_single_slope"]), None)
-    assert ([limit.standing for limit in found.limits], found.standing) == (["unknown"], "inside")
+    assert ([limit.standing for limit in found.limits], found.verdict) == (["unknown"], "inside")

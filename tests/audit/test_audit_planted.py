@@ -13,13 +13,12 @@ import numpy as np
 import pytest
 
 from brdfdb.audit import pairs
-from brdfdb.audit.findings import Nodes, TableError
-from brdfdb.audit.nodes import nodes_of
+from brdfdb.audit.nodes import Nodes, nodes_of
 from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.reciprocity import reciprocity_of
 from brdfdb.audit.smoothness import smoothness_of
 from brdfdb.audit.statement import contradictions
-from brdfdb.audit.table_error import table_error_of
+from brdfdb.audit.table_error import TableError, table_error_of
 from brdfdb.audit.values import values_of
 from brdfdb.materials import presets
 from brdfdb.tables.grids import Grid

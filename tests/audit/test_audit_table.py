@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from brdfdb.audit import pairs
-from brdfdb.audit.findings import Jump, Reciprocity, Smoothness, TableError
 from brdfdb.audit.pairs import pairs_of
-from brdfdb.audit.reciprocity import TABLE_RECIPROCITY_TOLERANCE, reciprocity_of
-from brdfdb.audit.smoothness import TABLE_TOLERANCE, smoothness_of
-from brdfdb.audit.table_error import LEAST, table_error_of
+from brdfdb.audit.reciprocity import TABLE_RECIPROCITY_TOLERANCE, Reciprocity, reciprocity_of
+from brdfdb.audit.smoothness import TABLE_TOLERANCE, Jump, Smoothness, smoothness_of
+from brdfdb.audit.table_error import LEAST, TableError, table_error_of
 from brdfdb.tables import error_measurement
 from brdfdb.tables.table import Table
 from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, UNEQUAL, lambert

@@ -13,9 +13,8 @@ import pytest
 import scipy.stats
 
 from brdfdb.audit import pairs
-from brdfdb.audit.findings import Disagreement
 from brdfdb.audit.pairs import pairs_of
-from brdfdb.audit.statement import CHANCE, QUANTILES, contradictions, disagreements, limits
+from brdfdb.audit.statement import CHANCE, QUANTILES, Disagreement, contradictions, disagreements, limits
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
 from tests.tables.test_albedo import KINDS, table_of

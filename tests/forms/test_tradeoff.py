@@ -235,7 +235,9 @@ def test_beckmanns_limit_gets_better_with_g(coppers: FamilyChart) -> None:
 def test_the_g_of_a_family_is_that_of_eq_79_along_the_normal(coppers: FamilyChart) -> None:
     # Eq. (79) with both cosines 1 and sigma = sigma_0: nothing is hidden along the normal
     expected = [(2.0 * np.pi * value / 0.55 * 2.0) ** 2 for value in SIGMA_0_UM]
-    np.testing.assert_allclose(coppers.g or [], expected, rtol=5e-3)  # three digits
+    assert coppers.diagnostic is not None
+    assert (coppers.diagnostic.symbol, coppers.diagnostic.title) == ("g", "g along the normal, eq. 79")
+    np.testing.assert_allclose(coppers.diagnostic.values, expected, rtol=5e-3)  # three digits
 
 
 def test_errors_of_a_member_are_those_of_its_chart(coppers: FamilyChart, monkeypatch: pytest.MonkeyPatch) -> None:

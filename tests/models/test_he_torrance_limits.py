@@ -438,7 +438,7 @@ def test_the_ceramic_of_the_paper_reflects_more_than_it_receives() -> None:
 
 @compiled
 def test_a_max_is_where_the_worst_angle_reflects_all() -> None:
-    bound = uniform_bound.he_torrance_a_max(**CERAMIC, tolerance=1e-5)
+    bound = uniform_bound.largest_uniform("he_torrance", **CERAMIC, tolerance=1e-5)
     theta_i = np.deg2rad(np.linspace(82.0, 85.0, 13))
     albedo, _ = directional_albedo("he_torrance", theta_i, tolerance=1e-6, specular=True, a=float(bound), **CERAMIC)
     assert albedo.max() == pytest.approx(1.0, abs=1e-4)
@@ -449,12 +449,12 @@ def test_a_max_is_where_the_worst_angle_reflects_all() -> None:
 @compiled
 def test_a_max_of_a_smooth_surface_is_nothing() -> None:
     smooth = {"wavelength_nm": 460.0, "tau_um": 1.0, "n": 1.5, "k": 0.0}
-    bound = uniform_bound.he_torrance_a_max(sigma_0_um=[0.0, 1e-3], **smooth, tolerance=1e-4)
+    bound = uniform_bound.largest_uniform("he_torrance", sigma_0_um=[0.0, 1e-3], **smooth, tolerance=1e-4)
     assert bound.shape == (2,)
     assert bound[0] == pytest.approx(0.0, abs=1e-14)
     assert 0.0 < bound[1] < 0.1
     with pytest.raises(ValueError, match="n: 0 is outside"):
-        uniform_bound.he_torrance_a_max(sigma_0_um=0.0, **smooth | {"n": 0.0})
+        uniform_bound.largest_uniform("he_torrance", sigma_0_um=0.0, **smooth | {"n": 0.0})
 
 
 @compiled
@@ -468,4 +468,4 @@ def test_the_example_of_a_max_runs() -> None:
 def test_without_an_interface_a_may_be_one() -> None:
     nothing = {"wavelength_nm": 500.0, "sigma_0_um": 0.3, "tau_um": 2.0, "n": 1.0, "k": 0.0}
     assert fresnel.unpolarised(0.5, 1.0, 0.0) == 0.0
-    assert uniform_bound.he_torrance_a_max(**nothing, tolerance=1e-3) == 1.0
+    assert uniform_bound.largest_uniform("he_torrance", **nothing, tolerance=1e-3) == 1.0

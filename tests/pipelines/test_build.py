@@ -291,7 +291,7 @@ def test_one_table_that_fails_takes_no_other_with_it(
 @pytest.mark.parametrize(
     ("error", "code", "sentence"),
     [
-        (KeyboardInterrupt(), 130, "brdfdb: interrupted; what was published before stays"),
+        (KeyboardInterrupt(), 130, "brdfdb: interrupted; published tables and complete blocks stay"),
         (MemoryError("Unable to allocate 3.64 TiB"), 2, "brdfdb: Unable to allocate 3.64 TiB"),
         (StoreError("cannot write foam: No space left"), 2, "brdfdb: cannot write foam: No space left"),
     ],

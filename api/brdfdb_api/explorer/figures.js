@@ -147,7 +147,7 @@ function spectrum(series, answers, state, ink) {
 
 /** Albedos of an answer of the service, or of the audit, which tells that of the model, too. */
 function albedosOf(answer, source) {
-  const found = answer.finding?.energy[source];
+  const found = answer.finding?.findings.energy[source];
   if (found) return { theta_i: found.theta_i_deg, at: found.wavelength_nm, total: found.albedo };
   const total = answer.albedo.map((row, k) => row.map((value, i) => value + answer.specular_reflectance[k][i]));
   return { theta_i: answer.theta_i, at: answer.wavelength_nm, total };

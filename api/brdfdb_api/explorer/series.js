@@ -41,8 +41,8 @@ export function quantityWords({ info }, { nm, illuminant }) {
   return nm === null && makesColour(info) ? `Luminance of fᵣ under ${illuminant}` : `fᵣ at ${nearest(info, nm)} nm`;
 }
 
-/** Whether albedos are those of the audit: it alone knows that of a model. */
-export const againstAudit = ({ info }, { compare }) => compare === MODEL && info.audit !== null;
+/** Whether albedos are those of the audit: it alone knows that of a model, unless the table was audited without one. */
+export const againstAudit = ({ info }, { compare }) => compare === MODEL && Boolean(info.audit?.model);
 
 /** The address of what a view shows of one series. */
 export function request(each, state, series) {

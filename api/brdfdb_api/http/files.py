@@ -14,8 +14,9 @@ from brdfdb.errors import StoreError
 from brdfdb.store.files import sha256_of
 from brdfdb.store.manifest import check_manifest
 from brdfdb.store.paths import manifest_path
+from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.openapi_notes import answers
-from brdfdb_api.http.responses import RequestError, cache_headers, not_modified
+from brdfdb_api.http.responses import cache_headers, not_modified
 from brdfdb_api.http.routes import both, query_names, shelf_of
 
 ZIP = "application/zip"

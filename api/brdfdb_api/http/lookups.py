@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
-from brdfdb_api.http.responses import RequestError
+from brdfdb_api.http.errors import RequestError
 
 if TYPE_CHECKING:
     from brdfdb.materials import Material

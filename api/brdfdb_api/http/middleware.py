@@ -16,7 +16,7 @@ from prometheus_client import REGISTRY, CollectorRegistry, Counter, Histogram, g
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from brdfdb_api.http.responses import RequestError
+from brdfdb_api.http.errors import RequestError
 from brdfdb_api.serving.settings import LogLevel
 
 LOOKUP = re.compile(r"/v1/materials/([^/]+)(?:/revisions/([^/]+))?/lookup")

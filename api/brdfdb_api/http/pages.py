@@ -12,7 +12,8 @@ from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import Response
 
-from brdfdb_api.http.responses import RequestError, not_modified
+from brdfdb_api.http.errors import RequestError
+from brdfdb_api.http.responses import not_modified
 
 SCRIPT = "text/javascript; charset=utf-8"
 MEDIA = {

@@ -1,11 +1,9 @@
-"""What goes out: problem+json, JSON through orjson, .npy bytes, and the documents that OpenAPI describes."""
+"""Answers as JSON and .npy, their headers, and the documents that OpenAPI describes."""
 
 from __future__ import annotations
 
 import functools
 import io
-from collections.abc import Sequence
-from http import HTTPStatus
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -17,32 +15,9 @@ from starlette.responses import Response
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-PROBLEM_JSON = "application/problem+json"
 NPY = "application/x-npy"
 JSON = "application/json"
 REVISION = "Brdfdb-Revision"  # header: which revision the numbers of a lookup are of
-
-# The phrases of RFC 9110; those of http.HTTPStatus change from one Python to the next.
-TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
-
-
-class RequestError(Exception):
-    """A request that is not answered, in one sentence.
-
-    Parameters
-    ----------
-    status : int
-        The HTTP status.
-    detail : str
-        The sentence.
-    parameter : str, optional
-        The parameter that is at fault.
-    """
-
-    def __init__(self, status: int, detail: str, parameter: str | None = None) -> None:
-        super().__init__(detail)
-        self.status = status
-        self.parameter = parameter
 
 
 class Problem(BaseModel):
@@ -130,7 +105,7 @@ class Material(BaseModel):
     )
     incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
     audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
-        description="verdict of each finding of the audit, and whether it is of this revision; null: none"
+        description="verdict of the audit, its findings in sentences, and whether it is of this revision; null: none"
     )
     colour: str | None
     attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
@@ -247,27 +222,6 @@ def lookup_headers(tag: str | None, revision: str, kind: str, *, immutable: bool
     """Of the answer to a lookup: by its tag, or None of what is not to be kept; which revision the numbers are of."""
     cached = {"Cache-Control": "no-store"} if tag is None else cache_headers(tag, kind, immutable=immutable)
     return Encoded({**cached, REVISION: revision, "Content-Type": NPY if kind == "npy" else JSON})
-
-
-def problem_response(
-    status: int,
-    detail: str,
-    parameter: str | None = None,
-    closest: Sequence[str] | None = None,
-    headers: dict[str, str] | None = None,
-) -> Response:
-    """An error as application/problem+json, with the members `parameter` and `closest` where they are known."""
-    problem: dict[str, Any] = {
-        "type": "about:blank",
-        "title": TITLES.get(status) or HTTPStatus(status).phrase,
-        "status": status,
-        "detail": detail.encode(errors="backslashreplace").decode(),  # paths may have what is no text
-    }
-    if parameter is not None:
-        problem["parameter"] = parameter
-    if closest is not None:
-        problem["closest"] = list(closest)
-    return Response(orjson.dumps(problem), status_code=status, media_type=PROBLEM_JSON, headers=headers)
 
 
 def plain(array: Any) -> Any:

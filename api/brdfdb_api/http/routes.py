@@ -16,6 +16,7 @@ from starlette.responses import Response
 from starlette.types import Scope
 
 from brdfdb_api.http import middleware, openapi_notes
+from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import FIELDS, OPTIONS, Options, Points, evaluate, parsed
 from brdfdb_api.http.openapi_notes import BODY, ERROR, NPY_ANSWER, POINT, WAVELENGTHS, answers
 from brdfdb_api.http.responses import (
@@ -28,7 +29,6 @@ from brdfdb_api.http.responses import (
     Health,
     Lookup,
     Material,
-    RequestError,
     cache_headers,
     json_bytes,
     json_response,
@@ -107,7 +107,7 @@ def catalogue(
     request: Request,
     cursor: Annotated[str, Query(description="of the page before, its last name")] = "",
     limit: Annotated[int, Query(ge=1, le=MOST, description="materials on a page")] = PAGE,
-    model: Annotated[str, Query(description="only of this model, such as ward")] = "",
+    model: Annotated[str, Query(description="only of this model")] = "",
     paper: Annotated[str, Query(description="only with this in the key of the paper or in the source")] = "",
     q: Annotated[str, Query(description="only with all of these words in name, title, model or source")] = "",
 ) -> Response:
@@ -220,13 +220,11 @@ def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
 
 
 def _verdicts(finding: dict[str, Any], when: str, revision: str) -> dict[str, Any]:
-    """The verdict of an audit, and of each finding that has one."""
-    each = {key: value["verdict"] for key, value in finding.items() if isinstance(value, dict) and "verdict" in value}
+    """Return the verdict of an audit, and its findings in sentences."""
     return {
         "verdict": finding["verdict"],
-        "findings": each,
-        "reason": finding["energy"]["reason"],
-        "validity": finding["validity"]["standing"],
+        "model": finding["model"],
+        "sentences": finding["sentences"],
         "revision": finding["revision"],
         "current": finding["revision"] == revision,
         "when": when,

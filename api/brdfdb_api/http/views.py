@@ -14,6 +14,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from brdfdb.geometry import radians
+from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import Options, Points, evaluate, parsed
 from brdfdb_api.http.openapi_notes import LOBE_NPY_ANSWER, LOBE_OPTIONS, WAVELENGTHS, answers
 from brdfdb_api.http.responses import (
@@ -22,7 +23,6 @@ from brdfdb_api.http.responses import (
     Albedo,
     Audit,
     Lobe,
-    RequestError,
     cache_headers,
     json_bytes,
     json_response,

@@ -245,9 +245,10 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _complete(finding: Any) -> bool:
-    """Whether a finding has what is shown of it."""
+    """Return True if the audit of a material has what is shown of it; those of older reports do not."""
     try:
-        shown = (finding["revision"], finding["verdict"], finding["energy"]["reason"], finding["validity"]["standing"])
+        words = [each[field] for each in finding["sentences"] for field in ("title", "word", "text")]
+        shown = (finding["revision"], finding["verdict"], finding["model"], *words)
     except (KeyError, TypeError):
         return False
     return all(isinstance(each, str) for each in shown)
