@@ -20,7 +20,8 @@ from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.renderer import Reflector, reflectors
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
-from brdfdb.store.staging import make_store, remove_begun
+from brdfdb.store.marker import make_store
+from brdfdb.store.staging import remove_begun
 from brdfdb_pipelines import terminal
 from brdfdb_pipelines.choice_publication import Built, build, with_reason
 from brdfdb_pipelines.scene_file import SceneError, load
