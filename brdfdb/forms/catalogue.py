@@ -92,8 +92,9 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
     -------
     list of Form
         The forms that the model names (`ModelSpec.forms`), or the source itself; then tables. Coarser rungs of the
-        exact form follow it: the ladder that an approximation is compared with. Tables hold the exact form where a model of
-        the registry is it (`ModelSpec.exact_model`); they are planned for the material's own model, which is as smooth.
+        exact form follow it: the ladder that an approximation is compared with. Tables hold the exact form where a
+        model of the registry is it (`ModelSpec.exact_model`). They are planned for the model of the material, which is
+        as smooth.
 
     Raises
     ------

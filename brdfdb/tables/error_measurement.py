@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
-from brdfdb.materials import Source
+from brdfdb.materials import FunctionRecord, Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -55,13 +55,15 @@ class Draw(NamedTuple):
         return np.asarray(self.weight > 0.0)
 
 
-def draw(source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int) -> Draw:
+def draw(
+    source: Source | FunctionRecord | None, wavelength_nm: NDArray[np.float64] | None, count: int, seed: int
+) -> Draw:
     """Draw `count` pairs of directions a band, half of the viewers over the hemisphere and half in the lobe.
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
     light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
-    its own distribution hardly ever reaches the shoulder where the lobe ends. Viewers of a source without a lobe are
-    all drawn over the hemisphere.
+    its own distribution hardly ever reaches the shoulder where the lobe ends. Viewers of a source without a lobe, or
+    of one that is not known, are all drawn over the hemisphere.
     """
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
@@ -70,7 +72,7 @@ def draw(source: Source, wavelength_nm: NDArray[np.float64] | None, count: int, 
     u, angle = 1.0 - rng.random(band.size), rng.uniform(0.0, 2.0 * np.pi, band.size)
     over = unit_vector(np.arccos(u), angle)
     in_turn = None if wavelength_nm is None else wavelength_nm[np.arange(band.size) % wavelength_nm.size]
-    lobe = source.lobe(wi[:, 2], in_turn)
+    lobe = None if source is None else source.lobe(wi[:, 2], in_turn)
     if lobe is None:
         return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), np.zeros(band.size, dtype=bool))
     lobes = [
