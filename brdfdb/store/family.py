@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -249,7 +249,6 @@ class Family:
         """Wavelengths [nm] of all members; None if they are grey."""
         return self._member(0).wavelength_nm
 
-    @overload
     def lookup(
         self,
         theta_i: ArrayLike,
@@ -257,112 +256,68 @@ class Family:
         theta_r: ArrayLike,
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
         **parameters: float,
-    ) -> Floats: ...
-
-    @overload
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[True],
-        **parameters: float,
-    ) -> Stated: ...
-
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: bool = False,
-        **parameters: float,
-    ) -> Floats | Stated:
-        """Interpolate f_r over directions, wavelengths and parameters.
+    ) -> Floats:
+        """Interpolate f_r [1/sr] over directions, wavelengths and parameters.
 
         Parameters
         ----------
         theta_i, phi_i, theta_r, phi_r, wavelength_nm
             As in `Table.lookup`: angles in radians.
-        with_error : bool
-            Give the error beside the values: at the parameters of a member what its table states, else what was
-            measured of the family.
         **parameters : float
             One number for each swept parameter, in the unit of the model: angles in radians.
 
         Returns
         -------
-        array [1/sr], or Stated
+        array [1/sr]
             Shaped as by `Table.lookup`. At the parameters of a member, what that table gives.
 
         Raises
         ------
-        ValueError
+        ParameterError
             If a parameter is missing, not swept, not one number or outside its swept range, or an angle or wavelength
-            is outside its range; the message names it.
+            is outside its range.
         StoreError
             If a member was built anew since the family was recorded.
         """
-        parts = self._parts(parameters)
         given = (theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+        return self._blended(self._parts(parameters), lambda table: table.lookup(*given))
+
+    def lookup_vectors(
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
+    ) -> Floats:
+        """Interpolate f_r [1/sr] for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+        return self._blended(self._parts(parameters), lambda table: table.lookup_vectors(wi, wr, wavelength_nm))
+
+    def lookup_with_error(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+        **parameters: float,
+    ) -> Stated:
+        """Interpolate f_r [1/sr], and give the stated error [1/sr] of each value.
+
+        Parameters and errors are those of `lookup`. At the parameters of a member the error is what its table states,
+        elsewhere what was measured of the family.
+        """
+        parts, given = self._parts(parameters), (theta_i, phi_i, theta_r, phi_r, wavelength_nm)
         if len(parts) == 1:
-            table = parts[0].table
-            return table.lookup(*given, with_error=True) if with_error else table.lookup(*given)
-        brdf = self._blended(parts, [part.table.lookup(*given) for part in parts])
-        if not with_error:
-            return brdf
+            return parts[0].table.lookup_with_error(*given)
+        brdf = self._blended(parts, lambda table: table.lookup(*given))
         directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
         return Stated(brdf, parts[0].table.stated_by(self.error, directions, brdf, wavelength_nm))
 
-    @overload
-    def lookup_vectors(
-        self,
-        wi: ArrayLike,
-        wr: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-        **parameters: float,
-    ) -> Floats: ...
-
-    @overload
-    def lookup_vectors(
-        self,
-        wi: ArrayLike,
-        wr: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[True],
-        **parameters: float,
-    ) -> Stated: ...
-
-    def lookup_vectors(
-        self,
-        wi: ArrayLike,
-        wr: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: bool = False,
-        **parameters: float,
-    ) -> Floats | Stated:
-        """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    def lookup_vectors_with_error(
+        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
+    ) -> Stated:
+        """Interpolate f_r [1/sr] for unit vectors, and give the stated error [1/sr]; as `lookup_with_error`."""
         parts = self._parts(parameters)
         if len(parts) == 1:
-            table = parts[0].table
-            if with_error:
-                return table.lookup_vectors(wi, wr, wavelength_nm, with_error=True)
-            return table.lookup_vectors(wi, wr, wavelength_nm)
-        brdf = self._blended(parts, [part.table.lookup_vectors(wi, wr, wavelength_nm) for part in parts])
-        if not with_error:
-            return brdf
+            return parts[0].table.lookup_vectors_with_error(wi, wr, wavelength_nm)
+        brdf = self._blended(parts, lambda table: table.lookup_vectors(wi, wr, wavelength_nm))
         return Stated(brdf, parts[0].table.stated_by(self.error, checked_vectors(wi, wr), brdf, wavelength_nm))
 
     def specular_reflectance(
@@ -397,7 +352,11 @@ class Family:
         """The members that a lookup at these parameters is made of; parameters and errors as `lookup` has them."""
         return [part.table for part in self._parts(parameters)]
 
-    def _blended(self, parts: Sequence[_Part], values: Sequence[Floats]) -> Floats:
+    def _blended(self, parts: Sequence[_Part], look: Callable[[Table], Floats]) -> Floats:
+        """Return what `look` finds in the members around a point, weighted; of one member its own values."""
+        values = [look(part.table) for part in parts]
+        if len(parts) == 1:
+            return values[0]
         mean = blended(
             [np.asarray(value, dtype=np.float64) for value in values],
             [part.weight for part in parts],

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, overload
+from typing import TYPE_CHECKING, Any, NoReturn
 from urllib.parse import quote, urlencode, urlsplit, urlunsplit
 
 import numpy as np
@@ -25,7 +25,7 @@ from brdfdb.parameters import Floats
 from brdfdb.store.manifest import NAME
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.table_base import Described, Stated
+from brdfdb.tables.table_base import BaseTable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -204,7 +204,7 @@ def _exchange(
 
 
 @dataclass(frozen=True, eq=False)
-class RemoteTable(Described):
+class RemoteTable(BaseTable):
     """The table of one revision of one material, looked up by a service; methods as of `brdfdb.tables.table.Table`.
 
     Answers are those of the revision that it was opened with, also when the service has a newer one. They are
@@ -233,7 +233,6 @@ class RemoteTable(Described):
     _specular: bool = field(repr=False)
     _service: Service = field(repr=False)
 
-    @overload
     def lookup(
         self,
         theta_i: ArrayLike,
@@ -241,66 +240,19 @@ class RemoteTable(Described):
         theta_r: ArrayLike,
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-    ) -> Floats: ...
-
-    @overload
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[True],
-    ) -> Stated: ...
-
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: bool = False,
-    ) -> Floats | Stated:
-        """Interpolate f_r: parameters, shapes [1/sr] and errors as by `brdfdb.tables.table.Table.lookup`."""
+    ) -> Floats:
         self._wavelengths(wavelength_nm)  # what is wrong is refused in the order of a table, before anything is sent
         np.broadcast_shapes(*(np.shape(angle) for angle in (theta_i, phi_i, theta_r, phi_r)))
         given = checked_angles(theta_i, phi_i, theta_r, phi_r)
-        brdf = self._looked_up((given.theta_i, given.phi_i, given.theta_r, given.phi_r), given, wavelength_nm)
-        return Stated(brdf, self._stated(given, brdf, wavelength_nm)) if with_error else brdf
+        return self._looked_up((given.theta_i, given.phi_i, given.theta_r, given.phi_r), given, wavelength_nm)
 
-    @overload
-    def lookup_vectors(
-        self,
-        wi: ArrayLike,
-        wr: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-    ) -> Floats: ...
-
-    @overload
-    def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: Literal[True]
-    ) -> Stated: ...
-
-    def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: bool = False
-    ) -> Floats | Stated:
-        """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         self._wavelengths(wavelength_nm)
         given = checked_vectors(wi, wr)
         (theta_i, phi_i), (theta_r, phi_r) = spherical_angles(given.w_i), spherical_angles(given.w_r)
-        brdf = self._looked_up((theta_i, phi_i, theta_r, phi_r), given, wavelength_nm)
-        return Stated(brdf, self._stated(given, brdf, wavelength_nm)) if with_error else brdf
+        return self._looked_up((theta_i, phi_i, theta_r, phi_r), given, wavelength_nm)
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Interpolate the Dirac part: parameters, shapes [1] and errors as by `Table.specular_reflectance`."""
         count, tail = self._asked(wavelength_nm)
         given = checked_angles(theta_i, 0.0, 0.0, 0.0)
         values = np.zeros((given.theta_i.size, count))
@@ -428,24 +380,18 @@ class RemoteStore(Mapping[str, RemoteTable]):
         """Return the metadata of the current revision; of the request of its build nothing."""
         return self[name].metadata
 
-    def dataset(self, name: str) -> xr.Dataset:
-        """The current revision as a lazy xarray Dataset, read over HTTP as far as it is needed.
+    def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
+        """Return a revision, by default the current one, as a lazy Dataset that is read over HTTP as far as needed.
 
         Raises
         ------
-        UnknownMaterialError
-            If the store has no such material.
+        UnknownMaterialError, UnknownRevisionError
+            If the store has no such material, or it no such revision.
         StoreError
             If fsspec and aiohttp, which read zarr over HTTP, are not installed.
         """
-        if find_spec("fsspec") is None or find_spec("aiohttp") is None:
-            raise StoreError("a dataset over HTTP needs fsspec and aiohttp: pip install 'brdfdb[http]'")
-        import xarray as xr
-
-        from brdfdb.tables.xarray_view import with_brdf
-
-        path = f"/v1/store/materials/{name}/{self.head(name)}"
-        return with_brdf(xr.open_zarr(f"{self.url}{path}", chunks=None))
+        document = self._material(name, "" if revision is None else f"/revisions/{quote(revision, safe='')}")
+        return remote_dataset(f"{self.url}/v1/store/materials/{name}/{document['revision']}")
 
     def families(self) -> NoReturn:
         """Not served: a StoreError that says so."""
@@ -480,6 +426,18 @@ class RemoteStore(Mapping[str, RemoteTable]):
             _specular=document["specular"],
             _service=self._service,
         )
+
+
+def remote_dataset(url: str) -> xr.Dataset:
+    """Return the lazy Dataset of a revision at the address of its files; StoreError if an extra is not installed."""
+    if find_spec("fsspec") is None or find_spec("aiohttp") is None:
+        raise StoreError("a dataset over HTTP needs fsspec and aiohttp: pip install 'brdfdb[http]'")
+    from brdfdb.tables.xarray_view import opened
+
+    try:
+        return opened(url)
+    except FileNotFoundError:
+        raise StoreError(f"no revision at {url}") from None
 
 
 def _sendable(angle: NDArray[Any]) -> NDArray[np.float64]:

@@ -303,24 +303,25 @@ class Store(Mapping[str, "Table"]):
             return self.snapshot["families"][name]
         return read_sealed(self.root / "families" / f"{name}.json", f"the family {name}")
 
-    def dataset(self, name: str) -> xr.Dataset:
-        """Return the current revision as a lazy xarray Dataset.
+    def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
+        """Return a revision, by default the current one, as a lazy Dataset: see `brdfdb.tables.xarray_view.opened`.
 
         Raises
         ------
-        UnknownMaterialError
-            If the store has no such material.
+        UnknownMaterialError, UnknownRevisionError
+            If the store has no such material, or it no such revision.
         StoreError
             If a file of it is missing or changed, also later, while it is read; it names material, revision and file.
         """
-        import xarray as xr
-
         from brdfdb.store.zarr_store import Whole
-        from brdfdb.tables.xarray_view import with_brdf
+        from brdfdb.tables.xarray_view import opened
 
-        group, digest = self.location(name)
+        group, digest = self.location(name) if revision is None else self.located(name, revision)
         files = check_manifest(group, digest, contents=False)["files"]
-        return with_brdf(xr.open_zarr(Whole(group, files), chunks=None))
+        try:
+            return opened(Whole(group, files))
+        except ValueError as error:  # written by another program
+            raise StoreError(f"{name} {group.name} is no table: {error}") from error
 
     def verify(self, name: str) -> None:
         """Check every file of the current revision against its manifest, and the manifest against the pointer.

@@ -119,6 +119,12 @@ class TableMetadata(BaseModel):
         needed = [key for key in REQUIRED if key not in _OF_MODELS] if self.of_function else REQUIRED
         return [key for key in needed if key not in self.model_fields_set and key not in self.strange]
 
+    def known_interpolation(self) -> Interpolation:
+        """Return the interpolation; ValueError if it is one that this program does not know."""
+        if "interpolation" in self.strange:
+            raise ValueError(f"interpolation: {self.strange['interpolation']}")
+        return self.interpolation
+
     @property
     def gaps(self) -> str:
         """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -19,14 +19,14 @@ from brdfdb.tables._interpolation import Axes, prepared
 from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.table_base import Described, Stated
+from brdfdb.tables.table_base import BaseTable
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
 _Ready = tuple[_kernels.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
-class Table(Described):
+class Table(BaseTable):
     """A decoded table: the values of one revision of one material, in memory.
 
     Attributes
@@ -119,7 +119,6 @@ class Table(Described):
         """Whether the stored numbers are f_r itself."""
         return self.spectra is None and self.uniform is None and self.interpolation.plain
 
-    @overload
     def lookup(
         self,
         theta_i: ArrayLike,
@@ -127,60 +126,7 @@ class Table(Described):
         theta_r: ArrayLike,
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-    ) -> Floats: ...
-
-    @overload
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[True],
-    ) -> Stated: ...
-
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: bool = False,
-    ) -> Floats | Stated:
-        """Interpolate f_r.
-
-        Parameters
-        ----------
-        theta_i, phi_i, theta_r, phi_r : array_like [rad]
-            Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
-        wavelength_nm : float or array_like (M,) [nm], optional
-            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table. Between them
-            the numbers that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
-        with_error : bool
-            Give the error that the table states beside the values, between its wavelengths, too: see `Stated`.
-
-        Returns
-        -------
-        array [1/sr], or Stated
-            In the shape of the angles, with a last axis for the wavelengths of a spectral table, or M if an array of
-            wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is nan.
-            Beyond the last theta node of its grid the value is that of the node. float32 arrays in give float32 out.
-
-        Raises
-        ------
-        ValueError
-            If an angle or a wavelength is outside its range; the message names it. If an error is asked of a table
-            that states none, or between the wavelengths of a table of before version 3.
-        """
-        if with_error:
-            brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
-            return Stated(brdf, self._stated(checked_angles(theta_i, phi_i, theta_r, phi_r), brdf, wavelength_nm))
+    ) -> Floats:
         at = self._wavelengths(wavelength_nm)
         given: Sequence[ArrayLike] = (theta_i, phi_i, theta_r, phi_r)
         shape: tuple[int, ...] = ()
@@ -203,28 +149,7 @@ class Table(Described):
             checked_angles(*given)
         return values.reshape(shape + at.tail)[()]
 
-    @overload
-    def lookup_vectors(
-        self,
-        wi: ArrayLike,
-        wr: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-    ) -> Floats: ...
-
-    @overload
-    def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: Literal[True]
-    ) -> Stated: ...
-
-    def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: bool = False
-    ) -> Floats | Stated:
-        """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
-        if with_error:
-            brdf = self.lookup_vectors(wi, wr, wavelength_nm)
-            return Stated(brdf, self._stated(checked_vectors(wi, wr), brdf, wavelength_nm))
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         at = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
@@ -250,25 +175,6 @@ class Table(Described):
         return rule, axes, self.values.reshape(-1), channels, spectra, uniform
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Interpolate the reflectance of the Dirac part; 0 for models that have none.
-
-        Parameters
-        ----------
-        theta_i : array_like [rad]
-            Angle of incidence, in [0, pi].
-        wavelength_nm : float or array_like (M,) [nm], optional
-            As in `lookup`.
-
-        Returns
-        -------
-        array [1]
-            Shaped as by `lookup`.
-
-        Raises
-        ------
-        ValueError
-            If theta_i or a wavelength is outside its range.
-        """
         at = self._wavelengths(wavelength_nm)
         given = np.asarray(theta_i)
         dtype = asked_for(theta_i)
@@ -333,9 +239,7 @@ def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
 
 def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], attrs: Mapping[str, Any]) -> Table:
     """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
-    metadata = TableMetadata.read(attrs)
-    if "interpolation" in metadata.strange:
-        raise ValueError(f"interpolation: {metadata.strange['interpolation']}")
+    interpolation = TableMetadata.read(attrs).known_interpolation()
     variable = "brdf" if "brdf" in arrays else "parts"
     if variable not in arrays:
         raise ValueError(f"brdf: neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
@@ -357,7 +261,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         values=arrays[variable],
         specular=None if specular is None else specular.astype(np.float32),
         specular_theta_deg=arrays.get("specular_theta_i"),
-        interpolation=metadata.interpolation,
+        interpolation=interpolation,
         spectra=spectra,
         uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),
         n=arrays.get("n"),

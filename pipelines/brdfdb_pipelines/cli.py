@@ -65,6 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     options = _parser().parse_args(arguments, argparse.Namespace(arguments=arguments))
     try:
+        _add_models([*getattr(options, "models", ()), *getattr(options, "models_of_command", ())])
         code: int = options.run(options)
         sys.stdout.flush()  # a reader that left shows here, not at exit
         return code
@@ -94,22 +95,38 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
-    _add_debug(parser)
+    _add_globals(parser, "models")
     subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, command in commands().items():
         first_sentence = command.HELP.partition(". ")[0].rstrip(".")
         subparser = subparsers.add_parser(name, help=f"{first_sentence}.", description=command.HELP)
         command.add_arguments(subparser)
-        _add_debug(subparser)
+        _add_globals(subparser, "models_of_command")
         subparser.set_defaults(run=command.run)
     return parser
 
 
-def _add_debug(parser: argparse.ArgumentParser) -> None:
-    # without a default: that of a command would replace what stands before the command
+def _add_globals(parser: argparse.ArgumentParser, models: str) -> None:
+    # without a default, and a list of its own: those of a command would replace what stands before the command
     parser.add_argument(
         "--debug", action="store_true", default=argparse.SUPPRESS, help="print the traceback of an error, too"
     )
+    parser.add_argument(
+        "--models",
+        action="append",
+        dest=models,
+        default=argparse.SUPPRESS,
+        metavar="FILE",
+        help="a Python file with models of yours, for this command and the processes that it starts; may be repeated "
+        "(default: $BRDFDB_MODELS)",
+    )
+
+
+def _add_models(files: Sequence[str]) -> None:
+    if files:
+        from brdfdb.models import MODELS
+
+        MODELS.add_files(files)
 
 
 def _refusal(error: Exception) -> str | None:

@@ -72,7 +72,7 @@ def test_a_bug_without_a_directory_for_its_traceback_prints_it(
         ),
         (
             ModuleNotFoundError("No module named 'matplotlib.figure'", name="matplotlib.figure"),
-            "matplotlib is not installed; it comes with pip install 'brdfdb[report]' or pip install 'brdfdb[scenes]'",
+            "matplotlib is not installed; it comes with pip install 'brdfdb[scenes]' or pip install 'brdfdb[report]'",
         ),
     ],
 )

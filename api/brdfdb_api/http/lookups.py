@@ -26,8 +26,7 @@ ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 REQUIRED = ("theta_i", "theta_r")
 FIELDS = (*ANGLES, "wavelength_nm")
 OPTIONS = ("from", "error", "output", "illuminant", "format")
-# Names of the library's parameters, and those of a request
-_PARAMETERS = {**{name: name for name in (*FIELDS, "illuminant")}, "with_error": "error"}
+_PARAMETERS = (*FIELDS, "illuminant", "error")  # of the library, which a request calls the same
 
 Source = Literal["table", "model"]
 Output = Literal["spectrum", "xyz", "linear-srgb"]
@@ -226,7 +225,7 @@ def evaluate(points: Points, options: Options, table: Table, *, specular: bool =
 
         def spectra(angles: Angles) -> tuple[Any, Any]:
             if options.error:
-                return table.lookup(*angles, at, with_error=True)
+                return table.lookup_with_error(*angles, at)
             return source.lookup(*angles, at), None
 
         if options.output != "spectrum":
@@ -275,8 +274,7 @@ def _coloured(
 
 def _refusal(error: ParameterError) -> RequestError | None:
     """Return the answer (422) to an error about a parameter of the request; None for any other."""
-    name = _PARAMETERS.get(error.parameter)
-    return None if name is None else RequestError(422, f"{name}: {error.sentence}", name)
+    return RequestError(422, str(error), error.parameter) if error.parameter in _PARAMETERS else None
 
 
 def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list[str]]:

@@ -48,5 +48,5 @@ SPEC = ModelSpec(
     evaluate=rpv,
     vectors=rpv_vectors,
     grazing_pole=True,
-    excess="Rahman et al. 1993: a fit to measured reflectances, not normalised; with k below 1 it has a pole at grazing",
+    excess="Rahman et al. 1993: a fit to measured reflectances, not normalised; for k below 1 it has a pole at grazing",
 )
