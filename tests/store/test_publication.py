@@ -16,7 +16,7 @@ from brdfdb.forms.catalogue import forms
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import FunctionRecord, FunctionSource, presets
 from brdfdb.scenes.gbuffer import gather
-from brdfdb.scenes.offered_forms import candidates
+from brdfdb.scenes.offered_forms import offered_forms
 from brdfdb.scenes.renderer import reflectors, render
 from brdfdb.store.publication import Published, publish
 from brdfdb.tables.table_source import source_of_table
@@ -130,7 +130,7 @@ def test_a_scene_shows_the_table_of_a_function_and_offers_its_forms(root: Path, 
     expected = render(scene, view, own, materials=reflectors(scene))
     assert shown.max() > 0.1
     np.testing.assert_allclose(shown, expected, rtol=0.1, atol=1e-3)
-    assert candidates(scene.materials["store:gloss"], np.array(VISIBLE_NM[:2]), [])[0].form.kind == "exact"
+    assert offered_forms(scene.materials["store:gloss"], np.array(VISIBLE_NM[:2]), [])[0].form.kind == "exact"
     assert cli.main(["render", str(path), "--out", str(root.parent / "out"), "--width", "24"]) == 0
     assert (root.parent / "out" / "scene.png").is_file()
     capsys.readouterr()
