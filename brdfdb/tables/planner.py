@@ -242,9 +242,14 @@ def _offset(task: _Task) -> float:
 def coarsest(source: Source) -> Grid:
     """Return the smallest grid that suits a source."""
     names = ANISOTROPIC_AXES if source.anisotropic else ISOTROPIC_AXES
+    return _grid(source, names, pole=source.grazing_pole)
+
+
+def _grid(source: Source, names: tuple[str, ...], *, pole: bool) -> Grid:
+    """Return the grid with the two ends of each axis alone; with a pole, light and viewer end before it."""
     ends = {name: _end(source, name) for name in names}
-    if source.grazing_pole:
-        ends |= {"theta_i": POLE_END_DEG, "theta_r": POLE_END_DEG}
+    if pole:
+        ends |= {name: POLE_END_DEG for name in ("theta_i", "theta_r") if name in names}
     return Grid({name: [0.0, end] for name, end in ends.items()})
 
 
@@ -271,16 +276,9 @@ def _table_kinds(task: _Task) -> Iterator[_TableKind]:
         for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
             # what goes on beyond the horizon may fall below 0, which a logarithm does not
             for logarithm in (True,) if "theta_h" in names else (True, False):
-                ends = {name: _end(source, name) for name in names}
-                if source.grazing_pole and power == 0.0:
-                    ends |= {name: POLE_END_DEG for name in ("theta_i", "theta_r") if name in names}
-                grid = Grid({name: [0.0, end] for name, end in ends.items()})
-                layout = Layout(
-                    source,
-                    grid,
-                    task.wavelength_nm,
-                    interpolation=Interpolation("linear", logarithm, offset if logarithm else 0.0, power),
-                )
+                grid = _grid(source, names, pole=source.grazing_pole and power == 0.0)
+                how = Interpolation("linear", logarithm, offset if logarithm else 0.0, power)
+                layout = Layout(source, grid, task.wavelength_nm, how)
                 lines: dict[str, tuple[Floats, Floats]] = {}
                 for method in ("cubic", "linear"):
                     chosen = replace(layout, interpolation=replace(layout.interpolation, method=method))
