@@ -21,7 +21,7 @@ from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-SHARED = ("_elementary.py", "fresnel.py", "tables/_interpolation.py", "models/_he_torrance_series.py")
+SHARED = ("_elementary.py", "fresnel.py", "tables/_interpolation.py", "models/_diffraction_series.py")
 
 
 def kernel(function: F) -> F:

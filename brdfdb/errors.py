@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import importlib
 from collections.abc import Iterable
+from types import ModuleType
 
 _SHOWN = 60  # characters of an unknown name that a sentence repeats
 
@@ -57,6 +59,10 @@ class MaterialError(ParameterError):
         return f"{self.material}: {super().__str__()}"
 
 
+class WriteError(BrdfdbError, OSError):
+    """A file that cannot be written, where the library that writes it does not say which error it met."""
+
+
 class StoreError(BrdfdbError):
     """A store that is missing, damaged, of another version, or cannot be written."""
 
@@ -105,3 +111,43 @@ class UnknownRevisionError(BrdfdbError, KeyError):
 
 class BusyError(BrdfdbError):
     """A lock of the store that another build holds."""
+
+
+# Modules that an optional extra of the distribution installs. The service needs those of scenes, too
+EXTRAS = {
+    "serve": ("fastapi", "uvicorn", "uvloop", "httptools", "orjson", "prometheus_client", "plotly"),
+    "scenes": ("colour", "matplotlib", "OpenEXR", "scipy"),
+    "report": ("jinja2", "matplotlib", "mpmath", "colour"),
+    "dask": ("distributed",),
+    "http": ("fsspec", "aiohttp"),
+}
+
+
+class MissingExtraError(BrdfdbError):
+    """A module that is not installed because it belongs to an optional extra."""
+
+
+def import_extra(module: str) -> ModuleType:
+    """Return a module of an optional extra; MissingExtraError, with the command that installs it, where it is not."""
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error.name or module)
+        if missing is None:
+            raise
+        raise missing from None
+
+
+def missing_extra(module: str) -> MissingExtraError | None:
+    """Return the error that names the extras which install a module; None for a module of no extra.
+
+    Parameters
+    ----------
+    module : str
+        Full name of the module that is not installed, as `ModuleNotFoundError.name` has it.
+    """
+    package = module.partition(".")[0]
+    commands = [f"pip install 'brdfdb[{extra}]'" for extra, modules in EXTRAS.items() if package in modules]
+    if not commands:
+        return None
+    return MissingExtraError(f"{package} is not installed; it comes with {' or '.join(commands)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Literal
 
@@ -12,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 Numbers = list[float | None]
 Role = Literal["ours", "printed", "textbook", "truth", "other"]
 
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
@@ -117,3 +119,21 @@ def listed(values: Iterable[float], form: str = ".3g") -> str:
     """Numbers in a sentence, as "1, 2 and 3"."""
     *most, last = (format(float(value), form) for value in values)
     return f"{', '.join(most)} and {last}" if most else last
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number for people: 0.0123, 1.2·10⁻⁹; a dash for None."""
+    if value is None:
+        return "–"
+    value += 0.0  # -0 is 0
+    if not math.isfinite(value):
+        return "not finite"
+    if value != 0.0 and not 1e-4 <= abs(value) < 1e5:
+        mantissa, exponent = f"{value:.1e}".split("e")
+        return f"{mantissa.removesuffix('.0')}·10{superscript(int(exponent))}".replace("-", "−")
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def superscript(exponent: int) -> str:
+    """Return an integer in raised digits."""
+    return str(exponent).translate(_SUPERSCRIPT)

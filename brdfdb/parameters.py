@@ -1,18 +1,23 @@
-"""What a model's parameters are: frozen data that feeds checks, recipes, the README table and the tests alike."""
+"""Parameters and specifications of models: frozen data for checks, recipes, audits, charts, HTTP and tests."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import ParameterError
+from brdfdb.lobes import Lobe
 
 Floats = NDArray[np.floating[Any]]
+Arguments = Mapping[str, Any]  # of a model call, directions apart; a spectral model's include wavelength_nm, n and k
+
+FormKind = Literal["exact", "quadrature", "closed form", "approximation", "customary", "printed", "other model"]
+Standing = Literal["inside", "at the edge", "outside", "unknown"]
 
 
 @dataclass(frozen=True)
@@ -52,27 +57,75 @@ class Parameter:
         return array
 
 
-class Lobe(NamedTuple):
-    """Where a model has its lobe: what samplers and quadratures look for, not a part of the model's value.
+def white(_: Mapping[str, Any]) -> dict[str, float]:
+    """Return the parameters that make a model lossless if it absorbs by an albedo rho alone."""
+    return {"rho": 1.0}
 
-    `share` [1], in [0, 1], is about what part of the reflected light lies in the lobe around the mirror direction,
-    whose half vectors have slopes distributed about as exp(-(s_x / alpha_x)^2 - (s_y / alpha_y)^2). The rest is looked
-    for all over the hemisphere: a model with wider tails than this Gaussian leaves a tenth to that, or more.
+
+def bytes_of(arguments: Arguments) -> int:
+    """Return the size [byte] of the arguments of a model call in float64."""
+    return 8 * sum(int(np.size(each)) for each in arguments.values())
+
+
+class ModelForm(NamedTuple):
+    """One way to get f_r of a model, to be charted: the model itself, an approximation, or what a paper prints.
+
+    Attributes
+    ----------
+    key : str
+        Unique among those of a model: lower-case words joined by hyphens.
+    title : str
+        A name for people, with the equation.
+    kind : str
+        "exact"; "quadrature", the same by a coarser integral or sum; "closed form"; "approximation"; "customary", usual
+        in programs and printed by no paper; "printed" by a paper, where this library holds another form; "other model",
+        of the same parameters and meant to differ.
+    python : str
+        The function in Python.
+    vectors : callable
+        ``vectors(wi, wr, **arguments)``: f_r [1/sr], called as `ModelSpec.vectors` is.
+    bytes : int
+        Size of the numbers that an evaluation reads: parameters, spectra, and constants that kernels look up.
+    single : bool
+        Whether to chart it with float32 in and out, too.
     """
 
-    share: Floats
-    alpha_x: Floats
-    alpha_y: Floats
+    key: str
+    title: str
+    kind: FormKind
+    python: str
+    vectors: Callable[..., Floats]
+    bytes: int
+    single: bool = False
 
 
-def white(_: Mapping[str, Any]) -> dict[str, float]:
-    """What makes a model lossless that absorbs by an albedo rho alone."""
-    return {"rho": 1.0}
+class StatedLimit(NamedTuple):
+    """One limit of validity that a paper states of its model, and the standing of some parameters in it.
+
+    `quantity` is what is limited, `value` its value and `valid` its range, in words. `words` is the quotation, `where`
+    its paper and section. Where a paper says "much less" and no number, a tenth is inside, and what is less, but not by
+    that much, at the edge.
+    """
+
+    quantity: str
+    value: str
+    valid: str
+    standing: Standing
+    words: str
+    where: str
+
+
+class Diagnostic(NamedTuple):
+    """A number that tells in which regime a model is: its symbol, a title, and a function of the arguments."""
+
+    symbol: str
+    title: str
+    value: Callable[[Arguments], float]
 
 
 @dataclass(frozen=True)
 class ModelSpec:
-    """A model as the rest of the library sees it.
+    """A model as the rest of the library sees it: nothing outside its own modules knows a model by name.
 
     `version` is written into every table and is raised whenever a tabulated value moves. `evaluate` has the call
     shape ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``, `vectors`, its twin, ``f(wi, wr, *, parameters)``;
@@ -87,6 +140,14 @@ class ModelSpec:
     `lobe`, of models that have one, is called as ``lobe(cos_i, **parameters)`` and says where; None: a diffuse model.
     `lossless` says which parameters to set to what so that nothing is absorbed: light that is then missing, the model
     itself loses. None where no parameters do that.
+
+    For charts, `forms` gives the forms of the model at some arguments, the exact one first; None: the model itself.
+    `exact_model` names another model of the registry, with its parameters, that this one approximates at some
+    parameters, or None: charted tables hold that one. `diagnostic` is shown along the members of a family.
+    For audits, `limits` gives the limits that a paper states, judged at some arguments. `slow` marks a model whose
+    values are integrals, of about 30 us each: audits ask for fewer. `uniform_bound_cosine` marks a model whose uniform
+    part is free up to what energy conservation leaves; at some arguments it gives the lowest cos theta_i [1] down to
+    which the largest reflectance is searched.
     """
 
     name: str
@@ -107,9 +168,15 @@ class ModelSpec:
     uniform: str | None = None
     excess: str = ""
     lossless: Callable[[Mapping[str, Any]], dict[str, float]] | None = None
+    forms: Callable[[Arguments], Iterable[ModelForm]] | None = None
+    exact_model: Callable[[Mapping[str, Any]], tuple[str, dict[str, Any]] | None] | None = None
+    diagnostic: Diagnostic | None = None
+    limits: Callable[[Arguments], Iterable[StatedLimit]] | None = None
+    slow: bool = False
+    uniform_bound_cosine: Callable[[Arguments], float] | None = None
 
     def parameter(self, name: str) -> Parameter:
-        """The parameter called `name`; KeyError if the model has none."""
+        """Return the parameter called `name`; KeyError if the model has none."""
         for parameter in self.parameters:
             if parameter.name == name:
                 return parameter

@@ -28,7 +28,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from brdfdb.models.he_torrance_1991 import SIGMA_0_UM, TAU_UM
 from brdfdb.parameters import Floats, Parameter
 
 _SQRT_2 = float(np.sqrt(2.0))
@@ -37,6 +36,8 @@ ALPHA = Parameter("alpha", "α", "1", 0.0, 1e12, "width of the Gaussian of slope
 SLOPE = Parameter("slope", "σ", "1", 0.0, 1e12, "rms slope along one axis")
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the slope angle in one plane")
 SIGMA_DEG = Parameter("sigma_deg", "σ", "degree", 0.0, 90.0, "standard deviation of the slope angle in one plane")
+SIGMA_0_UM = Parameter("sigma_0_um", "σ_0", "µm", 0.0, 1e4, "rms height")
+TAU_UM = Parameter("tau_um", "τ", "µm", 1e-6, 1e6, "autocorrelation length")
 ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1e6, "of a specular lobe; a shader's slider ends at 1")
 
 

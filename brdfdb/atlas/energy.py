@@ -25,7 +25,7 @@ from brdfdb.atlas._albedos import (
 )
 from brdfdb.figure import Figure, Panel, Statement
 from brdfdb.geometry import radians
-from brdfdb.integrals.uniform_bound import he_torrance_a_max
+from brdfdb.integrals.uniform_bound import largest_uniform
 from brdfdb.materials import presets
 from brdfdb.models import he_torrance_specular
 from brdfdb.reference import he_torrance_1991
@@ -195,7 +195,7 @@ def _magnesium_oxide() -> Figure:
     specular: Array = np.asarray(he_torrance_specular(radians(THETA_DEG), **surface))
     first = albedo_of("he_torrance", a=0.0, **surface)
     total = albedo_of("he_torrance", a=a, **surface)
-    bound = float(he_torrance_a_max(tolerance=1e-5, **surface))
+    bound = float(largest_uniform("he_torrance", tolerance=1e-5, **surface))
     known_deg = (30.0, 60.0, 85.0)
     known = [at(total, theta_deg) for theta_deg in known_deg]
     between_deg = np.arange(50.0, 58.0)
@@ -235,7 +235,7 @@ def _magnesium_oxide() -> Figure:
             ),
             Statement(
                 says="with a at the bound nothing exceeds 1",
-                where="`he_torrance_a_max`",
+                where="`largest_uniform`",
                 seen=f"at most {largest(first + bound)}",
                 holds=float(np.max(first + bound)) <= 1.0 + TOLERANCE,
             ),

@@ -23,7 +23,7 @@ from brdfdb.atlas._errors import lobe
 from brdfdb.figure import Figure, Panel, Statement
 from brdfdb.gallery.ward_1992_forms import FORMS
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.sampling import ward_sample
+from brdfdb.integrals.sampling import sample
 from brdfdb.reference import mp
 
 _ALPHAS = (0.05, 0.1, 0.2, 0.5)
@@ -177,7 +177,16 @@ def _ward_samples() -> Figure:
     alpha = 0.1
     u = (np.arange(128.0) + 0.5) / 128.0
     lights = unit_vector(radians(THETA_DEG), 0.0)
-    drawn = ward_sample(u[:, np.newaxis, np.newaxis], u[:, np.newaxis], lights, rho_s=1.0, alpha_x=alpha, alpha_y=alpha)
+    drawn = sample(
+        "ward",
+        u[:, np.newaxis, np.newaxis],
+        u[:, np.newaxis],
+        lights,
+        rho_d=0.0,
+        rho_s=1.0,
+        alpha_x=alpha,
+        alpha_y=alpha,
+    )
     weighted = drawn.weight.mean(axis=(0, 1))
     uniform = (drawn.wr[..., 2] > 0.0).mean(axis=(0, 1))
     albedo = albedo_of("ward", **lobe(alpha))

@@ -32,7 +32,7 @@ from brdfdb.atlas._errors import (
 from brdfdb.figure import Figure
 from brdfdb.geometry import unit_vector
 from brdfdb.misprints import HE
-from brdfdb.models._he_torrance_series import diffraction_series
+from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
 
 SERIES = 1e-11  # Relative error of eq. 78 that `diffraction_series` promises. Worst measured: 8.3e-13

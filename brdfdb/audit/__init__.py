@@ -6,30 +6,26 @@ from collections.abc import Sequence
 from datetime import datetime
 from importlib.metadata import version
 
-from brdfdb.audit.energy import energy_of
-from brdfdb.audit.findings import AuditReport, MaterialAudit, Verdict
-from brdfdb.audit.nodes import nodes_of
-from brdfdb.audit.pairs import pairs_of
-from brdfdb.audit.reciprocity import reciprocity_of
-from brdfdb.audit.sampling import sampling_of
-from brdfdb.audit.smoothness import smoothness_of
-from brdfdb.audit.table_error import table_error_of
-from brdfdb.audit.validity import validity_of
-from brdfdb.audit.values import values_of
+from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, Verdict
+from brdfdb.audit.findings import FINDINGS
+from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.figure import Figure
-from brdfdb.tables.albedo import linear_in_angles, material_of
+from brdfdb.materials import Material, Source
 from brdfdb.tables.table import Table
 
-__all__ = ["AuditReport", "MaterialAudit", "audit", "report"]
+__all__ = ["FINDINGS", "AuditReport", "Finding", "MaterialAudit", "audit", "report"]
 
 
-def audit(table: Table, *, accept_excess: bool = False) -> MaterialAudit:
-    """Audit one table: what it says of the table holds for what is looked up in it.
+def audit(table: Table, *, source: Source | None = None, accept_excess: bool = False) -> MaterialAudit:
+    """Audit one table: each finding of `FINDINGS`, for what is looked up in the table.
 
     Parameters
     ----------
     table : Table
-        A decoded table; its attributes name the model and its parameters.
+        A decoded table. Where it does not give back its source, the table is audited alone, and findings that take a
+        source are not judged.
+    source : Source, optional
+        Source of the table, such as a function, which no store can give back; by default that of the table.
     accept_excess : bool
         Accept that the model reflects more than it receives at these parameters, and the table with it.
 
@@ -42,35 +38,25 @@ def audit(table: Table, *, accept_excess: bool = False) -> MaterialAudit:
         "violates" where either exceeds 1 otherwise. A table that states its error may exceed 1, or what is known, by
         what that error explains. That a model "loses" light that nothing absorbs is said, and passes.
     """
-    material = material_of(table)
-    pairs = pairs_of(table, material)
-    energy = energy_of(table, material, accept_excess=accept_excess)
-    reciprocity = reciprocity_of(table, pairs)
-    # what is linear between its nodes is no less than they are
-    values = values_of(table, None if linear_in_angles(table) else pairs.table[pairs.drawn.above])
-    smoothness = smoothness_of(table, material, pairs)
-    nodes = nodes_of(table, material)
-    table_error = table_error_of(table, material, pairs, nodes.verdict)
-    sampling = sampling_of(table, material)
-    found = (
-        *(energy.verdict, reciprocity.verdict, values.positivity, values.finiteness),
-        *(nodes.verdict, smoothness.verdict, table_error.verdict, sampling.verdict),
-    )
-    order: tuple[Verdict, ...] = ("violates", "accepted excess", "known published excess")
-    worst: Verdict = next((word for word in order if word in found), "passes")
+    if source is None and isinstance(table.source, Material):
+        source = table.source
+    subject = Subject(table, source, accept_excess)
+    sentences: list[Sentence] = []
+    for key, kind in FINDINGS.items():
+        finding = subject.found[key] = kind.judge(subject)
+        if isinstance(finding, NotJudged):
+            sentences.append(kind.sentence("not judged", finding.reason))
+        else:
+            sentences += finding.sentences()
+    words = {finding.verdict for finding in subject.found.values()}
+    verdict: Verdict = next((word for word in DECISIVE if word in words), "passes")
     return MaterialAudit(
         material=table.name,
         revision=table.revision,
-        model=str(table.attrs["model"]),
-        energy=energy,
-        reciprocity=reciprocity,
-        values=values,
-        nodes=nodes,
-        smoothness=smoothness,
-        table_error=table_error,
-        sampling=sampling,
-        validity=validity_of(material, table.wavelength_nm),
-        verdict=worst,
+        model=source.model if isinstance(source, Material) else "",
+        findings=subject.found,
+        sentences=sentences,
+        verdict=verdict,
     )
 
 
@@ -83,11 +69,12 @@ def report(
     gallery: Sequence[Figure] = (),
     damaged: Sequence[str] = (),
 ) -> AuditReport:
-    """Collect audits, figures and what could not be audited into the report of a store."""
+    """Collect audits, figures and sentences on damaged tables into the report of a store."""
     return AuditReport(
         store=store,
         brdfdb=version("brdfdb"),
         when=when,
+        explanations=explanations(),
         materials=list(audits),
         atlas=list(atlas),
         gallery=list(gallery),

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
+import numpy as np
+from pydantic import Field
+
+from brdfdb.audit.energy_figures import panels_of
 from brdfdb.audit.excess import ANGLE_TOLERANCE_DEG, published_excess
-from brdfdb.audit.findings import Energy, EnergyVerdict, ModelEnergy
-from brdfdb.audit.model_energy import TOLERANCE, model_energy_of
-from brdfdb.audit.table_energy import table_energy_of
-from brdfdb.materials import Material
+from brdfdb.audit.finding import LAST, Cell, Finding, Sentence, Subject, Word
+from brdfdb.audit.model_energy import (
+    LOSSLESS,
+    TOLERANCE,
+    EnergyVerdict,
+    Furnace,
+    ModelEnergy,
+    UniformBound,
+    model_energy_of,
+)
+from brdfdb.audit.table_energy import TableEnergy, table_energy_of
+from brdfdb.figure import Map, Panel, number
+from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.tables.table import Table
 
@@ -22,11 +35,144 @@ _SEVERITY: tuple[EnergyVerdict, ...] = (
 _ACCEPTED = "accepted, not published"
 
 
-def energy_of(table: Table, material: Material, *, accept_excess: bool = False) -> Energy:
+class Energy(Finding):
+    """What the model behind a table does with light, and what the table makes of it."""
+
+    key = "energy"
+    title = "Energy"
+    columns = ("albedo of the model", "albedo of the table", "white furnace")
+    explanation = (
+        "Directional albedo is the share of the light from one direction that leaves the surface in any direction, "
+        "specular part included: the integral of f_r cos theta_r over the hemisphere. More than 1 is light from "
+        "nowhere. Looked at up to 90°, of models that grow without bound there up to 89.9°. The white furnace is "
+        "the surface in light that is the same from everywhere, with its parameters set so that nothing is "
+        "absorbed. An ideal model then shows 1 at every angle; less is what single scattering loses, more is energy "
+        "made up. The table of all materials has the mean over angles, where a loss or a gain counts as one beyond "
+        "1 %; a model loses light where it does so at any angle up to 85°."
+    )
+
+    model: ModelEnergy | None = Field(description="null: the source is not known")
+    table: TableEnergy
+    verdict: EnergyVerdict = Field(description="the worse of the two")
+    reason: str = Field(description="of the one that is worse")
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Energy:
+        """Judge the energy of a table and its source; without a source that of the table alone."""
+        return energy_of(subject.table, subject.source, accept_excess=subject.accept_excess)
+
+    def sentences(self) -> list[Sentence]:
+        """Return sentences on model, table, white furnace and uniform diffuse part."""
+        model, table = self.model, self.table
+        most = f"reflects at most {_albedo(table.max_albedo)} at {table.max_at_theta_i_deg:.4g}°"
+        of_table = table.reason or most
+        if model is None:
+            return [
+                self.sentence("not judged", "the source of this table is not known", title="Energy of the model"),
+                self.sentence(table.verdict, of_table, title="Energy of the table"),
+            ]
+        of_table = "as the model" if table.reason and table.reason == model.reason else of_table
+        if len(model.hemispherical) == 1:
+            both = f"{number(model.hemispherical[0], 4)}, the table {number(table.hemispherical[0], 4)}"
+            of_table += f"; in uniform light the model reflects {both}"
+        overall = [] if self.reason in (model.reason, table.reason) else [self.sentence(self.verdict, self.reason)]
+        sentences = [
+            *overall,
+            self.sentence(model.verdict, model.reason, title="Energy of the model"),
+            self.sentence(table.verdict, of_table, title="Energy of the table"),
+        ]
+        if model.furnace is not None:
+            sentences.append(_of_furnace(model.furnace))
+        if model.bound_on_a is not None:
+            sentences.append(_of_bound(model.bound_on_a))
+        return sentences
+
+    def problems(self) -> list[str]:
+        """Return a sentence where light is made up, also where the stated error of the table explains it."""
+        reason = self.table.reason if self.verdict in ("conserves", "loses") else self.reason
+        return [reason] if reason else []
+
+    def cells(self) -> list[Cell]:
+        """Return the largest albedos, and what a lossless surface shows in uniform light."""
+        model, table = self.model, self.table
+        of_table = _largest(table.verdict, table.max_albedo, table.max_at_theta_i_deg)
+        if model is None:
+            nothing = Cell("not judged", "–", LAST)
+            return [nothing, of_table, nothing]
+        of_model = _largest(model.verdict, model.max_albedo, model.max_at_theta_i_deg)
+        return [of_model, of_table, furnace_cell(model.furnace)]
+
+    def figures(self) -> list[Panel | Map]:
+        """Return albedos of model and table, the furnace, and the bound on the uniform diffuse part."""
+        return [*panels_of(self.model, self.table)]
+
+    @classmethod
+    def overview(cls, found: Sequence[Finding]) -> list[str]:
+        """Return a sentence on tables that exceed 1 where their models do not, and on models that lose light."""
+        energies = [each for each in found if isinstance(each, Energy)]
+        sentences = []
+        if any(each.table.verdict == "violates" for each in energies):
+            sentences.append(
+                "a table whose grid is too coarse for its lobe can exceed 1 where its model does not: try a finer grid"
+            )
+        within = sum(each.table.verdict == "passes" and bool(each.table.reason) for each in energies)
+        if within:
+            sentences.append(
+                f"{within} exceed 1 by no more than the error that they state, or that of the integration, and pass"
+            )
+        losing = sum(each.verdict == "loses" for each in energies)
+        if losing:
+            sentences.append(
+                f"{losing} are of models that lose light even where nothing absorbs it: the report says how much, and "
+                "where"
+            )
+        return sentences
+
+
+def _largest(word: Word, albedo: float | None, theta_i_deg: float) -> Cell:
+    return Cell(word, f"{_albedo(albedo)} at {theta_i_deg:.4g}°", LAST if albedo is None else albedo)
+
+
+def _albedo(value: float | None) -> str:
+    return "not finite" if value is None else f"{value:.4f}"
+
+
+def furnace_cell(furnace: Furnace | None) -> Cell:
+    """Return what a lossless surface shows in uniform light, at the wavelength that is worst."""
+    values = [] if furnace is None else [value for value in furnace.hemispherical if value is not None]
+    if not values:
+        return Cell("unknown", "–", LAST)
+    worst = max(values, key=lambda value: abs(value - 1.0))
+    word: Word = "loses" if worst < LOSSLESS else "gains" if worst > 2.0 - LOSSLESS else "conserves"
+    return Cell(word, f"{worst:.3f}", worst)
+
+
+def _of_furnace(furnace: Furnace) -> Sentence:
+    cell = furnace_cell(furnace)
+    least = f"{number(furnace.smallest, 4)} at {furnace.smallest_at_theta_i_deg:.4g}°"
+    most = f"{number(furnace.largest, 4)} at {furnace.largest_at_theta_i_deg:.4g}°"
+    text = f"{furnace.lossless}; the albedo is between {least} and {most}, in uniform light {cell.text}"
+    return Energy.sentence(cell.word, text, title="White furnace")
+
+
+def _of_bound(bound: UniformBound) -> Sentence:
+    own, largest = "", ""
+    if len(bound.largest) == 1:
+        own, largest = (f" of {number(value, 4)}" for value in (bound.preset[0], bound.largest[0]))
+    kept = "keeps to" if bound.keeps else "is above"
+    text = f"the material's own a(λ){own} {kept} the largest that conserves energy{largest}"
+    return Energy.sentence("inside" if bound.keeps else "outside", text, title="Uniform diffuse part")
+
+
+def energy_of(table: Table, source: Source | None, *, accept_excess: bool = False) -> Energy:
     """Return the energy of a model and its table. With `accept_excess` both may exceed 1 as far as the model does."""
-    known = published_excess(material, table.wavelength_nm)
+    if source is None:
+        stored = table_energy_of(table, None)
+        verdict: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
+        return Energy(model=None, table=stored, verdict=verdict, reason=stored.reason)
+    known = published_excess(source, table.wavelength_nm) if isinstance(source, Material) else None
     claim = str(table.attrs.get("known_excess", {}).get("citation", ""))
-    model = model_energy_of(material, table.wavelength_nm, known, claim, accept_excess=accept_excess)
+    model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess)
     # what is published, or accepted, is an excess of the model: where it has none, that of a table is the table's own
     excess = {"known published excess": known, "accepted excess": _of_model(model)}.get(model.verdict)
     accepted = model.verdict == "accepted excess"
@@ -39,7 +185,7 @@ def energy_of(table: Table, material: Material, *, accept_excess: bool = False) 
 
 
 def _of_model(model: ModelEnergy) -> KnownExcess | None:
-    """The excess that a model has, as far as it goes."""
+    """Return the excess that a model has, as far as it goes."""
     if model.exceeds_1_from_theta_i_deg is None or model.max_albedo is None or not np.isfinite(model.max_albedo):
         return None
     return KnownExcess(

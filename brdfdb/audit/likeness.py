@@ -12,7 +12,7 @@ import numpy as np
 
 from brdfdb.audit.pairs import Pairs, representative_nm
 from brdfdb.geometry import radians, spherical_angles, unit_vector
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.table import Table
@@ -35,7 +35,7 @@ def bias_of(pairs: Pairs) -> float | None:
     return float(f"{largest:.3g}") if np.isfinite(largest) else None
 
 
-def likeness_of(table: Table, material: Material, pairs: Pairs) -> str:
+def likeness_of(table: Table, source: Source, pairs: Pairs) -> str:
     """Return what a table agrees with at least twice as well as with its model, in words; empty if with nothing."""
     some = np.flatnonzero(pairs.drawn.above)[:: max(len(pairs.drawn.wi) // DIRECTIONS, 1)]
     middle = pairs.table.shape[1] // 2
@@ -49,8 +49,8 @@ def likeness_of(table: Table, material: Material, pairs: Pairs) -> str:
     scale = float(weight @ found / (weight @ truth)) if weight @ truth > 0.0 else 1.0
     if abs(scale - 1.0) > _SCALE:
         left[f"the model times {scale:.3g}"] = weight @ np.abs(found - scale * truth)
-    for name, changed in _changes(material.anisotropic):
-        model = error_measurement.model_values(material, at, *changed(light, viewer))[:, 0]
+    for name, changed in _changes(source.anisotropic):
+        model = error_measurement.model_values(source, at, *changed(light, viewer))[:, 0]
         left[name] = weight @ np.abs(found - model)
     best = min(left, key=lambda name: left[name])
     return best if left[best] < MUCH_BETTER * left[""] else ""

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from pydantic import BaseModel, Field
 
 from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of
-from brdfdb.audit.findings import EnergyVerdict, Furnace, ModelEnergy, UniformBound
-from brdfdb.figure import numbers, rows
+from brdfdb.audit.finding import STRICT
+from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import spectral_albedo
-from brdfdb.integrals.uniform_bound import a_max
-from brdfdb.materials import Material
+from brdfdb.integrals.uniform_bound import largest_uniform_beside
+from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
+from brdfdb.tables.albedo import source_albedo
 from brdfdb.tables.grids import Axis
+
+EnergyVerdict = Literal["conserves", "loses", "known published excess", "accepted excess", "violates"]
 
 TOLERANCE = 1e-6  # absolute, of each albedo
 MOST_PANELS = 1000  # where the quadrature of one light gives up
@@ -33,6 +35,54 @@ LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
 GAIN = 1e-4  # beyond 1, of a lossless model, that is worth saying
 _ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])  # azimuths of a light over a lobe with two axes: the rest is the same
 _TURN_DEG = np.arange(0.0, 360.0, 60.0)
+
+
+class Furnace(BaseModel):
+    """The white furnace: the model made lossless, in light that is the same from everywhere; an ideal one shows 1."""
+
+    model_config = STRICT
+
+    lossless: str = Field(description="which parameters were set to what")
+    theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: grey; of many wavelengths the ends and the middle")
+    albedo: list[Numbers] = Field(description="[theta_i][wavelength], specular part included")
+    hemispherical: Numbers = Field(description="[wavelength], the mean over uniform light")
+    smallest: float | None = Field(description="null: not finite")
+    smallest_at_theta_i_deg: float
+    largest: float | None = Field(description="null: not finite")
+    largest_at_theta_i_deg: float
+
+
+class UniformBound(BaseModel):
+    """The largest uniform diffuse part a(lambda) that conserves energy at all angles, against the material's own."""
+
+    model_config = STRICT
+
+    wavelength_nm: list[float]
+    largest: Numbers
+    preset: Numbers
+    keeps: bool = Field(description="whether the material's own is no larger at any wavelength")
+
+
+class ModelEnergy(BaseModel):
+    """Directional albedo of the model behind a table, by adaptive quadrature, specular part included."""
+
+    model_config = STRICT
+
+    theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: grey")
+    albedo: list[Numbers] = Field(description="[theta_i][wavelength]; over the azimuths of the light the largest")
+    specular: list[Numbers] = Field(description="[theta_i][wavelength], the share of the specular part in it")
+    integration_error: float | None = Field(description="of the albedo, the largest estimate; null: not finite")
+    hemispherical: Numbers = Field(description="[wavelength], of light that is the same from everywhere")
+    max_albedo: float | None = Field(description="null: not finite")
+    max_at_theta_i_deg: float
+    max_at_wavelength_nm: float | None
+    exceeds_1_from_theta_i_deg: float | None = Field(description="to 0.001 degrees")
+    furnace: Furnace | None = Field(description="null: the model has no lossless parameters")
+    bound_on_a: UniformBound | None = Field(description="null: the model has no such part")
+    verdict: EnergyVerdict
+    reason: str = Field(description="how much, where; of a known excess the citation")
 
 
 class _Lights(NamedTuple):
@@ -55,27 +105,26 @@ class _Reflected(NamedTuple):
 
 
 def model_energy_of(
-    material: Material,
+    source: Source,
     wavelength_nm: Axis | None,
     known: KnownExcess | None,
     claim: str = "",
     *,
     accept_excess: bool = False,
 ) -> ModelEnergy:
-    """Return the energy of a model at the parameters of a material, at wavelengths [nm] if it is spectral.
+    """Return the energy of a material or a function, at wavelengths [nm] if it is spectral.
 
     `known` is the excess that is known as published. `claim` is what a recipe says of an excess: it is repeated, and
     excuses nothing. With `accept_excess` one that is not known is accepted.
     """
-    arguments = material.arguments(wavelength_nm)
-    lights = _lights(material)
-    furnace = _furnace(material, arguments, wavelength_nm, lights)
-    lights, found = _refined(material, arguments, lights, _reflected(material, arguments, lights))
+    lights = _lights(source)
+    furnace = _furnace(source, wavelength_nm, lights)
+    lights, found = _refined(source, wavelength_nm, lights, _reflected(source, wavelength_nm, lights))
     theta, wavelength = _worst(found.largest)
-    first = _first_above_1(material, arguments, lights, found)
+    first = _first_above_1(source, wavelength_nm, lights, found)
     verdict, reason = _verdict(lights, found, furnace, known)
     if verdict == "violates" and first is not None:
-        reason += _explained(material, found, first, known, claim)
+        reason += _explained(source, found, first, known, claim)
         verdict = "accepted excess" if accept_excess and np.isfinite(found.largest).all() else verdict
     return ModelEnergy(
         theta_i_deg=lights.theta_i_deg.tolist(),
@@ -89,14 +138,14 @@ def model_energy_of(
         max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
         exceeds_1_from_theta_i_deg=first,
         furnace=furnace,
-        bound_on_a=_bound(material, arguments, lights, found) if material.model == "he_torrance" else None,
+        bound_on_a=_bound(source, wavelength_nm, lights, found),
         verdict=verdict,
         reason=reason,
     )
 
 
 def _refined(
-    material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected
+    source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _Reflected
 ) -> tuple[_Lights, _Reflected]:
     """More lights where the albedo is largest, each time half way to those beside: peaks lie between round angles."""
     for _ in range(ROUNDS):
@@ -109,14 +158,12 @@ def _refined(
         more = _Lights(between, np.zeros(between.size))
         order = np.argsort(np.concatenate([lights.theta_i_deg, between]))
         lights = _Lights(*(np.concatenate(pair)[order] for pair in zip(lights, more, strict=True)))
-        new = _reflected(material, arguments, more)
+        new = _reflected(source, wavelength_nm, more)
         found = _Reflected(*(np.concatenate(pair)[order] for pair in zip(found, new, strict=True)))
     return lights, found
 
 
-def _first_above_1(
-    material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected
-) -> float | None:
+def _first_above_1(source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _Reflected) -> float | None:
     """Return the angle [degree] above which an albedo exceeds 1: its crossing of 1 between two lights."""
 
     def excess(of: _Reflected) -> Axis:
@@ -130,17 +177,17 @@ def _first_above_1(
         return float(lights.theta_i_deg[first])
 
     def between(theta_i_deg: float) -> float:
-        return float(excess(_reflected(material, arguments, _Lights(np.array([theta_i_deg]), np.zeros(1))))[0])
+        return float(excess(_reflected(source, wavelength_nm, _Lights(np.array([theta_i_deg]), np.zeros(1))))[0])
 
     return crossing(between, *lights.theta_i_deg[first - 1 : first + 1].tolist())
 
 
-def _explained(material: Material, found: _Reflected, first: float, known: KnownExcess | None, claim: str) -> str:
+def _explained(source: Source, found: _Reflected, first: float, known: KnownExcess | None, claim: str) -> str:
     """Return a sentence on an excess that is not known as published: its origin, and what does not excuse it."""
     most = float(np.max(np.where(np.isfinite(found.largest), found.largest, -np.inf)))
     said = f"; this model does so by itself for such parameters: up to {most:.4g}, from {first:.4g} degrees"
-    if material.spec.excess:
-        said += f" ({material.spec.excess})"
+    if isinstance(source, Material) and source.spec.excess:
+        said += f" ({source.spec.excess})"
     if known is not None:
         return f"{said}; published are {known.max_albedo:.4g}, from {known.from_theta_i_deg:.4g} degrees"
     return f"{said}; its recipe excuses it, which counts for nothing: {claim}" if claim else said
@@ -192,67 +239,50 @@ def _verdict(
     return "conserves", f"{largest}{gains}"
 
 
-def _lights(material: Material) -> _Lights:
+def _lights(source: Source) -> _Lights:
     """The lights of a model: 90 degrees itself is one of them where it has no pole there."""
     x, weight = np.polynomial.legendre.leggauss(NODES)
     nodes, weights = np.round(45.0 * (1.0 + x), 4), weight * (np.pi / 4.0)  # people read them
-    others = np.array(THETA_I_DEG if material.spec.grazing_pole else (*THETA_I_DEG, 90.0))
+    others = np.array(THETA_I_DEG if source.grazing_pole else (*THETA_I_DEG, 90.0))
     theta_i_deg = np.concatenate([nodes, others])
     weights = np.concatenate([weights * np.sin(2.0 * radians(nodes)), np.zeros(others.size)])
     order = np.argsort(theta_i_deg)
     return _Lights(theta_i_deg[order], weights[order])
 
 
-def _reflected(material: Material, arguments: Mapping[str, Any], lights: _Lights) -> _Reflected:
-    """The albedos of a model for lights from all azimuths that matter."""
-    spec, theta_i = material.spec, radians(lights.theta_i_deg)
+def _reflected(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> _Reflected:
+    """Return the albedos of a source for lights from all azimuths that matter."""
+    theta_i = radians(lights.theta_i_deg)
     phi_i_deg, weights = np.zeros(1), np.ones(1)
-    if material.anisotropic and spec.lobe_axes is not None:
+    if source.anisotropic and source.elliptical:
         phi_i_deg, weights = _ELLIPSE_DEG, np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
-    elif material.anisotropic:
+    elif source.anisotropic:
         phi_i_deg, weights = _TURN_DEG, np.full(_TURN_DEG.size, 1.0 / _TURN_DEG.size)
+    limits: dict[str, Any] = {"tolerance": TOLERANCE, "most_panels": MOST_PANELS}
     found = [
-        [
-            spectral_albedo(
-                spec,
-                float(theta),
-                float(phi),
-                arguments,
-                tolerance=TOLERANCE,
-                most_panels=MOST_PANELS,
-                mirrored=not material.anisotropic,
-            )
-            for phi in radians(phi_i_deg)
-        ]
+        [source_albedo(source, float(theta), float(phi), wavelength_nm, **limits) for phi in radians(phi_i_deg)]
         for theta in theta_i
     ]
     diffuse = np.array([[each.albedo for each in row] for row in found])
-    specular = np.zeros(diffuse[:, 0].shape)
-    if spec.specular is not None:
-        parameters = {name: arguments[name] for name in spec.specular_parameters}
-        specular = np.stack(
-            [np.broadcast_to(spec.specular(theta, **parameters), specular[0].shape) for theta in theta_i]
-        )
+    specular = np.reshape(source.specular_reflectance(theta_i, wavelength_nm), (theta_i.size, -1))
+    specular = np.broadcast_to(specular, diffuse[:, 0].shape)
     mean = np.einsum("tpw,p->tw", diffuse, weights) + specular
     error = np.array([[max(float(each.error) for each in row)] for row in found])
     return _Reflected(diffuse.max(axis=1) + specular, mean, specular, error)
 
 
-def _furnace(
-    material: Material, arguments: Mapping[str, Any], wavelength_nm: Axis | None, lights: _Lights
-) -> Furnace | None:
-    """The model with nothing absorbed, of many wavelengths at the first, the middle and the last."""
-    if material.spec.lossless is None:
+def _furnace(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> Furnace | None:
+    """Return the source with nothing absorbed, of many wavelengths at the first, the middle and the last."""
+    lossless = source.lossless
+    if lossless is None:
         return None
-    lossless = material.spec.lossless(material.parameters)
     some = wavelength_nm
     if wavelength_nm is not None:
         some = wavelength_nm[np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])]
-        arguments = material.arguments(some)
-    found = _reflected(material, {**arguments, **lossless}, lights)
+    found = _reflected(lossless.source, some, lights)
     low, high = found.largest.min(axis=1), found.largest.max(axis=1)
     return Furnace(
-        lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.items()),
+        lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.changes.items()),
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if some is None else some.tolist(),
         albedo=rows(found.largest, DIGITS),
@@ -264,15 +294,23 @@ def _furnace(
     )
 
 
-def _bound(material: Material, arguments: Mapping[str, Any], lights: _Lights, found: _Reflected) -> UniformBound:
-    """The largest a: what reflects with a uniform part of a reflects as much less without it, at every light."""
-    a = float(material.parameters["a"])
-    surfaces = {name: value for name, value in arguments.items() if name != "a"}
-    largest = a_max(radians(lights.theta_i_deg), found.largest - a, surfaces, BOUND_TOLERANCE)
-    wavelength_nm = np.ravel(arguments["wavelength_nm"])
+def _bound(source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _Reflected) -> UniformBound | None:
+    """Return the largest albedo of a uniform part that only energy bounds; None of other models.
+
+    With a uniform part of a, a surface reflects as much more than without it, at every light.
+    """
+    if not isinstance(source, Material):
+        return None
+    spec, arguments = source.spec, source.arguments(wavelength_nm)
+    if spec.uniform_bound_cosine is None or spec.uniform is None:
+        return None
+    a = float(source.parameters[spec.uniform])
+    surfaces = {name: value for name, value in arguments.items() if name != spec.uniform}
+    largest = largest_uniform_beside(spec, radians(lights.theta_i_deg), found.largest - a, surfaces, BOUND_TOLERANCE)
+    nm = np.ravel(arguments["wavelength_nm"])
     return UniformBound(
-        wavelength_nm=wavelength_nm.tolist(),
+        wavelength_nm=nm.tolist(),
         largest=numbers(np.round(largest, 9)),
-        preset=[a] * wavelength_nm.size,
+        preset=[a] * nm.size,
         keeps=bool(np.all(a <= largest + BOUND_TOLERANCE)),
     )

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from pydantic import Field
 
-from brdfdb.audit.findings import Nodes
+from brdfdb.audit.finding import Cell, Finding, Sentence, Subject, Verdict
 from brdfdb.errors import ParameterError
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.tables.error_measurement import FLOOR
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
@@ -16,7 +17,7 @@ from brdfdb.tables.tabulation import block, rounded, specular_nodes
 
 # Values of the model that are computed for the comparison. A table with more nodes is compared at some rows of its
 # first axis, evenly spread from the first to the last. A value of the facets' integral takes 30 us, others 0.2 us
-MOST_VALUES, _SLOW = 1 << 20, {"oren_nayar_gaussian": 1 << 15}
+MOST_VALUES, _MOST_SLOW = 1 << 20, 1 << 15
 # Numbers are the same but for rounding: to the bits that are stored, and of float64 sums on another processor,
 # relative to the largest number of the table
 _ROUNDING = 1e-11
@@ -24,17 +25,59 @@ _ROUNDING = 1e-11
 SAME = 1e-9
 
 
-def nodes_of(table: Table, material: Material) -> Nodes:
+class Nodes(Finding):
+    """The numbers that a table stores, beside those that its source gives at the same nodes."""
+
+    key = "nodes"
+    title = "Nodes"
+    columns = ("nodes",)
+    explanation = "What is stored against what the model gives at the same nodes: the same but for rounding."
+
+    compared: int = Field(description="of the stored numbers; of large tables those of some rows of the first axis")
+    count: int = Field(description="of the stored numbers")
+    wrong: int = Field(description="of those compared, by more than rounding")
+    stored: float | None = Field(description="the number that is furthest off; null: none is, or it is not finite")
+    expected: float | None = Field(description="what the model gives in its place")
+    beside: list[str] = Field(
+        description="a sentence each on n, k and the uniform part, where they are not those of entry and parameters"
+    )
+    verdict: Verdict
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Finding:
+        """Compare the nodes of a table with those of its source."""
+        if subject.source is None:
+            return subject.not_judged("values at nodes are compared with those of the source")
+        return nodes_of(subject.table, subject.source)
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the numbers of the table, its refractive index and its uniform part."""
+        part = "" if self.compared == self.count else f", of the {self.count} in the table,"
+        numbers = f"all {self.compared} stored values that were compared{part} are the model's"
+        if self.wrong:
+            numbers = f"{self.wrong} of {self.compared} stored values{part} are not the model's"
+            if self.expected is not None:
+                stored = "a value that is not finite" if self.stored is None else f"{self.stored:.4g}"
+                numbers += f", such as {stored} for {self.expected:.4g}"
+        return [self.sentence(self.verdict, "; ".join([numbers, *self.beside]))]
+
+    def cells(self) -> list[Cell]:
+        """Return the number of wrong values."""
+        good = "all good" if self.verdict == "passes" else "bad"
+        return [Cell(self.verdict, f"{self.wrong} bad" if self.wrong else good, self.wrong)]
+
+
+def nodes_of(table: Table, source: Source) -> Nodes:
     """Return how many stored numbers are those of the model, and the one that is furthest off.
 
     Raises
     ------
     ValueError
-        If the table is not laid out as one of its material can be.
+        If the table is not laid out as one of its source can be.
     """
     bits = int(table.attrs.get("bits", 23))
     layout = Layout(
-        material,
+        source,
         table.grid,
         table.wavelength_nm,
         table.interpolation,
@@ -61,7 +104,7 @@ def nodes_of(table: Table, material: Material) -> Nodes:
         if beyond.any() and (largest := float(np.max(excess, where=beyond, initial=-np.inf))) > worst[0]:
             at = np.unravel_index(int(np.argmax(np.where(beyond, excess, -np.inf))), excess.shape)
             worst = largest, float(stored[at]), float(expected[at])
-    beside = [*_refraction(table, material), *_uniform(table, layout), *_dirac(table, layout), *_unstated(table)]
+    beside = [*_refraction(table, source), *_uniform(table, layout), *_dirac(table, layout), *_unstated(table)]
     return Nodes(
         compared=rows * (table.values.size // table.values.shape[0]),
         count=table.values.size,
@@ -76,7 +119,8 @@ def nodes_of(table: Table, material: Material) -> Nodes:
 def _rows(layout: Layout) -> Iterator[slice]:
     """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
-    most = _SLOW.get(layout.material.model, MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
+    slow = isinstance(layout.source, Material) and layout.source.spec.slow
+    most = (_MOST_SLOW if slow else MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
     if most >= layout.shape[0]:
         yield from layout.blocks
         return
@@ -84,14 +128,15 @@ def _rows(layout: Layout) -> Iterator[slice]:
         yield slice(int(row), int(row) + 1)
 
 
-def _refraction(table: Table, material: Material) -> Iterator[str]:
+def _refraction(table: Table, source: Source) -> Iterator[str]:
     """Yield a sentence on each of n and k that is not that of the entry; tables in memory may store neither."""
-    arguments = material.arguments(table.wavelength_nm)
-    for name, stored in (("n", table.n), ("k", table.k)):
-        if stored is None or table.wavelength_nm is None:
+    indices = source.refractive_indices(table.wavelength_nm)
+    if indices is None or table.wavelength_nm is None:
+        return
+    scale = np.hypot(*indices)
+    for name, stored, expected in zip(("n", "k"), (table.n, table.k), indices, strict=True):
+        if stored is None:
             continue
-        expected = np.asarray(arguments[name])
-        scale = np.hypot(arguments["n"], arguments["k"])
         if stored.shape != expected.shape:
             raise ParameterError(
                 name,
@@ -104,7 +149,7 @@ def _refraction(table: Table, material: Material) -> Iterator[str]:
             worst = int(np.argmax(off))
             yield (
                 f"{name} is stored as {stored[worst]:.5g} at {table.wavelength_nm[worst]:g} nm, where "
-                f"{material.refractive_index} has {expected[worst]:.5g}"
+                f"{source.attributes()['refractive_index']} has {expected[worst]:.5g}"
             )
 
 
@@ -118,7 +163,7 @@ def _uniform(table: Table, layout: Layout) -> Iterator[str]:
 
 def _dirac(table: Table, layout: Layout) -> Iterator[str]:
     """Yield a sentence on a Dirac part that is missing, or whose nodes are not those of the layout."""
-    if layout.material.spec.specular is None:
+    if not layout.source.has_specular:
         return
     if table.specular is None:
         yield "the Dirac part of the model is not stored"

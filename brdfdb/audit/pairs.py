@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
@@ -17,7 +17,10 @@ DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
 
 
 class Pairs(NamedTuple):
-    """f_r [1/sr] at pairs of directions, all of shape (N, L): of light and viewer, and of the two exchanged."""
+    """f_r [1/sr] at pairs of directions, all of shape (N, L): of light and viewer, and of the two exchanged.
+
+    Where the source of a table is not known, `model` and `model_exchanged` are those of the table itself.
+    """
 
     drawn: Draw
     table: Floats
@@ -26,15 +29,17 @@ class Pairs(NamedTuple):
     model_exchanged: Floats
 
 
-def pairs_of(table: Table, material: Material) -> Pairs:
-    """Look up, and evaluate the model, at all wavelengths of a table."""
+def pairs_of(table: Table, source: Source | None) -> Pairs:
+    """Look up a table, and evaluate its source if it is known, at all wavelengths of the table."""
     count = DIRECTIONS if wavelengths_of(table) <= _FEW else _FEWER_DIRECTIONS
-    drawn = error_measurement.draw(material, table.wavelength_nm, count, SEED)
+    drawn = error_measurement.draw(table.source if source is None else source, table.wavelength_nm, count, SEED)
     shape = (len(drawn.wi), wavelengths_of(table))
     both = ((drawn.wi, drawn.wr), (drawn.wr, drawn.wi))
-    looked_up = (table.lookup_vectors(*each).reshape(shape) for each in both)
+    looked_up = [table.lookup_vectors(*each).reshape(shape) for each in both]
+    if source is None:
+        return Pairs(drawn, *looked_up, *looked_up)
     return Pairs(
-        drawn, *looked_up, *(error_measurement.model_values(material, table.wavelength_nm, *each) for each in both)
+        drawn, *looked_up, *(error_measurement.model_values(source, table.wavelength_nm, *each) for each in both)
     )
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field
 
 from brdfdb._elementary import COS_HORIZON
-from brdfdb.audit.findings import Asymmetry, Reciprocity
+from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import Pairs
+from brdfdb.figure import number
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.grids import Grid
@@ -21,6 +23,82 @@ TABLE_RECIPROCITY_TOLERANCE = 1e-6
 # at the horizon is taken out, the offset is divided by the cosines as f_r is
 LOOKUP_RECIPROCITY_TOLERANCE = 5e-14
 _TINY = 1e-270  # 1/sr; smaller values carry too few digits
+
+
+class Asymmetry(BaseModel):
+    """abs(f - f') / (abs(f) + abs(f')) over pairs of directions, f' with light and viewer exchanged."""
+
+    model_config = STRICT
+
+    pairs: int
+    min: float
+    mean: float
+    max: float
+    tolerance: float | None = Field(description="of max; null: not judged, the two are interpolated from other nodes")
+
+
+class Reciprocity(Finding):
+    """Asymmetry of the model at the parameters of the table, and of the table.
+
+    Tables are looked up; to values that are interpolated in logarithms the offset of the logarithms is added.
+    """
+
+    key = "reciprocity"
+    title = "Reciprocity"
+    columns = ("reciprocity",)
+    explanation = (
+        "Asymmetry is |f − f′| / (|f| + |f′|), where f′ has light and viewer exchanged. 0 is reciprocal "
+        "(Helmholtz), 1 as far from it as can be."
+    )
+
+    model_random: Asymmetry | None = Field(description="viewers over the hemisphere; null: the source is not known")
+    model_lobe: Asymmetry | None = Field(description="viewers in the lobe and on its shoulder; null: it has none")
+    table_random: Asymmetry
+    table_lobe: Asymmetry | None
+    table_nodes: Asymmetry | None = Field(
+        description="over every pair that the grid holds both ways round; null: half and difference vectors hold none"
+    )
+    verdict: Verdict
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Reciprocity:
+        """Judge a table and its source; without a source the table alone."""
+        found = reciprocity_of(subject.table, subject.pairs)
+        return found if subject.source else found.model_copy(update={"model_random": None, "model_lobe": None})
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the largest asymmetry of those that are judged."""
+        judged = [(each.max, each.tolerance) for _, each in self.named() if each.tolerance is not None]
+        if not judged:
+            text = "light and viewer have different nodes, so that what is looked up need not be symmetric"
+            return [self.sentence(self.verdict, text)]
+        most, allowed = max(judged, key=lambda pair: (pair[0] > pair[1], pair[0]))
+        text = f"asymmetry up to {number(most)}, of {number(allowed)} allowed"
+        return [self.sentence(self.verdict, text if most <= allowed else f"not reciprocal: {text}")]
+
+    def cells(self) -> list[Cell]:
+        """Return the largest asymmetry."""
+        largest = max(each.max for _, each in self.named())
+        return [Cell(self.verdict, number(largest, 2), largest)]
+
+    def tables(self) -> list[NumberTable]:
+        """Return the asymmetry of each set of pairs."""
+        rows = [
+            (name, str(each.pairs), *(number(value, 2) for value in (each.min, each.mean, each.max, each.tolerance)))
+            for name, each in self.named()
+        ]
+        return [NumberTable("Asymmetry", ("of", "pairs", "smallest", "mean", "largest", "allowed"), rows)]
+
+    def named(self) -> list[tuple[str, Asymmetry]]:
+        """Return the sets of pairs that there are, with their names."""
+        named = (
+            ("model, random directions", self.model_random),
+            ("model, in the lobe", self.model_lobe),
+            ("table, random directions", self.table_random),
+            ("table, in the lobe", self.table_lobe),
+            ("table, its nodes", self.table_nodes),
+        )
+        return [(name, each) for name, each in named if each is not None]
 
 
 def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
@@ -39,8 +117,7 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
         table_nodes=None if table.grid.half_difference else _node_asymmetry(table),
         verdict="passes",
     )
-    every = (found.model_random, found.model_lobe, found.table_random, found.table_lobe, found.table_nodes)
-    good = all(each is None or each.tolerance is None or each.max <= each.tolerance for each in every)
+    good = all(each.tolerance is None or each.max <= each.tolerance for _, each in found.named())
     return found if good else found.model_copy(update={"verdict": "violates"})
 
 

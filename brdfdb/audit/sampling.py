@@ -8,33 +8,104 @@ from typing import Any, NamedTuple
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from brdfdb.audit.findings import Sampling
+from brdfdb.audit.finding import Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import SEED, representative_nm
-from brdfdb.figure import numbers
+from brdfdb.figure import Numbers, number, numbers
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.sampling import lobe_of, mixture_density, sample
+from brdfdb.lobes import Lobe
 from brdfdb.materials import Material
-from brdfdb.parameters import Lobe, ModelSpec
+from brdfdb.parameters import ModelSpec
 from brdfdb.tables.table import Table
 
-SAMPLES = 100_000  # of each light
-_FEWER = {"oren_nayar_gaussian": 4000}  # integrals, of 30 us a value
+SAMPLES = 100_000  # for each light
+FEWER_SAMPLES = 4000  # of a model whose values are integrals
 THETA_I_DEG, PHI_I_DEG = (10.0, 45.0, 80.0), 30.0
 LEAST_CHANCE = 1e-6  # below this p, samples are not those of the density
 STANDARD_ERRORS = 6.0  # chance makes one difference of 500 million as large
 _ROUNDING = 1e-12  # of a mean of weights that are all the same
 _ALBEDO_TOLERANCE = 1e-6
 _ENOUGH = 10.0  # samples that are expected in a bin
-# Bins of half vectors: of t, the slope in widths of the lobe, tenths of its Gaussian and beyond it half octaves up to
-# a hundred thousand; and of the azimuth on its ellipse
-_T = np.sqrt(-np.log1p(-np.arange(10) / 10.0))
-_T_EDGES = np.append(_T, _T[-1] * 2.0 ** (np.arange(1, 33) / 2.0))
+# Bins of half vectors: of t, the slope in widths of the lobe, tenths of its distribution, and half octaves beyond them;
+# and of the azimuth on its ellipse
+_TENTHS = 1.0 - np.arange(10) / 10.0
+_HALF_OCTAVES = 2.0 ** (np.arange(1, 33) / 2.0)
 _PSI_EDGES = np.linspace(-np.pi, np.pi, 13)
 _NODES = 12  # of Gauss's rule, along each side of a bin
 
 Array = NDArray[np.float64]
+
+
+class Sampling(Finding):
+    """The sampler of the model at the parameters of the material, for some lights."""
+
+    key = "sampling"
+    title = "Sampling"
+    columns = ("sampling",)
+    explanation = (
+        "p is the chance of a histogram worse than that of the samples if their density is what the model says. The "
+        "weight of a sample is f_r cos theta_r over that density."
+    )
+
+    samples: int = Field(description="of each light")
+    theta_i_deg: list[float]
+    phi_i_deg: float
+    wavelength_nm: float | None
+    chi_square_p: Numbers = Field(description="probability of a worse histogram if the density is right")
+    largest_weight: Numbers
+    weight_spread: Numbers = Field(description="standard deviation of the weights over their mean")
+    monte_carlo: Numbers = Field(description="albedo without the specular part")
+    monte_carlo_error: Numbers = Field(description="its standard error")
+    quadrature: Numbers
+    verdict: Verdict
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Finding:
+        """Draw samples of the model of a table."""
+        if not isinstance(subject.source, Material):
+            return subject.not_judged("samples are drawn from the model of the source")
+        return sampling_of(subject.table, subject.source)
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the least likely histogram."""
+        if self._smallest is None:
+            text = "no bins to compare"
+        else:
+            text = f"the smallest p of {len(self.theta_i_deg)} lights is {_probability(self._smallest)}"
+        if self.verdict == "violates":
+            text = f"samples of the model do not have the density or the albedo that they should; {text}"
+        return [self.sentence(self.verdict, text)]
+
+    def cells(self) -> list[Cell]:
+        """Return the smallest p."""
+        sort = 1.0 if self._smallest is None else self._smallest
+        return [Cell(self.verdict, f"p {_probability(self._smallest)}", sort)]
+
+    def tables(self) -> list[NumberTable]:
+        """Return the samples of each light."""
+        columns = (self.largest_weight, self.weight_spread, self.monte_carlo, self.monte_carlo_error, self.quadrature)
+        rows = [
+            (f"{theta:.4g}°", _probability(p), *(number(value) for value in rest))
+            for theta, p, *rest in zip(self.theta_i_deg, self.chi_square_p, *columns, strict=True)
+        ]
+        at = "" if self.wavelength_nm is None else f" at {self.wavelength_nm:g} nm"
+        caption = f"Sampling: {self.samples} samples of each light{at}"
+        headings = ("light", "p", "largest weight", "spread", "diffuse albedo, sampled", "standard error", "integrated")
+        return [NumberTable(caption, headings, rows)]
+
+    @property
+    def _smallest(self) -> float | None:
+        return min((p for p in self.chi_square_p if p is not None), default=None)
+
+
+def _probability(value: float | None) -> str:
+    """Return a probability for people, without digits that mean nothing."""
+    if value is None:
+        return "–"
+    return "below 0.001" if value < 0.001 else f"{value:.3f}"
 
 
 class _Light(NamedTuple):
@@ -52,7 +123,7 @@ class _Light(NamedTuple):
 def sampling_of(table: Table, material: Material) -> Sampling:
     """Draw for each light, at the wavelength in the middle of those of the table."""
     wavelength = representative_nm(table)
-    count = min(SAMPLES, _FEWER.get(material.model, SAMPLES))
+    count = min(SAMPLES, FEWER_SAMPLES) if material.spec.slow else SAMPLES
     arguments = material.arguments(wavelength)
     found = [_light(material.spec, arguments, theta, count) for theta in THETA_I_DEG]
     columns = {name: numbers([getattr(light, name) for light in found]) for name in _Light._fields if name != "good"}
@@ -97,16 +168,22 @@ def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
     h = wr + wi
     s = h[:, :2] / h[:, 2:] / alpha
     t, psi = np.hypot(s[:, 0], s[:, 1]), np.arctan2(s[:, 1], s[:, 0])
-    found, _, _ = np.histogram2d(t, psi, bins=(_T_EDGES, _PSI_EDGES))
-    expected = len(wr) * _shares(wi, lobe, alpha)
+    t_edges = _t_edges(lobe)
+    found, _, _ = np.histogram2d(t, psi, bins=(t_edges, _PSI_EDGES))
+    expected = len(wr) * _shares(wi, lobe, alpha, t_edges)
     observed, wanted = _pooled(np.append(found, len(wr) - found.sum()), np.append(expected, len(wr) - expected.sum()))
     chi_square = float(np.sum((observed - wanted) ** 2 / wanted))
     return float(mpmath.gammainc((len(wanted) - 1) / 2.0, chi_square / 2.0, regularized=True))
 
 
-def _shares(wi: Array, lobe: Lobe, alpha: Array) -> Array:
-    """The integral of the density over each bin."""
-    t, t_weight = _gauss(_T_EDGES)
+def _t_edges(lobe: Lobe) -> Array:
+    tenths = lobe.distribution.radius(_TENTHS)
+    return np.append(tenths, tenths[-1] * _HALF_OCTAVES)
+
+
+def _shares(wi: Array, lobe: Lobe, alpha: Array, t_edges: Array) -> Array:
+    """Return the integral [1] of the density over each bin, shape (bins of t, bins of psi)."""
+    t, t_weight = _gauss(t_edges)
     psi, psi_weight = _gauss(_PSI_EDGES)
     t, psi = t[:, :, np.newaxis, np.newaxis], psi[np.newaxis, np.newaxis]
     s_x, s_y = alpha[0] * t * np.cos(psi), alpha[1] * t * np.sin(psi)

@@ -8,11 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field
 
-from brdfdb.audit.findings import Jump, Smoothness
+from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import Pairs
+from brdfdb.figure import number
 from brdfdb.geometry import degrees, directions_from_half_difference, radians, spherical_angles, unit_vector
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
@@ -54,16 +56,74 @@ class _Seam(NamedTuple):
     half_difference: bool = False
 
 
-def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
-    """Return the jumps of the model at all wavelengths of a table, and of the table.
+class Jump(BaseModel):
+    """How far f_r jumps across a seam, relative to its value there, or to the floor of the error of a table.
+
+    It is the crossing that jumps most for what is allowed there. A slope is no jump: the value on either side is that
+    of the line through two points next to the seam.
+    """
+
+    model_config = STRICT
+
+    seam: str = Field(description="what is crossed")
+    crossings: int
+    largest: float
+    where: str = Field(description="of the largest: the directions in degrees, and the wavelength")
+    tolerance: float = Field(description="there; of a table the error that it states of the band of theta_i")
+
+
+class Smoothness(Finding):
+    """Jumps of the model across its branches, and of the table across the seams of its grid."""
+
+    key = "smoothness"
+    title = "Smoothness"
+    columns = ("smoothness",)
+    explanation = (
+        "How far f_r jumps where the model changes its formula, and where the table may jump: at its nodes, at the "
+        "poles and at both ends of a turn. A table may jump by the error that it states."
+    )
+
+    model: list[Jump] = Field(description="empty: the source is not known")
+    table: list[Jump]
+    verdict: Verdict
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Smoothness:
+        """Judge a table and its source; without a source the table alone."""
+        return smoothness_of(subject.table, subject.source, subject.pairs)
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the largest jump: of those that are too large, if there are any."""
+        name, jump = max(self._named(), key=lambda each: (each[1].largest > each[1].tolerance, each[1].largest))
+        text = (
+            f"the {name} jumps by {number(jump.largest)} of f_r across {jump.seam}, of {number(jump.tolerance)} allowed"
+        )
+        return [self.sentence(self.verdict, text if self.verdict == "passes" else f"{text}: {jump.where}")]
+
+    def cells(self) -> list[Cell]:
+        """Return the largest jump."""
+        largest = max(jump.largest for _, jump in self._named())
+        return [Cell(self.verdict, number(largest, 2), largest)]
+
+    def tables(self) -> list[NumberTable]:
+        """Return the largest jump across each seam."""
+        rows = [
+            (name, jump.seam, number(jump.largest, 2), jump.where, number(jump.tolerance, 2))
+            for name, jump in self._named()
+        ]
+        return [NumberTable("Jumps of f_r", ("of", "across", "largest, relative", "where", "allowed"), rows)]
+
+    def _named(self) -> list[tuple[str, Jump]]:
+        return [*(("model", jump) for jump in self.model), *(("table", jump) for jump in self.table)]
+
+
+def smoothness_of(table: Table, source: Source | None, pairs: Pairs) -> Smoothness:
+    """Return the jumps of the model, if it is known, at all wavelengths of a table, and of the table.
 
     A table may jump by the 99th percentile of the error that it states of the band of theta_i and the wavelength. A
     seam near the horizon of the viewer is judged by the band of the viewer, as if light and viewer were exchanged.
     """
     wavelengths = table.wavelength_nm
-
-    def model(wi: Array, wr: Array) -> Floats:
-        return error_measurement.model_values(material, wavelengths, wi, wr)
 
     def looked_up(wi: Array, wr: Array) -> Floats:
         return table.lookup_vectors(wi, wr).reshape(len(wi), wavelengths_of(table))
@@ -71,14 +131,20 @@ def smoothness_of(table: Table, material: Material, pairs: Pairs) -> Smoothness:
     floor = (
         error_measurement.floor_of(pairs.model, pairs.drawn) + _TINY
     )  # far below it tables may be anything, as they may err
-    tiny = np.full_like(floor, _TINY)
-    of_model = [_jump(seam, model, wavelengths, tiny, _rounding) for seam in _crossed(_of_model())]
-    of_model.append(_between_methods(material, wavelengths, tiny))
+    of_model = [] if source is None else _jumps_of_model(source, wavelengths, np.full_like(floor, _TINY))
     of_table = [
         _jump(seam, looked_up, wavelengths, floor, partial(_stated, table.error)) for seam in _crossed(_of_table(table))
     ]
     good = all(jump.largest <= jump.tolerance for jump in (*of_model, *of_table))
     return Smoothness(model=of_model, table=of_table, verdict="passes" if good else "violates")
+
+
+def _jumps_of_model(source: Source, wavelengths: Array | None, floor: Floats) -> list[Jump]:
+    def model(wi: Array, wr: Array) -> Floats:
+        return error_measurement.model_values(source, wavelengths, wi, wr)
+
+    jumps = [_jump(seam, model, wavelengths, floor, _rounding) for seam in _crossed(_of_model())]
+    return [*jumps, _between_methods(source, wavelengths, floor)]
 
 
 def _rounding(*_: Array) -> Floats:
@@ -115,13 +181,13 @@ def _of_table(table: Table) -> Iterator[_Seam]:
         at[:, 3] = at[:, 1] + delta_phi
         yield _Seam(f"delta_phi of {name} degrees", at, 3)
     rng = np.random.default_rng(_SEED)
-    for number, (name, nodes) in enumerate(table.axes_deg.items()):
+    columns = _columns(table)
+    for axis, (name, nodes) in enumerate(table.axes_deg.items()):
         on = np.stack([radians(rng.uniform(0.0, each[-1], _NODES)) for each in table.axes_deg.values()], axis=1)
-        on[:, number] = radians(rng.choice(nodes, _NODES))
+        on[:, axis] = radians(rng.choice(nodes, _NODES))
         at = np.zeros((_NODES, 4))
-        columns = _columns(table)
         at[:, columns] = on
-        yield _Seam(f"nodes of {name}", at, columns[number], table.grid.half_difference)
+        yield _Seam(f"nodes of {name}", at, columns[axis], table.grid.half_difference)
     if not table.grid.half_difference:
         for name, moved in (("theta_i", 0), ("theta_r", 2)):
             at = _all(_THETA, _PHI, _THETA, _PHI + 0.1)
@@ -167,12 +233,11 @@ def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: F
     return _largest(seam.name, relative, at, wavelength_nm, allowed(*at))
 
 
-def _between_methods(material: Material, wavelength_nm: Array | None, floor: Floats) -> Jump:
+def _between_methods(source: Source, wavelength_nm: Array | None, floor: Floats) -> Jump:
     """Between values along an azimuth, of which He-Torrance takes a sum from a table, and the same one by one."""
     theta_i, theta_r, phi_r = np.meshgrid(_THETA, _THETA, np.linspace(0.0, np.pi, _ROW), indexing="ij")
-    spectrum = [material.arguments()] if wavelength_nm is None else [material.arguments(w) for w in wavelength_nm]
     rows, single = (
-        np.stack([material.spec.evaluate(*angles, **arguments).ravel() for arguments in spectrum], axis=-1)
+        np.reshape(source.lookup(*angles, wavelength_nm), (theta_i.size, -1))
         for angles in ((theta_i[..., :1], 0.0, theta_r[..., :1], phi_r), (theta_i, 0.0, theta_r, phi_r))
     )
     at = unit_vector(theta_i, 0.0).reshape(-1, 3), unit_vector(theta_r, phi_r).reshape(-1, 3)

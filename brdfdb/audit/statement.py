@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field
 
-from brdfdb.audit.findings import Disagreement, Statistic
+from brdfdb.audit.finding import STRICT
 from brdfdb.audit.pairs import Pairs
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
@@ -24,6 +25,8 @@ from brdfdb.tables.error_measurement import Draw
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.places import BANDS, BANDS_DEG, RINGS
 from brdfdb.tables.stated_error import Error, Overall
+
+Statistic = Literal["l1", "median", "p95", "p99", "max", "floor"]
 
 # Probability of each test to fail a sound table. A table of 41 wavelengths takes 3000 of them: one in 300 000 such
 # tables fails by chance
@@ -38,9 +41,39 @@ EXACT = 1e-6
 DIGITS = 1.1e-2  # relative: a statement has three digits, and so has the floor of its relative errors
 LEAST_DIRECTIONS = 500  # of a band: a statement that rests on fewer is judged as if it rested on so many
 QUANTILES: dict[Statistic, float] = {"median": 0.5, "p95": 0.95, "p99": 0.99, "max": 1.0}
+_WORDS: dict[Statistic, str] = {
+    "l1": "mean error",
+    "median": "median",
+    "p95": "95th percentile",
+    "p99": "99th percentile",
+    "max": "maximum",
+    "floor": "floor",
+}
 NAMES: tuple[Statistic, ...] = ("l1", *QUANTILES)
 
 Counts = NDArray[np.int64]
+
+
+class Disagreement(BaseModel):
+    """One number of the error that a table states, which chance does not reconcile with fresh directions."""
+
+    model_config = STRICT
+
+    statistic: Statistic
+    theta_i_deg: tuple[float, float] = Field(description="ends of the band; 0 and 90: of all directions")
+    wavelength_nm: float | None = Field(description="null: the table is grey")
+    stated: float
+    fresh: float | None = Field(description="null: not finite")
+    times: float | None = Field(description="the larger over the smaller; null: not finite")
+
+    @property
+    def text(self) -> str:
+        """Both numbers, and their place, in words."""
+        low, high = self.theta_i_deg
+        where = "overall" if (low, high) == (0.0, 90.0) else f"at theta_i of {low:g} to {high:g} degrees"
+        at = "" if self.wavelength_nm is None else f", {self.wavelength_nm:g} nm"
+        fresh = "not finite" if self.fresh is None else f"{self.fresh:.3g}"
+        return f"{_WORDS[self.statistic]} {fresh}, stated {self.stated:.3g}, {where}{at}"
 
 
 class _Band(NamedTuple):

@@ -6,10 +6,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field
 
 from brdfdb.audit.excess import DIGITS, crossing, limit_of
-from brdfdb.audit.findings import Bands, TableEnergy, Verdict
-from brdfdb.figure import numbers, rows
+from brdfdb.audit.finding import STRICT, Verdict
+from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
@@ -22,6 +23,60 @@ from brdfdb.tables.table import Table
 MOST_ERROR = 0.5
 _BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
 _NOT_FINITE, _FINITE = 1e30, 1e20  # what stands for an albedo that is not finite, and what is below any mean of it
+
+
+class Bands(BaseModel):
+    """What a table that states its error is judged by: what exceeds 1, on average over bands of theta_i."""
+
+    model_config = STRICT
+
+    theta_i_deg: list[float] = Field(description="edges of the bands")
+    stated_error: list[list[float]] = Field(
+        description="[band][wavelength], of all but the specular part: integral of abs(error) cos theta_r over that of "
+        "f_r cos theta_r"
+    )
+    explained: list[list[float | None]] = Field(
+        description="[band][wavelength], by how much that error can raise the mean albedo at most; null: not finite"
+    )
+    excess: list[list[float | None]] = Field(
+        description="[band][wavelength], mean of what exceeds 1, specular part included; null: not finite"
+    )
+
+
+class TableEnergy(BaseModel):
+    """Directional albedo of the table, specular part included: what leaves, of unit flux from theta_i.
+
+    A table that states its error does so over bands of theta_i. What exceeds 1, or what is known of the material, may
+    be as much of a band as that error explains, and no more.
+    """
+
+    model_config = STRICT
+
+    theta_i_deg: list[float]
+    wavelength_nm: list[float] | None = Field(description="null: the table is grey")
+    albedo: list[list[float | None]] = Field(
+        description="[theta_i][wavelength]; over the azimuths of the light the largest, if the table is anisotropic; "
+        "null: not finite"
+    )
+    specular: list[list[float | None]] = Field(
+        description="[theta_i][wavelength], the share of the specular part in it"
+    )
+    integration_error: float | None = Field(
+        description="of the albedo, the largest estimate; 0: the exact integral of the interpolant; null: not finite"
+    )
+    hemispherical: Numbers = Field(
+        description="[wavelength], of light that is the same from everywhere, albedo taken as linear between theta_i"
+    )
+    bands: Bands | None = Field(description="null: the table states no error, and is allowed none")
+    max_albedo: float | None = Field(description="null: not finite")
+    max_at_theta_i_deg: float
+    max_at_wavelength_nm: float | None
+    exceeds_1_from_theta_i_deg: float | None = Field(description="to 0.001 degrees")
+    exceeds_1_beyond_error_from_theta_i_deg: float | None = Field(
+        description="where neither the stated error nor that of the integration explains it"
+    )
+    verdict: Verdict
+    reason: str = Field(description="also where a table passes because of the error that it states")
 
 
 class _Judge(NamedTuple):

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+from pydantic import Field
 
-from brdfdb.audit.findings import Disagreement, TableError, Verdict
+from brdfdb.audit.finding import LAST, Cell, Finding, Sentence, Subject, Verdict, Word
 from brdfdb.audit.likeness import bias_of, likeness_of
+from brdfdb.audit.nodes import Nodes
 from brdfdb.audit.pairs import SEED, Pairs, representative_nm
-from brdfdb.audit.statement import contradictions, disagreements
-from brdfdb.figure import Map, rows
+from brdfdb.audit.statement import Disagreement, contradictions, disagreements
+from brdfdb.figure import Map, Panel, number, rows
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
@@ -25,7 +27,76 @@ LEAST, _MOST = 1e-6, 1.0  # what is less is drawn as the least: zeros have no co
 _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90.0}
 
 
-def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Verdict = "passes") -> TableError:
+class TableError(Finding):
+    """The table less the model, over planes of incidence, and at fresh directions against what the table states."""
+
+    key = "table_error"
+    title = "Table error"
+    columns = ("table error",)
+    explanation = (
+        "|table − model| over the model, or over a thousandth of the Lambertian of the same albedo where the model "
+        "is less. 99 of 100 values are below the number shown: as measured now at directions drawn afresh, and as "
+        "the table states of itself. Mean, median, 95th and 99th percentile and maximum that it states of each band "
+        "of theta_i and each wavelength are held against the fresh ones, too: one violates that a sound table would "
+        "show with a probability below 10⁻⁹."
+    )
+
+    stated_p99: float | None = Field(description="null: the table states no error, and none is asked of it")
+    fresh_p99: float | None = Field(description="null: not finite")
+    specular: float | None = Field(
+        description="largest difference of the stored specular part from the model's; null: none, or not finite"
+    )
+    directions: int
+    contradictions: list[str] = Field(description="what of the statement contradicts itself, a sentence each")
+    disagreements: int = Field(description="numbers of the statement that fresh directions contradict")
+    worst: list[Disagreement] = Field(description="of these, of each statistic the one that is furthest off")
+    bias: float | None = Field(
+        description="signed: integral of (table - model) cos theta_r over that of the model, mean of all directions at "
+        "the wavelength where it is largest; null: not finite"
+    )
+    likeness: str = Field(description="what the table agrees with much better than with its model; empty: nothing")
+    maps: list[Map] = Field(description="relative error over theta_i and theta_r, negative back towards the light")
+    verdict: Verdict
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Finding:
+        """Hold a table against what it states of its error."""
+        if subject.source is None:
+            return subject.not_judged("the error of a table is measured against its source")
+        return table_error_of(subject.table, subject.source, subject.pairs, subject.found[Nodes.key].verdict)
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the error, and on each thing that is wrong with what the table states."""
+        fresh = "its error (p99) is not finite"
+        if self.fresh_p99 is not None:
+            fresh = f"99 of 100 fresh values are within {number(self.fresh_p99)}"
+        stated = "states none" if self.stated_p99 is None else f"states {number(self.stated_p99)}"
+        bias = "" if self.bias is None else f", on average off by {number(self.bias, 2)} of the model"
+        mirror = ""
+        if self.specular is not None:
+            mirror = f"; the specular part is off by up to {number(self.specular)}"
+        wrong = [f"its stated error contradicts itself: {each}" for each in self.contradictions]
+        if self.worst:
+            worst = "; ".join(each.text for each in self.worst)
+            wrong.append(f"{self.disagreements} numbers of its stated error are not those of fresh directions: {worst}")
+        if self.likeness:
+            wrong.append(f"the table agrees with {self.likeness}")
+        return [self.sentence(self.verdict, "; ".join([f"{fresh}{bias}; the table {stated}{mirror}", *wrong]))]
+
+    def cells(self) -> list[Cell]:
+        """Return the error at fresh directions, and the stated one."""
+        word: Word = "unknown" if self.stated_p99 is None and self.verdict == "passes" else self.verdict
+        stated = "" if self.stated_p99 is None else f" of {number(self.stated_p99, 2)}"
+        if self.fresh_p99 is None:
+            return [Cell(word, f"not finite{stated}", LAST)]
+        return [Cell(word, f"{number(self.fresh_p99, 2)}{stated}", self.fresh_p99)]
+
+    def figures(self) -> list[Panel | Map]:
+        """Return the maps of the error over planes of incidence."""
+        return list(self.maps)
+
+
+def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "passes") -> TableError:
     """Hold a table against what it states of its error, and draw the error at the middle of its wavelengths.
 
     `nodes` is the verdict on its nodes: what is wrong with a table is looked for where that, or its error, violates.
@@ -37,7 +108,7 @@ def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Verdic
     if table.error is not None:
         contradicts = contradictions(table.error, wavelengths_of(table))
         disagree = [] if contradicts else disagreements(table.error, pairs, table.wavelength_nm)
-    specular = _specular_error(table, material)
+    specular = _specular_error(table, source)
     mirrors = specular is None or specular <= SPECULAR_TOLERANCE  # nan is not
     good = mirrors and not contradicts and not disagree
     floor = error_measurement.floor_of(pairs.model, pairs.drawn)
@@ -51,25 +122,22 @@ def table_error_of(table: Table, material: Material, pairs: Pairs, nodes: Verdic
         disagreements=len(disagree),
         worst=list({each.statistic: each for each in reversed(disagree)}.values())[::-1],
         bias=bias_of(pairs),
-        likeness="" if good and nodes == "passes" else likeness_of(table, material, pairs),
-        maps=[_map(table, material, middle, *plane) for plane in _PLANES.items()],
+        likeness="" if good and nodes == "passes" else likeness_of(table, source, pairs),
+        maps=[_map(table, source, middle, *plane) for plane in _PLANES.items()],
         verdict="passes" if good else "violates",
     )
 
 
-def _specular_error(table: Table, material: Material) -> float | None:
+def _specular_error(table: Table, source: Source) -> float | None:
     """The largest difference of the stored reflectances of the Dirac part from the model's; None: there is none."""
-    if table.specular is None or material.spec.specular is None:
+    if table.specular is None or not source.has_specular:
         return None
     nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
-    arguments = material.arguments(table.wavelength_nm)
-    parameters = {name: arguments[name] for name in material.spec.specular_parameters}
-    theta_i = radians(nodes) if table.wavelength_nm is None else radians(nodes)[:, np.newaxis]
-    truth = material.spec.specular(theta_i, **parameters)
+    truth = source.specular_reflectance(radians(nodes), table.wavelength_nm)
     return float(f"{np.max(np.abs(table.specular.reshape(truth.shape) - truth)):.3g}")
 
 
-def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_deg: float) -> Map:
+def _map(table: Table, source: Source, floor: Floats, title: str, delta_phi_deg: float) -> Map:
     wavelength = representative_nm(table)
     theta_i_deg = np.append(np.arange(0.0, _LAST_DEG, _STEP_DEG), _LAST_DEG)
     theta_r_deg = np.concatenate([-theta_i_deg[:0:-1], theta_i_deg])
@@ -78,9 +146,7 @@ def _map(table: Table, material: Material, floor: Floats, title: str, delta_phi_
     wr = unit_vector(-radians(theta_r_deg), radians(delta_phi_deg))
     wi, wr = (np.reshape(w, (-1, 3)) for w in np.broadcast_arrays(wi, wr))
     found = table.lookup_vectors(wi, wr, wavelength)
-    truth = error_measurement.model_values(material, None if wavelength is None else np.array([wavelength]), wi, wr)[
-        :, 0
-    ]
+    truth = error_measurement.model_values(source, None if wavelength is None else np.array([wavelength]), wi, wr)[:, 0]
     with np.errstate(invalid="ignore"):
         error = error_measurement.relative(found, truth, floor).reshape(theta_i_deg.size, -1)
     return Map(

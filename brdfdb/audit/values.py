@@ -3,10 +3,55 @@
 from __future__ import annotations
 
 import numpy as np
+from pydantic import Field
 
-from brdfdb.audit.findings import Values
+from brdfdb.audit.finding import Cell, Finding, Sentence, Subject, Verdict
+from brdfdb.figure import number
 from brdfdb.parameters import Floats
+from brdfdb.tables.albedo import linear_in_angles
 from brdfdb.tables.table import Table
+
+
+class Values(Finding):
+    """The stored values themselves, and those of f_r that come of them."""
+
+    key = "values"
+    title = "Values"
+    columns = ("values",)
+    explanation = (
+        "Stored values, and f_r where it is looked up between them, are finite, and f_r is not negative. Nodes "
+        "below the horizon may be: they continue the table, and lookups end at 0."
+    )
+
+    count: int = Field(description="of stored values")
+    looked_up: int = Field(description="directions between the nodes where f_r was looked up; 0: linear between nodes")
+    smallest: float | None = Field(description="of f_r at the nodes and where it was looked up; null: none is finite")
+    negative: int = Field(description="of those of f_r, and of the specular part")
+    not_finite: int = Field(description="of those, and of what is stored in place of f_r")
+    positivity: Verdict
+    finiteness: Verdict
+    verdict: Verdict = Field(description="worse of the two")
+
+    @classmethod
+    def judge(cls, subject: Subject) -> Values:
+        """Count the values of a table that are negative or not finite."""
+        # what is linear between its nodes is no less than they are
+        pairs, linear = subject.pairs, linear_in_angles(subject.table)
+        return values_of(subject.table, None if linear else pairs.table[pairs.drawn.above])
+
+    def sentences(self) -> list[Sentence]:
+        """Return a sentence on the sign of the values, and one on those that are not finite."""
+        negative = f"{self.negative} values are negative; the smallest f_r is {number(self.smallest)} 1/sr"
+        finite = f"{self.not_finite} of {self.count} stored values and {self.looked_up} lookups are not finite"
+        return [
+            self.sentence(self.positivity, negative, title="Positivity"),
+            self.sentence(self.finiteness, finite, title="Finiteness"),
+        ]
+
+    def cells(self) -> list[Cell]:
+        """Return the number of bad values."""
+        bad = self.negative + self.not_finite
+        return [Cell(self.verdict, f"{bad} bad" if bad else "all good", bad)]
 
 
 def values_of(table: Table, looked_up: Floats | None) -> Values:
@@ -34,4 +79,5 @@ def values_of(table: Table, looked_up: Floats | None) -> Values:
         not_finite=not_finite,
         positivity="violates" if negative else "passes",
         finiteness="violates" if not_finite else "passes",
+        verdict="violates" if negative or not_finite else "passes",
     )

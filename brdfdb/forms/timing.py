@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.forms.catalogue import Representation
+from brdfdb.forms.catalogue import Form
 from brdfdb.parameters import Floats
 
 BATCH = 100_000  # directions at once, of forms that are fast enough
@@ -44,7 +44,7 @@ class Times(NamedTuple):
 
 
 def times(
-    forms: Sequence[Representation],
+    forms: Sequence[Form],
     wi: Floats,
     wr: Floats,
     *,
@@ -60,7 +60,7 @@ def times(
 
     Parameters
     ----------
-    forms : sequence of Representation
+    forms : sequence of Form
         What to time, on one thread.
     wi, wr : arrays of shape (N, 3)
         Unit vectors to evaluate at, repeated or cut off as needed.
@@ -98,7 +98,7 @@ def times(
 
 
 def mixed_times(
-    forms: Sequence[Representation],
+    forms: Sequence[Form],
     wi: Floats,
     wr: Floats,
     *,
@@ -109,7 +109,7 @@ def mixed_times(
 
     Parameters
     ----------
-    forms : sequence of Representation
+    forms : sequence of Form
         To time, on one thread.
     wi, wr : arrays of shape (N, 3)
         Unit vectors to evaluate at, repeated or cut off as needed.
@@ -150,13 +150,11 @@ def mixed_times(
     return [Times(seconds, FEW) for seconds in taken.T]
 
 
-def _directions(form: Representation, wi: Floats, wr: Floats, count: int) -> tuple[Floats, Floats]:
+def _directions(form: Form, wi: Floats, wr: Floats, count: int) -> tuple[Floats, Floats]:
     return np.resize(wi, (count, 3)).astype(form.dtype), np.resize(wr, (count, 3)).astype(form.dtype)
 
 
-def _counts(
-    forms: Sequence[Representation], wi: Floats, wr: Floats, most: int, clock: Callable[[], float]
-) -> list[int]:
+def _counts(forms: Sequence[Form], wi: Floats, wr: Floats, most: int, clock: Callable[[], float]) -> list[int]:
     """At how many directions each form is timed: the largest step that fits."""
     if most <= _STEPS[0]:
         return [most] * len(forms)

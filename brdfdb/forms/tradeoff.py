@@ -1,4 +1,4 @@
-"""Speed against accuracy: every representation of a material, or along a family, its error, its cost, the best."""
+"""Speed against accuracy: every form of a material, or along a family, its error, its cost, the best."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.forms import sampler_efficiency, timing
-from brdfdb.forms.catalogue import SPECTRAL_TOLERANCES, Representation, of_family, representations
+from brdfdb.forms import catalogue, sampler_efficiency, timing
+from brdfdb.forms.catalogue import SPECTRAL_TOLERANCES, Form, of_family
 from brdfdb.forms.tradeoff_document import (
     Between,
     Chart,
     Cost,
     Curve,
+    Diagnostic,
     FamilyChart,
     Fronts,
     Point,
@@ -22,7 +23,7 @@ from brdfdb.forms.tradeoff_document import (
     Saving,
     Work,
 )
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 from brdfdb.store.family import Family, Sweep
 from brdfdb.tables import error_measurement
@@ -37,24 +38,24 @@ SHARE, CONFIDENCE = 0.99, 0.95  # the percentile that is charted, and the confid
 
 
 def chart(
-    material: Material,
+    source: Source,
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float] | None = None,
     *,
-    also: Sequence[Representation] = (),
+    also: Sequence[Form] = (),
     tick: Callable[[], None] = lambda: None,
 ) -> Chart:
-    """Measure error and cost of every representation of a material.
+    """Measure error and cost of every form of a source.
 
     Parameters
     ----------
-    material : Material
-        Of any model.
+    source : Source
+        A material of any model, or a function.
     wavelength_nm : array of shape (L,) [nm], or None
-        For spectral materials, and only for them.
+        For spectral sources, and only for them.
     tolerances : sequence of float, optional
-        Of planned tables, as `representations` takes them.
-    also : sequence of Representation
+        Of planned tables, as `catalogue.forms` takes them.
+    also : sequence of Form
         More of them, at the same wavelengths: a table of a store.
     tick : callable
         Called `STEPS` times.
@@ -69,9 +70,9 @@ def chart(
     ValueError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
     """
-    forms = [*representations(material, wavelength_nm, tolerances), *also]
+    forms = [*catalogue.forms(source, wavelength_nm, tolerances), *also]
     tick()
-    drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+    drawn = error_measurement.draw(source, wavelength_nm, DIRECTIONS, SEED)
     errors = _errors(forms, drawn)
     tick()
     batch, block, single = _timed(forms, drawn, tick)
@@ -80,7 +81,7 @@ def chart(
     middle = None if wavelength_nm is None else float(wavelength_nm[wavelength_nm.size // 2])
     samplers = [
         Sampler(key=key, title=sampler_efficiency.SAMPLERS[key], albedo=_work(albedo), sphere=_work(sphere))
-        for key, (albedo, sphere) in sampler_efficiency.works(material, middle).items()
+        for key, (albedo, sphere) in sampler_efficiency.works(source, middle).items()
     ]
     tick()
     seconds = np.stack([each.seconds for each in batch], axis=1)
@@ -90,10 +91,10 @@ def chart(
         return _front(forms, [error["l1"] for error in errors], costs)
 
     return Chart(
-        material=material.name,
-        title=material.title,
-        model=material.model,
-        parameters=material.file_parameters(),
+        material=source.name,
+        title=source.title,
+        model=source.model if isinstance(source, Material) else "function",
+        parameters=source.file_parameters() if isinstance(source, Material) else {},
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         directions=int(np.count_nonzero(drawn.above)),
         truth=forms[0].key,
@@ -121,7 +122,7 @@ def _against(
     rungs: Sequence[int],
     errors: Sequence[dict[str, Any]],
     seconds: Floats,
-    forms: Sequence[Representation],
+    forms: Sequence[Form],
 ) -> dict[str, Any]:
     """The cheapest rung that is as accurate as a form, and the ratio of their times: fields of a `Point`."""
     if forms[number].kind in ("exact", "quadrature"):
@@ -149,7 +150,7 @@ def chart_family(
     family: Family | None = None,
     tick: Callable[[], None] = lambda: None,
 ) -> FamilyChart:
-    """Measure the error of every representation at every member of a family, and the cost of each at one of them.
+    """Measure the error of every form at every member of a family, and the cost of each at one of them.
 
     Parameters
     ----------
@@ -160,7 +161,7 @@ def chart_family(
     wavelength_nm : array of shape (L,) [nm], or None
         For spectral materials, and only for them.
     tolerances : sequence of float, optional
-        Of planned tables, as `representations` takes them; by default 0.1 and 0.01.
+        Of planned tables, as `catalogue.forms` takes them; by default 0.1 and 0.01.
     family : Family, optional
         As the store has it: its lookups between members are measured, too.
     tick : callable
@@ -179,34 +180,24 @@ def chart_family(
         If a member of `family` was built anew since it was recorded.
     """
     tolerances = SPECTRAL_TOLERANCES if tolerances is None else tolerances
-    middle = len(materials) // 2
-    kept: dict[str, tuple[int, Representation]] = {}  # of each key the one next to the middle, which is timed
-    errors: list[dict[str, dict[str, Any]]] = []
-    for number, material in enumerate(materials):
-        forms = representations(material, wavelength_nm, tolerances)
-        drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
-        errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
-        for form in forms:
-            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
-                kept[form.key] = number, form
-        tick()
+    kept, errors = _forms_of_members(materials, wavelength_nm, tolerances, tick)
     timed = [form for _, form in kept.values()]
     between = None if family is None else of_family(family)
-    drawn = error_measurement.draw(materials[middle], wavelength_nm, DIRECTIONS, SEED)
+    drawn = error_measurement.draw(materials[len(materials) // 2], wavelength_nm, DIRECTIONS, SEED)
     batch, block, single = _timed([*timed, *([between] if between else [])], drawn, tick)
     seconds = np.stack([each.seconds for each in batch], axis=1)
     fronts = []
     for found in errors:
-        here = [index for index, form in enumerate(timed) if form.key in found]
-        some = [timed[index] for index in here]
-        fronts.append(_front(some, [found[form.key]["l1"] for form in some], seconds[:, here]))
+        present = [index for index, form in enumerate(timed) if form.key in found]
+        rivals = [timed[index] for index in present]
+        fronts.append(_front(rivals, [found[form.key]["l1"] for form in rivals], seconds[:, present]))
     return FamilyChart(
         family=sweep.name,
         title=sweep.title,
         model=sweep.model,
         axes=sweep.axes,
         members=sweep.members,
-        g=_g(materials, wavelength_nm),
+        diagnostic=_diagnostic(materials, wavelength_nm),
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         truth=timed[0].key,
         curves=[
@@ -229,16 +220,39 @@ def chart_family(
     )
 
 
-def _g(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> list[float] | None:
-    """Eq. 79 of He et al. along the normal, where nothing is hidden and sigma is sigma_0; None of other models."""
-    if materials[0].model != "he_torrance" or wavelength_nm is None:
+def _forms_of_members(
+    materials: Sequence[Material],
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerances: Sequence[float],
+    tick: Callable[[], None],
+) -> tuple[dict[str, tuple[int, Form]], list[dict[str, dict[str, Any]]]]:
+    """Return by key the form of the member next to the middle and its number; and by key the errors of each member."""
+    middle = len(materials) // 2
+    kept: dict[str, tuple[int, Form]] = {}
+    errors: list[dict[str, dict[str, Any]]] = []
+    for number, material in enumerate(materials):
+        forms = catalogue.forms(material, wavelength_nm, tolerances)
+        drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+        errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
+        for form in forms:
+            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
+                kept[form.key] = number, form
+        tick()
+    return kept, errors
+
+
+def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:
+    """Return what the model of a family names as its diagnostic, for each member; None if it names none."""
+    found = materials[0].spec.diagnostic
+    if found is None:
         return None
-    middle_um = 1e-3 * float(wavelength_nm[wavelength_nm.size // 2])
-    return [float(f"{(4.0 * np.pi * m.parameters['sigma_0_um'] / middle_um) ** 2:.3g}") for m in materials]
+    middle = None if wavelength_nm is None else wavelength_nm[wavelength_nm.size // 2]
+    values = [float(f"{found.value(material.arguments(middle)):.3g}") for material in materials]
+    return Diagnostic(symbol=found.symbol, title=found.title, values=values)
 
 
 def _timed(
-    forms: Sequence[Representation], drawn: error_measurement.Draw, tick: Callable[[], None]
+    forms: Sequence[Form], drawn: error_measurement.Draw, tick: Callable[[], None]
 ) -> tuple[list[timing.Times], list[timing.Times], list[timing.Times]]:
     """Return the costs of calls with many directions, with a block of them, and with one."""
     mixed = np.random.default_rng(SEED).permutation(np.flatnonzero(drawn.above))  # few of them are as mixed as all
@@ -248,7 +262,7 @@ def _timed(
     return batch, block, single
 
 
-def _front(forms: Sequence[Representation], l1: Sequence[float], costs: Floats) -> list[str]:
+def _front(forms: Sequence[Form], l1: Sequence[float], costs: Floats) -> list[str]:
     """Keys of the forms worth having, of which costs has a column each."""
     # black is free, and has an l1 of 1
     rivals = [
@@ -259,7 +273,7 @@ def _front(forms: Sequence[Representation], l1: Sequence[float], costs: Floats) 
     return [forms[rivals[index]].key for index in timing.front([l1[index] for index in rivals], costs[:, rivals])]
 
 
-def _described(form: Representation, batch: timing.Times, block: timing.Times, single: timing.Times) -> dict[str, Any]:
+def _described(form: Form, batch: timing.Times, block: timing.Times, single: timing.Times) -> dict[str, Any]:
     """The fields of a `Form`."""
     return {
         "key": form.key,
@@ -274,7 +288,7 @@ def _described(form: Representation, batch: timing.Times, block: timing.Times, s
     }
 
 
-def _errors(forms: Sequence[Representation], drawn: error_measurement.Draw) -> list[dict[str, Any]]:
+def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[str, Any]]:
     """Of each form against the first one: the errors of a `Point`, to three digits."""
     truth = forms[0].evaluate(drawn.wi, drawn.wr)
     classes = error_measurement.classes(drawn)

@@ -25,7 +25,7 @@ class Cost(BaseModel):
 
 
 class Form(BaseModel):
-    """A representation, and what it costs."""
+    """A form, and what it costs."""
 
     model_config = _STRICT
 
@@ -51,7 +51,7 @@ class Saving(BaseModel):
 
 
 class Point(Form):
-    """A representation: errors are relative to the truth, at the worst wavelength."""
+    """A form: errors are relative to the truth, at the worst wavelength."""
 
     l1: float = Field(description="mean of abs(f_r - truth) over that of the truth, weighted with the cosine")
     p99: float = Field(description="99th percentile of abs(f_r - truth) / max(truth, floor)")
@@ -124,7 +124,7 @@ class Chart(BaseModel):
 
 
 class Curve(Form):
-    """A representation along a family: errors as those of a point, bytes and cost those of one member."""
+    """A form along a family: errors as those of a point, bytes and cost those of one member."""
 
     timed: str = Field(description="the member: of those that have this form, the one next to the middle of the family")
     l1: list[float | None] = Field(description="of each member; null where there is no such form")
@@ -138,6 +138,16 @@ class Between(Form):
     p99: float
 
 
+class Diagnostic(BaseModel):
+    """A number that tells in which regime the model of a member is, at the middle wavelength."""
+
+    model_config = _STRICT
+
+    symbol: str
+    title: str
+    values: list[float] = Field(description="of each member")
+
+
 class FamilyChart(BaseModel):
     """A family: which form is right where in it."""
 
@@ -148,9 +158,7 @@ class FamilyChart(BaseModel):
     model: str
     axes: dict[str, list[float]] = Field(description="values of each swept parameter, as in the record of a family")
     members: list[str] = Field(description="names of the materials; the last axis runs fastest")
-    g: list[float] | None = Field(
-        description="of He-Torrance, for each member: eq. 79 along the normal, at the middle wavelength"
-    )
+    diagnostic: Diagnostic | None = Field(description="null unless the model names one")
     wavelength_nm: list[float] | None
     truth: str = Field(description="key of the curve that the others are compared with")
     curves: list[Curve]

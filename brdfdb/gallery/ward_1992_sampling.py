@@ -12,7 +12,7 @@ from brdfdb.figure import Figure, Panel, Picture, Statement, curve_of, listed, r
 from brdfdb.gallery._ward_sphere import Points, points_at
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
-from brdfdb.integrals.sampling import ward_sample
+from brdfdb.integrals.sampling import sample
 from brdfdb.materials import presets
 from brdfdb.models import ward_vectors
 
@@ -72,7 +72,7 @@ def _followed(points: Points, directions: Array, weight: Array) -> _Rays:
 def _by_eq_7(points: Points, rays: int, seed: int = 7) -> _Rays:
     """Return rays drawn from the lobe of each point, eq. 7 with its weights."""
     u1, u2 = _random(seed, rays, points.camera.shape[:-1])
-    drawn = ward_sample(u1, u2, points.camera, **_lobe())
+    drawn = sample("ward", u1, u2, points.camera, rho_d=0.0, **_lobe())
     return _followed(points, drawn.wr, drawn.weight)
 
 
@@ -276,7 +276,7 @@ def _uniform_weights() -> Statement:
     thetas_deg = [0.0, 30.0, 60.0]
     viewers = unit_vector(radians(thetas_deg), 0.0)
     u1, u2 = _random(92, 4000, (len(thetas_deg),))
-    drawn = ward_sample(u1, u2, viewers, **lobe)
+    drawn = sample("ward", u1, u2, viewers, rho_d=0.0, **lobe)
     exact = directional_albedo("ward", radians(thetas_deg), tolerance=1e-4, rho_d=0.0, **lobe).albedo
     uniform = lobe["rho_s"] * (drawn.wr[..., 2] > 0.0).mean(axis=0) / exact
     weighted = drawn.weight.mean(axis=0) / exact

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, check_phi, check_theta, unit_vector
+from brdfdb.lobes import Lobe
 from brdfdb.models import MODELS
-from brdfdb.parameters import Floats, Lobe, ModelSpec
+from brdfdb.parameters import Floats, ModelSpec
 
 Array = NDArray[np.float64]
 Integrand = Callable[[Array, Array], Array]
@@ -152,11 +153,7 @@ def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def spec_of(model: ModelSpec | str) -> ModelSpec:
     """A model by its name, or itself."""
-    if isinstance(model, ModelSpec):
-        return model
-    if model not in MODELS:
-        raise ParameterError("model", f"{model!r} is not one of {', '.join(MODELS)}", model, tuple(MODELS))
-    return MODELS[model]
+    return model if isinstance(model, ModelSpec) else MODELS[model]
 
 
 def _albedo(
@@ -284,8 +281,9 @@ def narrowest(spec: ModelSpec, cos_i: float, parameters: Mapping[str, Any]) -> L
     """The lobe of a model where parameters make it narrowest: panels that resolve it resolve the others."""
     if spec.lobe is None:
         return None
-    share, alpha_x, alpha_y = spec.lobe(np.asarray(cos_i), **parameters)
-    return Lobe(*(np.asarray(value) for value in (np.max(share), np.min(alpha_x), np.min(alpha_y))))
+    lobe = spec.lobe(np.asarray(cos_i), **parameters)
+    share, alpha_x, alpha_y = np.max(lobe.share), np.min(lobe.alpha_x), np.min(lobe.alpha_y)
+    return lobe._replace(share=np.asarray(share), alpha_x=np.asarray(alpha_x), alpha_y=np.asarray(alpha_y))
 
 
 def _panels_of(

@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_vectors
 from brdfdb.integrals.quadrature import named, spec_of
-from brdfdb.parameters import Floats, Lobe, ModelSpec
+from brdfdb.lobes import Lobe
+from brdfdb.parameters import Floats, ModelSpec
 
 Array = NDArray[np.float64]
 
 _TINY = 1e-300  # u of 0 is read as this: its logarithm is finite
-_DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
+DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
 
 
 class Sample(NamedTuple):
@@ -128,86 +129,12 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
     return np.broadcast_to(density, shape).copy()[()]
 
 
-def ward_sample(
-    u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, *, rho_s: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike
-) -> Sample:
-    """Draw from the lobe of `brdfdb.models.ward` alone, by the paper's eq. 7 with its misprint put right.
-
-    Parameters
-    ----------
-    u1, u2 : array_like
-        Uniform random numbers, in [0, 1].
-    wi : array_like
-        Unit vectors of the light, of shape (..., 3).
-    rho_s, alpha_x, alpha_y : array_like [1]
-        As in `brdfdb.models.ward`.
-
-    Returns
-    -------
-    Sample
-        (wr, pdf, weight): weight = rho_s (h.i) cos^3(delta) sqrt(cos theta_r / cos theta_i), 0 below the horizon.
-
-    Raises
-    ------
-    ValueError
-        If an argument is outside its range.
-
-    Notes
-    -----
-    Eq. (7): delta = arctan([-log(u1) / (cos^2 phi / alpha_x^2 + sin^2 phi / alpha_y^2)]^(1/2)), where (7a) is printed
-    without the arctan, and phi = arctan(alpha_y / alpha_x tan(2 pi u2)) in the quadrant of 2 pi u2.
-
-    References
-    ----------
-    ward1992
-
-    Examples
-    --------
-    >>> wr, density, weight = ward_sample(1.0, 0.2, [0.6, 0.0, 0.8], rho_s=0.3, alpha_x=0.1, alpha_y=0.2)
-    >>> (wr + 0.0).round(6).tolist(), round(float(weight), 6)
-    ([-0.6, 0.0, 0.8], 0.24)
-    """
-    return sample("ward", u1, u2, wi, rho_d=0.0, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
-
-
-def ward_pdf(wi: ArrayLike, wr: ArrayLike, *, alpha_x: ArrayLike, alpha_y: ArrayLike) -> Floats:
-    """The density [1/sr] with which `ward_sample` draws `wr` for the light `wi`.
-
-    Parameters
-    ----------
-    wi, wr : array_like
-        Unit vectors, of shape (..., 3), `wr` anywhere on the sphere.
-    alpha_x, alpha_y : array_like [1]
-        As in `brdfdb.models.ward`.
-
-    Returns
-    -------
-    array [1/sr]
-        exp(-tan^2(delta) (..)) / (4 pi alpha_x alpha_y (h.i) cos^3(delta)); over the sphere it integrates to 1.
-
-    Raises
-    ------
-    ValueError
-        If an argument is outside its range.
-
-    References
-    ----------
-    ward1992
-
-    Examples
-    --------
-    >>> round(float(ward_pdf([0.6, 0.0, 0.8], [-0.6, 0.0, 0.8], alpha_x=0.1, alpha_y=0.2)), 6)
-    4.973592
-    """
-    return pdf("ward", wi, wr, rho_d=0.0, rho_s=1.0, alpha_x=alpha_x, alpha_y=alpha_y)
-
-
 def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> Lobe:
     """Where a model has its lobe, of lights `i`; of a diffuse model, a lobe that has no share."""
     for parameter in spec.parameters:
         if parameter.name in parameters:
             parameter.check(parameters[parameter.name])
-    return _DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
+    return DIFFUSE if spec.lobe is None else spec.lobe(i[..., 2], **parameters)
 
 
 def _uniform(name: str, u: ArrayLike) -> Array:
@@ -232,8 +159,8 @@ def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
 
 
 def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
-    """The light mirrored in a half vector drawn by Ward's eq. 7, in slopes: tan(delta) times cos(phi) and sin(phi)."""
-    radius = np.sqrt(-np.log(u1))
+    """Return the light (..., 3) mirrored in half vectors whose slopes follow the distribution of the lobe."""
+    radius = lobe.distribution.radius(u1)
     s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
     s_x, s_y = np.broadcast_arrays(s_x, s_y)
     h = np.stack([s_x, s_y, np.ones_like(s_x)], axis=-1)
@@ -256,7 +183,8 @@ def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
     x, y, z = (i[..., axis] + r[..., axis] for axis in range(3))
     length2 = x * x + y * y + z * z
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        exponent = ((x / lobe.alpha_x) ** 2 + (y / lobe.alpha_y) ** 2) / (z * z)
-        gaussian = np.exp(-exponent) * length2 / (2.0 * np.pi * lobe.alpha_x * lobe.alpha_y * np.abs(z) ** 3)
-    gaussian = np.where((np.abs(z) < 1e-100) | (exponent > 700.0), 0.0, gaussian)  # half vectors that are not drawn
-    return np.asarray(lobe.share * gaussian + (1.0 - lobe.share) * cosine)
+        t2 = ((x / lobe.alpha_x) ** 2 + (y / lobe.alpha_y) ** 2) / (z * z)
+        slopes = lobe.distribution.density(t2)
+        mirrored = slopes * length2 / (2.0 * np.pi * lobe.alpha_x * lobe.alpha_y * np.abs(z) ** 3)
+    mirrored = np.where(np.abs(z) < 1e-100, 0.0, mirrored)  # no half vector is drawn there
+    return np.asarray(lobe.share * mirrored + (1.0 - lobe.share) * cosine)

@@ -1,4 +1,4 @@
-"""The bound that energy conservation puts on the uniform diffuse part of He et al. 1991, section 3.2.3."""
+"""The bound that energy conservation puts on the uniform part of a model, where the model leaves it free."""
 
 from __future__ import annotations
 
@@ -7,37 +7,30 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI
-from brdfdb.integrals.quadrature import spectral_albedo
-from brdfdb.models import MODELS
-from brdfdb.models.he_torrance_1991 import checked_surface
-from brdfdb.parameters import Floats
+from brdfdb.integrals.quadrature import named, spec_of, spectral_albedo
+from brdfdb.parameters import Floats, ModelSpec
 
 Array = NDArray[np.float64]
 
 # Angles of the first search, even in arcsinh(tan theta_i), which is theta_i near 0 and -ln(cos theta_i) near grazing:
 # there the reflectance peaks where shadowing begins
 _ANGLES = 40
-_ROUNDS = 12  # of the search around the largest of them, each of which halves the step: as a rule four are enough
+_ROUNDS = 12  # rounds of the search around the largest of them, each of which halves the step: four are often enough
 
 
-def he_torrance_a_max(
-    *,
-    wavelength_nm: ArrayLike,
-    sigma_0_um: ArrayLike,
-    tau_um: ArrayLike,
-    n: ArrayLike,
-    k: ArrayLike,
-    tolerance: float = 1e-6,
-) -> Floats:
-    """The largest a(lambda) with which `he_torrance` reflects no more than it receives, from any direction.
+def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parameters: ArrayLike) -> Floats:
+    """Return the largest albedo [1] of the uniform part with which a model reflects no more than it receives.
 
     Parameters
     ----------
-    wavelength_nm, sigma_0_um, tau_um, n, k : array_like
-        As in `brdfdb.models.he_torrance`; they broadcast, and are integrated together.
+    model : ModelSpec or str
+        An isotropic model that leaves its uniform part free (`ModelSpec.uniform_bound_cosine`), or its name.
     tolerance : float
         Absolute error of the directional albedo that is allowed, in [1e-13, 1].
+    **parameters : array_like
+        Those of the model but the uniform part; they broadcast, and are integrated together.
 
     Returns
     -------
@@ -47,15 +40,14 @@ def he_torrance_a_max(
 
     Raises
     ------
-    ValueError
-        If an argument is outside its range.
+    ParameterError
+        If an argument is outside its range, or energy does not bound the uniform part of the model.
 
     Notes
     -----
-    Section 3.2.3: a(lambda) is "a constrained, but otherwise free, parameter. The constraint is based on energy
-    conservation and gives an upper bound." A smooth surface reflects everything at grazing: its bound is 0, and any
-    a > 0 breaks it. The worst angle is searched in cos theta_i down to a hundredth of sigma_0 / tau, where
-    shadowing has taken the specular part away.
+    He et al. 1991, section 3.2.3: a(lambda) is "a constrained, but otherwise free, parameter. The constraint is based
+    on energy conservation and gives an upper bound." A smooth surface reflects everything at grazing: its bound is 0,
+    and any a > 0 breaks it.
 
     References
     ----------
@@ -64,32 +56,41 @@ def he_torrance_a_max(
     Examples
     --------
     >>> ceramic = dict(wavelength_nm=500.0, sigma_0_um=1.45, tau_um=13.2, n=1.7456, k=0.0)
-    >>> round(float(he_torrance_a_max(**ceramic)), 3)  # the paper takes 0.9
+    >>> round(float(largest_uniform("he_torrance", **ceramic)), 3)  # the paper takes 0.9
     0.777
     """
-    surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
-    arrays = np.broadcast_arrays(surface.wavelength_um * 1000.0, surface.sigma_0, surface.tau, surface.n, surface.k)
-    names = ("wavelength_nm", "sigma_0_um", "tau_um", "n", "k")
-    surfaces = {name: np.ravel(array) for name, array in zip(names, arrays, strict=True)}
-    steepest = np.arccosh(1.0 / lowest_cosine(surfaces))
+    spec = spec_of(model)
+    if spec.uniform_bound_cosine is None or spec.uniform is None:
+        raise ParameterError("model", f"{spec.name!r} has no uniform part that only energy conservation bounds")
+    given = named(spec, dict(**parameters, **{spec.uniform: 0.0}))
+    normal = np.array([0.0, 0.0, 1.0])
+    spec.vectors(normal, normal, **given)  # checks them
+    del given[spec.uniform]
+    arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given.values()))
+    surfaces = {name: np.ravel(array) for name, array in zip(given, arrays, strict=True)}
+    steepest = np.arccosh(1.0 / spec.uniform_bound_cosine(surfaces))
     theta_i = np.append(np.arctan(np.sinh(np.linspace(0.0, steepest, _ANGLES))), HALF_PI)
-    reflectance = np.stack([_reflectance(theta, surfaces, tolerance) for theta in theta_i])
-    return a_max(theta_i, reflectance, surfaces, tolerance).reshape(arrays[0].shape)[()]
+    reflectance = np.stack([_reflectance(spec, theta, surfaces, tolerance) for theta in theta_i])
+    return largest_uniform_beside(spec, theta_i, reflectance, surfaces, tolerance).reshape(arrays[0].shape)[()]
 
 
-def a_max(theta_i: Array, reflectance: Floats, surfaces: Mapping[str, ArrayLike], tolerance: float) -> Array:
-    """`he_torrance_a_max` of surfaces whose reflectance is known at some angles, among which it is searched on.
+def largest_uniform_beside(
+    spec: ModelSpec, theta_i: Array, reflectance: Floats, surfaces: Mapping[str, ArrayLike], tolerance: float
+) -> Array:
+    """Return `largest_uniform` [1] of surfaces whose reflectance is known at some angles; others are searched.
 
     Parameters
     ----------
+    spec : ModelSpec
+        The model.
     theta_i : array (angles,) [rad]
-        Increasing, up to 90 degrees; the last but one near `lowest_cosine`.
+        Increasing, up to 90 degrees.
     reflectance : array (angles, surfaces) [1]
         Specular and directional diffuse.
     surfaces : mapping
-        wavelength_nm, sigma_0_um, tau_um, n and k; numbers, or arrays of one shape (surfaces,).
+        Arguments of the model but the uniform part; numbers, or arrays of one shape (surfaces,).
     tolerance : float
-        As in `he_torrance_a_max`.
+        As in `largest_uniform`.
 
     Returns
     -------
@@ -100,28 +101,24 @@ def a_max(theta_i: Array, reflectance: Floats, surfaces: Mapping[str, ArrayLike]
     peak = _peak(
         np.arcsinh(np.tan(theta_i[below])),
         reflectance[below],
-        lambda x: _reflectance(float(np.arctan(np.sinh(x))), surfaces, tolerance),
+        lambda x: _reflectance(spec, float(np.arctan(np.sinh(x))), surfaces, tolerance),
         tolerance,
     )
     return np.asarray(np.maximum(0.0, 1.0 - np.maximum(peak, reflectance.max(axis=0))))
 
 
-def lowest_cosine(surfaces: Mapping[str, ArrayLike]) -> float:
-    """Of theta_i where a search for the worst angle of the surfaces may end."""
-    slope = np.min(np.asarray(surfaces["sigma_0_um"]) / np.asarray(surfaces["tau_um"]))
-    return float(np.clip(1e-2 * slope, 1e-9, 1e-3))
-
-
-def _reflectance(theta_i: float, surfaces: Mapping[str, ArrayLike], tolerance: float) -> Array:
-    """Specular and directional diffuse reflectance of all surfaces."""
-    spec = MODELS["he_torrance"]
-    assert spec.specular is not None
-    diffuse, _ = spectral_albedo(spec, theta_i, 0.0, {**surfaces, "a": 0.0}, tolerance=tolerance, mirrored=True)
-    return np.asarray(diffuse + spec.specular(theta_i, **surfaces))
+def _reflectance(spec: ModelSpec, theta_i: float, surfaces: Mapping[str, ArrayLike], tolerance: float) -> Array:
+    """Return the reflectance [1] of all surfaces, specular and directional diffuse."""
+    assert spec.uniform is not None
+    arguments = {**surfaces, spec.uniform: 0.0}
+    diffuse, _ = spectral_albedo(spec, theta_i, 0.0, arguments, tolerance=tolerance, mirrored=True)
+    if spec.specular is None:
+        return np.asarray(diffuse)
+    return np.asarray(diffuse + spec.specular(theta_i, **{name: surfaces[name] for name in spec.specular_parameters}))
 
 
 def _peak(x: Array, y: Floats, f: Callable[[float], Array], tolerance: float) -> Array:
-    """The largest value of each of several functions that are known at increasing x, as y of shape (x, functions).
+    """Return the largest value of each of several functions known at increasing x, as y of shape (x, functions).
 
     The steps around the largest value of a function are halved until the top of the parabola through the highest three
     stays where it is.
@@ -142,7 +139,7 @@ def _peak(x: Array, y: Floats, f: Callable[[float], Array], tolerance: float) ->
 
 
 def _tops(x: Array, y: Floats) -> Array:
-    """The highest points of the parabolas through the largest values and their neighbours, not beyond these."""
+    """Return the highest points of the parabolas through the largest values and their neighbours, not beyond these."""
     middle = np.clip(np.argmax(y, axis=0), 1, x.size - 2)
     each = np.arange(y.shape[1])
     (x0, x1, x2), (y0, y1, y2) = (x[middle + i] for i in (-1, 0, 1)), (y[middle + i, each] for i in (-1, 0, 1))

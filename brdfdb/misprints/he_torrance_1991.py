@@ -13,8 +13,8 @@ from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import checked_angles, radians, unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.misprints._entry import HE, Misprint, at, dot, polarisation, propagation
+from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
-from brdfdb.models._he_torrance_series import diffraction_series
 from brdfdb.models.he_torrance_1991 import checked_surface, directional_diffuse
 
 TERMS = 10  # of eq. 78 of He et al., a customary number

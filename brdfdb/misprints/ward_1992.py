@@ -9,8 +9,13 @@ import numpy as np
 from brdfdb import models
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
-from brdfdb.integrals.sampling import ward_sample
+from brdfdb.integrals.sampling import Sample, sample
 from brdfdb.misprints._entry import WARD, Form, Misprint, at
+
+
+def _sample(u1: Any, u2: Any, wi: Any = (0.0, 0.0, 1.0), *, rho_s: Any = 1.0, alpha_x: Any, alpha_y: Any) -> Sample:
+    """Draw from the lobe of Ward's model alone, by eq. 7 with its misprint put right."""
+    return sample("ward", u1, u2, wi, rho_d=0.0, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
 
 
 def _slope_without_arctan(u1: Any, u2: Any, *, alpha_x: Any, alpha_y: Any) -> Any:
@@ -21,13 +26,13 @@ def _slope_without_arctan(u1: Any, u2: Any, *, alpha_x: Any, alpha_y: Any) -> An
 
 def _slope_sampled(u1: Any, u2: Any, *, alpha_x: Any, alpha_y: Any) -> Any:
     """delta [rad] of the half vector: half the angle at which a ray along the normal leaves."""
-    wr = ward_sample(u1, u2, (0.0, 0.0, 1.0), rho_s=1.0, alpha_x=alpha_x, alpha_y=alpha_y).wr
+    wr = _sample(u1, u2, alpha_x=alpha_x, alpha_y=alpha_y).wr
     return np.arctan2(np.hypot(wr[..., 0], wr[..., 1]), wr[..., 2]) / 2.0
 
 
 def _weight_of_one(*, rho_s: Any, **arguments: Any) -> Any:
     # Eqs (6) and (7) as printed: every sample above the horizon counts rho_s
-    return np.where(ward_sample(rho_s=rho_s, **arguments).wr[..., 2] > 0.0, rho_s, 0.0)
+    return np.where(_sample(rho_s=rho_s, **arguments).wr[..., 2] > 0.0, rho_s, 0.0)
 
 
 def _deviation_as_named(*, alpha_x: Any, **_: Any) -> Any:
@@ -41,11 +46,9 @@ def _deviation_of_samples(*, alpha_x: Any, alpha_y: Any) -> Any:
     Gauss and Laguerre in -log(u1) and eight azimuths: exact for a square of the slope.
     """
     x, weights = np.polynomial.laguerre.laggauss(4)
-    wr = ward_sample(
+    wr = _sample(
         np.exp(-x)[:, np.newaxis],
         (np.arange(8.0) + 0.5) / 8.0,
-        (0.0, 0.0, 1.0),
-        rho_s=1.0,
         alpha_x=alpha_x,
         alpha_y=alpha_y,
     ).wr
@@ -59,7 +62,7 @@ def _azimuth_of_one_branch(*, u2: Any, alpha_x: Any, alpha_y: Any, **_: Any) -> 
 
 
 def _azimuth_sampled(u1: Any, u2: Any, *, alpha_x: Any, alpha_y: Any) -> Any:
-    wr = ward_sample(u1, u2, (0.0, 0.0, 1.0), rho_s=1.0, alpha_x=alpha_x, alpha_y=alpha_y).wr
+    wr = _sample(u1, u2, alpha_x=alpha_x, alpha_y=alpha_y).wr
     return np.arctan2(wr[..., 1], wr[..., 0])
 
 
@@ -107,7 +110,7 @@ ENTRIES: tuple[Misprint, ...] = (
         printed="samples are uniformly weighted",
         right="each has the weight f_r cos(theta_r) / pdf = rho_s (h.i) cos^3(delta) sqrt(cos(theta_r) / cos(theta_i))",
         consequence="alpha of 0.1, light at 60 degrees: the mean weight is 1.00 where the lobe's albedo is 0.49",
-        as_printed=_weight_of_one, corrected=lambda **arguments: ward_sample(**arguments).weight,
+        as_printed=_weight_of_one, corrected=lambda **arguments: _sample(**arguments).weight,
         where=_UNIFORM | {"wi": unit_vector(radians(60.0), 0.0), "rho_s": 1.0, "alpha_x": 0.1, "alpha_y": 0.1}),
 )
 # fmt: on

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brdfdb._elementary import BLOCK, cosine, erfcx, exp, log
 from brdfdb._numba import elementwise, kernel, loop
 from brdfdb.fresnel import reflectance
-from brdfdb.models._he_torrance_series import (
+from brdfdb.models._diffraction_series import (
     G_HIGH,
     G_LOW,
     GROUPS,

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb._elementary import cosine, exp
 from brdfdb._numba import kernel
 from brdfdb.geometry import checked_angles, checked_vectors, finished
+from brdfdb.lobes import Lobe
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Floats, Lobe, Parameter
+from brdfdb.parameters import Floats, Parameter
 
 RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "diffuse reflectance")
 RHO_S = Parameter("rho_s", "ρ_s", "1", 0.0, 1.0, "specular reflectance; the tables of the paper call it ρ_r")

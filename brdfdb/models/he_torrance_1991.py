@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
 from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
+from brdfdb.lobes import Lobe
+from brdfdb.models._diffraction_series import CONSTANTS_BYTES, TERMS, TERMS_OF_FLOAT32, series_table
 from brdfdb.models._he_torrance_kernels import (
+    CORRECTED_LIMIT,
+    LIMIT,
     WHOLE,
     WORTH_THE_TABLE,
     angle_rows,
@@ -19,9 +24,9 @@ from brdfdb.models._he_torrance_kernels import (
     specular_rows,
     vector_rows,
 )
-from brdfdb.models._he_torrance_series import TERMS, TERMS_OF_FLOAT32, series_table
+from brdfdb.models._he_torrance_validity import G_ALONG_NORMAL, limits, lowest_cosine
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
+from brdfdb.parameters import Arguments, Floats, FormKind, ModelForm, ModelSpec, Parameter, bytes_of
 
 WAVELENGTH_NM = Parameter("wavelength_nm", "λ", "nm", 1e-3, 1e7, "wavelength in vacuum")
 SIGMA_0_UM = Parameter("sigma_0_um", "σ_0", "µm", 0.0, 1e4, "rms roughness; 0 is a mirror")
@@ -32,6 +37,10 @@ A = Parameter("a", "a", "1", 0.0, 1.0, "albedo of the uniform diffuse part", def
 
 _STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # what `lobe` says is held in here
 
+# Coarser sums of eq. 78 that charts show: up to these shares of the distance from its peak. The number of terms is the
+# square of the share
+_REACHES = (0.7, 0.5, 0.4, 0.3)
+_TERMS = 10  # customary in programs
 
 _NO_FRESNEL = np.zeros(())  # as refractive index: |F|^2 is left out
 
@@ -325,6 +334,37 @@ def lossless(_: Mapping[str, Any]) -> dict[str, float]:
     return {"n": N.low, "k": K.high, "a": 0.0}
 
 
+def forms(arguments: Arguments) -> Iterator[ModelForm]:
+    """Yield the forms of the model that charts compare: sums of eq. 78 of more and fewer terms, and its limits."""
+    size = bytes_of(arguments)
+    mirror = arguments["sigma_0_um"] == 0.0  # it has no sum to shorten
+    yield ModelForm(
+        "sum",
+        "the sum of eq. 78, whole",
+        "exact",
+        "models.he_torrance",
+        he_torrance_vectors,
+        size + (0 if mirror else CONSTANTS_BYTES),
+        single=True,
+    )
+    if mirror:
+        return
+
+    def form(key: str, title: str, kind: FormKind, vectors: Callable[..., Floats], more: int = 0) -> ModelForm:
+        return ModelForm(key, title, kind, "models.he_torrance_1991.with_sum", vectors, size + more)
+
+    for reach in _REACHES:
+        vectors = functools.partial(with_sum, reach=reach)
+        percent = round(100.0 * reach**2)
+        title = f"the sum of eq. 78, {percent} % of its terms"
+        yield form(f"sum-{percent}", title, "quadrature", vectors, CONSTANTS_BYTES)
+    yield form("ten-terms", "ten terms of eq. 78", "customary", functools.partial(with_sum, series=_TERMS))
+    corrected = functools.partial(with_sum, series=CORRECTED_LIMIT)
+    yield form("beckmann-corrected", "Beckmann, first order in 1/g", "approximation", corrected)
+    limit = functools.partial(with_sum, series=LIMIT)
+    yield form("beckmann", "Beckmann's limit, g to infinity", "customary", limit)
+
+
 SPEC = ModelSpec(
     name="he_torrance",
     version=2,
@@ -340,4 +380,8 @@ SPEC = ModelSpec(
     uniform="a",
     lobe=lobe,
     lossless=lossless,
+    forms=forms,
+    diagnostic=G_ALONG_NORMAL,
+    limits=limits,
+    uniform_bound_cosine=lowest_cosine,
 )

@@ -12,7 +12,7 @@ from brdfdb._elementary import arcsin, cosine
 from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import HALF_PI, Directions, checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
-from brdfdb.parameters import Floats, ModelSpec, Parameter, white
+from brdfdb.parameters import Floats, Parameter
 
 RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a facet")
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
@@ -31,13 +31,6 @@ class Parts(NamedTuple):
 
 _HALF_PI_REST = 6.123233995736766e-17  # pi/2 less the float64 nearest to it
 _NO_AZIMUTH = 1e-300  # smaller products of two sines: an azimuth means nothing
-
-# Measured at rho = 1 over sigma: the albedo reaches 1.0510 (sigma of 17 degrees) and exceeds 1 from 50 degrees on,
-# the qualitative model 1.015 or, with an offset of 0.57, 1.044
-_EXCESS = (
-    "Oren and Nayar 1994, eqs 27, 28 and 30: near grazing and with an albedo near 1 the fit reflects up to "
-    "5 % more than it receives, for sigma below 40 degrees"
-)
 
 
 @kernel
@@ -403,31 +396,3 @@ def oren_nayar_qualitative_vectors(
     """`oren_nayar_qualitative` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
     parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
     return by_rows_of_vectors(_qualitative_vector_rows, checked_vectors(wi, wr), parameters)
-
-
-SPEC = ModelSpec(
-    name="oren_nayar",
-    version=2,
-    title="Oren-Nayar, functional approximation",
-    equation="eqs 27-29",
-    reference="orennayar1994",
-    parameters=(RHO, SIGMA, INTERREFLECTION),
-    evaluate=oren_nayar,
-    vectors=oren_nayar_vectors,
-    grazing_pole=True,
-    excess=_EXCESS,
-    lossless=white,
-)
-QUALITATIVE_SPEC = ModelSpec(
-    name="oren_nayar_qualitative",
-    version=2,
-    title="Oren-Nayar, qualitative model",
-    equation="eq. 30",
-    reference="orennayar1994",
-    parameters=(RHO, SIGMA, OFFSET),
-    evaluate=oren_nayar_qualitative,
-    vectors=oren_nayar_qualitative_vectors,
-    grazing_pole=True,
-    excess=_EXCESS,
-    lossless=white,
-)

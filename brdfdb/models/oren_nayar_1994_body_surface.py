@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.lobes import Lobe
 from brdfdb.models import torrance_sparrow_1967
-from brdfdb.models.oren_nayar_1994 import INTERREFLECTION, RHO, SIGMA, oren_nayar, oren_nayar_vectors
+from brdfdb.models.oren_nayar_1994 import INTERREFLECTION, oren_nayar, oren_nayar_vectors
 from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow, torrance_sparrow_vectors
-from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
+from brdfdb.parameters import Floats, Parameter
 
 K_B = Parameter("k_b", "k_b", "1", 0.0, 1.0, "weight of the body's reflection", default=1.0)
 K_S = Parameter("k_s", "k_s", "1", 0.0, 1.0, "weight of the surface's reflection, eq. 31 as printed")
@@ -133,21 +134,3 @@ def lobe(
     body = np.asarray(k_b) * np.asarray(rho)
     total = surface + body
     return whole._replace(share=np.divide(surface, total, where=total > 0.0, out=np.zeros(np.shape(total))))
-
-
-# The sum of those of the two models, at rho = k_b = k_s = e_0 = 1
-_EXCESS = "Oren and Nayar 1994, eq. 32: a fitted sum of two radiances, of which that of eq. 31 is not normalised"
-
-SPEC = ModelSpec(
-    name="oren_nayar_body_surface",
-    version=1,
-    title="Oren-Nayar body with a Torrance-Sparrow surface",
-    equation="eq. 32",
-    reference="orennayar1994",
-    parameters=(RHO, SIGMA, K_S, K_B, E_0, WITH_INTERREFLECTION),
-    evaluate=oren_nayar_body_surface,
-    vectors=oren_nayar_body_surface_vectors,
-    grazing_pole=True,
-    lobe=lobe,
-    excess=_EXCESS,
-)

@@ -11,19 +11,12 @@ from brdfdb.geometry import Directions, checked_angles, checked_vectors, finishe
 from brdfdb.models._oren_nayar_facets import NODES, bounce_of_cavity, direct_of_cavity, gaussian
 from brdfdb.models._oren_nayar_single_slope import bounce_of_slope, direct_of_slope, over_slopes
 from brdfdb.models.oren_nayar_1994 import RHO, SIGMA, Parts
-from brdfdb.parameters import Floats, ModelSpec, Parameter, white
+from brdfdb.parameters import Floats, Parameter
 
 THETA_A = Parameter("theta_a", "θ_a", "rad", 0.0, np.pi / 2, "slope of the facets")
 PHI_A = Parameter("phi_a", "φ_a", "rad", 0.0, np.pi, "azimuth of the facets' normals, and half a turn from it")
 
 PartName = Literal["direct", "interreflected"]  # a field of `Parts`
-
-# Measured at rho = 1 over theta_a: the albedo reaches 1.0625 (theta_a of 41 degrees, theta_i of 89.999) and exceeds 1
-# from 74 degrees on; it is the weights of eq. 44 that do it: the integrals of eqs 23 and 46 stay below 1
-_SINGLE_SLOPE_EXCESS = (
-    "Oren and Nayar 1994, eqs 44, 45 and 49: near grazing and with an albedo near 1 the closed forms "
-    "reflect up to 6 % more than they receive, for slopes below 60 degrees"
-)
 
 
 def oren_nayar_unidirectional(
@@ -421,43 +414,3 @@ def _gaussian(
     features = *tangents, directions.cos_dphi, directions.sin_dphi, deviation
     direct, bounce = gaussian(*features, lit=only != "interreflected", bounce=only != "direct", nodes=nodes)
     return _scaled(direct, bounce, albedo, directions)
-
-
-UNIDIRECTIONAL_SPEC = ModelSpec(
-    name="oren_nayar_unidirectional",
-    version=1,
-    title="Oren-Nayar, parallel cavities of one slope",
-    equation="eqs 10-22",
-    reference="orennayar1994",
-    parameters=(RHO, THETA_A, PHI_A),
-    evaluate=oren_nayar_unidirectional,
-    vectors=oren_nayar_unidirectional_vectors,
-    grazing_pole=True,
-    anisotropic=lambda parameters: parameters["theta_a"] > 0.0,
-    lossless=white,
-)
-SINGLE_SLOPE_SPEC = ModelSpec(
-    name="oren_nayar_single_slope",
-    version=2,
-    title="Oren-Nayar, one slope in all azimuths",
-    equation="eqs 45, 49",
-    reference="orennayar1994",
-    parameters=(RHO, THETA_A),
-    evaluate=oren_nayar_single_slope,
-    vectors=oren_nayar_single_slope_vectors,
-    grazing_pole=True,
-    excess=_SINGLE_SLOPE_EXCESS,
-    lossless=white,
-)
-GAUSSIAN_SPEC = ModelSpec(
-    name="oren_nayar_gaussian",
-    version=1,
-    title="Oren-Nayar, Gaussian slopes, integrated",
-    equation="eqs 8, 10-20, 47",
-    reference="orennayar1994",
-    parameters=(RHO, SIGMA),
-    evaluate=oren_nayar_gaussian,
-    vectors=oren_nayar_gaussian_vectors,
-    grazing_pole=True,
-    lossless=white,
-)

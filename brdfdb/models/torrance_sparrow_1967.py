@@ -12,8 +12,9 @@ from brdfdb._numba import elementwise, kernel
 from brdfdb.errors import ParameterError
 from brdfdb.fresnel import unpolarised
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
+from brdfdb.lobes import Lobe
 from brdfdb.models.he_torrance_1991 import K, N
-from brdfdb.parameters import Floats, Lobe, ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, field_validator, model_validator
 
 from brdfdb.errors import ParameterError
-from brdfdb.integrals.sampling import directions, lobe_of, mixture_density
-from brdfdb.materials import Material
-from brdfdb.parameters import Lobe
+from brdfdb.integrals.sampling import DIFFUSE, directions, mixture_density
+from brdfdb.lobes import Lobe
+from brdfdb.materials import Source
 from brdfdb.scenes.shapes import STRICT, Array
 
 # Of the directions, how many a lobe gets at least, or few would carry all of a faint gloss, and at most, which bounds
@@ -62,7 +62,7 @@ class Environment(BaseModel):
         return self
 
     def resolved(self, folder: Path) -> Environment:
-        """The same with its file, if it has one, named relative to a folder."""
+        """Return the environment with its file, if it has one, named relative to a folder."""
         return self if self.file is None else self.model_copy(update={"file": str(folder / self.file)})
 
     @property
@@ -83,7 +83,7 @@ class Environment(BaseModel):
         return _read(path, path.stat().st_mtime_ns)
 
     def radiance(self, towards: Array) -> Array:
-        """Radiance that comes from directions (..., 3), unit vectors in the frame of the scene."""
+        """Return the radiance that comes from directions (..., 3), unit vectors in the frame of the scene."""
         picture = self.picture
         rows, columns = picture.shape
         theta = np.arccos(np.clip(towards[..., 2], -1.0, 1.0))
@@ -98,13 +98,13 @@ class Environment(BaseModel):
 
         return np.asarray((1.0 - down) * along(upper) + down * along(lower))
 
-    def drawn(self, material: Material, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> Drawn:
-        """Directions for points of a material, from its lobe around the mirror direction and from all above.
+    def drawn(self, source: Source, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> Drawn:
+        """Draw directions for points of a source, from its lobe around the mirror direction and from all above.
 
         Parameters
         ----------
-        material : Material
-            Of the points.
+        source : Source
+            The source of f_r at the points.
         wavelength_nm : array (L,) [nm]
             Those of the scene: the lobe is as wide as at the wavelength where it is widest.
         wr : array (N, 3)
@@ -126,7 +126,7 @@ class Environment(BaseModel):
         number = np.arange(self.samples)[:, np.newaxis]
         # Even over the unit square for any number of samples, and turned: even for each point, independent between them
         u1, u2 = (number / self.samples + turns[0]) % 1.0, (number * _TURN + turns[1]) % 1.0
-        lobe = _widest(material, wavelength_nm, wr)
+        lobe = _widest(source, wavelength_nm, wr)
         wi = directions(lobe, u1, u2, wr)
         density = self.samples * mixture_density(lobe, wr, wi)
         return Drawn(wi, np.divide(1.0, density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape)))
@@ -143,15 +143,17 @@ class Drawn(NamedTuple):
     solid_angle: Array
 
 
-def _widest(material: Material, wavelength_nm: Array, wr: Array) -> Lobe:
-    """The lobe (N,) around the mirror directions of viewers, no narrower than that of any wavelength."""
-    parameters = material.arguments(material.evaluated_at(wavelength_nm))
-    width = np.broadcast(*parameters.values()).size
-    lobe = lobe_of(material.spec, wr[:, np.newaxis], parameters)
-    share, alpha_x, alpha_y = (np.broadcast_to(each, (len(wr), width)) for each in lobe)
+def _widest(source: Source, wavelength_nm: Array, wr: Array) -> Lobe:
+    """Return the lobe (N,) around the mirror directions of viewers, no narrower than that of any wavelength."""
+    at = source.evaluated_at(wavelength_nm)
+    lobe = source.lobe(wr[:, np.newaxis, 2], at) or DIFFUSE
+    width = 1 if at is None else at.size
+    share, alpha_x, alpha_y = (
+        np.broadcast_to(value, (len(wr), width)) for value in (lobe.share, lobe.alpha_x, lobe.alpha_y)
+    )
     mean = share.mean(axis=1)
     share = np.where(mean > 0.0, np.clip(mean, _LEAST, _MOST), 0.0)
-    return Lobe(share, alpha_x.max(axis=1), alpha_y.max(axis=1))
+    return lobe._replace(share=share, alpha_x=alpha_x.max(axis=1), alpha_y=alpha_y.max(axis=1))
 
 
 def _checked(name: str, picture: Array) -> Array:
@@ -169,7 +171,7 @@ def _checked(name: str, picture: Array) -> Array:
 
 @functools.lru_cache(maxsize=4)
 def _read(path: Path, _written: int) -> Array:
-    """The picture of a file, kept until it is written anew: every list of points asks for it."""
+    """Return the picture of a file, kept until it is written anew: every list of points asks for it."""
     picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
     if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
         raise ParameterError("environment.file", f"{path}: must hold numbers of shape (rows, columns)")
@@ -178,12 +180,12 @@ def _read(path: Path, _written: int) -> Array:
 
 def _from_numpy(path: Path) -> NDArray[np.generic]:
     try:
-        found = np.load(path)
-        if isinstance(found, np.ndarray):
-            return found
-        with found:
-            if "radiance" in found:
-                return np.asarray(found["radiance"])
+        arrays = np.load(path)
+        if isinstance(arrays, np.ndarray):
+            return arrays
+        with arrays:
+            if "radiance" in arrays:
+                return np.asarray(arrays["radiance"])
     except (ValueError, EOFError, zipfile.BadZipFile, zlib.error):
         raise ParameterError("environment.file", f"{path}: is no .npz or .npy of numbers, or a damaged one") from None
     raise ParameterError("environment.file", f"{path}: has no array `radiance`")
@@ -194,7 +196,7 @@ def _from_exr(path: Path) -> NDArray[np.generic]:
 
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            channels = {name: np.asarray(each.pixels, dtype=np.float64) for name, each in file.channels().items()}
+            channels = {name: np.asarray(channel.pixels, dtype=np.float64) for name, channel in file.channels().items()}
     except RuntimeError:
         raise ParameterError("environment.file", f"{path}: is no OpenEXR file, or a damaged one") from None
     if "Y" in channels:

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import spectral_albedo
-from brdfdb.materials import Material
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.scenes.gbuffer import Points, View
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
+from brdfdb.tables.albedo import source_albedo
 
 # (wi, wr, wavelengths [nm]) of shapes (N, 3), (N, 3), (L,) -> f_r [1/sr], (N, L), or (N, 1) where it has no colour
 Brdf = Callable[[Array, Array, Array], Floats]
@@ -32,47 +32,47 @@ _BATCH = 20_000  # pairs of viewer and light at a time: calls cost little beside
 
 
 class Reflector:
-    """What a material does in a scene: f_r, the albedo that ambient light meets, and the mirror.
+    """The reflection of a source in a scene: f_r, the albedo that ambient light meets, and the mirror.
 
     Attributes
     ----------
-    material : Material
-        Which.
+    source : Source
+        Material, or table of a store.
     wavelength_nm : array (L,) [nm] or None
-        Where it is evaluated: that of the scene, or of the material if its parameters are stated for some wavelengths
-        only, which do not make a colour. None of a model that is not spectral.
+        Wavelengths at which it is evaluated: those of the scene, or one of a source that is stated for some wavelengths
+        only, which do not make a colour. None of a grey source.
 
     Raises
     ------
-    ValueError
-        If the parameters are stated for light that nobody sees.
+    ParameterError
+        If the source is stated for light that nobody sees, or does not hold at the wavelengths of the scene.
     """
 
-    def __init__(self, material: Material, wavelength_nm: Array) -> None:
-        self.material = material
-        self.wavelength_nm = material.evaluated_at(wavelength_nm)
-        if material.wavelengths_nm is not None and not _VISIBLE_NM[0] <= material.wavelengths_nm[0] <= _VISIBLE_NM[1]:
+    def __init__(self, source: Source, wavelength_nm: Array) -> None:
+        self.source = source
+        self.wavelength_nm = source.evaluated_at(wavelength_nm)
+        one = self.wavelength_nm[0] if self.wavelength_nm is not None and self.wavelength_nm.size == 1 else None
+        if one is not None and not _VISIBLE_NM[0] <= one <= _VISIBLE_NM[1]:
             raise ParameterError(
-                material.name,
-                f"its parameters are stated for {material.wavelengths_nm[0]:g} nm, outside the "
-                f"visible, {_VISIBLE_NM[0]:g} to {_VISIBLE_NM[1]:g} nm",
+                source.name,
+                f"its parameters are stated for {one:g} nm, outside the visible, {_VISIBLE_NM[0]:g} to "
+                f"{_VISIBLE_NM[1]:g} nm",
             )
-        self._parameters = material.arguments(self.wavelength_nm)
-        self._brdf = material.brdf_at(self.wavelength_nm)
+        self._brdf = source.brdf_at(self.wavelength_nm)
 
     def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
-        """f_r [1/sr] of the model: (N, L), or (N, 1) where it has no colour."""
+        """Return f_r [1/sr]: (N, L), or (N, 1) where it has no colour."""
         return self._brdf(wi, wr)
 
     def mirror(self, wr: Array) -> Floats:
-        """Reflectance [1] of the Dirac part towards viewers (N, 3): (N, L), (N, 1), or 0."""
-        if self.material.spec.specular is None:
+        """Return the reflectance [1] of the specular part towards viewers (N, 3): (N, L), or (N, 1)."""
+        if not self.source.has_specular:
             return np.zeros((len(wr), 1))
         theta = np.arccos(np.clip(wr[:, 2], -1.0, 1.0))
-        return np.reshape(self.material.specular_reflectance(theta, self.wavelength_nm), (len(wr), -1))
+        return np.reshape(self.source.specular_reflectance(theta, self.wavelength_nm), (len(wr), -1))
 
     def albedo(self, wr: Array) -> Floats:
-        """Share [1] of ambient radiance that viewers (N, 3) see, without the mirror's: (N, L), or (N, 1)."""
+        """Return the share [1] of ambient radiance that viewers (N, 3) see, without the mirror's: (N, L), or (N, 1)."""
         theta = np.minimum(np.arccos(np.clip(wr[:, 2], -1.0, 1.0)), _LAST)
         around = np.moveaxis(chebyshev.chebval(2.0 * theta / _LAST - 1.0, self._albedos), -1, 0)  # (N, azimuths, L)
         values = around[:, 0]
@@ -86,19 +86,12 @@ class Reflector:
     @functools.cached_property
     def _albedos(self) -> Array:
         """Polynomials of directional albedo, (coefficients, azimuths, L): by reciprocity, of viewers as of lights."""
-        anisotropic = self.material.anisotropic
+        anisotropic = self.source.anisotropic
         nodes = np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
         phis = np.arange(0.0, np.pi - 1e-9, _PHI) if anisotropic else np.zeros(1)
         known = [
             [
-                spectral_albedo(
-                    self.material.spec,
-                    float(theta),
-                    float(phi),
-                    self._parameters,
-                    tolerance=_TOLERANCE,
-                    mirrored=not anisotropic,
-                ).albedo
+                source_albedo(self.source, float(theta), float(phi), self.wavelength_nm, tolerance=_TOLERANCE).albedo
                 for phi in phis
             ]
             for theta in _LAST * (nodes + 1.0) / 2.0
@@ -108,13 +101,13 @@ class Reflector:
 
 
 def reflectors(scene: Scene) -> dict[str, Reflector]:
-    """What the materials of a scene do, by name."""
+    """Return the reflectors of a scene by the names of their materials."""
     wavelength = np.array(scene.wavelengths_nm)
-    return {name: Reflector(material, wavelength) for name, material in scene.materials.items()}
+    return {name: Reflector(source, wavelength) for name, source in scene.materials.items()}
 
 
 def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
-    """Spectral radiance of points, as multiples of the illuminant: 1 is white.
+    """Return the spectral radiance of points, as multiples of the illuminant: 1 is white.
 
     Parameters
     ----------
@@ -178,7 +171,7 @@ def render(
     materials: Mapping[str, Reflector] | None = None,
     progress: Callable[[], None] | None = None,
 ) -> NDArray[np.float64]:
-    """The picture of a scene.
+    """Render the picture of a scene.
 
     Parameters
     ----------
@@ -226,7 +219,7 @@ def render(
 def composed(
     scene: Scene, view: View, lists: Sequence[Floats], materials: Mapping[str, Reflector]
 ) -> NDArray[np.float64]:
-    """The picture (height, width, L) of radiances of each list of points, to which mirrors add what they show."""
+    """Return the picture (height, width, L) of radiances of each list of points; mirrors add what they show."""
     known, lists = materials, [values.copy() for values in lists]
     pixels = np.zeros((view.height * view.width, len(scene.wavelengths_nm)))
     free = np.full(len(pixels), float(view.samples))

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field, field_validator, model_validator
 
-from brdfdb.errors import MaterialError, ParameterError
+from brdfdb.errors import BrdfdbError, MaterialError, ParameterError
 from brdfdb.geometry import radians
-from brdfdb.materials import Material, presets
+from brdfdb.materials import Material, Source, presets
 from brdfdb.parameters import closest
 from brdfdb.scenes.environment import Environment
 from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Vector, check_direction, unit
 from brdfdb.spectra import ILLUMINANT, OBSERVER, check_illuminant, check_observer, covers_visible
+from brdfdb.store.reader import Store
+from brdfdb.tables.table_source import source_of_table
 
+STORED = "store:"  # what the name of a material begins with that is read from the store of the scene
 WAVELENGTHS_NM = [float(wavelength) for wavelength in range(380, 781, 10)]
 
 
@@ -93,7 +97,7 @@ class Camera(BaseModel):
         return self
 
     def covered(self, distance: Array) -> Array:
-        """How high what the camera sees is, at distances from it, from the lower to the upper edge of the picture."""
+        """Return the height of the visible part of the scene at distances from the camera."""
         if self.fov_deg is None:
             assert self.height is not None
             return np.full_like(distance, self.height)
@@ -127,7 +131,9 @@ class Object(BaseModel):
     model_config = STRICT
 
     name: Annotated[str, Field(min_length=1)]
-    material: str = Field(description="a preset, or a material that the scene defines")
+    material: str = Field(
+        description="a preset, a material that the scene defines, or store:NAME, a material of the scene's store"
+    )
     shape: AnyShape | Recorded = Field(discriminator="kind")
     grain_deg: float = Field(default=0.0, description="counter-clockwise, seen from outside")
 
@@ -152,15 +158,15 @@ class Tolerance(BaseModel):
 
     @property
     def unit(self) -> Literal["relative", "CIEDE2000"]:
-        """What `value` counts."""
+        """The unit of `value`."""
         return "CIEDE2000" if self.relative is None else "relative"
 
     @property
     def value(self) -> float:
         """The largest error, in `unit`."""
-        found = self.ciede2000 if self.relative is None else self.relative
-        assert found is not None  # as `_check` saw
-        return found
+        value = self.ciede2000 if self.relative is None else self.relative
+        assert value is not None  # as `_check` saw
+        return value
 
 
 class Scene(BaseModel):
@@ -188,6 +194,12 @@ class Scene(BaseModel):
     wavelengths_nm: list[float] = WAVELENGTHS_NM
     tolerance: Tolerance = Tolerance(ciede2000=1.0)
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
+    store: str | None = Field(
+        default=None,
+        min_length=1,
+        description="directory of a store, beside the scene, for materials store:NAME: the model that the table NAME "
+        "was tabulated from, or the table itself where that was a function or is not known",
+    )
 
     @field_validator("illuminant")
     @classmethod
@@ -222,31 +234,61 @@ class Scene(BaseModel):
         return self
 
     @property
-    def materials(self) -> dict[str, Material]:
-        """The materials of the objects by name, each once."""
-        return _materials(self)
+    def materials(self) -> dict[str, Source]:
+        """The sources of the objects by the names that the objects give them, each once.
+
+        Raises
+        ------
+        ParameterError
+            If the store of the scene cannot be read, or has no such material.
+        """
+        sources = _materials(self)
+        for name in self.stored:
+            assert self.store is not None  # as `_materials` saw
+            sources[name] = _stored(self.store, name)
+        return sources
+
+    @property
+    def stored(self) -> list[str]:
+        """The names of materials that are read from the store of the scene, each once."""
+        return list(dict.fromkeys(item.material for item in self.objects if item.material.startswith(STORED)))
 
     def resolved(self, folder: Path) -> Scene:
-        """The scene with the names of files that it reads relative to a folder."""
+        """Return the scene with the names of files that it reads relative to a folder."""
         objects = [
             item.model_copy(update={"shape": item.shape.resolved(folder)}) if isinstance(item.shape, Recorded) else item
             for item in self.objects
         ]
         environment = None if self.environment is None else self.environment.resolved(folder)
-        return self.model_copy(update={"objects": objects, "environment": environment})
+        store = None if self.store is None else str(folder / self.store)
+        return self.model_copy(update={"objects": objects, "environment": environment, "store": store})
 
 
-def _materials(scene: Scene) -> dict[str, Material]:
+@functools.lru_cache(maxsize=64)
+def _stored(root: str, name: str) -> Source:
+    """Return a material of a store, kept: a scene asks for it at every list of points."""
+    try:
+        return source_of_table(Store(root)[name.removeprefix(STORED)])
+    except BrdfdbError as error:
+        raise ParameterError(f"material {name}", str(error)) from None
+
+
+def _materials(scene: Scene) -> dict[str, Source]:
+    """Return the sources of the objects by name, but for those of a store; ParameterError for an unknown name."""
     known: dict[str, Material] = presets()
     for name, table in scene.define.items():
         if name in known:
-            raise ParameterError(f"define.{name}", "is the name of a built-in material; give yours another")
+            raise ParameterError(f"define.{name}", "is the name of a preset; give yours another")
         try:
             known[name] = Material.from_table(name, table)
         except MaterialError as error:
             raise ParameterError(f"define.{name}", f"{error.parameter}: {error.sentence}") from None
-    found = {}
+    sources: dict[str, Source] = {}
     for item in scene.objects:
+        if item.material.startswith(STORED):
+            if scene.store is None:
+                raise ParameterError("store", f"objects.{item.name} has the material {item.material}, give its store")
+            continue
         if item.material not in known:
             raise ParameterError(
                 f"objects.{item.name}.material",
@@ -254,5 +296,5 @@ def _materials(scene: Scene) -> dict[str, Material]:
                 item.material,
                 tuple(known),
             )
-        found[item.material] = known[item.material]
-    return found
+        sources[item.material] = known[item.material]
+    return sources

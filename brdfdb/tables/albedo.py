@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from brdfdb.geometry import radians
-from brdfdb.integrals.quadrature import narrowest, reflected_share
-from brdfdb.materials import Material
+from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
+from brdfdb.lobes import Lobe
+from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.table import Table
@@ -22,7 +23,7 @@ _PHI_I_STEP_DEG = 30.0
 
 
 class TableAlbedo(NamedTuple):
-    """The directional albedo of a table, without the Dirac part.
+    """The directional albedo of a table, without the specular part.
 
     Attributes
     ----------
@@ -54,7 +55,7 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
     Parameters
     ----------
     table : Table
-        Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the model.
+        Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the source.
     theta_i_deg : array (theta_i,) [degree], optional
         The lights, in [0, 90].
 
@@ -69,10 +70,11 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
     -----
     Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
     stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
-    quadrature of `brdfdb.integrals.quadrature`, which follows the lobe of the model, to `QUADRATURE_TOLERANCE`.
+    quadrature of `brdfdb.integrals.quadrature`, to `QUADRATURE_TOLERANCE`. It follows the lobe of the source if that
+    is known.
     """
     if not linear_in_angles(table):
-        return _integrated(table, material_of(table), THETA_I_DEG if theta_i_deg is None else theta_i_deg)
+        return _integrated(table, THETA_I_DEG if theta_i_deg is None else theta_i_deg)
     nodes = table.axes_deg["theta_i"]
     theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
     if table.anisotropic:
@@ -95,7 +97,7 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
 
 
 def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
-    """The share that is reflected of light that is the same from everywhere.
+    """Return the share [1] that is reflected of light that is the same from everywhere.
 
     Parameters
     ----------
@@ -112,50 +114,96 @@ def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
     return np.asarray(2.0 * _theta_weights(radians(theta_i_deg)) @ albedo)
 
 
-def material_of(table: Table) -> Material:
-    """The material behind a table, from what the table says of itself."""
-    metadata = table.metadata
-    if metadata.model is None:
-        raise ValueError(f"model: the table of {table.name} {metadata.gaps}")
-    stated = metadata.model_dump(include={"title", "model", "parameters", "source"})
-    return Material.from_table(table.name, {**stated, "refractive_index": metadata.refractive_index or None})
+def source_albedo(
+    source: Source,
+    theta_i: float,
+    phi_i: float,
+    wavelength_nm: Axis | None,
+    *,
+    tolerance: float,
+    most_panels: int = MOST_PANELS,
+) -> Albedo:
+    """Integrate f_r cos theta_r of a source over the hemisphere [1], at all wavelengths at once.
+
+    Parameters
+    ----------
+    source : Source
+        Material or function.
+    theta_i, phi_i : float [rad]
+        Direction of the light, theta up to pi/2.
+    wavelength_nm : array (L,) [nm], or None
+        For spectral sources, and only for them.
+    tolerance, most_panels
+        As in `brdfdb.integrals.quadrature.reflected_share`.
+
+    Returns
+    -------
+    Albedo
+        Albedo of shape (L,), or (1,) of a grey source, without the specular part; and one estimate of its error.
+    """
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
+            values = source.lookup_vectors(wi, wr.reshape(-1, 3), wavelength_nm)  # in one row: models are faster so
+        return np.asarray(values).reshape(*wr.shape[:-1], width)
+
+    width = 1 if wavelength_nm is None else wavelength_nm.size
+    return reflected_share(
+        brdf,
+        theta_i,
+        phi_i,
+        _narrowest(source.lobe(np.asarray(np.cos(theta_i)), wavelength_nm)),
+        tolerance=tolerance,
+        most_panels=most_panels,
+        width=width,
+        mirrored=not source.anisotropic,
+    )
 
 
 def linear_in_angles(table: Table) -> bool:
-    """Whether the table is f_r over light and viewer, linear in each angle between its nodes."""
+    """Return True if the table is f_r over light and viewer, linear in each angle between its nodes."""
     return table.values_are_brdf and not table.grid.half_difference and not table.interpolation.cubic
 
 
 def wavelengths_of(table: Table) -> int:
-    """How many wavelengths a table has; 1 if it is grey."""
+    """Return the number of wavelengths of a table; 1 if it is grey."""
     return 1 if table.wavelength_nm is None else table.wavelength_nm.size
 
 
-def _integrated(table: Table, material: Material, theta_i_deg: Axis) -> TableAlbedo:
-    """The albedo by quadrature of lookups, at all wavelengths at once."""
+def _integrated(table: Table, theta_i_deg: Axis) -> TableAlbedo:
+    """Return the albedo by quadrature of lookups, at all wavelengths at once."""
     width = wavelengths_of(table)
     phi_i_deg = np.zeros(1)
     if table.anisotropic:
         phi_i_deg = np.arange(0.0, 360.0 / table.grid.copies + 1.0, _PHI_I_STEP_DEG)
     albedo, error = np.empty((theta_i_deg.size, phi_i_deg.size, width)), np.empty((theta_i_deg.size, phi_i_deg.size))
-    arguments = material.arguments(table.wavelength_nm)
+    source = table.source
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return table.lookup_vectors(wi, wr).reshape(*wr.shape[:-1], width)
 
     for t, p in np.ndindex(*error.shape):
         theta_i = float(radians(theta_i_deg[t]))
+        lobe = None if source is None else source.lobe(np.asarray(np.cos(theta_i)), table.wavelength_nm)
         albedo[t, p], error[t, p] = reflected_share(
             brdf,
             theta_i,
             float(radians(phi_i_deg[p])),
-            narrowest(material.spec, float(np.cos(theta_i)), arguments),
+            _narrowest(lobe),
             tolerance=QUADRATURE_TOLERANCE,
             most_panels=_MOST_PANELS,
             width=width,
             mirrored=not table.anisotropic,
         )
     return TableAlbedo(theta_i_deg, phi_i_deg, albedo, error.max(axis=1))
+
+
+def _narrowest(lobe: Lobe | None) -> Lobe | None:
+    """Return a lobe as narrow as that of any wavelength: panels that resolve it resolve the others."""
+    if lobe is None:
+        return None
+    share, alpha_x, alpha_y = np.max(lobe.share), np.min(lobe.alpha_x), np.min(lobe.alpha_y)
+    return lobe._replace(share=np.asarray(share), alpha_x=np.asarray(alpha_x), alpha_y=np.asarray(alpha_y))
 
 
 def _trapezoid_weights(nodes: Axis) -> Axis:
@@ -167,7 +215,7 @@ def _trapezoid_weights(nodes: Axis) -> Axis:
 
 
 def _theta_weights(nodes: Axis) -> Axis:
-    """Integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat held constant up to pi/2.
+    """Return the integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat held constant up to pi/2.
 
     With F = sin^2 / 2 and its integral G = theta / 4 - sin(2 theta) / 8, the rising half over [a, b] gives
     F(b) - (G(b) - G(a)) / (b - a).

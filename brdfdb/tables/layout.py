@@ -1,7 +1,8 @@
-"""What a table is going to be: its material, grid and wavelengths, decided and checked before anything is computed."""
+"""Layouts: the source, grid and wavelengths of a table, decided and checked before anything is computed."""
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import math
@@ -13,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from brdfdb.errors import ParameterError
-from brdfdb.materials import Material
+from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.materials import Material, Source, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Grid, check_wavelengths
 
@@ -27,19 +28,19 @@ _BLOCK_VALUES = 1 << 20  # values of a block, 4 MB
 
 @dataclass(frozen=True)
 class Interpolation:
-    """How the numbers of a table become f_r between its nodes.
+    """The way from the numbers of a table to f_r between its nodes.
 
     Attributes
     ----------
     method : str
         "linear", or "cubic": Catmull-Rom, each cell the Hermite cubic with the slopes of parabolas through three nodes.
     logarithm : bool
-        Whether logarithms are tabulated and interpolated.
+        True if logarithms are tabulated and interpolated.
     offset : float [1/sr]
-        What is added before logarithms are taken: values much smaller take no nodes.
+        Number that is added before logarithms are taken: much smaller values take no nodes.
     power : float
-        What is tabulated is f_r times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a
-        model has at the horizon.
+        f_r is tabulated times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a source
+        may have at the horizon.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # where attributes of tables are read
@@ -59,21 +60,21 @@ class Interpolation:
 
     @property
     def cubic(self) -> bool:
-        """Whether four nodes of an axis count, not two."""
+        """True if four nodes of an axis count, not two."""
         return self.method == "cubic"
 
     @property
     def plain(self) -> bool:
-        """Whether it is f_r itself that is tabulated."""
+        """True if f_r itself is tabulated."""
         return not self.logarithm and self.power == 0.0
 
     def numbers(self, f_r: Floats, mu: Floats) -> Floats:
-        """What is tabulated of f_r [1/sr], shape (..., L), where mu = cos theta_i cos theta_r, shape (...)."""
+        """Return the numbers to tabulate for f_r [1/sr], shape (..., L); mu = cos theta_i cos theta_r, shape (...)."""
         values = f_r if self.power == 0.0 else f_r * (mu**self.power)[..., np.newaxis]
         return np.log(values + self.offset) if self.logarithm else values
 
     def f_r(self, numbers: Floats, mu: Floats) -> Floats:
-        """f_r [1/sr] from what is tabulated: the inverse of `numbers`, nothing below 0."""
+        """Return f_r [1/sr] from tabulated numbers: the inverse of `numbers`, nothing below 0."""
         values = np.maximum(np.exp(numbers) - self.offset, 0.0) if self.logarithm else numbers
         return values if self.power == 0.0 else values / (mu**self.power)[..., np.newaxis]
 
@@ -83,34 +84,37 @@ PLAIN = Interpolation()
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A table that is still to be computed: plain data that travels to workers and into a staging directory.
+    """A table that is still to be computed.
+
+    The layout of a material is plain data that travels to workers and into a staging directory. That of a function
+    stays in this process.
 
     Parameters
     ----------
-    material : Material
-        Model, parameters and where they come from.
+    source : Source
+        Material or function to tabulate.
     grid : Grid
-        Angles [degree]; anisotropic for anisotropic materials.
+        Angles [degree]; anisotropic for anisotropic sources.
     wavelength_nm : array of shape (L,) [nm], optional
-        For spectral materials, and only for them.
+        For spectral sources, and only for them.
     interpolation : Interpolation
-        How the numbers of the table become f_r between its nodes; by default they are f_r, and linear.
+        The way from the numbers of the table to f_r; by default they are f_r, and linear.
     spectra : array of shape (parts, L), optional
-        Of logarithms: orthonormal rows that make up the spectrum of every node, which then is stored in parts.
+        Basis of a factored spectrum of logarithms: orthonormal rows. Nodes then store coefficients.
     bits : int
-        Bits of the mantissa that are kept, in [1, 23].
+        Bits of the mantissa to keep, in [1, 23].
     reason : str
-        Why the table is laid out so.
+        Reason for the layout, in words.
 
     Raises
     ------
     ValueError
-        If grid or wavelengths do not suit the material: no wavelengths for a spectral one, an isotropic grid for an
+        If grid or wavelengths do not suit the source: no wavelengths for a spectral one, an isotropic grid for an
         anisotropic one, an azimuth of 90 or 180 degrees for a surface without the symmetry of an ellipse, a node at 90
-        degrees where the model has a pole.
+        degrees where f_r has a pole.
     """
 
-    material: Material
+    source: Source
     grid: Grid
     wavelength_nm: NDArray[np.float64] | None = None
     interpolation: Interpolation = PLAIN
@@ -119,41 +123,35 @@ class Layout:
     reason: str = ""
 
     def __post_init__(self) -> None:
-        material = self.material
-        if material.spectral != (self.wavelength_nm is not None):
+        source = self.source
+        if source.spectral != (self.wavelength_nm is not None):
+            raise ParameterError("wavelengths_nm", f"{source.name} {'needs them' if source.spectral else 'is grey'}")
+        if source.anisotropic and not self.grid.anisotropic:
             raise ParameterError(
-                "wavelengths_nm", f"{material.name} {'needs them' if material.spectral else 'is grey'}"
+                "grid", f"{source.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r"
             )
-        if material.anisotropic and not self.grid.anisotropic:
-            raise ParameterError(
-                "grid", f"{material.name} is anisotropic and needs the axes theta_i, phi_i, theta_r, phi_r"
-            )
-        if material.anisotropic and material.spec.lobe_axes is None and self.grid.copies > 1:
-            raise ParameterError("grid", f"{material.name} has no symmetry of an ellipse; phi must end at 360 degrees")
-        if material.spec.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
-            raise ParameterError(
-                "grid",
-                f"theta of 90 degrees is a pole of the model {material.spec.name} ({material.name}); "
-                "end the axis below 90",
-            )
+        if source.anisotropic and not source.elliptical and self.grid.copies > 1:
+            raise ParameterError("grid", f"{source.name} has no symmetry of an ellipse; phi must end at 360 degrees")
+        if source.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
+            raise ParameterError("grid", f"theta of 90 degrees is a pole of {source.name}; end the axis below 90")
         if self.wavelength_nm is not None:
             object.__setattr__(self, "wavelength_nm", check_wavelengths(self.wavelength_nm))
-            material.arguments(self.wavelength_nm)
+            source.brdf_at(self.wavelength_nm)
 
     @property
     def plain(self) -> bool:
-        """Whether the stored numbers are f_r itself."""
+        """True if the stored numbers are f_r itself."""
         return self.interpolation.plain and self.spectra is None
 
-    @property
-    def apart(self) -> str | None:
-        """The parameter whose part of f_r, the same in all directions, is not in the table but beside it."""
-        return None if self.plain else self.material.spec.uniform
+    @functools.cached_property
+    def tabulated(self) -> Source:
+        """The source whose f_r is in the table: without its uniform part, unless the stored numbers are f_r itself."""
+        return self.source if self.plain else self.source.without_uniform()
 
     @property
     def uniform(self) -> NDArray[np.float64] | None:
-        """That part [1/sr], of shape (1,)."""
-        return None if self.apart is None else np.array([self.material.parameters[self.apart] / np.pi])
+        """The uniform part [1/sr], of shape (1,), where it is beside the table and not in it."""
+        return None if self.plain or self.source.uniform is None else np.array([self.source.uniform])
 
     @property
     def variable(self) -> str:
@@ -184,7 +182,7 @@ class Layout:
 
     @property
     def block_rows(self) -> int:
-        """Rows of the first axis that make a block, the piece that a worker computes and a chunk of the store."""
+        """Number of rows of the first axis in a block: the piece that a worker computes, and a chunk of the store."""
         return max(1, min(self.shape[0], _BLOCK_VALUES // math.prod(self.shape[1:])))
 
     @property
@@ -196,11 +194,10 @@ class Layout:
         ]
 
     def document(self) -> dict[str, Any]:
-        """All that decides the values, ready for JSON; `from_document` makes the same layout of it."""
+        """Return all that decides the values, as JSON, but for the function of a source that is one."""
         return {
             "table_version": TABLE_VERSION,
-            "model_version": self.material.spec.version,
-            "material": self.material.model_dump(mode="json"),
+            **self.source.document(),
             "grid": {name: nodes.tolist() for name, nodes in self.grid.axes.items()},
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
             "interpolation": asdict(self.interpolation),
@@ -211,12 +208,24 @@ class Layout:
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Layout:
-        """The layout that a document describes."""
+        """Return the layout that a document describes.
+
+        Raises
+        ------
+        BrdfdbError
+            If its source is a function, which a document cannot hold.
+        """
+        source = source_of(document)
+        if not isinstance(source, Material):
+            raise BrdfdbError(
+                f"{source.name}: is a function, which no other process can read from a file; tabulate it in this one, "
+                "with brdfdb.store.publication.publish"
+            )
         arrays = {
             name: None if document[name] is None else np.array(document[name]) for name in ("wavelength_nm", "spectra")
         }
         return cls(
-            Material.model_validate(document["material"]),
+            source,
             Grid(document["grid"]),
             interpolation=Interpolation(**document["interpolation"]),
             bits=document["bits"],
@@ -226,5 +235,5 @@ class Layout:
 
 
 def digest(document: Mapping[str, Any]) -> str:
-    """sha256 of a document, whatever the order of its keys."""
+    """Return the sha256 of a document, whatever the order of its keys."""
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()

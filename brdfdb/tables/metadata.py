@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, PrivateAttr, ValidationError
 
+from brdfdb.errors import ParameterError
 from brdfdb.materials.provenance import Assumption, KnownExcess
 from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.stated_error import Error
@@ -15,6 +16,7 @@ MANTISSA_BITS = 23  # of a float32 value
 
 # The statements without which nobody can tell what a table is
 REQUIRED = ("title", "material", "table_version", "model", "model_version", "parameters", "source", "conventions")
+_OF_MODELS = ("model", "model_version", "parameters")
 
 
 def _assumptions(value: Any) -> Any:
@@ -39,7 +41,7 @@ class TableMetadata(BaseModel):
     title: str | None = Field(default=None, description="one line that names the material for people")
     material: str | None = Field(default=None, description="name of the material")
     table_version: int | None = Field(default=None, description="version of the variables, dimensions and attributes")
-    model: str | None = Field(default=None, description="name of the model, such as ward")
+    model: str | None = Field(default=None, description="name of the model")
     model_version: int | None = Field(default=None, description="raised when the values of the model change")
     model_title: str | None = Field(default=None, description="authors and subject of the model")
     model_equation: str | None = Field(default=None, description="equations of the paper that are evaluated")
@@ -63,6 +65,10 @@ class TableMetadata(BaseModel):
         default=None,
         description="a published excess of the albedo over 1; an empty object without one",
         json_schema_extra=_or_empty,
+    )
+    source_record: dict[str, Any] | None = Field(
+        default=None,
+        description="the source complete: a material in the units of its model, or what is known of a function",
     )
     conventions: str | None = Field(default=None, description="the meaning of the angles and of f_r, in words")
     anisotropic: bool | None = Field(default=None, description="true if the azimuth of the light counts")
@@ -89,7 +95,7 @@ class TableMetadata(BaseModel):
         try:
             return cls.model_validate(known)
         except ValidationError as error:
-            strange = {str(each["loc"][0]): each["msg"] for each in error.errors(include_url=False)}
+            strange = {str(item["loc"][0]): item["msg"] for item in error.errors(include_url=False)}
         metadata = cls.model_validate({key: value for key, value in known.items() if key not in strange})
         metadata._strange.update(strange)
         return metadata
@@ -104,16 +110,28 @@ class TableMetadata(BaseModel):
         return self._strange
 
     @property
+    def of_function(self) -> bool:
+        """Return True if the table was tabulated from a function, which has no model."""
+        return "function" in (self.source_record or {})
+
+    @property
     def missing(self) -> list[str]:
         """The required attributes that the table does not have."""
-        return [key for key in REQUIRED if key not in self.model_fields_set and key not in self.strange]
+        needed = [key for key in REQUIRED if key not in _OF_MODELS] if self.of_function else REQUIRED
+        return [key for key in needed if key not in self.model_fields_set and key not in self.strange]
+
+    def known_interpolation(self) -> Interpolation:
+        """Return the interpolation; ValueError if it is one that this program does not know."""
+        if "interpolation" in self.strange:
+            raise ParameterError("interpolation", self.strange["interpolation"])
+        return self.interpolation
 
     @property
     def gaps(self) -> str:
         """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""
-        said = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
-        said += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
-        return ", and ".join(said)
+        phrases = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
+        phrases += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
+        return ", and ".join(phrases)
 
 
 def _words(key: str) -> str:

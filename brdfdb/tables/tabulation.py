@@ -1,4 +1,4 @@
-"""From a material and a grid to a table: an xarray Dataset in memory that says where every number comes from."""
+"""Tabulation: from a layout to a table, an xarray Dataset in memory that says where every number comes from."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from brdfdb.tables.metadata import TableMetadata
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
 _CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
-# Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
+# Where the specular part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
 
 
 def tabulate(layout: Layout) -> xr.Dataset:
-    """Tabulate the BRDF of a material: all blocks of a layout, in memory.
+    """Tabulate the BRDF of a source: all blocks of a layout, in memory.
 
     Returns
     -------
     Dataset
         ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says: float32, over
-        the axes of the grid and, last, ``wavelength`` or ``part``; for models with a Dirac part
+        the axes of the grid and, last, ``wavelength`` or ``part``; for models with a specular part
         ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
         ``k`` as used.
         Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
@@ -41,27 +41,27 @@ def tabulate(layout: Layout) -> xr.Dataset:
 
 
 def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
-    """The values of some rows of the first axis of a table: float32, in the shape of the table's other axes."""
+    """Return the values of some rows of the first axis of a table: float32, over its other axes, too."""
     values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
     step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
     for start in range(rows.start, rows.stop, step):
-        here = slice(start, min(start + step, rows.stop))
-        at = slice(here.start - rows.start, here.stop - rows.start)
+        some = slice(start, min(start + step, rows.stop))
+        at = slice(some.start - rows.start, some.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
-            for last, arguments in _spectrum(layout):
-                index: tuple[Any, ...] = (at, ..., *last)
-                values[index] = _evaluated(layout, here, arguments)
+            for number, wavelength in enumerate(_wavelengths(layout)):
+                index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
+                values[index] = _evaluated(layout, some, wavelength)
         else:
-            numbers = node_numbers(layout, here)
+            numbers = node_numbers(layout, some)
             if layout.spectra is not None:
                 # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
                 numbers = np.einsum("...w,pw->...p", numbers, layout.spectra)
-            values[at] = numbers.reshape(here.stop - here.start, *layout.shape[1:])
+            values[at] = numbers.reshape(some.stop - some.start, *layout.shape[1:])
     return rounded(values, layout.bits)
 
 
 def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
-    """float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
+    """Return float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
     drop = 23 - bits
     if drop == 0:
         return values
@@ -69,27 +69,28 @@ def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
     return ((whole + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
 
 
-def _spectrum(layout: Layout) -> list[tuple[tuple[int, ...], dict[str, Any]]]:
-    """The arguments of the model at each wavelength, and where their values go in the last dimension."""
-    if layout.wavelength_nm is None:
-        return [((), layout.material.arguments())]
-    return [((w,), layout.material.arguments(one)) for w, one in enumerate(layout.wavelength_nm)]
+def _wavelengths(layout: Layout) -> list[float | None]:
+    """Return the wavelengths [nm] of a table, one by one; None stands for those of a grey one."""
+    return [None] if layout.wavelength_nm is None else list(layout.wavelength_nm)
 
 
-def _evaluated(layout: Layout, rows: slice, arguments: dict[str, Any]) -> Floats:
-    """The model at some rows of the first axis; on a reciprocal grid with the smaller theta always the light's.
+def _evaluated(layout: Layout, rows: slice, wavelength_nm: float | None) -> Floats:
+    """Return f_r [1/sr] at some rows of the first axis; on a reciprocal grid with the smaller theta always the light's.
 
     There a table is its own transpose to the last bit, in whatever pieces it is computed.
     """
-    evaluate = layout.material.spec.evaluate
+
+    def evaluate(theta_i: Floats, phi_i: Floats, theta_r: Floats, phi_r: Floats) -> Floats:
+        return layout.tabulated.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+
     if not layout.grid.reciprocal:
-        return evaluate(*layout.grid.directions(rows), **arguments)
+        return evaluate(*layout.grid.directions(rows))
     theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
-    here, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
-    values = np.empty((here.size, theta.size, delta_phi.size))
-    values[:, rows.start :] = evaluate(*_spread(here, right, delta_phi), **arguments)
-    swapped = evaluate(*_spread(left, here, delta_phi), **arguments)
-    smaller = left < here[:, np.newaxis]
+    some, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
+    values = np.empty((some.size, theta.size, delta_phi.size))
+    values[:, rows.start :] = evaluate(*_spread(some, right, delta_phi))
+    swapped = evaluate(*_spread(left, some, delta_phi))
+    smaller = left < some[:, np.newaxis]
     np.copyto(values[:, : rows.stop], np.swapaxes(swapped, 0, 1), where=smaller[..., np.newaxis])
     return values
 
@@ -100,23 +101,22 @@ def _spread(theta_i: Axis, theta_r: Axis, delta_phi: Axis) -> tuple[Axis, ...]:
 
 
 def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
-    """What a table holds or would hold at any directions: shape (..., L), before a spectrum is taken in parts.
+    """Return the numbers of a table at any directions, shape (..., L), before a spectrum is factored.
 
     Parameters
     ----------
     layout : Layout
-        Which numbers.
+        Layout of the table.
     wi, wr : arrays of shape (..., 3)
         Unit vectors, at the horizon or above.
     """
     mu = np.maximum(wi[..., 2], COS_HORIZON) * np.maximum(wr[..., 2], COS_HORIZON)
-    return _numbers(layout, lambda arguments: layout.material.spec.vectors(wi, wr, **arguments), mu)
+    return _numbers(layout, lambda wavelength: layout.tabulated.lookup_vectors(wi, wr, wavelength), mu)
 
 
-def _numbers(layout: Layout, evaluate: Callable[[dict[str, Any]], Floats], mu: Floats) -> Floats:
-    """Numbers from f_r at the wavelengths of a layout, mu = cos theta_i cos theta_r."""
-    without = {} if layout.apart is None else {layout.apart: 0.0}
-    f_r = [evaluate(arguments | without) for _, arguments in _spectrum(layout)]
+def _numbers(layout: Layout, evaluate: Callable[[float | None], Floats], mu: Floats) -> Floats:
+    """Return numbers from f_r at the wavelengths of a layout, mu = cos theta_i cos theta_r."""
+    f_r = [evaluate(wavelength) for wavelength in _wavelengths(layout)]
     return layout.interpolation.numbers(np.stack(f_r, axis=-1).astype(np.float64), mu)
 
 
@@ -130,7 +130,7 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
     if not grid.half_difference:
         angles = grid.directions(rows)
         mu = np.maximum(np.cos(angles[0]), COS_HORIZON) * np.maximum(np.cos(angles[2]), COS_HORIZON)
-        return _numbers(layout, lambda arguments: _evaluated(layout, rows, arguments), mu)
+        return _numbers(layout, lambda wavelength: _evaluated(layout, rows, wavelength), mu)
     axes = [radians(nodes) for nodes in grid.axes.values()]
     axes[0] = axes[0][rows]
     nodes = np.ix_(*axes)
@@ -141,7 +141,7 @@ def node_numbers(layout: Layout, rows: slice) -> Floats:
 def continued(layout: Layout, theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats) -> Floats:
     """`numbers` at half and difference angles [rad], and beyond the horizon what `node_numbers` says."""
     lowest = 0.0  # cosine of light and viewer
-    if layout.material.spec.grazing_pole and layout.interpolation.power == 0.0:
+    if layout.source.grazing_pole and layout.interpolation.power == 0.0:
         end = radians(POLE_END_DEG)
         lowest, theta_h = float(np.cos(end)), np.minimum(theta_h, end)
     # cos theta_r = along cos theta_d - across sin theta_d, at phi_d or at the other side
@@ -168,45 +168,40 @@ def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats
 
 
 def frame(layout: Layout) -> xr.Dataset:
-    """All of a table but its values: coordinates, Dirac part, how to rebuild f_r, refractive indices, attributes."""
-    material, grid, wavelength_nm = layout.material, layout.grid, layout.wavelength_nm
-    spec = material.spec
+    """Return a table without its values: coordinates, specular part, basis, refractive indices and attributes."""
+    source, grid, wavelength_nm = layout.source, layout.grid, layout.wavelength_nm
     spectral = () if wavelength_nm is None else ("wavelength",)
     coordinates: dict[str, Any] = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
     variables: dict[str, Any] = {}
-    arguments = material.arguments(wavelength_nm)
     if wavelength_nm is not None:
         coordinates["wavelength"] = (
             "wavelength",
             wavelength_nm,
-            {"units": "nm", "long_name": "wavelength in vacuum"},
+            {"units": "nm", "long_name": "wavelength in vacuum", "standard_name": "radiation_wavelength"},
         )
-        for name, meaning in (("n", "refractive index"), ("k", "extinction coefficient")):
-            variables[name] = ("wavelength", arguments[name], {"units": "1", "long_name": meaning})
+    if (indices := source.refractive_indices(wavelength_nm)) is not None:
+        for name, meaning, values in zip("nk", ("refractive index", "extinction coefficient"), indices, strict=True):
+            variables[name] = ("wavelength", values, {"units": "1", "long_name": meaning})
     if layout.spectra is not None:
         parts = np.arange(float(len(layout.spectra)))
         coordinates["part"] = ("part", parts, {"units": "1", "long_name": "number of a part"})
         variables["spectra"] = (("part", "wavelength"), layout.spectra, VARIABLES["spectra"])
     if layout.uniform is not None:
         variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])
-    if spec.specular is not None:
+    if source.has_specular:
         theta_i_deg = specular_nodes(layout)
         name = "specular_theta_i" if theta_i_deg is SPECULAR_THETA_DEG else "theta_i"
         coordinates[name] = _coordinate(name, theta_i_deg)
-        theta_i = radians(theta_i_deg)
         variables["specular_reflectance"] = (
             (name, *spectral),
-            spec.specular(
-                theta_i[:, np.newaxis] if spectral else theta_i,
-                **{name: arguments[name] for name in spec.specular_parameters},
-            ),
-            {"units": "1", "long_name": "reflectance of the Dirac part, in the exact mirror direction"},
+            source.specular_reflectance(radians(theta_i_deg), wavelength_nm),
+            {"units": "1", "long_name": "reflectance of the specular part, in the exact mirror direction"},
         )
     return xr.Dataset(variables, coordinates, metadata_of(layout).attributes())
 
 
 def specular_nodes(layout: Layout) -> Axis:
-    """Return the angles of incidence [degree] at which the Dirac part of a table is stored."""
+    """Return the angles of incidence [degree] at which the specular part of a table is stored."""
     given = "theta_i" in layout.grid.axes and not layout.reason
     return layout.grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
 
@@ -216,7 +211,7 @@ def _coordinate(name: str, nodes: Axis) -> tuple[str, Axis, dict[str, str]]:
 
 
 def _reconstruction(layout: Layout) -> str:
-    """How to rebuild f_r from the arrays of a table, in one line."""
+    """Return the formula for f_r from the arrays of a table, in one line."""
     spectrum = "" if layout.wavelength_nm is None else "; over wavelengths cubic"
     if layout.plain:
         return f"brdf is f_r; between nodes {layout.interpolation.method}{spectrum}"
@@ -232,25 +227,11 @@ def _reconstruction(layout: Layout) -> str:
 
 def metadata_of(layout: Layout) -> TableMetadata:
     """Return the metadata of a table that is known before its values are: without request and stated error."""
-    material, spec, wavelength_nm = layout.material, layout.material.spec, layout.wavelength_nm
-    # parameters by the names that files give them
-    written = dict(zip(material.parameters, material.file_parameters(), strict=True))
+    source, wavelength_nm = layout.source, layout.wavelength_nm
     return TableMetadata(
-        title=material.title,
-        material=material.name,
         table_version=TABLE_VERSION,
-        model=spec.name,
-        model_version=spec.version,
-        model_title=spec.title,
-        model_equation=spec.equation,
-        model_reference=spec.reference,
-        parameters=material.file_parameters(),
-        parameter_sources={written[name]: material.sources.get(name, material.source) for name in written},
-        source=material.source,
-        assumed={written.get(name, name): each for name, each in material.assumed.items()},
-        note=material.note,
-        refractive_index=material.refractive_index or "",
-        known_excess=material.known_excess,
+        **source.attributes(),
+        source_record=source.document(),
         conventions=(
             "directions point away from the surface; delta_phi = phi_r - phi_i, 0 is back towards the light, "
             "180 degrees the mirror half plane; f_r without cosine; isotropic tables are even in delta_phi"
@@ -267,7 +248,7 @@ def metadata_of(layout: Layout) -> TableMetadata:
 
 _LONG_NAMES = {
     "theta_i": "polar angle of the light",
-    "specular_theta_i": "polar angle of the light, of the Dirac part",
+    "specular_theta_i": "polar angle of the light, of the specular part",
     "theta_r": "polar angle of the viewer",
     "phi_i": "azimuth of the light",
     "phi_r": "azimuth of the viewer",

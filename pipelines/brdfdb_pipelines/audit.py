@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 
 import brdfdb
 from brdfdb.atlas import ATLAS
-from brdfdb.audit import AuditReport, MaterialAudit, audit, report
-from brdfdb.audit.findings import Asymmetry
+from brdfdb.audit import FINDINGS, AuditReport, audit, report
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.gallery import GALLERY
-from brdfdb_pipelines import audit_page, audit_sentences, terminal, workers
+from brdfdb_pipelines import audit_page, terminal, workers
 
 Task = Callable[[], Any]
 
@@ -132,7 +131,7 @@ def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except BrokenProcessPool as error:
-            raise ChildProcessError("the workers are gone, killed or out of memory") from error
+            raise workers.WorkersError("the workers are gone, killed or out of memory") from error
         finally:
             for future in futures:
                 future.cancel()
@@ -157,27 +156,21 @@ def _drawn(key: str) -> Section:
 
 
 def _print(root: Path, found: AuditReport, report_path: Path) -> None:
-    audits = found.materials
-    numbers = ("albedo of model", "of table", "model", "table", "smallest f_r")
+    audits, columns = found.materials, audit_page.columns()
     terminal.print_table(
-        f"Audit of {root}, the tables as interpolated (model, table: largest asymmetry under exchange of directions)",
-        ("material", "verdict", "energy", *numbers),
-        [_row(a) for a in audits],
-        numbers=numbers,
+        f"Audit of {root}, the tables as interpolated",
+        ("material", "verdict", *columns),
+        [(a.material, a.verdict, *(cell.text for cell in audit_page.cells_of(a))) for a in audits],
+        numbers=columns,
     )
     for a in audits:
-        for reason in _reasons(a):
-            print(f"{a.material}: {reason}")
-    if any(a.energy.table.verdict == "violates" for a in audits):
-        print("a table whose grid is too coarse for its lobe can exceed 1 where its model does not: try a finer grid")
-    within = sum(a.energy.table.verdict == "passes" and bool(a.energy.table.reason) for a in audits)
-    if within:
-        print(f"{within} exceed 1 by no more than the error that they state, or that of the integration, and pass")
-    losing = sum(a.energy.verdict == "loses" for a in audits)
-    if losing:
-        print(
-            f"{losing} are of models that lose light even where nothing absorbs it: the report says how much, and where"
-        )
+        for problem in a.problems():
+            print(f"{a.material}: {problem}")
+        if a.not_judged:
+            print(f"{a.material}: its source is not known; not judged: {', '.join(a.not_judged).lower()}")
+    for key, kind in FINDINGS.items():
+        for sentence in kind.overview([a.findings[key] for a in audits]):
+            print(sentence)
     known = sum(a.verdict == "known published excess" for a in audits)
     accepted = sum(a.verdict == "accepted excess" for a in audits)
     allowed = f"{accepted} exceed 1 as --allow accepts, " if accepted else ""
@@ -187,53 +180,3 @@ def _print(root: Path, found: AuditReport, report_path: Path) -> None:
         f"their published parameters are known to, {allowed}{len(found.violations)} violate; page {page_path}, "
         f"data {report_path}"
     )
-
-
-def _row(a: MaterialAudit) -> tuple[str, ...]:
-    model, table = a.energy.model, a.energy.table
-    of_model, of_table = (
-        "not finite" if each.max_albedo is None else f"{each.max_albedo:.4f}" for each in (model, table)
-    )
-    return (
-        a.material,
-        a.verdict,
-        a.energy.verdict,
-        f"{of_model} at {model.max_at_theta_i_deg:4.3g}°",
-        f"{of_table} at {table.max_at_theta_i_deg:4g}°",
-        f"{_largest(a.reciprocity.model_random, a.reciprocity.model_lobe):.0e}",
-        f"{_largest(a.reciprocity.table_random, a.reciprocity.table_lobe, a.reciprocity.table_nodes):.0e}",
-        "none" if a.values.smallest is None else f"{a.values.smallest:.3g}",
-    )
-
-
-def _largest(*found: Asymmetry | None) -> float:
-    return max(each.max for each in found if each is not None)
-
-
-def _reasons(a: MaterialAudit) -> list[str]:
-    """A sentence for each finding that is not a pass, or is one only because of the error that the table states."""
-    exceeds = a.energy.verdict not in ("conserves", "loses")
-    energy = a.energy.reason if exceeds else a.energy.table.reason
-    reasons = [energy] if energy else []
-    reasons += ["not reciprocal"] if a.reciprocity.verdict == "violates" else []
-    reasons += [f"{a.values.negative} negative values"] if a.values.negative else []
-    reasons += [f"{a.values.not_finite} values are not finite"] if a.values.not_finite else []
-    for what, jumps in (("model", a.smoothness.model), ("table", a.smoothness.table)):
-        worst = max(jumps, key=lambda jump: jump.largest / jump.tolerance)
-        if worst.largest > worst.tolerance:
-            reasons.append(
-                f"the {what} jumps by {worst.largest:.2g} at a seam, {worst.tolerance:.2g} allowed, {worst.seam}: "
-                f"{worst.where}"
-            )
-    if a.nodes.verdict == "violates":
-        reasons.append(audit_sentences.of_nodes(a.nodes))
-    error = a.table_error
-    if error.verdict == "violates":
-        fresh = "not finite" if error.fresh_p99 is None else terminal.error(error.fresh_p99)
-        mirror = "" if error.specular is None else f"; its mirror part is off by up to {error.specular:.2g}"
-        states = "none" if error.stated_p99 is None else terminal.error(error.stated_p99)
-        reasons.append(f"its error (p99) is {fresh}, the table states {states}{mirror}")
-    reasons += audit_sentences.of_error(error)
-    if a.sampling.verdict == "violates":
-        reasons.append("samples of the model do not have the density or the albedo that they should")
-    return reasons

@@ -21,7 +21,7 @@ from matplotlib.patches import Wedge
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
-from brdfdb.figure import Curve, Map, Numbers, Panel, Picture, Role
+from brdfdb.figure import Curve, Map, Numbers, Panel, Picture, Role, superscript
 
 Floats = NDArray[np.float64]
 Drawing = Panel | Map | Picture
@@ -79,7 +79,6 @@ STYLE: dict[Any, Any] = {
 _PIXELS_PER_INCH = 72  # of maps
 _BLANK: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
 _NO_SOFTWARE: Any = {"Software": None}
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def svg(drawing: Drawing, key: str) -> str:
@@ -363,11 +362,6 @@ def _ticks(axes: Axes, which: Literal["x", "y"], low: float, high: float, *, log
 
 def _plain(value: float) -> str:
     return f"{value:.6g}".replace("-", "−")
-
-
-def superscript(exponent: int) -> str:
-    """An integer, raised."""
-    return str(exponent).translate(_SUPERSCRIPT)
 
 
 def _power(value: float) -> str:

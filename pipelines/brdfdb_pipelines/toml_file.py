@@ -1,4 +1,4 @@
-"""TOML files of a user, read within bounds: no file makes the program hang or fill the memory."""
+"""TOML files of a user, read within bounds, so that no file makes the program hang or fill the memory."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from typing import Any
 
 from brdfdb.errors import BrdfdbError
 
-MOST_BYTES = 4_000_000  # of a file: tomllib reads about a megabyte a second
-MOST_KEY_PARTS = 64  # of a dotted key: tomllib takes memory that grows with their square
+MOST_BYTES = 4_000_000  # size of a file [byte]: tomllib reads about a megabyte a second
+MOST_KEY_PARTS = 64  # parts of a dotted key; the memory of tomllib grows with their square
+_MOST_BITS = 14_000  # bits of an integer: Python prints no more than 4300 digits
 
 _PART = r"""(?:"[^"\n]*"|'[^'\n]*'|[\w-]++)"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_KEY_PARTS}}}")
@@ -43,19 +44,29 @@ def read(source: Path | Traversable) -> dict[str, Any]:
     TomlError
         If it is no regular file, is larger than `MOST_BYTES`, or is not TOML.
     """
-    content = _bounded(source) if isinstance(source, Path) else source.read_bytes()
+    data = _bounded(source) if isinstance(source, Path) else source.read_bytes()
     try:
-        text = content.decode("utf-8")
+        text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise TomlError(f"not TOML: {error}") from None
     if _LONG_KEY.search(text):
         raise TomlError(f"a key has more than {MOST_KEY_PARTS} parts between dots")
     try:
-        return tomllib.loads(text)
+        content = tomllib.loads(text)
+        _check_integers(content)
     except RecursionError:
         raise TomlError("values are nested too deeply") from None
     except ValueError as error:  # after a semicolon, int() tells programmers how to allow more digits
         raise TomlError(f"not TOML: {str(error).partition(';')[0]}") from None
+    return content
+
+
+def _check_integers(value: Any) -> None:
+    """Raise TomlError for an integer that Python does not print: of more than 4300 digits, by default."""
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+        raise TomlError(f"an integer has more than {_MOST_BITS} bits")
+    for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        _check_integers(item)
 
 
 def _bounded(path: Path) -> bytes:

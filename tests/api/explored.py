@@ -21,11 +21,18 @@ theta_r_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
 phi_r_deg = [{ start = 0, stop = 360, step = 30 }]
 """
 ALBEDO = {"theta_i_deg": [0.0, 90.0], "wavelength_nm": None, "albedo": [[0.5], [1.2]]}
-FOUND = {each: {"verdict": "passes"} for each in ("reciprocity", "smoothness", "table_error", "sampling")} | {
+SENTENCES = [
+    ("energy", "Energy", "violates", "reflects 1.2 at 90 degrees", ""),
+    ("reciprocity", "Reciprocity", "passes", "asymmetry up to 0", ""),
+    ("validity", "Validity", "at the edge", "of 1 limit 1 at the edge", ""),
+    ("validity", "Alpha", "at the edge", "0.2 (at most 0.2)", "up to about 0.2"),
+]
+FOUND = {
     "material": "rolled-brass",
     "revision": "r000001",
-    "energy": {"verdict": "violates", "reason": "reflects 1.2 at 90 degrees", "model": ALBEDO, "table": ALBEDO},
-    "validity": {"standing": "at the edge"},
+    "model": "ward",
+    "findings": {"energy": {"verdict": "violates", "model": ALBEDO, "table": ALBEDO}},
+    "sentences": [dict(zip(("finding", "title", "word", "text", "quote"), each, strict=True)) for each in SENTENCES],
     "verdict": "violates",
 }
 # Of three materials one is audited, one was at another revision

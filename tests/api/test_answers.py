@@ -11,7 +11,6 @@ import pytest
 
 from brdfdb.spectra import srgb_weights, xyz_weights
 from brdfdb.store.reader import Store
-from brdfdb.tables.albedo import material_of
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, npy, read_npy
 
 FOIL, FELT, TILE, METAL = (
@@ -36,7 +35,7 @@ def test_the_model_itself(client: Client, store: Store, name: str, wavelengths: 
     params = {**POINT, "from": "model"} | ({} if wavelengths is None else {"wavelength_nm": wavelengths})
     answer = client.get(f"/v1/materials/{name}/lookup", params=params).json()
     assert answer["source"] == "model"
-    material = material_of(table)
+    material = table.source
     np.testing.assert_allclose(answer["brdf"], material.lookup(*RADIANS, at), **EXACT)
     np.testing.assert_allclose(answer["specular_reflectance"], material.specular_reflectance(RADIANS[0], at), **EXACT)
 
@@ -64,7 +63,7 @@ def test_colours(client: Client, store: Store, output: str, weights: Any, illumi
     assert (answer["output"], answer["illuminant"]) == (output, illuminant or "D65")
     of = weights(tuple(VISIBLE_NM.tolist()), illuminant or "D65")
     table = store["copper-foil"]
-    spectrum = table.lookup(*RADIANS) if source == "table" else material_of(table).lookup(*RADIANS, VISIBLE_NM)
+    spectrum = table.lookup(*RADIANS) if source == "table" else table.source.lookup(*RADIANS, VISIBLE_NM)
     np.testing.assert_allclose(answer["brdf"], spectrum @ of, **EXACT)
     if source == "table":
         specular = table.specular_reflectance(RADIANS[0])
@@ -95,7 +94,7 @@ def test_colours_of_more_points_than_are_worked_on_at_once(root: Path, store: St
         headers=BINARY,
         params={"output": "linear-srgb", "format": "npy", "error": "true"},
     )
-    spectra = store["copper-foil"].lookup(*np.radians(points.T), with_error=True)
+    spectra = store["copper-foil"].lookup_with_error(*np.radians(points.T))
     of = srgb_weights(tuple(VISIBLE_NM.tolist()))
     expected = np.stack([spectra.brdf @ of, spectra.error @ np.abs(of)])
     np.testing.assert_allclose(read_npy(answer.content), expected, rtol=1e-12, atol=1e-15)
@@ -148,7 +147,7 @@ def test_a_colour_of_very_many_wavelengths_is_refused(client: Client) -> None:
 @pytest.mark.parametrize("name", ["copper-foil", "grey-felt"])
 def test_the_stated_error_stands_beside_the_values(client: Client, store: Store, name: str) -> None:
     address = f"/v1/materials/{name}/lookup"
-    brdf, error = store[name].lookup(*RADIANS, with_error=True)
+    brdf, error = store[name].lookup_with_error(*RADIANS)
     answer = client.get(address, params={**POINT, "error": "true"}).json()
     np.testing.assert_array_equal(answer["brdf"], brdf)
     np.testing.assert_array_equal(answer["error"], error)
@@ -159,7 +158,7 @@ def test_the_stated_error_stands_beside_the_values(client: Client, store: Store,
 
 def test_the_error_of_a_colour_adds_up(client: Client, store: Store) -> None:
     answer = client.get(FOIL, params={**POINT, "error": "true", "output": "linear-srgb"}).json()
-    stated = store["copper-foil"].lookup(*RADIANS, with_error=True).error
+    stated = store["copper-foil"].lookup_with_error(*RADIANS).error
     np.testing.assert_allclose(answer["error"], stated @ np.abs(srgb_weights(tuple(VISIBLE_NM.tolist()))), **EXACT)
 
 

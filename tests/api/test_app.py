@@ -14,7 +14,7 @@ import pytest
 import brdfdb_api
 from brdfdb.errors import StoreError
 from brdfdb_api.http.app import create_app, openapi_json
-from brdfdb_api.server import serve
+from brdfdb_api.server import ServerError, serve
 from brdfdb_api.serving.settings import Settings
 from tests.api.a_store import Client
 
@@ -99,7 +99,7 @@ def test_openapi_is_served(client: Client) -> None:
         ("GET", f"{FOIL}/lobe", "/v1/materials/{name}/lobe", 200),
         ("GET", f"{FOIL}/lobe?view=hemisphere&output=xyz", "/v1/materials/{name}/lobe", 200),
         ("GET", f"{FOIL}/lobe?format=npy", "/v1/materials/{name}/lobe", 200),
-        ("GET", f"{FOIL}/slice.exr", "/v1/materials/{name}/slice.exr", 200),
+        ("GET", f"{FOIL}/export/exr", "/v1/materials/{name}/export/{file_format}", 200),
         ("GET", f"{FOIL}/audit", "/v1/materials/{name}/audit", 404),
         ("GET", f"{FOIL}/download.zarr", "/v1/materials/{name}/download.zarr", 200),
         ("GET", "/v1/store/materials/copper-foil/r000001/brdf/c/0/0/0/0", STORED, 200),
@@ -140,7 +140,7 @@ def test_serve_on_a_port_that_is_taken(root: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("BRDFDB_STORE", "put back afterwards")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(OSError, match=f"^cannot listen on 127.0.0.1, port {port}: Address already in use$"):
+        with pytest.raises(ServerError, match=f"^cannot listen on 127.0.0.1, port {port}: Address already in use$"):
             serve(root, "127.0.0.1", port)
 
 

@@ -14,21 +14,19 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from brdfdb.audit import sampling
-from brdfdb.audit.findings import Jump, Limit, Sampling, Smoothness
 from brdfdb.audit.pairs import pairs_of
-from brdfdb.audit.sampling import sampling_of
-from brdfdb.audit.smoothness import MODEL_TOLERANCE, smoothness_of
-from brdfdb.audit.validity import validity_of
+from brdfdb.audit.sampling import Sampling, sampling_of
+from brdfdb.audit.smoothness import MODEL_TOLERANCE, Jump, Smoothness, smoothness_of
+from brdfdb.audit.validity import Limit, validity_of
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import Albedo
 from brdfdb.integrals.sampling import lobe_of
+from brdfdb.lobes import Lobe
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
-from brdfdb.parameters import Lobe
 from brdfdb.tables import error_measurement
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.table import Table
-from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
+from tests.audit.a_table import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
 
 Array = NDArray[np.float64]
 
@@ -95,8 +93,9 @@ def test_what_is_said_of_weights_is_said_of_a_lambertian_in_closed_form() -> Non
 @pytest.mark.parametrize("alpha", [(0.05, 0.15), (1e-4, 1e-4), (2.0, 0.3)])
 def test_bins_hold_the_shares_of_a_gaussian_of_slopes(alpha: tuple[float, float]) -> None:
     lobe = Lobe(np.ones(()), np.asarray(alpha[0]), np.asarray(alpha[1]))
-    shares = sampling._shares(unit_vector(0.8, 0.3), lobe, np.array(alpha))
-    exact = -np.diff(np.exp(-(sampling._T_EDGES**2))) / (sampling._PSI_EDGES.size - 1)
+    t_edges = sampling._t_edges(lobe)
+    shares = sampling._shares(unit_vector(0.8, 0.3), lobe, np.array(alpha), t_edges)
+    exact = -np.diff(np.exp(-(t_edges**2))) / (sampling._PSI_EDGES.size - 1)
     np.testing.assert_allclose(shares, np.broadcast_to(exact[:, np.newaxis], shares.shape), atol=SHARES)
 
 
@@ -137,7 +136,7 @@ SIDES: dict[str, Callable[[Array], Any]] = {
 
 
 def smoothness(table: Table) -> Smoothness:
-    return smoothness_of(table, material_of(table), pairs_of(table, material_of(table)))
+    return smoothness_of(table, table.source, pairs_of(table, table.source))
 
 
 def by_seam(jumps: list[Jump]) -> dict[str, Jump]:
@@ -201,7 +200,7 @@ def limits(made_up: Material, wavelength_nm: Array | None = None) -> dict[str, L
     ],
 )
 def test_where_the_materials_of_the_papers_stand(name: str, standing: str) -> None:
-    assert validity_of(presets()[name], np.array([400.0, 700.0])).standing == standing
+    assert validity_of(presets()[name], np.array([400.0, 700.0])).verdict == standing
 
 
 def test_a_very_rough_surface_needs_no_gentle_slopes_for_its_integrals() -> None:
@@ -255,4 +254,4 @@ def test_the_gaussian_of_slopes_reaches_beyond_90_degrees() -> None:
 
 def test_what_a_material_does_not_say_is_unknown_and_decides_nothing() -> None:
     found = validity_of(material("oren_nayar_single_slope", PARAMETERS["oren_nayar_single_slope"]), None)
-    assert ([limit.standing for limit in found.limits], found.standing) == (["unknown"], "inside")
+    assert ([limit.standing for limit in found.limits], found.verdict) == (["unknown"], "inside")

@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 from brdfdb.audit import audit
-from brdfdb.audit.reciprocity import LOOKUP_RECIPROCITY_TOLERANCE
+from brdfdb.audit.energy import Energy
+from brdfdb.audit.reciprocity import LOOKUP_RECIPROCITY_TOLERANCE, Reciprocity
 from brdfdb.audit.table_energy import _band_means, table_energy_of
+from brdfdb.audit.values import Values
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
-from tests.audit.test_audit import ISOTROPIC, known, material, verdicts, written
+from tests.audit.a_table import ISOTROPIC, known, material, verdicts, written
 from tests.tables.test_albedo import KINDS, planned, table_of
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
@@ -49,26 +51,29 @@ def worst(table: Table) -> float:
 def test_planned_tables_pass_and_their_reports_are_valid(kind: str) -> None:
     table = table_of(kind)
     found = audit(table)
-    assert (found.verdict, verdicts(found), found.energy.table.reason) == ("passes", {}, "")
-    assert found.energy.table.bands is not None
-    assert found.energy.table.bands.stated_error == table.attrs["error"]["l1"]
-    assert np.max(found.energy.table.bands.excess) == 0.0
-    assert np.min(found.energy.table.bands.explained) > 0.0
-    assert found.values.looked_up > 1000
-    assert found.values.count >= table.values.size
+    assert (found.verdict, verdicts(found), found.of(Energy).table.reason) == ("passes", {}, "")
+    assert found.of(Energy).table.bands is not None
+    assert found.of(Energy).table.bands.stated_error == table.attrs["error"]["l1"]
+    assert np.max(found.of(Energy).table.bands.excess) == 0.0
+    assert np.min(found.of(Energy).table.bands.explained) > 0.0
+    assert found.of(Values).looked_up > 1000
+    assert found.of(Values).count >= table.values.size
     written([found])
 
 
 @KINDS
 def test_half_as_much_light_again_violates(kind: str) -> None:
     table = table_of(kind)
-    albedo = audit(table).energy.table.max_albedo
+    albedo = audit(table).of(Energy).table.max_albedo
     assert albedo is not None
     found = audit(scaled(table, 1.5 / albedo))
-    assert (found.verdict, found.energy.table.verdict) == ("violates", "violates")
-    assert found.energy.table.max_albedo == pytest.approx(1.5, rel=0.02)
-    assert "more than the error that the table states explains" in found.energy.table.reason
-    assert found.energy.table.exceeds_1_beyond_error_from_theta_i_deg == found.energy.table.exceeds_1_from_theta_i_deg
+    assert (found.verdict, found.of(Energy).table.verdict) == ("violates", "violates")
+    assert found.of(Energy).table.max_albedo == pytest.approx(1.5, rel=0.02)
+    assert "more than the error that the table states explains" in found.of(Energy).table.reason
+    assert (
+        found.of(Energy).table.exceeds_1_beyond_error_from_theta_i_deg
+        == found.of(Energy).table.exceeds_1_from_theta_i_deg
+    )
 
 
 @KINDS
@@ -77,8 +82,8 @@ def test_one_node_of_nan_violates_and_the_report_is_json(kind: str) -> None:
     values = table.values.copy()
     values[(1,) * values.ndim if table.spectra is None else (1,) * (values.ndim - 1)] = np.nan
     found = audit(replace(table, values=values))
-    assert (found.verdict, found.values.finiteness) == ("violates", "violates")
-    assert found.values.not_finite > 0
+    assert (found.verdict, found.of(Values).finiteness) == ("violates", "violates")
+    assert found.of(Values).not_finite > 0
     written([found])
 
 
@@ -88,16 +93,16 @@ def test_what_is_stored_beside_the_values_is_audited(name: str) -> None:
     broken = getattr(table, name).copy()
     broken.flat[0] = np.nan
     found = audit(replace(table, **{name: broken}))
-    assert found.values.finiteness == "violates"
+    assert found.of(Values).finiteness == "violates"
 
 
 def test_a_negative_uniform_part_violates() -> None:
     table = table_of("half-difference")
     assert table.uniform is not None
     found = audit(replace(table, uniform=-table.uniform))
-    assert found.values.positivity == "violates"
-    assert found.values.smallest is not None
-    assert found.values.smallest < 0.0
+    assert found.of(Values).positivity == "violates"
+    assert found.of(Values).smallest is not None
+    assert found.of(Values).smallest < 0.0
 
 
 def test_a_negative_node_violates_even_if_lookups_stop_at_0() -> None:
@@ -106,8 +111,8 @@ def test_a_negative_node_violates_even_if_lookups_stop_at_0() -> None:
     values = dataset["brdf"].values
     values[2, 3, 1] = values[3, 2, 1] = -1e-3
     found = audit(replace(Table.of(cubic, values), attrs=dataset.attrs))
-    assert (found.values.positivity, found.values.negative) == ("violates", 2)
-    assert found.values.smallest == np.float32(-1e-3)
+    assert (found.of(Values).positivity, found.of(Values).negative) == ("violates", 2)
+    assert found.of(Values).smallest == np.float32(-1e-3)
 
 
 @pytest.mark.parametrize("kind", ["polar", "polar-parts"])
@@ -117,8 +122,8 @@ def test_one_node_that_is_not_reciprocal_violates(kind: str) -> None:
     values[2, 5, 1] *= np.float32(1.0 + 1e-4)
     found = audit(replace(table, values=values))
     assert verdicts(found)["reciprocity"] == "violates"
-    assert found.reciprocity.table_nodes is not None
-    assert found.reciprocity.table_nodes.max > 1e-5
+    assert found.of(Reciprocity).table_nodes is not None
+    assert found.of(Reciprocity).table_nodes.max > 1e-5
 
 
 @pytest.mark.parametrize("kind", ["half-difference", "half-difference-anisotropic"])
@@ -126,7 +131,7 @@ def test_half_and_difference_vectors_are_reciprocal_whatever_they_hold(kind: str
     table = table_of(kind)
     noise = np.random.default_rng(5).uniform(0.9, 1.1, table.values.shape).astype(np.float32)
     found = audit(replace(table, values=table.values * noise))
-    reciprocity = found.reciprocity
+    reciprocity = found.of(Reciprocity)
     assert reciprocity.table_nodes is None
     assert reciprocity.table_lobe is not None
     for each in (reciprocity.table_random, reciprocity.table_lobe):
@@ -145,7 +150,7 @@ def ideal() -> Table:
 
 def test_an_ideal_material_may_exceed_1_by_what_its_error_explains(ideal: Table) -> None:
     found = audit(ideal)
-    energy = found.energy.table
+    energy = found.of(Energy).table
     assert energy.max_albedo is not None
     assert energy.max_albedo > 1.001
     assert energy.exceeds_1_from_theta_i_deg is not None
@@ -159,18 +164,22 @@ def test_an_ideal_material_may_exceed_1_by_what_its_error_explains(ideal: Table)
 def test_the_same_table_without_a_stated_error_violates(ideal: Table) -> None:
     attrs = {key: value for key, value in ideal.attrs.items() if key != "error"}
     found = audit(replace(ideal, attrs=attrs))
-    assert (found.verdict, found.energy.table.verdict, found.energy.table.bands) == ("violates", "violates", None)
+    assert (found.verdict, found.of(Energy).table.verdict, found.of(Energy).table.bands) == (
+        "violates",
+        "violates",
+        None,
+    )
 
 
 def test_the_error_excuses_no_more_than_itself(ideal: Table) -> None:
     factor = 1.0 + 1.1 * worst(ideal)
-    assert audit(scaled(ideal, factor)).energy.table.verdict == "violates"
+    assert audit(scaled(ideal, factor)).of(Energy).table.verdict == "violates"
 
 
 def test_a_stated_error_that_nobody_can_ask_for_is_no_excuse(ideal: Table) -> None:
     boast = {**ideal.attrs["error"], "l1": [[1e9] for _ in ideal.attrs["error"]["l1"]]}
     found = audit(replace(scaled(ideal, 3.0), attrs={**ideal.attrs, "error": boast}))
-    assert found.energy.table.verdict == "violates"
+    assert found.of(Energy).table.verdict == "violates"
 
 
 @pytest.mark.parametrize(

@@ -13,16 +13,14 @@ import numpy as np
 import pytest
 
 from brdfdb.audit import pairs
-from brdfdb.audit.findings import Nodes, TableError
-from brdfdb.audit.nodes import nodes_of
+from brdfdb.audit.nodes import Nodes, nodes_of
 from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.reciprocity import reciprocity_of
 from brdfdb.audit.smoothness import smoothness_of
 from brdfdb.audit.statement import contradictions
-from brdfdb.audit.table_error import table_error_of
+from brdfdb.audit.table_error import TableError, table_error_of
 from brdfdb.audit.values import values_of
 from brdfdb.materials import presets
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
@@ -46,8 +44,8 @@ SOUND = 6
 
 
 def findings(table: Table) -> tuple[Nodes, TableError]:
-    nodes = nodes_of(table, material_of(table))
-    return nodes, table_error_of(table, material_of(table), pairs_of(table, material_of(table)), nodes.verdict)
+    nodes = nodes_of(table, table.source)
+    return nodes, table_error_of(table, table.source, pairs_of(table, table.source), nodes.verdict)
 
 
 @pytest.mark.parametrize("make", [copper, brass, clay, grooves])
@@ -80,8 +78,7 @@ def test_refractive_indices_are_held_against_their_entry(field: str) -> None:
     assert said.startswith(f"{field} is stored as ")
     assert " at 550 nm, where main/Cu/Johnson has " in said
     assert (
-        nodes_of(replace(table, **{field: np.array(getattr(table, field)) * (1.0 + 1e-12)}), material_of(table)).beside
-        == []
+        nodes_of(replace(table, **{field: np.array(getattr(table, field)) * (1.0 + 1e-12)}), table.source).beside == []
     )
 
 
@@ -107,7 +104,7 @@ def bounded() -> Table:
 
 def test_a_seam_is_judged_by_its_band() -> None:
     """This table jumps by more than its overall error at 89.6 degrees, where its band states four times as much."""
-    table, material = bounded(), material_of(bounded())
+    table, material = bounded(), bounded().source
     found = smoothness_of(table, material, pairs_of(table, material))
     assert found.verdict == "passes"
     assert table.error is not None
@@ -124,7 +121,7 @@ def test_rounding_next_to_a_pole_is_no_asymmetry(monkeypatch: pytest.MonkeyPatch
     table = planned("ward_duer", {"rho_d": 0.109, "rho_s": 0.0332, "alpha_x": 0.0825, "alpha_y": 0.135}, None, 0.03)
     assert table.interpolation.power == 1.0
     monkeypatch.setattr(pairs, "SEED", 1)
-    assert reciprocity_of(table, pairs_of(table, material_of(table))).verdict == "passes"
+    assert reciprocity_of(table, pairs_of(table, table.source)).verdict == "passes"
 
 
 @pytest.mark.parametrize("number", range(SOUND))
@@ -132,7 +129,7 @@ def test_no_sound_table_is_named(number: int) -> None:
     words, table = sound()[number]
     nodes, error = findings(table)
     assert (nodes.verdict, error.verdict) == ("passes", "passes"), words
-    assert smoothness_of(table, material_of(table), pairs_of(table, material_of(table))).verdict == "passes", words
+    assert smoothness_of(table, table.source, pairs_of(table, table.source)).verdict == "passes", words
 
 
 @cache
@@ -143,19 +140,17 @@ def sound() -> list[tuple[str, Table]]:
 def test_a_dirac_part_that_is_missing_or_has_other_nodes_is_named() -> None:
     table = copper()
     assert table.specular is not None
-    assert nodes_of(replace(table, specular=None), material_of(table)).beside == [
-        "the Dirac part of the model is not stored"
-    ]
+    assert nodes_of(replace(table, specular=None), table.source).beside == ["the Dirac part of the model is not stored"]
     ends = np.array([0, len(table.specular) - 1])
     fewer = replace(table, specular=table.specular[ends], specular_theta_deg=np.array([0.0, 90.0]))
-    (said,) = nodes_of(fewer, material_of(table)).beside
+    (said,) = nodes_of(fewer, table.source).beside
     assert said.startswith("the Dirac part is stored at 2 angles that are not the ")
 
 
 def test_a_planned_table_that_states_no_error_is_named() -> None:
     table = clay()
     attrs = {key: value for key, value in table.attrs.items() if key != "error"} | {"request": {"tolerance": 0.05}}
-    assert nodes_of(replace(table, attrs=attrs), material_of(table)).beside == [
+    assert nodes_of(replace(table, attrs=attrs), table.source).beside == [
         "no error is stated, though a tolerance of 0.05 was asked for"
     ]
 

@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 from brdfdb.audit import pairs
-from brdfdb.audit.findings import Jump, Reciprocity, Smoothness, TableError
 from brdfdb.audit.pairs import pairs_of
-from brdfdb.audit.reciprocity import TABLE_RECIPROCITY_TOLERANCE, reciprocity_of
-from brdfdb.audit.smoothness import TABLE_TOLERANCE, smoothness_of
-from brdfdb.audit.table_error import LEAST, table_error_of
+from brdfdb.audit.reciprocity import TABLE_RECIPROCITY_TOLERANCE, Reciprocity, reciprocity_of
+from brdfdb.audit.smoothness import TABLE_TOLERANCE, Jump, Smoothness, smoothness_of
+from brdfdb.audit.table_error import LEAST, TableError, table_error_of
 from brdfdb.tables import error_measurement
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.table import Table
-from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, UNEQUAL, lambert
+from tests.audit.a_table import ANISOTROPIC, ISOTROPIC, UNEQUAL, lambert
 from tests.audit.test_audit_planned import scaled
 from tests.tables.test_albedo import KINDS, planned, table_of
 
@@ -29,11 +27,11 @@ SCALED = 0.02
 
 
 def error_of(table: Table) -> TableError:
-    return table_error_of(table, material_of(table), pairs_of(table, material_of(table)))
+    return table_error_of(table, table.source, pairs_of(table, table.source))
 
 
 def jumps_of(table: Table) -> Smoothness:
-    return smoothness_of(table, material_of(table), pairs_of(table, material_of(table)))
+    return smoothness_of(table, table.source, pairs_of(table, table.source))
 
 
 def jump(found: Smoothness, seam: str) -> Jump:
@@ -42,7 +40,7 @@ def jump(found: Smoothness, seam: str) -> Jump:
 
 
 def reciprocity(table: Table) -> Reciprocity:
-    return reciprocity_of(table, pairs_of(table, material_of(table)))
+    return reciprocity_of(table, pairs_of(table, table.source))
 
 
 # The error
@@ -114,7 +112,7 @@ def test_maps_are_of_the_middle_wavelength() -> None:
     assert [each.title.split(", ")[1] for each in found.maps] == ["550 nm", "550 nm"]
     wi, wr = np.array([0.6, 0.0, 0.8]), np.array([-0.8, 0.0, 0.6])
     value = table.lookup_vectors(wi, wr, 550.0)
-    truth = error_measurement.model_values(material_of(table), np.array([550.0]), wi[np.newaxis], wr[np.newaxis])[0, 0]
+    truth = error_measurement.model_values(table.source, np.array([550.0]), wi[np.newaxis], wr[np.newaxis])[0, 0]
     near = np.array(found.maps[0].values, dtype=np.float64)[12:13, 47:49]  # 36 degrees, 51 and 54
     assert abs(value - truth) / truth < 0.02
     assert near.max() < 0.02

@@ -13,10 +13,8 @@ import pytest
 import scipy.stats
 
 from brdfdb.audit import pairs
-from brdfdb.audit.findings import Disagreement
 from brdfdb.audit.pairs import pairs_of
-from brdfdb.audit.statement import CHANCE, QUANTILES, contradictions, disagreements, limits
-from brdfdb.tables.albedo import material_of
+from brdfdb.audit.statement import CHANCE, QUANTILES, Disagreement, contradictions, disagreements, limits
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
 from tests.tables.test_albedo import KINDS, table_of
@@ -39,7 +37,7 @@ def found_in(table: Table, change: Change | None = None) -> list[Disagreement]:
         change(stated)
     error = Error.model_validate(stated)
     assert contradictions(error, wavelengths(table)) == []
-    return disagreements(error, pairs_of(table, material_of(table)), table.wavelength_nm)
+    return disagreements(error, pairs_of(table, table.source), table.wavelength_nm)
 
 
 @pytest.mark.parametrize("quantile", QUANTILES.values())

@@ -37,7 +37,7 @@ def main() -> None:
     tasks = [(job.layout(), number) for job in recipe.jobs() for number in range(len(job.layout().blocks))]
     tasks.sort(key=lambda task: task[0].size, reverse=True)
     total = sum(job.layout().size for job in recipe.jobs())
-    for layout in {layout.material.model: layout for layout, _ in tasks}.values():  # compile before the clock runs
+    for layout in {layout.source.model: layout for layout, _ in tasks}.values():  # compile before the clock runs
         encoded(layout, 0, block(layout, layout.blocks[0]))
     best: dict[str, float] = {}
     with ThreadPoolExecutor(options.jobs) as pool:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from brdfdb.forms.catalogue import representations
+from brdfdb.forms import catalogue
 from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.materials import Material, presets
 
@@ -193,7 +193,7 @@ class Form:
         self.own = None if option["wavelengths_nm"] is None else np.array(option["wavelengths_nm"])
         planned = re.search(r"planned for ([0-9.]+) %", option["title"])
         tolerances = [float(planned[1]) / 100.0] if planned else [0.1] if option["kind"] == "table" else []
-        forms = {each.key: each for each in representations(material, self.own, tolerances)}
+        forms = {each.key: each for each in catalogue.forms(material, self.own, tolerances)}
         self.form, self.truth = forms[key.removesuffix("-true-limbs")], next(iter(forms.values()))
         self.limbs = key.endswith("-true-limbs")
 

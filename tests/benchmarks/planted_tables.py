@@ -17,7 +17,6 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
 from brdfdb.tables.stated_error import Overall
 from brdfdb.tables.table import Table
-from brdfdb_pipelines.audit_sentences import of_error, of_nodes
 from tests.benchmarks.sound_materials import built
 
 WAVELENGTHS = np.linspace(420.0, 680.0, 5)
@@ -179,11 +178,4 @@ PLANTED: dict[str, Callable[[], Table]] = {
 
 def reasons_of(found: MaterialAudit) -> list[str]:
     """Return what an audit says against a table, finding by finding."""
-    said = [found.energy.reason] if found.energy.verdict == "violates" else []
-    said += [f"{found.reciprocity.verdict} reciprocity"] if found.reciprocity.verdict == "violates" else []
-    jumps = [each for each in (*found.smoothness.model, *found.smoothness.table) if each.largest > each.tolerance]
-    said += [f"jumps by {each.largest:g} of {each.tolerance:g} across {each.seam}, {each.where}" for each in jumps]
-    said += [of_nodes(found.nodes)] if found.nodes.verdict == "violates" else []
-    said += of_error(found.table_error)
-    said += [f"{found.sampling.verdict} sampling"] if found.sampling.verdict == "violates" else []
-    return said
+    return found.problems()

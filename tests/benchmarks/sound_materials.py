@@ -38,11 +38,11 @@ def built(layout: Layout, count: int = DIRECTIONS) -> Table:
     """Return the table of a layout with its measured error, as a store gives it."""
     dataset = tabulate(layout)
     values = dataset[layout.variable].values
-    count = _SLOW.get(layout.material.model, count)
+    count = _SLOW.get(layout.source.attributes().get("model", ""), count)
     error = error_measurement.measure(layout, lambda rows: values[rows], count=count)
     arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
     attrs = {**dataset.attrs, "error": error.model_dump(mode="json")}
-    return table_from(layout.material.name, "r000001", arrays, attrs)
+    return table_from(layout.source.name, "r000001", arrays, attrs)
 
 
 def materials(count: int, seed: int) -> Iterator[Sound]:

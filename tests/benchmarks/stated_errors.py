@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 import brdfdb
 from brdfdb.materials import Material
 from brdfdb.tables import error_measurement, tabulation
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
 from brdfdb_pipelines.recipe_file import load
@@ -42,7 +41,7 @@ def main(arguments: list[str]) -> int:
     names = options.names or (QUICK if options.quick else ())
     least: dict[str, tuple[float, str]] = {}
     for table in stored(options.store, names) if options.store else made(names, options.wavelengths):
-        shares = shares_of(table, material_of(table) if options.store else table.attrs["of"])
+        shares = shares_of(table, table.source if options.store else table.attrs["of"])
         print(f"{table.name:<34}" + "  ".join(f"{place} {share:.4f}" for place, share in shares.items()), flush=True)
         for place, share in shares.items():
             least[place] = min(least.get(place, (1.0, "")), (share, table.name))
@@ -94,7 +93,7 @@ def shares_of(table: Table, material: Material) -> dict[str, float]:
 
 def share(table: Table, material: Material, wi: Array, wr: Array, wavelength_nm: Array | None) -> float:
     """Return the share of values that are as near to the model as stated; the least of all wavelengths."""
-    found = table.lookup_vectors(wi, wr, wavelength_nm, with_error=True)
+    found = table.lookup_vectors_with_error(wi, wr, wavelength_nm)
     truth = error_measurement.model_values(material, wavelength_nm, wi, wr).reshape(found.brdf.shape)
     held = np.abs(found.brdf - truth) <= found.error + ROUNDING * truth
     return float(held.reshape(len(wi), -1).mean(axis=0).min())

@@ -73,12 +73,12 @@ def lobe_width(material: Material, wavelength_nm: NDArray[np.float64] | None) ->
 def uniform_nodes(layout: Layout, error: float) -> int:
     """Nodes of the uniform grid whose multilinear interpolation has the same 99th percentile of the error."""
     wavelength_nm = None if layout.wavelength_nm is None else layout.wavelength_nm[[0, layout.wavelength_nm.size // 2]]
-    drawn = error_measurement.draw(layout.material, wavelength_nm, DRAWS, FRESH)
-    truth = error_measurement.model_values(layout.material, wavelength_nm, drawn.wi, drawn.wr)
+    drawn = error_measurement.draw(layout.source, wavelength_nm, DRAWS, FRESH)
+    truth = error_measurement.model_values(layout.source, wavelength_nm, drawn.wi, drawn.wr)
     floor = error_measurement.floor_of(truth, drawn)
     count = 8
     while True:
-        found = uniform_lookup(layout.material, wavelength_nm, drawn, count)
+        found = uniform_lookup(layout.source, wavelength_nm, drawn, count)
         if (
             np.percentile(error_measurement.relative(found, truth, floor)[drawn.above], 99, axis=0).max() <= error
             or count > 3000

@@ -1,4 +1,4 @@
-"""The representations of a material: finite, reciprocal, as far from the truth as their papers and limits say."""
+"""The forms of a material: finite, reciprocal, as far from the truth as their papers and limits say."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from brdfdb import models
-from brdfdb.forms.catalogue import Representation, representations
+from brdfdb.forms import catalogue
+from brdfdb.forms.catalogue import Form
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.materials.provenance import Assumption
@@ -36,9 +37,9 @@ CLOSED = 1e-3  # relative, 24 slopes less the 400 of the misprint: 4.1e-4
 SHORT = 3e-8  # l1 of ten terms where g stays below 1.3: 2.3e-8; the first one left out is g^10 / (11! 11) of the first
 
 
-def of(material: Material, *tolerances: float) -> tuple[dict[str, Representation], error_measurement.Draw]:
+def of(material: Material, *tolerances: float) -> tuple[dict[str, Form], error_measurement.Draw]:
     wavelength_nm = wavelengths(material)
-    forms = {form.key: form for form in representations(material, wavelength_nm, tolerances)}
+    forms = {form.key: form for form in catalogue.forms(material, wavelength_nm, tolerances)}
     return forms, error_measurement.draw(material, wavelength_nm, 100, 7)
 
 
@@ -46,11 +47,11 @@ def wavelengths(material: Material) -> Any:
     return np.array(material.wavelengths_nm or (450.0, 550.0, 650.0)) if material.spectral else None
 
 
-def values(form: Representation, wi: Any, wr: Any) -> Any:
+def values(form: Form, wi: Any, wr: Any) -> Any:
     return form.evaluate(np.asarray(wi, dtype=form.dtype), np.asarray(wr, dtype=form.dtype)).astype(np.float64)
 
 
-def l1(forms: dict[str, Representation], drawn: error_measurement.Draw, key: str) -> float:
+def l1(forms: dict[str, Form], drawn: error_measurement.Draw, key: str) -> float:
     truth = values(next(iter(forms.values())), drawn.wi, drawn.wr)
     return float(error_measurement.mean_error(values(forms[key], drawn.wi, drawn.wr), truth, drawn.weight).max())
 
@@ -82,7 +83,7 @@ def test_every_form_is_finite_not_negative_and_reciprocal(name: str) -> None:
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_keys_are_unique_words_and_the_truth_comes_first(name: str) -> None:
-    found = representations(presets()[name], wavelengths(presets()[name]), (TOLERANCE, TOLERANCE))
+    found = catalogue.forms(presets()[name], wavelengths(presets()[name]), (TOLERANCE, TOLERANCE))
     keys = [form.key for form in found]
     assert len(set(keys)) == len(keys)
     assert all(re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", key) for key in keys)
@@ -107,7 +108,7 @@ def test_the_truth_is_that_of_the_references() -> None:
 
     def truth(name: str) -> Any:
         material = presets()[name]
-        return values(representations(material, wavelengths(material), ())[0], wi, wr)[0]
+        return values(catalogue.forms(material, wavelengths(material), ())[0], wi, wr)[0]
 
     plaster = oren_nayar_1994.gaussian(theta_i, theta_r, delta_phi, 0.9, float(radians(30.0)))
     np.testing.assert_allclose(truth("wall-plaster"), sum(plaster), rtol=SLOPES)
@@ -268,7 +269,7 @@ def test_beckmanns_limit_is_that_of_very_rough_surfaces() -> None:
     np.testing.assert_allclose(forms["beckmann"].evaluate(wi, wr)[:, 0], expected, rtol=LIMIT_OF_VERY_ROUGH)
 
 
-def cpu_seconds(form: Representation, wi: Any, wr: Any) -> float:
+def cpu_seconds(form: Form, wi: Any, wr: Any) -> float:
     """The least time of a few calls, on the processor: other programs do not count."""
     wi, wr = np.resize(wi, (20_000, 3)), np.resize(wr, (20_000, 3))
     form.evaluate(wi, wr)
@@ -354,7 +355,7 @@ def test_a_table_of_another_model_says_where_its_numbers_come_from(model: str) -
     forms, _ = of(material, TOLERANCE)
     layout = forms["table-10"].layout
     assert layout is not None
-    table = layout.material
+    table = layout.source
     assert table.model != model
     assert (table.source, table.title, table.assumed, table.note) == (
         preset.source,
@@ -402,4 +403,4 @@ def test_other_models_are_their_own_truth() -> None:
 @pytest.mark.parametrize("tolerance", [0.0, 0.7, float("nan")])
 def test_a_tolerance_that_is_none_is_a_sentence(tolerance: float) -> None:
     with pytest.raises(ValueError, match=r"^tolerance: \S+ is outside \[0.0001, 0.5\]$"):
-        representations(presets()["rolled-brass"], None, (tolerance,))
+        catalogue.forms(presets()["rolled-brass"], None, (tolerance,))

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.forms import timing
-from brdfdb.forms.catalogue import Representation, representations
+from brdfdb.forms import catalogue, timing
+from brdfdb.forms.catalogue import Form
 from brdfdb.forms.timing import CHEAPER, front, times
 from brdfdb.materials import presets
 
@@ -23,16 +23,16 @@ class Machine:
     def __init__(self) -> None:
         self.now, self.calls, self.slow = 0.0, [], itertools.repeat(1.0)
 
-    def form(self, key: str, ns: float, wavelengths: int = 1, dtype: Any = np.float64) -> Representation:
+    def form(self, key: str, ns: float, wavelengths: int = 1, dtype: Any = np.float64) -> Form:
         def evaluate(wi: Any, wr: Any) -> Any:
             assert wi.dtype == wr.dtype == dtype
             self.calls.append((key, len(wi)))
             self.now += 1e-9 * ns * len(wi) * wavelengths * next(self.slow)
             return np.zeros((len(wi), wavelengths), dtype)
 
-        return Representation(key, key, "approximation", key, evaluate, 8, dtype)
+        return Form(key, key, "approximation", key, evaluate, 8, dtype)
 
-    def times(self, *forms: Representation, **how: Any) -> list[timing.Times]:
+    def times(self, *forms: Form, **how: Any) -> list[timing.Times]:
         return times(forms, WI, WI, clock=lambda: self.now, **how)
 
 
@@ -125,7 +125,7 @@ def test_large_tables_are_copied_as_often_as_memory_allows() -> None:
 
 
 def test_a_copy_of_a_table_has_the_same_values_in_other_memory() -> None:
-    forms = {form.key: form for form in representations(presets()["rolled-brass"], None, (0.1,))}
+    forms = {form.key: form for form in catalogue.forms(presets()["rolled-brass"], None, (0.1,))}
     table = forms["table-10"]
     assert table.copied is not None
     np.testing.assert_array_equal(table.copied()(WI, WI), table.evaluate(WI, WI))

@@ -1,20 +1,21 @@
-"""Charts: errors, costs and fronts of the representations of a material, or along a family, in one document."""
+"""Charts: errors, costs and fronts of the forms of a material, or along a family, in one document."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from brdfdb.forms import timing
+from brdfdb.forms import catalogue, timing
 from brdfdb.forms import tradeoff as charting
-from brdfdb.forms.catalogue import Kind, representations
+from brdfdb.forms.catalogue import Kind
 from brdfdb.forms.tradeoff import STEPS, chart, chart_family, ranks
 from brdfdb.forms.tradeoff_document import Chart, FamilyChart
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import Material, presets
+from brdfdb.materials import FunctionSource, Material, presets
 from brdfdb.store.family import Sweep
 from brdfdb.tables.error_measurement import Draw, classes, draw, mean_error
 from brdfdb.tables.places import BANDS_DEG
@@ -25,8 +26,8 @@ def brass() -> Chart:
     return chart(presets()["rolled-brass"], None, (0.1,))
 
 
-def test_a_chart_has_every_representation_with_the_truth_at_no_error(brass: Chart) -> None:
-    forms = representations(presets()["rolled-brass"], None, (0.1,))
+def test_a_chart_has_every_form_with_the_truth_at_no_error(brass: Chart) -> None:
+    forms = catalogue.forms(presets()["rolled-brass"], None, (0.1,))
     assert [point.key for point in brass.points] == [form.key for form in forms]
     truth = brass.points[0]
     assert brass.truth == truth.key == "elliptical"
@@ -74,7 +75,7 @@ def test_errors_are_the_same_in_every_run(brass: Chart, monkeypatch: pytest.Monk
 
 def test_more_forms_can_be_charted_and_steps_are_counted() -> None:
     material, ticks = presets()["scene-plastic-cube"], []
-    also = [form for form in representations(presets()["rolled-brass"], None, ()) if form.key == "lambert"]
+    also = [form for form in catalogue.forms(presets()["rolled-brass"], None, ()) if form.key == "lambert"]
     found = chart(material, np.array([550.0]), (), also=also, tick=lambda: ticks.append(None))
     assert [point.key for point in found.points] == ["sum", "sum-float32", "lambert"]
     assert len(ticks) == STEPS
@@ -104,7 +105,7 @@ KINDS: tuple[Kind, ...] = ("exact", "quadrature", "quadrature", "table")
 def test_a_form_is_compared_with_the_cheapest_rung_that_is_as_accurate() -> None:
     rungs = [{"l1": 0.0, "p99": 0.0}, {"l1": 0.01, "p99": 0.1}, {"l1": 0.02, "p99": 0.2}]
     form = {"l1": 0.015, "p99": 0.5}  # the last rung is less accurate in the mean
-    forms = representations(presets()["rolled-brass"], None, ())[:4]
+    forms = catalogue.forms(presets()["rolled-brass"], None, ())[:4]
     forms = [replace(each, kind=kind) for each, kind in zip(forms, KINDS, strict=True)]
     seconds = np.array([[100.0, 50.0, 10.0, 5.0], [200.0, 120.0, 20.0, 10.0], [100.0, 50.0, 10.0, 5.0]])
     found = charting._against(3, [0, 1, 2], [*rungs, form], seconds, forms)
@@ -207,7 +208,7 @@ def coppers() -> FamilyChart:
 
 
 def test_a_family_has_every_form_with_an_error_at_every_member(coppers: FamilyChart) -> None:
-    forms = representations(copper(SIGMA_0_UM[0]), np.array([550.0]), ())
+    forms = catalogue.forms(copper(SIGMA_0_UM[0]), np.array([550.0]), ())
     assert [curve.key for curve in coppers.curves] == [form.key for form in forms]
     assert coppers.members == [copper(value).name for value in SIGMA_0_UM]
     for curve in coppers.curves:
@@ -235,7 +236,23 @@ def test_beckmanns_limit_gets_better_with_g(coppers: FamilyChart) -> None:
 def test_the_g_of_a_family_is_that_of_eq_79_along_the_normal(coppers: FamilyChart) -> None:
     # Eq. (79) with both cosines 1 and sigma = sigma_0: nothing is hidden along the normal
     expected = [(2.0 * np.pi * value / 0.55 * 2.0) ** 2 for value in SIGMA_0_UM]
-    np.testing.assert_allclose(coppers.g or [], expected, rtol=5e-3)  # three digits
+    assert coppers.diagnostic is not None
+    assert (coppers.diagnostic.symbol, coppers.diagnostic.title) == ("g", "g along the normal, eq. 79")
+    np.testing.assert_allclose(coppers.diagnostic.values, expected, rtol=5e-3)  # three digits
+
+
+def test_a_function_is_charted_by_itself_and_its_tables() -> None:
+    def half_lambert(wi: Any, wr: Any, _: Any) -> Any:
+        return np.full(len(wi), 0.5 / np.pi) + 0.0 * wr[:, 2]
+
+    source = FunctionSource(brdf=half_lambert, name="half", title="Half of Lambert", provenance="a test")
+    found = chart(source, None, (0.1,))
+    assert (found.material, found.model, found.parameters) == ("half", "function", {})
+    assert [point.key for point in found.points] == ["function", "table-10", "table-even", "table-halves"]
+    assert found.truth == "function"
+    assert max(point.l1 for point in found.points) < 1e-6
+    (own,) = [sampler for sampler in found.samplers if sampler.key == "model"]
+    assert own.albedo.variance < 1e-20  # the cosine draws it exactly
 
 
 def test_errors_of_a_member_are_those_of_its_chart(coppers: FamilyChart, monkeypatch: pytest.MonkeyPatch) -> None:

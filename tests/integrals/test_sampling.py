@@ -12,7 +12,7 @@ from brdfdb import models
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals import sampling
 from brdfdb.integrals.quadrature import directional_albedo
-from brdfdb.integrals.sampling import Sample, pdf, sample, ward_pdf, ward_sample
+from brdfdb.integrals.sampling import Sample, pdf, sample
 from brdfdb.models import MODELS
 from brdfdb.reference import ward_1992
 
@@ -54,7 +54,7 @@ DENSITY = 3e-7
 CHANCE = 1e-4  # below this p, samples are not those of the density
 STANDARD_ERRORS = 5.0
 BATCHES, STRATA = 16, (128, 64)  # 2^17 samples in all
-PDF = 2e-14  # ward_pdf against 40 digits, worst measured: 1.6e-14
+PDF = 2e-14  # Ward's density against 40 digits, worst measured: 1.6e-14
 EQ_7 = 2e-15  # samples against eq. 7 as the paper writes it, worst measured: 1.2e-15
 
 every_model = pytest.mark.parametrize("name", MODELS)
@@ -253,7 +253,7 @@ def test_ward_samples_are_those_of_eq_7_with_its_arctan(theta_deg: float) -> Non
     rng = np.random.default_rng(1992)
     u1, u2 = rng.random((2, 20_000))
     wi = light(theta_deg)
-    drawn = ward_sample(u1, u2, wi, rho_s=0.5, alpha_x=0.15, alpha_y=0.4)
+    drawn = sample("ward", u1, u2, wi, rho_d=0.0, rho_s=0.5, alpha_x=0.15, alpha_y=0.4)
     literal = equation_7(u1, u2, wi, 0.15, 0.4, arctan=True)
     np.testing.assert_allclose(drawn.wr, literal, atol=EQ_7)
     f_r = models.ward_vectors(wi, drawn.wr, rho_d=0.0, rho_s=0.5, alpha_x=0.15, alpha_y=0.4)
@@ -272,18 +272,19 @@ def test_eq_7a_as_printed_has_another_density(theta_deg: float) -> None:
     rng = np.random.default_rng(7)
     wi = light(theta_deg)
     u1, u2 = rng.random((2, 200_000))
-    shares = expected_shares(lambda wr: ward_pdf(wi, wr, alpha_x=0.15, alpha_y=0.4))
+    shares = expected_shares(lambda wr: pdf("ward", wi, wr, rho_d=0.0, rho_s=1.0, alpha_x=0.15, alpha_y=0.4))
     right, printed = (equation_7(u1, u2, wi, 0.15, 0.4, arctan=arctan) for arctan in (True, False))
     assert chance(right, shares) > CHANCE
     assert chance(printed, shares) < 1e-100
 
 
-def test_ward_pdf_against_the_reference() -> None:
+def test_the_density_of_wards_lobe_against_the_reference() -> None:
     rng = np.random.default_rng(77)
     theta_i, theta_r = rng.uniform(0.0, 1.5, (2, 200))
     phi_i, phi_r = rng.uniform(-np.pi, np.pi, (2, 200))
     alpha_x, alpha_y = rng.uniform(0.3, 1.5, (2, 200))
-    values = ward_pdf(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), alpha_x=alpha_x, alpha_y=alpha_y)
+    lobe = {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha_x, "alpha_y": alpha_y}
+    values = pdf("ward", unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), **lobe)
     compared = 0
     for value, *arguments in zip(values, theta_i, phi_i, theta_r, phi_r, alpha_x, alpha_y, strict=True):
         expected = float(ward_1992.sampling_pdf(*arguments))
@@ -297,13 +298,14 @@ def test_ward_pdf_against_the_reference() -> None:
 def test_ward_weights_do_not_depend_on_how_narrow_the_lobe_is(alpha: float) -> None:
     # their mean is the albedo, about rho_s cos(theta_i) for narrow lobes
     rng = np.random.default_rng(3)
-    drawn = ward_sample(*stratified(rng, STRATA), light(60.0), rho_s=1.0, alpha_x=alpha, alpha_y=alpha)
-    albedo, _ = directional_albedo("ward", np.deg2rad(60.0), rho_d=0.0, rho_s=1.0, alpha_x=alpha, alpha_y=alpha)
+    lobe = {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
+    drawn = sample("ward", *stratified(rng, STRATA), light(60.0), **lobe)
+    albedo, _ = directional_albedo("ward", np.deg2rad(60.0), **lobe)
     assert np.mean(drawn.weight) == pytest.approx(albedo, abs=2e-3)
     assert drawn.weight.max() < 1.0
 
 
-@pytest.mark.parametrize("function", [sample, pdf, ward_sample, ward_pdf], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("function", [sample, pdf], ids=lambda f: f.__name__)
 def test_the_examples_run(function: Any) -> None:
     runner = doctest.DocTestRunner()
     for example in doctest.DocTestFinder(recurse=False).find(function, globs=dict(vars(sampling))):

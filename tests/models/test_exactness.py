@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from brdfdb import models
-from brdfdb.models._he_torrance_series import diffraction_series
+from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, minnaert, mp, oren_nayar_1994, ward_1992
 
 PAPER_VALUES = Path(__file__).parents[1] / "paper_values"

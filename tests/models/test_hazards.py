@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brdfdb import models
 from brdfdb.geometry import unit_vector
 from brdfdb.models import MODELS
-from brdfdb.models._he_torrance_series import diffraction_series
+from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
 from tests.models.hazards import (
     AGREEMENT,

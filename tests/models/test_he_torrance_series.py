@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from brdfdb import models
-from brdfdb.models import _he_torrance_series as series
-from brdfdb.models._he_torrance_series import diffraction_series
+from brdfdb.models import _diffraction_series as series
+from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
 
 TINY = 1e-280

@@ -7,27 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from brdfdb.audit.findings import (
-    Asymmetry,
-    AuditReport,
-    Energy,
-    EnergyVerdict,
-    Furnace,
-    Jump,
-    Limit,
-    MaterialAudit,
-    ModelEnergy,
-    Nodes,
-    Reciprocity,
-    Sampling,
-    Smoothness,
-    TableEnergy,
-    TableError,
-    UniformBound,
-    Validity,
-    Values,
-    Verdict,
-)
+from brdfdb.audit.energy import Energy
+from brdfdb.audit.finding import Finding, Verdict
+from brdfdb.audit.findings import FINDINGS
+from brdfdb.audit.model_energy import EnergyVerdict, Furnace, ModelEnergy, UniformBound
+from brdfdb.audit.nodes import Nodes
+from brdfdb.audit.reciprocity import Asymmetry, Reciprocity
+from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
+from brdfdb.audit.sampling import Sampling
+from brdfdb.audit.smoothness import Jump, Smoothness
+from brdfdb.audit.table_energy import TableEnergy
+from brdfdb.audit.table_error import TableError
+from brdfdb.audit.validity import Limit, Validity
+from brdfdb.audit.values import Values
 from brdfdb.figure import Curve, Figure, Map, Panel, Picture, Statement, numbers
 
 THETA = np.linspace(0.0, 89.0, 60)
@@ -38,9 +30,8 @@ def report_of(materials: list[MaterialAudit], violations: list[str], **more: Any
     """A report of these materials, of one store at one time."""
     given: dict[str, Any] = {"atlas": [], "gallery": [], "damaged": [], **more}
     when = datetime(2026, 11, 21, 12, 34, tzinfo=UTC)
-    return AuditReport(
-        store=f"the store {ODD}", brdfdb="1.2.3", when=when, materials=materials, violations=violations, **given
-    )
+    given |= {"explanations": explanations(), "materials": materials, "violations": violations}
+    return AuditReport(store=f"the store {ODD}", brdfdb="1.2.3", when=when, **given)
 
 
 def asymmetry(largest: float = 1e-14) -> Asymmetry:
@@ -82,20 +73,23 @@ def sphere(title: str = "sigma 0°", flatness: float = 1.0, side: int = 96) -> P
     return Picture(title=title, radiance=[numbers(row) for row in shade])
 
 
-def material(
-    name: str, verdict: EnergyVerdict = "conserves", strength: float = 0.7, *, spectral: bool = False
-) -> MaterialAudit:
-    """All findings on a material that reflects so much at normal incidence."""
+def energy(verdict: EnergyVerdict, strength: float, spectral: bool) -> Energy:
+    """The energy of a material that reflects so much at normal incidence."""
     wavelengths = [400.0, 500.0, 600.0, 700.0] if spectral else None
     scale = np.linspace(0.8, 1.0, 4) if spectral else np.ones(1)
     rows = strength * (1.0 + (THETA / 90.0) ** 3 / 5.0)[:, np.newaxis] * scale
-    albedo = [numbers(row) for row in rows]
-    dirac = [numbers(np.zeros(scale.size)) for _ in THETA]
-    overall: Verdict = "passes" if verdict in ("conserves", "loses") else verdict  # type: ignore[assignment]
     reason = f"reflects up to {rows.max():.4g} at 89 degrees"
-    shared = {"theta_i_deg": THETA.tolist(), "wavelength_nm": wavelengths, "albedo": albedo, "specular": dirac}
-    shared |= {"max_albedo": float(rows.max()), "max_at_theta_i_deg": 89.0, "exceeds_1_from_theta_i_deg": None}
-    shared |= {"max_at_wavelength_nm": 700.0 if spectral else None, "reason": reason}
+    shared: dict[str, Any] = {
+        "theta_i_deg": THETA.tolist(),
+        "wavelength_nm": wavelengths,
+        "albedo": [numbers(row) for row in rows],
+        "specular": [numbers(np.zeros(scale.size)) for _ in THETA],
+        "max_albedo": float(rows.max()),
+        "max_at_theta_i_deg": 89.0,
+        "exceeds_1_from_theta_i_deg": None,
+        "max_at_wavelength_nm": 700.0 if spectral else None,
+        "reason": reason,
+    }
     furnace = Furnace(
         lossless="rho = 1",
         wavelength_nm=wavelengths,
@@ -108,33 +102,69 @@ def material(
         largest_at_theta_i_deg=89.0,
     )
     bound = UniformBound(wavelength_nm=[400.0, 700.0], largest=[0.6, 0.7], preset=[0.5, 0.65], keeps=True)
-    p = [0.31, 0.0004, None]
+    model = ModelEnergy(
+        **shared,
+        integration_error=1e-9,
+        hemispherical=numbers(0.7 * scale),
+        furnace=furnace,
+        bound_on_a=bound if spectral else None,
+        verdict=verdict,
+    )
+    table = TableEnergy(
+        **shared,
+        integration_error=1e-4,
+        hemispherical=numbers(0.69 * scale),
+        bands=None,
+        exceeds_1_beyond_error_from_theta_i_deg=None,
+        verdict=overall(verdict),
+    )
+    return Energy(model=model, table=table, verdict=verdict, reason=reason)
+
+
+def overall(verdict: EnergyVerdict) -> Verdict:
+    """The verdict on a material whose energy has one."""
+    return "passes" if verdict in ("conserves", "loses") else verdict  # type: ignore[return-value]
+
+
+def table_error() -> TableError:
+    return TableError(
+        stated_p99=0.0093,
+        fresh_p99=0.0091,
+        specular=None,
+        directions=9,
+        contradictions=[],
+        disagreements=0,
+        worst=[],
+        bias=-0.002,
+        likeness="",
+        maps=[error_map()],
+        verdict="passes",
+    )
+
+
+def sampling(spectral: bool) -> Sampling:
+    return Sampling(
+        samples=100_000,
+        phi_i_deg=0.0,
+        theta_i_deg=[0.0, 45.0, 80.0],
+        wavelength_nm=550.0 if spectral else None,
+        chi_square_p=[0.31, 0.0004, None],
+        largest_weight=[1.2, 1.5, 4.0],
+        weight_spread=[0.1, 0.2, 0.5],
+        monte_carlo=[0.7, 0.69, 0.6],
+        monte_carlo_error=[1e-3] * 3,
+        quadrature=[0.7, 0.69, 0.6],
+        verdict="passes",
+    )
+
+
+def others() -> tuple[Finding, ...]:
+    """Findings that are the same on each material."""
     limit = {"quantity": "alpha", "valid": "at most 0.2", "words": "up to about 0.2", "where": "section 4"}
-    return MaterialAudit(
-        material=name,
-        revision="r000001",
-        model="he_torrance" if spectral else "ward",
-        energy=Energy(
-            model=ModelEnergy(
-                **shared,
-                integration_error=1e-9,
-                hemispherical=numbers(0.7 * scale),
-                furnace=furnace,
-                bound_on_a=bound if spectral else None,
-                verdict=verdict,
-            ),
-            table=TableEnergy(
-                **shared,
-                integration_error=1e-4,
-                hemispherical=numbers(0.69 * scale),
-                bands=None,
-                exceeds_1_beyond_error_from_theta_i_deg=None,
-                verdict=overall,
-            ),
-            verdict=verdict,
-            reason=reason,
-        ),
-        reciprocity=Reciprocity(
+    limits = [Limit(value="0.05", standing="inside", **limit), Limit(value="0.2", standing="at the edge", **limit)]
+    values = {"count": 720, "looked_up": 5000, "smallest": 0.0123, "negative": 0, "not_finite": 0}
+    return (
+        Reciprocity(
             model_random=asymmetry(),
             model_lobe=asymmetry(3e-13),
             table_random=asymmetry(),
@@ -142,55 +172,31 @@ def material(
             table_nodes=asymmetry(0.0),
             verdict="passes",
         ),
-        values=Values(
-            count=720,
-            looked_up=5000,
-            smallest=0.0123,
-            negative=0,
-            not_finite=0,
-            positivity="passes",
-            finiteness="passes",
-        ),
-        nodes=Nodes(compared=360, count=720, wrong=0, stored=None, expected=None, beside=[], verdict="passes"),
-        smoothness=Smoothness(
+        Values(**values, positivity="passes", finiteness="passes", verdict="passes"),
+        Nodes(compared=360, count=720, wrong=0, stored=None, expected=None, beside=[], verdict="passes"),
+        Smoothness(
             model=[Jump(seam="alpha = 45°", crossings=9, largest=2e-7, where="45°, 45°", tolerance=1e-5)],
             table=[Jump(seam="delta_phi = 180°", crossings=9, largest=1e-4, where="theta_i 80°", tolerance=1e-2)],
             verdict="passes",
         ),
-        table_error=TableError(
-            stated_p99=0.0093,
-            fresh_p99=0.0091,
-            specular=None,
-            directions=9,
-            contradictions=[],
-            disagreements=0,
-            worst=[],
-            bias=-0.002,
-            likeness="",
-            maps=[error_map()],
-            verdict="passes",
-        ),
-        sampling=Sampling(
-            samples=100_000,
-            phi_i_deg=0.0,
-            theta_i_deg=[0.0, 45.0, 80.0],
-            wavelength_nm=550.0 if spectral else None,
-            chi_square_p=p,
-            largest_weight=[1.2, 1.5, 4.0],
-            weight_spread=[0.1, 0.2, 0.5],
-            monte_carlo=[0.7, 0.69, 0.6],
-            monte_carlo_error=[1e-3] * 3,
-            quadrature=[0.7, 0.69, 0.6],
-            verdict="passes",
-        ),
-        validity=Validity(
-            limits=[
-                Limit(value="0.05", standing="inside", **limit),
-                Limit(value="0.2", standing="at the edge", **limit),
-            ],
-            standing="at the edge",
-        ),
-        verdict=overall,
+        table_error(),
+        Validity(limits=limits, verdict="at the edge"),
+    )
+
+
+def material(
+    name: str, verdict: EnergyVerdict = "conserves", strength: float = 0.7, *, spectral: bool = False
+) -> MaterialAudit:
+    """All findings on a material that reflects so much at normal incidence."""
+    found = {each.key: each for each in (energy(verdict, strength, spectral), *others(), sampling(spectral))}
+    findings = {key: found[key] for key in FINDINGS}
+    return MaterialAudit(
+        material=name,
+        revision="r000001",
+        model="he_torrance" if spectral else "ward",
+        findings=findings,
+        sentences=[sentence for each in findings.values() for sentence in each.sentences()],
+        verdict=overall(verdict),
     )
 
 

@@ -13,9 +13,8 @@ from xml.etree import ElementTree
 import jsonschema
 import pytest
 
-from brdfdb.forms import timing
+from brdfdb.forms import catalogue, timing
 from brdfdb.forms import tradeoff as charting
-from brdfdb.forms.catalogue import representations
 from brdfdb.forms.tradeoff_document import (
     Between,
     Chart,
@@ -302,7 +301,7 @@ def test_a_family_of_a_recipe_is_charted_as_a_whole(brushed: Path, tmp_path: Pat
     assert whole.members == [f"brushed-{number:03d}" for number in range(1, 7)]
     assert member.material == "brushed-003"  # a member named by itself is a chart of its own
     material = load(brushed / "recipe.toml").jobs()[0].material
-    assert {curve.key for curve in whole.curves} == {form.key for form in representations(material, None, (0.2,))}
+    assert {curve.key for curve in whole.curves} == {form.key for form in catalogue.forms(material, None, (0.2,))}
     assert [(p.key, p.l1) for p in member.points] == [(curve.key, curve.l1[2]) for curve in whole.curves]
     assert whole.between is None
     printed, progress = capsys.readouterr()

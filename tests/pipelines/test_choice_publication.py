@@ -12,7 +12,7 @@ import brdfdb
 from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.table_error import table_error_of
 from brdfdb.materials import presets
-from brdfdb.store.staging import make_store
+from brdfdb.store.marker import make_store
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
@@ -77,8 +77,8 @@ def test_a_table_that_answers_is_left_whatever_it_was_chosen_for(store: Path) ->
     choice_publication.build(store, {NAME: with_reason(layout(10), "table", "spheres")})
     same = choice_publication.build(store, {NAME: with_reason(layout(10), "table", "clay-vase")})
     assert same[NAME] == Built("r000001", "r000001 of the store is this table")
-    retitled = layout(10).material.model_copy(update={"title": "Another"})
-    other = choice_publication.build(store, {NAME: replace(layout(10), material=retitled)})
+    retitled = layout(10).source.model_copy(update={"title": "Another"})
+    other = choice_publication.build(store, {NAME: replace(layout(10), source=retitled)})
     assert other[NAME].revision == "r000002"
 
 

@@ -15,7 +15,8 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import presets
-from brdfdb_pipelines import cli, terminal
+from brdfdb_pipelines import terminal
+from brdfdb_pipelines.exit_codes import INTERRUPTED
 from tests.pipelines.command import Captured, run
 
 COMMANDS = [
@@ -70,23 +71,22 @@ def test_a_command_without_a_store_does_not_take_one(command: str, capsys: Captu
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    ("command", "interrupted_at", "said"),
     [
-        ("render clay-vase", "interrupted"),
-        ("chart foam", "interrupted"),
-        ("choose clay-vase", "interrupted"),
-        ("choose clay-vase --build somewhere", "interrupted; what was published before stays"),
+        ("render clay-vase", "scene_file.load", "interrupted"),
+        ("chart foam", "chart.run", "interrupted"),
+        ("choose clay-vase", "choose.run", "interrupted"),
+        ("choose clay-vase --build somewhere", "choose.run", "interrupted; published tables stay"),
     ],
 )
 def test_ctrl_c_says_that_tables_stay_only_where_some_are_published(
-    command: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+    command: str, interrupted_at: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     def interrupted(*_arguments: object, **_options: object) -> None:
         raise KeyboardInterrupt
 
-    name, *arguments = command.split()
-    monkeypatch.setattr(f"brdfdb_pipelines.{name}.run", interrupted)
-    assert run(name, *arguments) == cli.INTERRUPTED
+    monkeypatch.setattr(f"brdfdb_pipelines.{interrupted_at}", interrupted)
+    assert run(*command.split()) == INTERRUPTED
     assert capsys.readouterr() == ("", f"brdfdb: {said}\n")
 
 
@@ -138,7 +138,7 @@ def test_list_presets_needs_no_store_and_cuts_nothing(tmp_path: Path, capsys: Ca
     assert run("list", "--presets", "--store", tmp_path / "none") == 0
     out, _ = capsys.readouterr()
     lines = out.splitlines()
-    assert lines[0].strip() == "59 built-in materials"
+    assert lines[0].strip() == "59 presets"
     assert [line.split()[0] for line in lines[2:]] == list(presets())
     assert all(material.source in out for material in presets().values())
 
@@ -289,7 +289,7 @@ def test_a_bad_wavelength_is_named(wavelength: str, built: Path, capsys: Capture
         (("lookup", "foam", 0, 0, 0), "the following arguments are required: PHI_R"),
         (("lookup",), "the following arguments are required: NAME, THETA_I, PHI_I, THETA_R, PHI_R"),
         (("build", "--jobs", "0"), "argument --jobs: 0 is not at least 1"),
-        (("build", "--jobs", "many"), "argument --jobs: invalid number value: 'many'"),
+        (("build", "--jobs", "many"), "argument --jobs: 'many' is not a whole number"),
         (("build", "--jobs", "1025"), "argument --jobs: 1025 is more than 1024"),
         (("render", "spheres", "--width", "4097"), "argument --width: 4097 is more than 4096"),
         (("build", "--memory", "lots"), "argument --memory: 'lots' is not a number of bytes, such as 500MB or 2GB"),

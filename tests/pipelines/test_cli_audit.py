@@ -14,7 +14,7 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.materials import Material
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
@@ -53,10 +53,10 @@ def spoil(dataset: xr.Dataset, index: tuple[int, ...], value: float) -> xr.Datas
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda d: spoil(d, (1, 2, 1), -0.1), "1 negative values"),
-        (lambda d: spoil(d, (1, 2, 1), np.nan), "1 values are not finite"),
-        (lambda d: spoil(d, (1, 2, 1), np.inf), "1 values are not finite"),
-        (lambda d: spoil(d, (1, 2, 1), 0.1), "not reciprocal"),
+        (lambda d: spoil(d, (1, 2, 1), -0.1), "1 values are negative; the smallest f_r is −0.1 1/sr"),
+        (lambda d: spoil(d, (1, 2, 1), np.nan), "1 of 48 stored values and 0 lookups are not finite"),
+        (lambda d: spoil(d, (1, 2, 1), np.inf), "1 of 48 stored values and 0 lookups are not finite"),
+        (lambda d: spoil(d, (1, 2, 1), 0.1), "not reciprocal: asymmetry up to 0.228, of 1·10⁻⁶ allowed"),
         (lambda d: spoil(d, (1, 2, 1), 0.1), "1 of 48 stored values are not the model's, such as 0.1 for 0.1592"),
         (lambda d: d.assign(brdf=d["brdf"] * np.float32(2.5)), "the table reflects 1.25 of what arrives at 0 degrees"),
     ],
@@ -141,8 +141,8 @@ def test_white_oren_nayar_violates_whatever_its_recipe_says_and_can_be_accepted(
     assert "2 audited: 1 pass, 0 exceed 1 as their published parameters are known to, 1 exceed 1 as --allow" in out
     document = json.loads((store / "audit-part.json").read_text(encoding="utf-8"))
     entry = next(entry for entry in document["materials"] if entry["material"] == "white")
-    assert (entry["verdict"], entry["energy"]["verdict"]) == ("accepted excess", "accepted excess")
-    assert entry["energy"]["table"]["max_albedo"] == pytest.approx(1.046, abs=0.003)
+    assert (entry["verdict"], entry["findings"]["energy"]["verdict"]) == ("accepted excess", "accepted excess")
+    assert entry["findings"]["energy"]["table"]["max_albedo"] == pytest.approx(1.046, abs=0.003)
     assert document["violations"] == []
 
 

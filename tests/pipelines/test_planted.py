@@ -13,7 +13,7 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.audit import sampling
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb_pipelines import cli
 
 DEFINED = """\
@@ -123,10 +123,10 @@ def jumping(dataset: xr.Dataset) -> xr.Dataset:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (scaled, "its error (p99) is "),
+        (scaled, "99 of 100 fresh values are within "),
         (not_reciprocal, "not reciprocal"),
-        (negative, " negative values"),
-        (not_a_number, " values are not finite"),
+        (negative, " values are negative; the smallest f_r is "),
+        (not_a_number, " lookups are not finite"),
         (jumping, "the table jumps by "),
     ],
     ids=lambda value: value.__name__ if callable(value) else "",
@@ -154,15 +154,12 @@ def test_a_dark_table_that_is_too_bright_is_caught_by_its_error_alone(sound: Pat
     publish_dataset(root, "dark", scaled(xr.open_zarr(brdfdb.open(sound).path("dark")).load()))
     assert audited(root, "dark", report) == 1
     entry = entry_of(report)
-    assert entry["energy"]["table"]["max_albedo"] < 0.5
-    assert (
-        entry["energy"]["table"]["verdict"]
-        == entry["reciprocity"]["verdict"]
-        == entry["smoothness"]["verdict"]
-        == "passes"
-    )
-    assert entry["table_error"]["verdict"] == "violates"
-    assert entry["table_error"]["fresh_p99"] == pytest.approx(0.5, abs=0.05)
+    assert entry["findings"]["energy"]["table"]["max_albedo"] < 0.5
+    found = entry["findings"]
+    words = [found["energy"]["table"]["verdict"], found["reciprocity"]["verdict"], found["smoothness"]["verdict"]]
+    assert words == ["passes", "passes", "passes"]
+    assert found["table_error"]["verdict"] == "violates"
+    assert found["table_error"]["fresh_p99"] == pytest.approx(0.5, abs=0.05)
 
 
 def test_a_mirror_part_that_is_too_weak_is_named(
@@ -173,9 +170,9 @@ def test_a_mirror_part_that_is_too_weak_is_named(
     dataset["specular_reflectance"].values[...] *= np.float32(0.98)
     publish_dataset(root, name, dataset)
     assert audited(root, name, report) == 1
-    assert f"{name}: its error (p99) is " in (out := capsys.readouterr().out)
-    assert "; its mirror part is off by up to 0.0" in out
-    assert entry_of(report)["table_error"]["specular"] == pytest.approx(0.02 * 0.2, abs=0.02)
+    assert f"{name}: 99 of 100 fresh values are within " in (out := capsys.readouterr().out)
+    assert "; the specular part is off by up to 0.0" in out
+    assert entry_of(report)["findings"]["table_error"]["specular"] == pytest.approx(0.02 * 0.2, abs=0.02)
 
 
 def test_a_table_that_is_none_of_ours_is_named_and_the_others_are_audited(
@@ -201,5 +198,5 @@ def test_a_sampler_that_weighs_too_much_is_named(
 
     monkeypatch.setattr(sampling, "sample", heavier)
     assert audited(sound, "dark", tmp_path / "report.json") == 1
-    said = "dark: samples of the model do not have the density or the albedo that they should\n"
+    said = "dark: samples of the model do not have the density or the albedo that they should; "
     assert said in capsys.readouterr().out

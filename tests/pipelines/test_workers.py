@@ -47,7 +47,7 @@ def test_a_process_that_is_killed_is_one_sentence_and_the_build_resumes(recipe: 
     with workers.processes(1) as at:
         at.executor.submit(kill)
         said = r"^the workers are gone, killed or out of memory; build again to resume$"
-        with pytest.raises(ChildProcessError, match=said):
+        with pytest.raises(workers.WorkersError, match=said):
             build(load(recipe), tmp_path, at)
     with workers.threads(1) as at:
         assert {b.state for b in build(load(recipe), tmp_path, at)} == {"published"}
@@ -166,7 +166,9 @@ def test_without_dask_the_scheduler_option_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert cli.main(["build", str(recipe), "--store", str(tmp_path), "--scheduler", "tcp://127.0.0.1:9"]) == 2
-    assert capsys.readouterr().err == "brdfdb: --scheduler needs dask: pip install 'brdfdb[dask]'\n"
+    assert capsys.readouterr().err == (
+        "brdfdb: distributed is not installed; it comes with pip install 'brdfdb[dask]'\n"
+    )
 
 
 def test_a_cluster_without_workers_is_said_and_waited_for(

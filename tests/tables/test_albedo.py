@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from brdfdb.integrals import quadrature
 from brdfdb.materials import Material
 from brdfdb.tables import albedo, error_measurement
-from brdfdb.tables.albedo import QUADRATURE_TOLERANCE, THETA_I_DEG, directional_albedo, material_of
+from brdfdb.tables.albedo import QUADRATURE_TOLERANCE, THETA_I_DEG, directional_albedo
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
@@ -79,7 +79,7 @@ def test_the_quadrature_keeps_to_its_tolerance_against_one_that_is_much_finer(
 def test_the_albedo_is_that_of_the_model(kind: str) -> None:
     table = table_of(kind)
     found = directional_albedo(table)
-    material = material_of(table)
+    material = table.source
     np.testing.assert_array_equal(found.theta_i_deg, THETA_I_DEG)
     for at in (0, 9, 16):
         theta_i, phi_i = np.deg2rad(found.theta_i_deg[at]), np.deg2rad(found.phi_i_deg)

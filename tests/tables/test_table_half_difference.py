@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from brdfdb.geometry import unit_vector
-from brdfdb.tables.albedo import material_of
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
-from tests.audit.test_audit import ISOTROPIC, material
+from tests.audit.a_table import ISOTROPIC, material
 from tests.tables.test_albedo import KINDS, planned, table_of
 
 # Azimuths are folded, which rounds them: measured 1.8e-13, of f_r far below the offset of its logarithm
@@ -118,7 +117,7 @@ def test_the_dirac_part_of_a_planned_table_has_nodes_of_its_own() -> None:
     table = planned("he_torrance", {"sigma_0_um": 0.02, "tau_um": 5.0, "a": 0.1}, wavelengths)
     assert table.specular_theta_deg is not None
     assert table.specular_theta_deg.size > 400
-    spec, arguments = material_of(table).spec, material_of(table).arguments(550.0)
+    spec, arguments = table.source.spec, table.source.arguments(550.0)
     theta_i = np.deg2rad(np.linspace(0.0, 85.0, 1000))  # beyond, the shadows of this surface grow within 0.1 degrees
     assert spec.specular is not None
     exact = spec.specular(theta_i, **{name: arguments[name] for name in spec.specular_parameters})
@@ -128,7 +127,7 @@ def test_the_dirac_part_of_a_planned_table_has_nodes_of_its_own() -> None:
 @KINDS
 def test_the_stated_error_has_the_shape_of_the_values(kind: str) -> None:
     table = table_of(kind)
-    found = table.lookup(*ANGLES, with_error=True)
+    found = table.lookup_with_error(*ANGLES)
     assert found.error.shape == found.brdf.shape
     assert (found.error > 0.0).all()
     np.testing.assert_array_equal(found.brdf, table.lookup(*ANGLES))

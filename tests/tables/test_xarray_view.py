@@ -10,8 +10,8 @@ import zarr
 import brdfdb
 from brdfdb.geometry import directions_from_half_difference
 from brdfdb.materials import presets
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.tabulation import tabulate
@@ -76,9 +76,7 @@ def test_nodes_hold_the_model_and_nothing_below_the_horizon(name: str, store: St
     if layout.spectra is not None:
         return  # three parts of four wavelengths are not the model
     for w, wavelength in enumerate(spectrum):
-        expected = layout.material.spec.evaluate(
-            theta_i, phi_i, theta_r, phi_r, **layout.material.arguments(wavelength)
-        )
+        expected = layout.source.spec.evaluate(theta_i, phi_i, theta_r, phi_r, **layout.source.arguments(wavelength))
         found = table.brdf if wavelength is None else table.brdf[..., w]
         np.testing.assert_allclose(found, expected, rtol=ROUNDING, atol=1e-3 * ROUNDING)
     below = np.maximum(theta_i, theta_r) > np.pi / 2

@@ -1,7 +1,7 @@
 // Elements: made in one line, and the chips that say a verdict in colour and in words.
 
 const LEVELS = {
-  passes: "good", conserves: "good", inside: "good", loses: "calm", "at the edge": "calm", unknown: "calm",
+  passes: "good", conserves: "good", inside: "good", loses: "calm", "at the edge": "calm", unknown: "calm", "not judged": "calm",
   outside: "note", gains: "note", "known published excess": "note", "accepted excess": "note",
   violates: "bad", damaged: "bad",
 };
@@ -17,6 +17,9 @@ export function element(tag, properties = {}, ...children) {
 export function chip(verdict) {
   return element("span", { className: `chip ${LEVELS[verdict] ?? "none"}` }, verdict ?? "not audited");
 }
+
+/** Whether a verdict is a plain pass. */
+export const isGood = (verdict) => LEVELS[verdict] === "good";
 
 /** A number with three digits, as people write it. */
 export function short(value) {

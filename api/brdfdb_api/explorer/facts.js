@@ -1,10 +1,9 @@
 // What is known of a material, beside the picture: parameters, stated error, what the audit found, links.
 
-import { chip, element, percent, short } from "./dom.js";
+import { chip, element, isGood, percent, short } from "./dom.js";
 import { nearest } from "./series.js";
 
 const aside = document.getElementById("facts");
-const FINDINGS = { energy: "energy", reciprocity: "reciprocity", nodes: "stored values", smoothness: "smoothness", table_error: "stated error", sampling: "sampling" };
 
 /** Fill the side with what the service says of a material. */
 export function show(info) {
@@ -55,21 +54,24 @@ export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
   into.textContent = `within ${percent(Math.max(...around))}`;
 }
 
+/** Every finding of the audit, in words where it is no plain pass; the report has the words of the papers. */
 function audited(audit) {
-  const found = Object.entries(FINDINGS).filter(([key]) => key in audit.findings);
+  const found = audit.sentences.filter(({ quote }) => !quote);
   return [
     pairs([
-      ["verdict", chip(audit.verdict)], ...found.map(([key, words]) => [words, chip(audit.findings[key])]),
-      ["range of the model", chip(audit.validity)],
+      ["verdict", chip(audit.verdict)],
+      ...found.map(({ title, word, text }) => [title.toLowerCase(), chip(word), isGood(word) ? "" : text]),
     ]),
-    element("p", { className: "quiet" }, audit.reason),
     ...(audit.current ? [] : [element("p", {}, `This is of revision ${audit.revision}, not of the current one.`)]),
   ];
 }
 
 function links({ links: to, audit }) {
   const wanted = [["material", to.self], ["albedo", to.albedo], ...(audit ? [["audit", to.audit]] : []),
-    ["table (zarr)", to["download.zarr"]], ["slice (EXR)", to["slice.exr"]]];
+    ["table (zarr)", to["download.zarr"]], ...Object.entries(to).flatMap(([key, href]) => {
+      const [kind, format] = key.split("/"); // a file of every format that the service exports
+      return kind === "export" ? [[format.toUpperCase(), href]] : [];
+    })];
   return wanted.map(([text, href]) => element("a", { href: href.replace(/^\//, "") }, text));
 }
 

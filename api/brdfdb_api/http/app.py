@@ -1,4 +1,4 @@
-"""The application: its factory, and which exception becomes which status."""
+"""The application and its factory."""
 
 from __future__ import annotations
 
@@ -10,19 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import orjson
 from fastapi import FastAPI
-from fastapi.exceptions import RequestValidationError
-from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.requests import Request
-from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb_api.http.errors import HANDLED, PROBLEM_JSON, handler, problem_of
 from brdfdb_api.http.files import files
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.http.pages import pages
-from brdfdb_api.http.responses import PROBLEM_JSON, REVISION, RequestError, problem_response
+from brdfdb_api.http.responses import REVISION
 from brdfdb_api.http.routes import LARGE_AT_ONCE, answer_point, router
 from brdfdb_api.http.views import views
 from brdfdb_api.serving.settings import Settings
@@ -39,7 +35,7 @@ phi_r - phi_i = 0 looks back towards the light, 180 is the side of the mirror di
 application/problem+json document with one sentence."""
 
 
-# Only JSON is compressed: numbers as bytes hardly shrink, files are compressed already
+# Media types that are not compressed: binary numbers hardly shrink, and files are compressed already
 UNCOMPRESSED = (*("application/x-npy", "application/octet-stream", "application/zip"), "image/*", "text/*")
 
 
@@ -53,7 +49,7 @@ class Application(FastAPI):
         await self.outermost(scope, receive, send)
 
     async def routed(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """What lies behind the edge."""
+        """Run the router, which lies behind the edge."""
         await super().__call__(scope, receive, send)
 
     def openapi(self) -> dict[str, Any]:
@@ -89,7 +85,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
         description=DESCRIPTION,
         generate_unique_id_function=lambda route: route.name,
         lifespan=_warmed,
-        redirect_slashes=False,  # what is not an address is 404
+        redirect_slashes=False,  # an unknown address is 404
     )
     app.state.settings = settings or Settings.from_environment()
     app.state.shelf = Shelf(app.state.settings, store)
@@ -98,11 +94,8 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     app.include_router(views)
     app.include_router(files)
     app.include_router(pages)
-    for kind in (
-        *(RequestError, RequestValidationError, UnknownMaterialError, UnknownRevisionError, StoreError),
-        *(HTTPException, Exception),
-    ):
-        app.add_exception_handler(kind, problem)
+    for kind in HANDLED:
+        app.add_exception_handler(kind, handler)
     app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=5, exclude_content_types=UNCOMPRESSED)
     limit, level = app.state.settings.max_body_bytes, app.state.settings.log_level
     app.outermost = Edge(app.routed, limit=limit, lookup=answer_point, failed=problem_of, log_level=level)
@@ -119,40 +112,14 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
 
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
-    """While the application runs: a thread that decodes what lists show first."""
+    """Run a thread that finds the colours of the first page of a list, until the application ends."""
     threading.Thread(target=app.state.shelf.warm, daemon=True).start()
     yield
     app.state.shelf.close()
 
 
-async def problem(_: Request, error: Exception) -> Response:
-    """What the router makes of an exception."""
-    return problem_of(error)
-
-
-def problem_of(error: Exception) -> Response:
-    """The one table from exceptions to statuses."""
-    match error:
-        case RequestError():
-            return problem_response(error.status, str(error), error.parameter)
-        case RequestValidationError():
-            first = error.errors()[0]
-            parameter = str(first["loc"][1])  # ("query", name, ...)
-            return problem_response(422, f"{parameter}: {first['msg'].lower()}", parameter)
-        case UnknownMaterialError():
-            return problem_response(404, str(error), closest=error.closest)
-        case UnknownRevisionError():
-            return problem_response(404, str(error), "revision")
-        case StoreError():
-            return problem_response(503, str(error))
-        case HTTPException():
-            return problem_response(error.status_code, error.detail, headers=dict(error.headers or {}))
-        case _:
-            return problem_response(500, "the server failed on this request; its log says why")
-
-
 def openapi_json() -> bytes:
-    """The OpenAPI document as it stands in ``api/openapi.json``."""
+    """Return the OpenAPI document as it stands in ``api/openapi.json``."""
     return orjson.dumps(create_app(Settings()).openapi(), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
 
 

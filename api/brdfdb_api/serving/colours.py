@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 Colour = Literal["xyz", "linear-srgb"]
 
-_WAVELENGTHS = 1000  # of a colour that is asked for: its weights take the square of their number
-_LIGHT_DEG = 45.0  # of the swatch
-_SAMPLES = 256  # of what it leaves
+_WAVELENGTHS = 1000  # largest number of wavelengths of a colour: the cost of its weights grows with the square
+_LIGHT_DEG = 45.0  # theta_i of the swatch
+_SAMPLES = 256  # viewers of the swatch
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
@@ -47,8 +47,8 @@ def weights(colour: Colour, wavelength_nm: NDArray[np.float64] | None, illuminan
         )
     # a grey material is a flat spectrum: any wavelengths sum to the same
     at = (380.0, 780.0) if wavelength_nm is None else tuple(wavelength_nm.tolist())
-    found = (xyz_weights if colour == "xyz" else srgb_weights)(at, illuminant)
-    return found.sum(axis=0, keepdims=True) if wavelength_nm is None else found
+    weights_at = (xyz_weights if colour == "xyz" else srgb_weights)(at, illuminant)
+    return weights_at.sum(axis=0, keepdims=True) if wavelength_nm is None else weights_at
 
 
 def coloured(values: Floats, of: NDArray[np.float64], *, grey: bool) -> Floats:
@@ -58,22 +58,21 @@ def coloured(values: Floats, of: NDArray[np.float64], *, grey: bool) -> Floats:
 
 
 def swatch(table: Table) -> str:
-    """The colour of a table under D65 as ``#rrggbb``: of what it leaves of a light at 45 degrees, Dirac part included.
+    """Return the colour of a table under D65 as ``#rrggbb``: albedo for light at 45 degrees, specular part included.
 
-    Grey where its wavelengths make no colour. To look at: the albedo is a mean over few directions.
+    Grey where its wavelengths make no colour. For display only: the albedo is a mean over few directions.
     """
-    from brdfdb.integrals.sampling import sample
-    from brdfdb.tables.albedo import material_of
+    from brdfdb.integrals.sampling import DIFFUSE, directions, mixture_density
 
-    material = material_of(table)
     wi = unit_vector(radians(_LIGHT_DEG), 0.0)
     number = np.arange(_SAMPLES) + 0.5
-    spectrum = material.arguments(table.wavelength_nm)
-    middle = {name: np.ravel(value)[np.size(value) // 2] for name, value in spectrum.items()}
-    drawn = sample(material.spec, number / _SAMPLES, number * _GOLDEN % 1.0, wi, **middle)
-    cosine = np.maximum(drawn.wr[:, 2], 0.0)
-    weight = np.divide(cosine, drawn.pdf, out=np.zeros(_SAMPLES), where=drawn.pdf > 0.0) / _SAMPLES
-    f_r = np.asarray(table.lookup_vectors(wi, drawn.wr)).reshape(_SAMPLES, -1)
+    middle = None if table.wavelength_nm is None else np.array(table.wavelength_nm[table.wavelength_nm.size // 2])
+    lobe = None if table.source is None else table.source.lobe(wi[2], middle)
+    wr = directions(lobe or DIFFUSE, number / _SAMPLES, number * _GOLDEN % 1.0, wi)
+    density = mixture_density(lobe or DIFFUSE, wi, wr)
+    cosine = np.maximum(wr[:, 2], 0.0)
+    weight = np.divide(cosine, density, out=np.zeros(_SAMPLES), where=density > 0.0) / _SAMPLES
+    f_r = np.asarray(table.lookup_vectors(wi, wr)).reshape(_SAMPLES, -1)
     reflected = weight @ f_r + np.ravel(table.specular_reflectance(radians(_LIGHT_DEG)))
     if table.wavelength_nm is not None and covers_visible(table.wavelength_nm):
         rgb = reflected @ srgb_weights(tuple(table.wavelength_nm.tolist()))

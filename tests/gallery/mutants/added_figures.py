@@ -166,7 +166,7 @@ HE_TORRANCE = (
 
 # Ward
 
-right_density, right_sample = sampling.mixture_density, sampling.ward_sample
+right_density, right_sample = sampling.mixture_density, sampling.sample
 
 
 def without_arctan(u1: Any, angle: Any, i: Any, lobe: Any) -> Any:
@@ -184,10 +184,10 @@ def of_half_vector(lobe: Any, i: Any, r: Any) -> Any:
     return right_density(lobe, i, r) * 4.0 * h_i
 
 
-def by_cosine(u1: Any, u2: Any, wi: Any, *, rho_s: Any, alpha_x: Any, alpha_y: Any) -> Any:
+def by_cosine(_: Any, u1: Any, u2: Any, wi: Any, **surface: Any) -> Any:
     """Return samples that follow the cosine of the viewer."""
     wr = unit_vector(np.arcsin(np.sqrt(u1)), 2.0 * np.pi * u2)
-    f_r = ward_vectors(wi, wr, rho_d=0.0, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
+    f_r = ward_vectors(wi, wr, **surface)
     return sampling.Sample(wr, wr[..., 2] / np.pi, np.pi * f_r)
 
 

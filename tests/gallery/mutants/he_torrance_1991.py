@@ -12,8 +12,8 @@ import numpy as np
 from brdfdb import fresnel
 from brdfdb.models import he_torrance_1991 as model
 from brdfdb.models import he_torrance_1991_limits as limits
+from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
-from brdfdb.models._he_torrance_series import diffraction_series
 from tests.gallery.mutants import added_figures
 from tests.gallery.mutants.mutation import Mutant
 

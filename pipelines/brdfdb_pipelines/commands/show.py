@@ -1,17 +1,14 @@
-"""Looking into a store from the command line: list, which loads little, show and lookup."""
+"""The command `brdfdb show`."""
 
 from __future__ import annotations
 
+import argparse
 import itertools
-import json
-import math
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import brdfdb
-from brdfdb.errors import ParameterError, StoreError
-from brdfdb_pipelines import family_listing, terminal
+from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 
 if TYPE_CHECKING:
     from brdfdb.materials.provenance import Assumption
@@ -20,60 +17,62 @@ if TYPE_CHECKING:
     from brdfdb.tables.stated_error import Error
     from brdfdb.tables.table import Table
 
+HELP = "Show parameters, sources, grid, albedo and files of a material, or a family."
+
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
 
-def list_store(root: Path, *, snapshot: str | None = None) -> None:
-    """Print a line for each material of a store, or of a snapshot of it, and for each family."""
-    store = brdfdb.open(root, snapshot=snapshot)
-    rows, damaged, incomplete = [], [], []
-    for name in store:
-        try:
-            head = store.summary(name)
-            if not (head["title"] and head["model"]):  # the pointer of a whole table has both
-                incomplete.append(f"{name} {head['revision']} {store.metadata(name).gaps}")
-        except StoreError as error:
-            damaged.append(str(error))
-            continue
-        rows.append((name, head["title"], head["model"], terminal.error(head.get("error_p99")), head["revision"]))
-    terminal.print_table(
-        f"{len(rows)} materials in {root}",
-        ("material", "title", "model", "error (p99)", "revision"),
-        rows,
-        numbers=("error (p99)",),
-    )
-    for sentence in incomplete:
-        print(terminal.plain(sentence))
-    damaged += family_listing.print_list(store)
-    if damaged:
-        raise StoreError("; ".join(damaged))
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the material and the store."""
+    parser.add_argument("name", metavar="NAME")
+    add_store(parser)
+    add_snapshot(parser)
 
 
-def list_presets() -> None:
-    """Print a line for each built-in material."""
-    from brdfdb.materials import presets
+def run(options: argparse.Namespace) -> int:
+    """Print what the store, or a snapshot of it, knows of a material or a family."""
+    root: Path = options.store
+    store = brdfdb.open(root, snapshot=options.snapshot)
+    if options.name not in store and options.name in store.families():
+        _print_family(store.family(options.name))
+    else:
+        _print_material(store[options.name], store.path(options.name))
+    return 0
 
-    rows = [(m.name, m.title, m.model, m.source) for m in presets().values()]
-    terminal.print_table(f"{len(rows)} built-in materials", ("material", "title", "model", "source"), rows)
 
+def _print_material(table: Table, path: Path) -> None:
+    from brdfdb_pipelines import terminal
 
-def show(root: Path, name: str, *, snapshot: str | None = None) -> None:
-    """Print what a store, or a snapshot of it, knows of a material or a family."""
-    store = brdfdb.open(root, snapshot=snapshot)
-    if family_listing.is_family(store, name):
-        family = store.family(name)
-        family_listing.show(family)
-        _print_error(family.error)
-        family_listing.show_worst(family)
-        return
-    table = store[name]
-    print(terminal.plain("\n".join([f"{name}: {table.metadata.title or 'no title'}", *_origin(table.metadata)])))
-    if table.metadata.gaps:
-        print(terminal.plain(f"  incomplete  the table {table.metadata.gaps}"))
+    metadata = table.metadata
+    print(terminal.plain("\n".join([f"{table.name}: {metadata.title or 'no title'}", *_origin(metadata)])))
+    if metadata.gaps:
+        print(terminal.plain(f"  incomplete  the table {metadata.gaps}"))
     _print_grid(table)
     _print_error(table.error)
     _print_albedo(table)
-    print(f"  files       {store.path(name)} (zarr v3, {terminal.size(_stored(store.path(name)))})")
+    print(f"  files       {path} (zarr v3, {terminal.size(_stored(path))})")
+
+
+def _print_family(family: Family) -> None:
+    from brdfdb_pipelines import terminal
+
+    record = family.record
+    print(terminal.plain(f"{record.name}: {record.title}"))
+    print(f"  model       {record.model}")
+    print(f"  tables      {len(record.members)}, {record.members[0]} to {record.members[-1]}")
+    print("  over")
+    for written, values in record.axes.items():
+        print(f"    {written:<16}{len(values)} values, {values[0]:g} to {values[-1]:g}")
+    how = record.interpolation
+    what = "f_r" if how.offset is None else f"logarithms of f_r + {how.offset:.3g}/sr"
+    along = ", ".join({0: f"ln {x}", 1: x}.get(power, f"{x}^{power}") for x, power in how.powers.items())
+    print(f"  between     {how.method} in {what} along {along}")
+    print(f"  measured    {how.reason}")
+    _print_error(family.error)
+    at = ", ".join(f"{x} {value:g}" for x, value in record.worst.parameters.items())
+    print(f"  worst       {terminal.error(record.worst.p99)} at {at}, of {record.points} sets of parameters")
+    if record.specular_error is not None:
+        print(f"  specular    within {record.specular_error:.3g} of the model's reflectance")
 
 
 def _origin(metadata: TableMetadata) -> list[str]:
@@ -116,7 +115,9 @@ def _assumption(parameter: str, assumption: Assumption) -> list[str]:
 
 
 def _print_grid(table: Table) -> None:
-    """Axes, how many values are stored and how, and how f_r comes of them."""
+    """Print the axes, the number and precision of the stored values, and how f_r is reconstructed from them."""
+    from brdfdb_pipelines import terminal
+
     metadata, wavelength = table.metadata, table.wavelength_nm
     print("  grid")
     for axis, nodes in table.axes_deg.items():
@@ -140,7 +141,7 @@ def _print_grid(table: Table) -> None:
 
 
 def _interpolation(table: Table) -> str:
-    """How a table is interpolated, in words."""
+    """Return the interpolation of a table in words."""
     how = table.interpolation
     what = "f_r" if how.power == 0.0 else f"f_r (cos theta_i cos theta_r)^{how.power:g}"
     if table.uniform is not None:
@@ -151,8 +152,9 @@ def _interpolation(table: Table) -> str:
 
 
 def _print_error(error: Error | None) -> None:
-    """Print the error that is stated: overall, and by bands and places at the wavelength where it is largest."""
+    """Print the stated error: overall, and by bands and places at the wavelength where it is largest."""
     from brdfdb.tables.places import RINGS_DEG
+    from brdfdb_pipelines import terminal
 
     if error is None:
         print("  error       not measured")
@@ -171,10 +173,10 @@ def _print_error(error: Error | None) -> None:
     print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
     for label, bands in rows:
         print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in bands))
-    said = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
-    said += [] if error.between is None else ["between: any wavelength between those of the table"]
-    if said:
-        print(f"    {'; '.join(said)}")
+    notes = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
+    notes += [] if error.between is None else ["between: any wavelength between those of the table"]
+    if notes:
+        print(f"    {'; '.join(notes)}")
         print("    98 of 100 values are within these limits, and within those next to the horizon, if given")
     if error.places is None:
         return
@@ -184,95 +186,27 @@ def _print_error(error: Error | None) -> None:
 
 
 def _print_albedo(table: Table) -> None:
-    """Directional albedo of the table at a few angles: the first, the middle and the last wavelength."""
+    """Print the directional albedo [1] of the table at a few angles, at the first, middle and last wavelength."""
     import numpy as np
 
     from brdfdb.geometry import radians
     from brdfdb.tables.albedo import directional_albedo
 
-    found = directional_albedo(table)
-    diffuse = found.mean
+    albedo = directional_albedo(table)
+    diffuse = albedo.mean
     wavelength = table.wavelength_nm
     columns = sorted({0, diffuse.shape[1] // 2, diffuse.shape[1] - 1})
     print(
         "  albedo, as tabulated "
         + "".join(f"{f'{angle:g}°':>9}" for angle in ALBEDO_ANGLES_DEG)
-        + "  (theta_i; with the Dirac part)"
+        + "  (theta_i; with the specular part)"
     )
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
-        values = np.interp(ALBEDO_ANGLES_DEG, found.theta_i_deg, diffuse[:, w]) + specular
+        values = np.interp(ALBEDO_ANGLES_DEG, albedo.theta_i_deg, diffuse[:, w]) + specular
         print(f"    {'grey' if at is None else f'{at:g} nm':<10}" + "".join(f"{value:9.4f}" for value in values))
 
 
 def _stored(path: Path) -> int:
     return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-
-
-def lookup(
-    root: Path,
-    name: str,
-    angles_deg: Sequence[float],
-    wavelength_nm: Sequence[float] | None,
-    *,
-    settings: Sequence[str] = (),
-    as_json: bool,
-    with_error: bool = False,
-    snapshot: str | None = None,
-) -> None:
-    """Print f_r at theta_i, phi_i, theta_r, phi_r [degree], and the Dirac part's reflectance if the model has one.
-
-    With the error that the table states beside each value, if asked for. Of a family, at the parameters of `settings`,
-    each ``name=value``.
-    """
-    import numpy as np
-
-    from brdfdb.geometry import radians
-    from brdfdb.tables.grids import ANISOTROPIC_AXES
-
-    for angle, value in zip(ANISOTROPIC_AXES, angles_deg, strict=True):
-        if not math.isfinite(value):
-            raise ParameterError(angle, f"{value} is not a number of degrees", value)
-        if angle.startswith("theta") and not 0.0 <= value <= 180.0:
-            raise ParameterError(angle, f"{value:g} is outside [0, 180] degrees", value, (0.0, 180.0))
-    store = brdfdb.open(root, snapshot=snapshot)
-    source: Table | Family
-    point: dict[str, Any] = {}
-    if family_listing.is_family(store, name):
-        source = store.family(name)
-        written = family_listing.written(source, settings)
-        point = family_listing.in_units_of_the_model(source, written)
-        head: dict[str, Any] = {"family": name, "parameters": written}
-        dirac = source.record.specular_error is not None
-    else:
-        source = store[name]
-        if settings:
-            raise ParameterError(f"--set {settings[0]}", f"{name} is a material, whose parameters are fixed")
-        head = {"material": name, "revision": source.revision}
-        dirac = source.specular is not None
-    theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
-    error = None
-    if with_error:
-        stated = source.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, with_error=True, **point)
-        brdf, error = (np.atleast_1d(values) for values in stated)
-    else:
-        brdf = np.atleast_1d(source.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm, **point))
-    specular = np.atleast_1d(source.specular_reflectance(theta_i, wavelength_nm, **point))
-    wavelengths = source.wavelength_nm if wavelength_nm is None else wavelength_nm
-    if as_json:
-        answer = {
-            **head,
-            "unit": "1/sr",
-            "wavelength_nm": None if wavelengths is None else list(wavelengths),
-            "brdf": brdf.tolist(),
-            **({} if error is None else {"error": error.tolist()}),
-            "specular_reflectance": specular.tolist(),
-        }
-        print(json.dumps(answer))
-        return
-    for index, value in enumerate(brdf):
-        at = "" if wavelengths is None else f"{wavelengths[index]:g} nm  "
-        mirrored = f"  and {specular[index]:.6g} of the light in the exact mirror direction" if dirac else ""
-        within = "" if error is None else f" +- {error[index]:.2g}"
-        print(f"{at}{value:.6g}{within} /sr{mirrored}")

@@ -1,0 +1,97 @@
+"""Errors of the HTTP layer: the one table from exceptions to statuses, and application/problem+json (RFC 9457)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import Any
+
+import orjson
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+
+from brdfdb.errors import BrdfdbError, StoreError, UnknownMaterialError, UnknownRevisionError
+
+PROBLEM_JSON = "application/problem+json"
+
+# Phrases of RFC 9110; those of http.HTTPStatus differ between versions of Python
+_TITLES = {413: "Content Too Large", 422: "Unprocessable Content"}
+
+
+class RequestError(BrdfdbError):
+    """A refused request.
+
+    Parameters
+    ----------
+    status : int
+        The HTTP status.
+    detail : str
+        The sentence.
+    parameter : str, optional
+        The parameter that is at fault.
+    """
+
+    def __init__(self, status: int, detail: str, parameter: str | None = None) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.parameter = parameter
+
+
+# Classes that the router hands to `handler`. Exception is what the server logs with its traceback, so that the other
+# errors of brdfdb are not named here: in a service they are bugs
+HANDLED = (
+    *(RequestError, RequestValidationError, UnknownMaterialError, UnknownRevisionError, StoreError),
+    *(HTTPException, Exception),
+)
+
+
+async def handler(_: Request, error: Exception) -> Response:
+    """Return the answer of the router to an exception."""
+    return problem_of(error)
+
+
+def problem_of(error: Exception) -> Response:
+    """Return the answer to an exception.
+
+    A ParameterError that reaches this table is about a parameter that no client gave, so it is a bug: 500.
+    """
+    match error:
+        case RequestError():
+            return _problem(error.status, str(error), error.parameter)
+        case RequestValidationError():
+            first = error.errors()[0]
+            parameter = str(first["loc"][1])  # ("query", name, ...)
+            return _problem(422, f"{parameter}: {first['msg'].lower()}", parameter)
+        case UnknownMaterialError():
+            return _problem(404, str(error), closest=error.closest)
+        case UnknownRevisionError():
+            return _problem(404, str(error), "revision")
+        case StoreError():
+            return _problem(503, str(error))
+        case HTTPException():
+            return _problem(error.status_code, error.detail, headers=dict(error.headers or {}))
+        case _:
+            return _problem(500, "the server failed on this request; its log says why")
+
+
+def _problem(
+    status: int,
+    detail: str,
+    parameter: str | None = None,
+    closest: Sequence[str] | None = None,
+    headers: dict[str, str] | None = None,
+) -> Response:
+    """Return an error as application/problem+json, with the members `parameter` and `closest` where they are known."""
+    problem: dict[str, Any] = {
+        "type": "about:blank",
+        "title": _TITLES.get(status) or HTTPStatus(status).phrase,
+        "status": status,
+        "detail": detail.encode(errors="backslashreplace").decode(),  # paths may have what is no text
+    }
+    if parameter is not None:
+        problem["parameter"] = parameter
+    if closest is not None:
+        problem["closest"] = list(closest)
+    return Response(orjson.dumps(problem), status_code=status, media_type=PROBLEM_JSON, headers=headers)

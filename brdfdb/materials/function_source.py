@@ -1,0 +1,335 @@
+"""Sources that are functions: a callable of the user, and the record of it that a table keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from brdfdb._elementary import COS_HORIZON
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished, radians, unit_vector
+from brdfdb.lobes import Lobe
+from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Text
+from brdfdb.materials.source import Evaluate, Lossless
+from brdfdb.parameters import Floats
+
+# (wi, wr, wavelength_nm) of shapes (N, 3), (N, 3) and (L,) -> f_r [1/sr] of shape (N, L); of a grey function the
+# wavelengths are None and the shape may be (N,)
+Function = Callable[[Floats, Floats, NDArray[np.float64] | None], ArrayLike]
+
+_LOBE_SHARE = 0.5  # of the reflected light: a lobe whose share nobody knows is looked for by half of the directions
+_CHECKED, _CHECKED_UP_TO_DEG, _SEED = 64, 85.0, 1967  # pairs of directions at which symmetries are checked
+_SAME = 1e-6  # relative difference that rounding may leave between values that a symmetry makes the same
+
+
+def _two_widths(alpha: Any) -> Any:
+    """Return the widths along x and y; one number stands for both."""
+    return (alpha, alpha) if isinstance(alpha, int | float) else alpha
+
+
+class FunctionRecord(BaseModel):
+    """All that a table keeps of the function that it was tabulated from: the function itself cannot be stored.
+
+    Attributes
+    ----------
+    name : str
+        Slug of lower-case words joined by hyphens.
+    title : str
+        A line for people.
+    provenance : str
+        Where the function comes from: a paper, a measurement, a program and its version.
+    wavelengths_nm : tuple of float or None
+        Wavelengths [nm] at which it is tabulated, increasing; it holds between the first and the last. None: grey.
+    anisotropic : bool
+        Set if f_r changes when the surface is turned about its normal.
+    elliptical : bool
+        Set if an anisotropic f_r has the symmetry of an ellipse with axes along x and y: tables are a quarter as large.
+    grazing_pole : bool
+        Set if f_r grows without bound as a direction reaches 90 degrees.
+    alpha : (float, float) or None
+        Widths [1] of the lobe around the mirror direction, along x and y: root mean square slopes of its half vectors,
+        times the square root of 2. One number stands for both. None: no lobe.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: str = Field(pattern=NAME_PATTERN, max_length=MOST_NAME)
+    title: Text
+    provenance: Text
+    wavelengths_nm: tuple[float, ...] | None = Field(default=None, min_length=1)
+    anisotropic: bool = False
+    elliptical: bool = False
+    grazing_pole: bool = False
+    alpha: Annotated[
+        tuple[Annotated[float, Field(gt=0.0, le=10.0)], Annotated[float, Field(gt=0.0, le=10.0)]] | None,
+        BeforeValidator(_two_widths),
+    ] = None
+
+    @field_validator("wavelengths_nm")
+    @classmethod
+    def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
+            raise ParameterError(
+                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
+            )
+        return wavelengths_nm
+
+    @model_validator(mode="after")
+    def _check_symmetry(self) -> FunctionRecord:
+        if self.elliptical and not self.anisotropic:
+            raise ParameterError("elliptical", "an isotropic function has more symmetry than an ellipse; leave it out")
+        if not self.anisotropic and self.alpha is not None and self.alpha[0] != self.alpha[1]:
+            raise ParameterError("alpha", f"{self.alpha} differs along x and y; an isotropic function has one width")
+        return self
+
+    @property
+    def spectral(self) -> bool:
+        """Return True if f_r depends on the wavelength."""
+        return self.wavelengths_nm is not None
+
+    def lobe(self, cos_i: Floats, _wavelength_nm: NDArray[np.float64] | None = None) -> Lobe | None:
+        """Return the lobe of lights with a cosine, which is the same for all; None without one."""
+        if self.alpha is None:
+            return None
+        share, alpha_x, alpha_y = (np.full(np.shape(cos_i), value) for value in (_LOBE_SHARE, *self.alpha))
+        return Lobe(share, alpha_x, alpha_y)
+
+    def document(self) -> dict[str, Any]:
+        """Return the record as JSON; `brdfdb.materials.source_of` reads it."""
+        return {"function": FunctionRecord.model_dump(self, mode="json", include=set(FunctionRecord.model_fields))}
+
+
+class FunctionSource(FunctionRecord):
+    """A function of the user as a source: it is tabulated, audited, charted and rendered like a material.
+
+    Parameters
+    ----------
+    brdf : callable
+        ``brdf(wi, wr, wavelength_nm)`` gives f_r [1/sr] without the cosine, finite and not below 0. `wi` and `wr` are
+        float64 arrays of shape (N, 3): unit vectors of light and viewer, above the horizon. `wavelength_nm` is an
+        array of shape (L,) [nm], and the result has the shape (N, L); for a grey function it is None, and the result
+        has the shape (N,) or (N, 1).
+    **record
+        As in `FunctionRecord`: name, title and provenance, and what is known of the function.
+
+    Raises
+    ------
+    ParameterError
+        If a value of the record is not allowed; if the function gives another shape or a value that is negative or not
+        finite; if it is not reciprocal, or lacks a symmetry that tables make use of. It is called at 64 pairs of
+        directions to find out.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> white = FunctionSource(
+    ...     brdf=lambda wi, wr, wavelength_nm: np.full(len(wi), 1.0 / np.pi),
+    ...     name="white", title="White", provenance="Lambert's law",
+    ... )
+    >>> round(float(white.lookup(0.3, 0.0, 0.2, 1.0)), 6)
+    0.31831
+    """
+
+    brdf: Function = Field(exclude=True, repr=False)
+
+    def __init__(self, *, brdf: Function, **record: Any) -> None:
+        try:
+            super().__init__(**{"brdf": brdf, **record})
+        except ValidationError as error:
+            raise _refusal(error) from None
+        self._check_function()
+
+    @property
+    def has_lobe(self) -> bool:
+        """Return True if the widths of a lobe are known."""
+        return self.alpha is not None
+
+    @property
+    def has_specular(self) -> bool:
+        """Return False: a specular part is no function of two directions."""
+        return False
+
+    @property
+    def uniform(self) -> None:
+        """Return None: no part is known to be the same in all directions."""
+        return None
+
+    @property
+    def lossless(self) -> Lossless | None:
+        """Return None: it is not known what absorbs."""
+        return None
+
+    def without_uniform(self) -> FunctionSource:
+        """Return the function as it is."""
+        return self
+
+    def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return the same wavelengths [nm]; None if grey."""
+        return wavelength_nm if self.spectral else None
+
+    def brdf_at(self, wavelength_nm: NDArray[np.float64] | None) -> Evaluate:
+        """Return f_r [1/sr] at wavelengths (L,) [nm] as a function of unit vectors (N, 3): shape (N, L), L = 1 if grey.
+
+        Raises
+        ------
+        ParameterError
+            If a wavelength is outside the range of the function, or if it needs wavelengths and gets none.
+        """
+        at = self._wavelengths(wavelength_nm)
+        return lambda wi, wr: self._values(checked_vectors(wi, wr), wi, wr, at)
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Return f_r [1/sr] of the function itself, as `brdfdb.tables.table.Table.lookup` gives that of its table.
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r : array_like [rad]
+            Directions of light and viewer; they broadcast.
+        wavelength_nm : float or array_like (M,) [nm], optional
+            Within the range of the function; by default its wavelengths. Grey functions take any.
+
+        Returns
+        -------
+        array [1/sr]
+            In the shape of the angles, with a last axis for a list of wavelengths.
+
+        Raises
+        ------
+        ParameterError
+            If an angle or a wavelength is outside its range, or the function gives what no f_r can be.
+        """
+        angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
+        light, viewer = unit_vector(angles.theta_i, angles.phi_i), unit_vector(angles.theta_r, angles.phi_r)
+        return self._shaped(angles, light, viewer, wavelength_nm)
+
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return f_r [1/sr] as by `lookup` at unit vectors of light and viewer (..., 3)."""
+        vectors = checked_vectors(wi, wr)
+        return self._shaped(vectors, vectors.w_i, vectors.w_r, wavelength_nm)
+
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return 0, shaped as by `lookup`."""
+        wavelengths = () if wavelength_nm is None else np.shape(wavelength_nm)
+        return np.zeros((*np.shape(theta_i), *wavelengths))[()]
+
+    def refractive_indices(self, _wavelength_nm: NDArray[np.float64] | None) -> None:
+        """Return None: the function is not made from refractive indices."""
+        return
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes that a table has of the function."""
+        return {"title": self.title, "material": self.name, "source": self.provenance}
+
+    def _wavelengths(self, wavelength_nm: ArrayLike | None) -> NDArray[np.float64] | None:
+        """Return wavelengths as an array of one axis, or none; ParameterError if the function does not hold there."""
+        if self.wavelengths_nm is None:
+            return None
+        at = np.asarray(self.wavelengths_nm if wavelength_nm is None else wavelength_nm, dtype=np.float64).reshape(-1)
+        low, high = self.wavelengths_nm[0], self.wavelengths_nm[-1]
+        bad = ~((at >= low) & (at <= high))
+        if np.any(bad):
+            first = float(at[bad][0])
+            raise ParameterError(
+                "wavelength_nm", f"{first:g} is outside [{low:g}, {high:g}] nm of {self.name}", first, (low, high)
+            )
+        return at
+
+    def _shaped(self, given: Directions, light: Floats, viewer: Floats, wavelength_nm: ArrayLike | None) -> Floats:
+        """Return values in the shape of directions, with a last axis for a list of wavelengths."""
+        values = self._values(given, light, viewer, self._wavelengths(wavelength_nm))
+        if wavelength_nm is None:
+            return values if self.spectral else values[..., 0][()]
+        if np.ndim(wavelength_nm) == 0:
+            return values[..., 0][()]
+        return values if self.spectral else np.repeat(values, np.size(wavelength_nm), axis=-1)
+
+    def _values(self, given: Directions, light: Floats, viewer: Floats, at: NDArray[np.float64] | None) -> Floats:
+        """Return f_r (..., L) at unit vectors that broadcast, 0 below the horizon; ParameterError if one is no f_r."""
+        light, viewer = np.broadcast_arrays(light, viewer)
+        wi, wr = (np.array(w.reshape(-1, 3), dtype=np.float64) for w in (light, viewer))
+        whole = ~np.isnan(wi + wr).any(axis=1)
+        above = whole & (wi[:, 2] >= 0.0) & (wr[:, 2] >= 0.0)
+        count = 1 if at is None else at.size
+        values = np.where(whole, 0.0, np.nan)[:, np.newaxis].repeat(count, axis=1)
+        wi, wr = wi[above], wr[above]
+        for w in (wi, wr):
+            w[:, 2] = np.maximum(w[:, 2], COS_HORIZON)
+        f_r = np.asarray(self.brdf(wi, wr, at))
+        allowed = [(len(wi), count)] + ([(len(wi),)] if at is None else [])
+        if f_r.shape not in allowed or f_r.dtype.kind not in "iuf":
+            raise ParameterError(
+                "brdf",
+                f"{self.name} gave {f_r.dtype} of shape {f_r.shape} for {len(wi)} pairs of directions"
+                f"{'' if at is None else f' at {count} wavelengths'}; numbers of shape {allowed[0]} are needed",
+            )
+        f_r = f_r.astype(np.float64).reshape(len(wi), count)
+        bad = ~(np.isfinite(f_r) & (f_r >= 0.0))
+        if np.any(bad):
+            row, column = np.argwhere(bad)[0]
+            raise ParameterError(
+                "brdf",
+                f"{self.name} gave {f_r[row, column]:g} for the light {_vector(wi[row])} and the viewer "
+                f"{_vector(wr[row])}; f_r must be finite and not below 0",
+                f_r[row, column],
+            )
+        values[above] = f_r
+        return finished(values.reshape(*light.shape[:-1], count), given, trailing=1)
+
+    def _check_function(self) -> None:
+        """Raise a ParameterError if the function is not reciprocal, or lacks a symmetry that tables make use of."""
+        rng = np.random.default_rng(_SEED)
+        least = np.cos(radians(_CHECKED_UP_TO_DEG))
+        theta = np.arccos(rng.uniform(least, 1.0, (2, _CHECKED)))
+        phi = rng.uniform(0.0, 2.0 * np.pi, (2, _CHECKED))
+        turn = rng.uniform(0.0, 2.0 * np.pi, _CHECKED)
+
+        def at(phi_i: Floats, phi_r: Floats) -> tuple[Floats, Floats]:
+            return unit_vector(theta[0], phi_i), unit_vector(theta[1], phi_r)
+
+        wi, wr = at(*phi)
+        others = {"is not reciprocal: light and viewer exchanged": (wr, wi)}
+        if not self.anisotropic:
+            others["is anisotropic, which it does not say: the surface turned"] = at(*(phi + turn))
+        if self.elliptical:
+            others["has not the symmetry of an ellipse: the surface turned by 180 degrees"] = at(*(phi + np.pi))
+        if self.elliptical or not self.anisotropic:
+            others["is not its own mirror image: -phi for phi"] = at(*-phi)
+        brdf = self.brdf_at(None if self.wavelengths_nm is None else np.array(self.wavelengths_nm))
+        value = brdf(wi, wr)
+        for what, directions in others.items():
+            other = brdf(*directions)
+            bad = np.abs(other - value) > _SAME * np.maximum(other, value)
+            if np.any(bad):
+                row, column = np.argwhere(bad)[0]
+                raise ParameterError(
+                    "brdf",
+                    f"{self.name} {what} gives {other[row, column]:.6g} 1/sr in place of {value[row, column]:.6g} for "
+                    f"the light {_vector(wi[row])} and the viewer {_vector(wr[row])}",
+                )
+
+
+def _vector(w: Floats) -> str:
+    return f"({', '.join(f'{x:.4g}' for x in w)})"
+
+
+def _refusal(error: ValidationError) -> ParameterError:
+    """Return the first finding of pydantic as an error that names the parameter."""
+    first = error.errors(include_url=False)[0]
+    parameter = str(first["loc"][0]) if first["loc"] else ""
+    if first["type"] == "missing":
+        return ParameterError(parameter, "missing; a function needs a name, a title and a provenance")
+    if first["type"] != "value_error":
+        return ParameterError(parameter, f"{first['input']!r}: {first['msg']}", first["input"])
+    ours = first["ctx"]["error"]
+    return ours if isinstance(ours, ParameterError) else ParameterError(parameter, str(ours), first["input"])

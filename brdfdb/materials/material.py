@@ -1,0 +1,429 @@
+"""Model materials: a model, its parameters, and where each number comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import ErrorDetails
+
+from brdfdb.errors import MaterialError, ParameterError
+from brdfdb.geometry import degrees
+from brdfdb.lobes import Lobe
+from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
+from brdfdb.materials.source import Evaluate, Lossless
+from brdfdb.materials.written_parameters import completed, from_file, written_name
+from brdfdb.models import MODELS
+from brdfdb.parameters import Floats, ModelSpec
+from brdfdb.spectra import refractive_index
+
+_SOURCED = ("refractive_index", "wavelengths_nm")  # fields that may have a source of their own, besides parameters
+
+# Number of directions above which a call for each wavelength is faster than one call for all: each is one row of the
+# kernel then. Measured for copper at 8 wavelengths, one call and separate calls: 278 and 637 ns a value at 256
+# directions, 293 and 204 ns at 16384
+_MANY = 2000
+
+
+class Material(BaseModel):
+    """One material: a model, its parameters in the units of the model, and where each number comes from.
+
+    Attributes
+    ----------
+    name : str
+        Slug of lower-case words joined by hyphens.
+    model : str
+        Key of `brdfdb.models.MODELS`.
+    parameters : dict
+        All parameters of the model in its units (angles in radians), those left out filled in by their defaults.
+    source : str
+        Paper and table, figure or section of every value that is not in `sources`.
+    sources : dict
+        Where single values come from, where that is another place.
+    assumed : dict of str to Assumption
+        Values that the paper does not print, by parameter: why ours was chosen, and what the alternatives would give.
+    refractive_index : str or None
+        ``shelf/book/page`` for `brdfdb.spectra.refractive_index`; spectral models have one, no other model has.
+    wavelengths_nm : tuple of float or None
+        The wavelengths [nm] that the paper's parameters are stated for; None if the model may be used at any.
+    known_excess : KnownExcess or None
+        Set where the published parameters are known to break energy conservation.
+
+    Raises
+    ------
+    ValueError
+        For an unknown model, a missing, unknown or out-of-range parameter, a source or an assumption about a value
+        that the material does not have, a known excess that rests on an assumption.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = Field(pattern=NAME_PATTERN, max_length=MOST_NAME)
+    title: Text
+    model: str
+    parameters: dict[str, Number]
+    source: Text
+    sources: dict[str, Text] = {}
+    assumed: dict[str, Assumption] = {}
+    note: Words = ""
+    refractive_index: str | None = Field(default=None, pattern=r"^[^/]+/[^/]+/[^/]+$")
+    wavelengths_nm: Annotated[tuple[float, ...], Field(fail_fast=True)] | None = Field(default=None, min_length=1)
+    known_excess: KnownExcess | None = None
+
+    # Arguments of the model that stand for those of the material: of its lossless form, and without its uniform part
+    _changed: dict[str, float] = PrivateAttr(default_factory=dict)
+
+    @classmethod
+    def from_table(cls, name: str, table: Mapping[str, Any]) -> Material:
+        """Return the material that a table of a TOML file describes; MaterialError if it describes none.
+
+        Parameters, and their names in sources and assumed, are read as `file_parameters` writes them: angles in
+        degrees, under names that end in ``_deg``.
+        """
+        fields = {**table, "name": name}
+        model, parameters = table.get("model"), table.get("parameters", {})
+        try:
+            if isinstance(model, str) and model in MODELS and isinstance(parameters, Mapping):
+                fields["parameters"] = from_file(MODELS[model], parameters)
+                own = {written_name(parameter): parameter.name for parameter in MODELS[model].parameters}
+                most = len(own) + len(_SOURCED)
+                for field in ("sources", "assumed"):
+                    if isinstance(stated := table.get(field), Mapping):
+                        if len(stated) > most:  # pydantic would keep an error for each of a million
+                            raise ParameterError(
+                                field,
+                                f"{len(stated)} are given, {model} has {most} values at most",
+                                len(stated),
+                                (0, most),
+                            )
+                        fields[field] = {own.get(written, written): value for written, value in stated.items()}
+            return cls.model_validate(fields)
+        except ValidationError as error:
+            (field, sentence), *others = map(_field_and_sentence, error.errors())
+            sentences = [sentence, *(f"{field}: {sentence}" for field, sentence in others)]
+            raise MaterialError(name, field, "; ".join(sentences)) from None
+        except ParameterError as error:
+            raise MaterialError(name, error.parameter, error.sentence, error.value, error.allowed) from None
+
+    @field_validator("model")
+    @classmethod
+    def _check_model(cls, model: str) -> str:
+        if model not in MODELS:
+            raise ParameterError("model", f"{model!r} is not one of {', '.join(MODELS)}", model, tuple(MODELS))
+        return model
+
+    @field_validator("parameters")
+    @classmethod
+    def _check_parameters(cls, parameters: dict[str, Number], info: ValidationInfo) -> dict[str, Number]:
+        if "model" not in info.data:  # an unknown model has been reported already
+            return parameters
+        return completed(MODELS[info.data["model"]], parameters)
+
+    @field_validator("wavelengths_nm")
+    @classmethod
+    def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
+            raise ParameterError(
+                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
+            )
+        return wavelengths_nm
+
+    @model_validator(mode="after")
+    def _check_provenance(self) -> Material:
+        if self.spectral and self.refractive_index is None:
+            raise ParameterError("refractive_index", f"the spectral model {self.model} needs an entry, shelf/book/page")
+        if not self.spectral and (self.refractive_index, self.wavelengths_nm) != (None, None):
+            raise ParameterError(
+                "refractive_index, wavelengths_nm", f"the model {self.model} is not spectral and has neither"
+            )
+        values = (*self.parameters, *_SOURCED)
+        alternatives = (
+            name
+            for assumption in self.assumed.values()
+            for other in assumption.alternatives
+            for name in other.parameters
+        )
+        written = (*map(written_name, self.spec.parameters), *_SOURCED)
+        for field, names, allowed in (
+            ("sources", self.sources, values),
+            ("assumed", self.assumed, values),
+            ("assumed alternatives", alternatives, written),
+        ):
+            for name in names:
+                if name not in allowed:
+                    raise ParameterError(field, f"{name!r} is not one of {', '.join(allowed)}", name, tuple(allowed))
+        for name, assumption in self.assumed.items():
+            if self.known_excess is not None and assumption.decides is not False:
+                raise ParameterError("known_excess", f"it rests on {name!r}, which is assumed and not published")
+        return self
+
+    @property
+    def spec(self) -> ModelSpec:
+        """The specification of the material's model."""
+        return MODELS[self.model]
+
+    @property
+    def provenance(self) -> str:
+        """Return the paper and table, figure or section of the values."""
+        return self.source
+
+    @property
+    def spectral(self) -> bool:
+        """Return True if f_r depends on the wavelength."""
+        return self.spec.spectral
+
+    @property
+    def anisotropic(self) -> bool:
+        """Return True if f_r changes when the surface is turned about its normal."""
+        if self.spec.anisotropic is not None:
+            return self.spec.anisotropic(self.parameters)
+        axes = self.spec.lobe_axes
+        return axes is not None and self.parameters[axes[0]] != self.parameters[axes[1]]
+
+    @property
+    def elliptical(self) -> bool:
+        """Return True if f_r has the symmetry of an ellipse, with axes along x and y."""
+        return self.spec.lobe_axes is not None
+
+    @property
+    def grazing_pole(self) -> bool:
+        """Return True if f_r grows without bound as a direction reaches 90 degrees."""
+        return self.spec.grazing_pole
+
+    @property
+    def has_lobe(self) -> bool:
+        """Return True if the model has a lobe around the mirror direction."""
+        return self.spec.lobe is not None
+
+    @property
+    def has_specular(self) -> bool:
+        """Return True if the model has a specular part (a Dirac delta)."""
+        return self.spec.specular is not None
+
+    @property
+    def uniform(self) -> float | None:
+        """Return the part of f_r [1/sr] that is the same in all directions; None of a model that names no such part."""
+        return None if self.spec.uniform is None else self.parameters[self.spec.uniform] / np.pi
+
+    def without_uniform(self) -> Material:
+        """Return the material without its uniform part."""
+        return self if self.spec.uniform is None else self._with({self.spec.uniform: 0.0})
+
+    @property
+    def lossless(self) -> Lossless | None:
+        """Return the material with nothing absorbed; None of a model that no parameters make so."""
+        if self.spec.lossless is None:
+            return None
+        changes = self.spec.lossless(self.parameters)
+        return Lossless(self._with(changes), changes)
+
+    def _with(self, changes: Mapping[str, float]) -> Material:
+        changed = self.model_copy()
+        changed._changed = {**self._changed, **changes}
+        return changed
+
+    def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return the wavelengths [nm] at which a picture at some wavelengths evaluates the material; None if grey.
+
+        One whose parameters are stated for some wavelengths, which make no colour, is evaluated at the first of them.
+        """
+        if not self.spectral:
+            return None
+        return wavelength_nm if self.wavelengths_nm is None else np.array(self.wavelengths_nm[:1])
+
+    def arguments(self, wavelength_nm: ArrayLike | None = None) -> dict[str, Any]:
+        """Return the keyword arguments of the model call, without the angles.
+
+        Parameters
+        ----------
+        wavelength_nm : array_like [nm], optional
+            Wavelengths for a spectral model; by default those that the parameters are stated for. Other models
+            do without.
+
+        Returns
+        -------
+        dict
+            The parameters; for a spectral model also ``wavelength_nm`` [nm], ``n`` and ``k`` [1], float64 arrays of
+            one shape.
+
+        Raises
+        ------
+        ValueError
+            If a spectral model is left without wavelengths, or its refractive index is not known at one of them.
+        """
+        if self.refractive_index is None:
+            return {**self.parameters, **self._changed}
+        if wavelength_nm is None:
+            wavelength_nm = self.wavelengths_nm
+        if wavelength_nm is None:
+            raise ParameterError("wavelength_nm", f"{self.name} needs wavelengths, its model {self.model} is spectral")
+        wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+        n, k = refractive_index(self.refractive_index, wavelength)
+        return {**self.parameters, "wavelength_nm": wavelength, "n": n, "k": k, **self._changed}
+
+    def brdf_at(
+        self, wavelength_nm: NDArray[np.float64] | None, vectors: Callable[..., Floats] | None = None
+    ) -> Evaluate:
+        """Return f_r of the model as a function of directions alone, with the spectra looked up once.
+
+        Parameters
+        ----------
+        wavelength_nm : array of shape (L,) [nm], or None
+            For spectral models, and only for them.
+        vectors : callable, optional
+            Takes the arguments of the model and stands for it, such as an approximation.
+
+        Returns
+        -------
+        callable
+            ``brdf(wi, wr)``: f_r [1/sr], shape (N, L), L = 1 of a grey material, of unit vectors of shape (N, 3).
+
+        Raises
+        ------
+        ValueError
+            If the refractive index is not known at one of the wavelengths.
+        """
+        f_r, together = vectors or self.spec.vectors, self.arguments(wavelength_nm)
+        if wavelength_nm is None:
+            return lambda wi, wr: f_r(wi, wr, **together)[:, np.newaxis]
+        separate = _each(together)
+
+        def brdf(wi: Floats, wr: Floats) -> Floats:
+            if len(separate) > 1 and len(wi) < _MANY:
+                return f_r(wi[:, np.newaxis], wr[:, np.newaxis], **together)
+            return np.stack([f_r(wi, wr, **arguments) for arguments in separate], axis=-1)
+
+        return brdf
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Return f_r of the model itself, as `brdfdb.tables.table.Table.lookup` gives that of its table.
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r : array_like [rad]
+            Directions of light and viewer; they broadcast.
+        wavelength_nm : float or array_like (M,) [nm], optional
+            As in `arguments`. Models that are not spectral take any.
+
+        Returns
+        -------
+        array [1/sr]
+            In the shape of the angles, with a last axis for a list of wavelengths.
+
+        Raises
+        ------
+        ValueError
+            As the model and `arguments` do.
+        """
+        return self._spectrum(self.spec.evaluate, (theta_i, phi_i, theta_r, phi_r), wavelength_nm, None)
+
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return f_r [1/sr] as by `lookup` at unit vectors of light and viewer (..., 3)."""
+        return self._spectrum(self.spec.vectors, (wi, wr), wavelength_nm, None)
+
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""
+        if self.spec.specular is None:
+            wavelengths = () if wavelength_nm is None else np.shape(wavelength_nm)
+            return np.zeros((*np.shape(theta_i), *wavelengths))[()]
+        return self._spectrum(self.spec.specular, (theta_i,), wavelength_nm, self.spec.specular_parameters)
+
+    def _spectrum(
+        self,
+        function: Callable[..., Floats],
+        angles: tuple[ArrayLike, ...],
+        wavelength_nm: ArrayLike | None,
+        names: tuple[str, ...] | None,
+    ) -> Floats:
+        """Evaluate a function of angles and parameters (`names` of them, or all); wavelengths are the last axis."""
+        if not self.spectral:
+            value = function(*angles, **self.arguments())
+            if wavelength_nm is None or np.ndim(wavelength_nm) == 0:
+                return value
+            return np.repeat(np.asarray(value)[..., np.newaxis], np.size(wavelength_nm), axis=-1)
+        given = self.arguments(wavelength_nm)
+        used = given if names is None else {name: given[name] for name in names}
+        if given["wavelength_nm"].ndim == 0:
+            return function(*angles, **used)
+        return np.stack([function(*angles, **arguments) for arguments in _each(used)], axis=-1)
+
+    def lobe(self, cos_i: Floats, wavelength_nm: NDArray[np.float64] | None) -> Lobe | None:
+        """Return the lobe of lights with a cosine, at wavelengths [nm] that broadcast with it; None if diffuse."""
+        return None if self.spec.lobe is None else self.spec.lobe(cos_i, **self.arguments(wavelength_nm))
+
+    def refractive_indices(
+        self, wavelength_nm: NDArray[np.float64] | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return n and k [1] at wavelengths [nm], as used; None of a model that is not spectral."""
+        if self.refractive_index is None:
+            return None
+        arguments = self.arguments(wavelength_nm)
+        return arguments["n"], arguments["k"]
+
+    def file_parameters(self) -> dict[str, Number]:
+        """Return the parameters as a human reads and writes them: angles in degrees, under names ending in ``_deg``."""
+        return {
+            # twelve digits: degrees to radians and back moves the last one
+            written_name(parameter): float(f"{degrees(value):.12g}") if parameter.unit == "rad" else value
+            for parameter in self.spec.parameters
+            for value in [self.parameters[parameter.name]]
+        }
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes that a table has of the material, for people: angles in degrees."""
+        spec, written = self.spec, {p.name: written_name(p) for p in self.spec.parameters}
+        return {
+            "title": self.title,
+            "material": self.name,
+            "model": spec.name,
+            "model_version": spec.version,
+            "model_title": spec.title,
+            "model_equation": spec.equation,
+            "model_reference": spec.reference,
+            "parameters": self.file_parameters(),
+            "parameter_sources": {in_file: self.sources.get(name, self.source) for name, in_file in written.items()},
+            "source": self.source,
+            "assumed": {written.get(n, n): value.model_dump(mode="json") for n, value in self.assumed.items()},
+            "note": self.note,
+            "refractive_index": self.refractive_index or "",
+            "known_excess": self.known_excess.model_dump() if self.known_excess else {},
+        }
+
+    def document(self) -> dict[str, Any]:
+        """Return the material as JSON, parameters in the units of the model; `brdfdb.materials.source_of` reads it."""
+        return {"model_version": self.spec.version, "material": self.model_dump(mode="json")}
+
+
+def _each(arguments: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the arguments of a spectral model at each wavelength."""
+    return [
+        {name: value[w] if np.ndim(value) else value for name, value in arguments.items()}
+        for w in range(arguments["wavelength_nm"].size)
+    ]
+
+
+def _field_and_sentence(error: ErrorDetails) -> tuple[str, str]:
+    """Return the field that pydantic finds fault with, and the sentence; our own errors name the field themselves."""
+    ours = error["ctx"]["error"] if error["type"] == "value_error" else error["msg"]
+    if isinstance(ours, ParameterError):
+        return ours.parameter, ours.sentence
+    return ".".join(map(str, error["loc"])), str(ours)

@@ -1,0 +1,130 @@
+"""The protocol of a source: all that layouts, tabulation, planner, error measurement and scenes know of f_r."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.lobes import Lobe
+from brdfdb.parameters import Floats
+
+# Function of unit vectors (N, 3) of light and viewer that gives f_r [1/sr], shape (N, L)
+Evaluate = Callable[[Floats, Floats], Floats]
+
+
+class Lossless(NamedTuple):
+    """A source with nothing absorbed, and the values of its parameters that were changed for it, by name."""
+
+    source: Source
+    changes: dict[str, float]
+
+
+class Source(Protocol):
+    """A thing that gives f_r: a material with a model, or a function.
+
+    Directions are unit vectors that point away from the surface, or angles [rad]. f_r is without the cosine [1/sr]
+    and without the specular part. `wavelength_nm` is None for a grey source in `brdf_at` and `lobe`.
+
+    Attributes
+    ----------
+    name : str
+        Slug of lower-case words joined by hyphens.
+    title : str
+        A line for people.
+    provenance : str
+        Where the values come from, in words.
+    wavelengths_nm : tuple of float or None
+        Wavelengths [nm] that the source is stated for; None if it may be evaluated at any.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def title(self) -> str: ...
+
+    @property
+    def provenance(self) -> str: ...
+
+    @property
+    def wavelengths_nm(self) -> tuple[float, ...] | None: ...
+
+    @property
+    def spectral(self) -> bool:
+        """Return True if f_r depends on the wavelength."""
+
+    @property
+    def anisotropic(self) -> bool:
+        """Return True if f_r changes when the surface is turned about its normal."""
+
+    @property
+    def elliptical(self) -> bool:
+        """Return True if f_r has the symmetry of an ellipse, with axes along x and y."""
+
+    @property
+    def grazing_pole(self) -> bool:
+        """Return True if f_r grows without bound as a direction reaches 90 degrees."""
+
+    @property
+    def has_lobe(self) -> bool:
+        """Return True if `lobe` gives a lobe around the mirror direction; a diffuse source has none."""
+
+    @property
+    def has_specular(self) -> bool:
+        """Return True if there is a specular part (a Dirac delta)."""
+
+    @property
+    def uniform(self) -> float | None:
+        """Return the known part of f_r [1/sr] that is the same in all directions; None without one."""
+
+    @property
+    def lossless(self) -> Lossless | None:
+        """Return the source with nothing absorbed; None where it is not known how."""
+
+    def without_uniform(self) -> Source:
+        """Return the source without its uniform part."""
+
+    def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return the wavelengths [nm] at which a picture at some wavelengths evaluates the source; None if grey."""
+
+    def brdf_at(self, wavelength_nm: NDArray[np.float64] | None) -> Evaluate:
+        """Return f_r [1/sr] at wavelengths (L,) [nm] as a function of unit vectors (N, 3): shape (N, L), L = 1 if grey.
+
+        Raises
+        ------
+        ParameterError
+            If the source does not hold at one of the wavelengths.
+        """
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Return f_r [1/sr] at angles [rad]: their broadcast shape, with a last axis for a list of wavelengths."""
+
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return f_r [1/sr] at unit vectors (..., 3), with a last axis for a list of wavelengths."""
+
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""
+
+    def lobe(self, cos_i: Floats, wavelength_nm: NDArray[np.float64] | None) -> Lobe | None:
+        """Return the lobe of lights with a cosine, at wavelengths [nm] that broadcast with it; None if diffuse."""
+
+    def refractive_indices(
+        self, wavelength_nm: NDArray[np.float64] | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return n and k [1] at wavelengths [nm], as used; None if f_r is not made from them."""
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes that a table has of its source, for people: JSON, angles in degrees."""
+
+    def document(self) -> dict[str, Any]:
+        """Return all that can be written of the source, as JSON: `brdfdb.materials.source_of` reads it."""

@@ -1,0 +1,71 @@
+"""Parameters of a model as files write them: angles in degrees, under names that end in ``_deg``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import degrees, radians
+from brdfdb.materials.provenance import Number
+from brdfdb.parameters import ModelSpec, Parameter
+
+
+def written_name(parameter: Parameter) -> str:
+    """Return the name of a parameter in files: that of an angle, which they give in degrees, ends in ``_deg``."""
+    return f"{parameter.name}_deg" if parameter.unit == "rad" else parameter.name
+
+
+def _as_written(parameter: Parameter) -> Parameter:
+    """Return a parameter as it appears in files: an angle in degrees, under a name that ends in ``_deg``."""
+    if parameter.unit != "rad":
+        return parameter
+    return replace(
+        parameter,
+        name=written_name(parameter),
+        unit="degree",
+        low=float(degrees(parameter.low)),
+        high=float(degrees(parameter.high)),
+        default=None if parameter.default is None else float(degrees(parameter.default)),
+    )
+
+
+def from_file(spec: ModelSpec, written: Mapping[str, Any]) -> dict[str, Number]:
+    """Return parameters in the units of the model, from those in a file; ValueError for one that is not allowed."""
+    file_spec = replace(spec, parameters=tuple(_as_written(parameter) for parameter in spec.parameters))
+    values = completed(file_spec, written).values()
+    return {
+        parameter.name: float(radians(value)) if parameter.unit == "rad" else value
+        for parameter, value in zip(spec.parameters, values, strict=True)
+    }
+
+
+def completed(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Number]:
+    """Return checked parameters in the order of the model, defaults filled in."""
+    names = [parameter.name for parameter in spec.parameters]
+    for name, value in parameters.items():
+        if name not in names:
+            hint = "; wavelength_nm, n and k come from refractive_index" if spec.spectral else ""
+            raise ParameterError(
+                name,
+                f"{value!r} given, but the parameters of {spec.name} are {', '.join(names)}{hint}",
+                value,
+                tuple(names),
+            )
+    complete: dict[str, Number] = {}
+    for parameter in spec.parameters:
+        value = parameters.get(parameter.name, parameter.default)
+        if value is None:
+            raise ParameterError(
+                parameter.name,
+                f"missing, {spec.name} needs a value in {parameter.interval}",
+                None,
+                (parameter.low, parameter.high),
+            )
+        switch = isinstance(parameter.default, bool)
+        if not isinstance(value, int | float) or isinstance(value, bool) != switch:
+            raise ParameterError(parameter.name, f"{value!r} is not {'true or false' if switch else 'a number'}", value)
+        parameter.check(value)
+        complete[parameter.name] = value
+    return complete

@@ -1,0 +1,72 @@
+"""Tables as sources: f_r of a stored table where the function that it was tabulated from is not known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import PrivateAttr
+
+from brdfdb.materials import FunctionRecord, FunctionSource, Material, Source
+from brdfdb.materials.function_source import Function
+from brdfdb.parameters import Floats
+from brdfdb.tables.table import Table
+
+
+class TableSource(FunctionSource):
+    """A table as a source: the values of its lookups are its f_r."""
+
+    _table: Table = PrivateAttr()
+
+    def __init__(self, table: Table) -> None:
+        recorded = table.source
+        wavelength_nm, metadata = table.wavelength_nm, table.metadata
+        stated = metadata.source or "source not stated"
+        record: dict[str, Any] = {
+            "name": table.name,
+            "title": metadata.title or table.name,
+            "provenance": f"{stated}; by way of the table {table.name} {table.revision}",
+            "wavelengths_nm": None if wavelength_nm is None else tuple(wavelength_nm.tolist()),
+            "anisotropic": table.anisotropic,
+            "elliptical": table.anisotropic and table.grid.copies == 4,
+        }
+        if isinstance(recorded, FunctionRecord):
+            record |= {"grazing_pole": recorded.grazing_pole, "alpha": recorded.alpha}
+        super().__init__(brdf=_brdf_of(table), **record)
+        self._table = table
+
+    @property
+    def has_specular(self) -> bool:
+        """Return True if the table holds the reflectance of a specular part."""
+        return self._table.specular is not None
+
+    def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return the same wavelengths [nm], or the only one of the table; None if grey."""
+        stored = self._table.wavelength_nm
+        return wavelength_nm if stored is None or stored.size > 1 else stored
+
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""
+        return self._table.specular_reflectance(theta_i, wavelength_nm)
+
+    def _check_function(self) -> None:
+        """Take the table as it is: between its nodes the two halves of a symmetry differ by its error."""
+
+
+def _brdf_of(table: Table) -> Function:
+    def brdf(wi: Floats, wr: Floats, wavelength_nm: NDArray[np.float64] | None) -> Floats:
+        return table.lookup_vectors(wi, wr, wavelength_nm)
+
+    return brdf
+
+
+def source_of_table(table: Table) -> Source:
+    """Return the material that a table was tabulated from, or else the table as a source.
+
+    Raises
+    ------
+    ParameterError
+        If the table holds what no f_r can be, or its name is not that of a material.
+    """
+    return table.source if isinstance(table.source, Material) else TableSource(table)

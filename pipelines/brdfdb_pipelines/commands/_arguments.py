@@ -1,0 +1,82 @@
+"""Arguments that several commands have, and the types of numbers on the command line."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+MOST_JOBS = 1024  # threads or processes
+MOST_WIDTH = 4096  # pixels across a picture: a wider one takes tens of gigabytes
+
+_UNITS = {"": 1, "B": 1, "kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+
+
+def add_store(parser: argparse.ArgumentParser) -> None:
+    """Add the option --store DIR."""
+    parser.add_argument(
+        "--store",
+        type=Path,
+        default=Path(os.environ.get("BRDFDB_STORE", "brdf-store")),
+        metavar="DIR",
+        help="directory of the store (default: $BRDFDB_STORE or %(default)s)",
+    )
+
+
+def add_snapshot(parser: argparse.ArgumentParser) -> None:
+    """Add the option --snapshot NAME."""
+    parser.add_argument("--snapshot", metavar="NAME", help="read the revisions that this snapshot of the store names")
+
+
+def add_jobs(parser: argparse.ArgumentParser, workers: str) -> None:
+    """Add the option --jobs N, a number of `workers`; the default is the number of processors."""
+    parser.add_argument(
+        "--jobs",
+        type=whole_number(MOST_JOBS),
+        default=len(os.sched_getaffinity(0)),
+        metavar="N",
+        help=f"{workers} (default: %(default)s)",
+    )
+
+
+def add_out(parser: argparse.ArgumentParser, directory: str) -> None:
+    """Add the option --out DIR with its default."""
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path(directory),
+        metavar="DIR",
+        help="directory to write to (default: %(default)s)",
+    )
+
+
+def add_scene(parser: argparse.ArgumentParser) -> None:
+    """Add the argument SCENE."""
+    parser.add_argument("scene", metavar="SCENE", help="a .toml file, or a scene that comes with the program")
+
+
+def whole_number(most: int | None = None) -> Callable[[str], int]:
+    """Return a parser of whole numbers from 1 to `most`."""
+
+    def number(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if value < 1:
+            raise argparse.ArgumentTypeError(f"{value} is not at least 1")
+        if most is not None and value > most:
+            raise argparse.ArgumentTypeError(f"{value} is more than {most}")
+        return value
+
+    return number
+
+
+def byte_count(text: str) -> int:
+    """Return a number of bytes [byte] from a text such as 500MB."""
+    number = text.rstrip("BkMGT")
+    try:
+        return int(float(number) * _UNITS[text[len(number) :]])
+    except (KeyError, ValueError, OverflowError):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of bytes, such as 500MB or 2GB") from None

@@ -1,0 +1,54 @@
+"""The command `brdfdb audit`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store
+from brdfdb_pipelines.exit_codes import INTERRUPTED, VIOLATED
+
+HELP = "Audit the energy, reciprocity, smoothness and error of tables and their models; exit 1 on a violation."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the materials, the store and the report."""
+    parser.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all)")
+    add_store(parser)
+    parser.add_argument(
+        "--report",
+        type=Path,
+        metavar="FILE",
+        help="JSON report, which ends in .json (default: DIR/audit.json, or DIR/audit-part.json with names)",
+    )
+    add_jobs(parser, "processes")
+    parser.add_argument(
+        "--allow",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help="materials whose models may reflect more than they receive: accepted, and shown as such",
+    )
+    parser.add_argument("--no-figures", action="store_true", help="leave out the stability atlas and the gallery")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Audit the materials; return `VIOLATED` if there is a new violation."""
+    from brdfdb_pipelines import audit
+
+    default = options.store / ("audit-part.json" if options.names else "audit.json")
+    try:
+        report = audit.run(
+            options.store,
+            options.names,
+            options.report or default,
+            jobs=options.jobs,
+            figures=not (options.names or options.no_figures),
+            allow=options.allow,
+        )
+    except KeyboardInterrupt:
+        print("brdfdb: interrupted; no report was written, an earlier one is unchanged", file=sys.stderr)
+        return INTERRUPTED
+    return VIOLATED if report.violations else 0

@@ -1,0 +1,104 @@
+"""The command `brdfdb build`."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shlex
+import sys
+import time
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store, byte_count
+from brdfdb_pipelines.exit_codes import INTERRUPTED
+
+if TYPE_CHECKING:
+    from brdfdb_pipelines.build import Built
+    from brdfdb_pipelines.workers import Workers
+
+HELP = "Tabulate the materials of a recipe that the store does not have yet."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the recipe, the store, and where the work is done."""
+    parser.add_argument("recipe", type=Path, nargs="?", help="a TOML file (default: every material of the papers)")
+    add_store(parser)
+    add_jobs(parser, "threads or processes")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--processes", action="store_true", help="work in processes instead of threads")
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="work on the dask cluster of this scheduler, such as tcp://10.0.0.1:8786; its workers must see DIR, too",
+    )
+    parser.add_argument(
+        "--memory",
+        type=byte_count,
+        metavar="SIZE",
+        help="memory of all tasks together, such as 500MB (default: that of the machine)",
+    )
+    parser.add_argument("--json", action="store_true", help="print progress as JSON, an object a line")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Build the recipe, show progress, and print what was built."""
+    try:
+        _build(options)
+    except KeyboardInterrupt:
+        print(
+            "brdfdb: interrupted; published tables and complete blocks stay; "
+            f"to resume: {shlex.join(['brdfdb', *options.arguments])}",
+            file=sys.stderr,
+        )
+        return INTERRUPTED
+    return 0
+
+
+def _build(options: argparse.Namespace) -> None:
+    from brdfdb_pipelines import build_resources, recipe_file, workers
+    from brdfdb_pipelines.build import build
+    from brdfdb_pipelines.build_progress import Bars, Lines
+
+    recipe = recipe_file.load(options.recipe)
+    start = time.perf_counter()
+    memory: int | None = options.memory
+    at: AbstractContextManager[Workers]
+    if options.scheduler:
+        at = workers.cluster(options.scheduler)
+    else:
+        memory = build_resources.machine_memory() if memory is None else memory
+        at = (workers.processes if options.processes else workers.threads)(options.jobs)
+    with at as opened, Lines() if options.json else Bars() as report:
+        built = build(recipe, options.store, opened, report, memory=memory)
+    if not options.json:
+        _print(built, options.store, time.perf_counter() - start)
+
+
+def _print(built: list[Built], root: Path, seconds: float) -> None:
+    """Print a line for each table that is not as it was before."""
+    from brdfdb_pipelines import terminal
+
+    changed = [one for one in built if one.state != "unchanged"]
+    if changed:
+        values = sum(math.prod(one.shape) for one in changed if one.shape)
+        terminal.print_table(
+            f"{len(changed)} tables, {values / 1e6:.1f} million values, in {seconds:.1f} s",
+            ("material", "model", "shape", "revision", "stored", "why"),
+            [
+                (
+                    one.job.material.name,
+                    one.job.material.model,
+                    " x ".join(map(str, one.shape)),
+                    one.revision,
+                    terminal.size(one.stored_bytes),
+                    f"{one.why}; {one.revision} is current again" if one.state == "adopted" else one.why,
+                )
+                for one in changed
+            ],
+            numbers=("shape", "stored"),
+        )
+    if len(changed) < len(built):
+        print(f"{len(built) - len(changed)} tables unchanged")
+    print(f"{terminal.size(sum(one.stored_bytes for one in built))} in {root}")

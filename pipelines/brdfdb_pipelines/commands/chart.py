@@ -1,0 +1,40 @@
+"""The command `brdfdb chart`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from brdfdb_pipelines.commands._arguments import add_out, add_store
+
+HELP = "Chart the cost of every form of a material or family against its error: pictures and JSON."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the materials, the store, the recipe and the tolerances."""
+    parser.add_argument(
+        "names",
+        nargs="+",
+        metavar="NAME",
+        help="presets, or materials and families of the recipe or the store",
+    )
+    add_store(parser)
+    add_out(parser, "brdf-chart")
+    parser.add_argument(
+        "--recipe", type=Path, metavar="FILE", help="a TOML file that defines materials, families and wavelengths"
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        action="append",
+        metavar="X",
+        help="tolerance of a planned table; repeat for more tables (default: 0.1, 0.01 and, for grey materials, 0.001)",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Chart the materials and families."""
+    from brdfdb_pipelines import chart
+
+    chart.run(options.names, options.out, store=options.store, recipe_path=options.recipe, tolerances=options.tolerance)
+    return 0

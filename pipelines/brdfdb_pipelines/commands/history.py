@@ -1,0 +1,41 @@
+"""The command `brdfdb history`."""
+
+from __future__ import annotations
+
+import argparse
+
+from brdfdb_pipelines.commands._arguments import add_store
+
+HELP = "List the revisions of a material."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the material and the store."""
+    parser.add_argument("name", metavar="NAME")
+    add_store(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print a line for each revision of the material, oldest first."""
+    from brdfdb.store import revisions
+    from brdfdb_pipelines import terminal
+
+    history = revisions.history(options.store, options.name)
+    terminal.print_table(
+        f"{len(history)} revisions of {options.name} in {options.store}",
+        ("revision", "built", "model", "version", "stored", "request", ""),
+        [
+            (
+                revision.name,
+                revision.summary["created"],
+                revision.summary["model"],
+                str(revision.summary["model_version"]),
+                terminal.size(revision.summary["bytes"]),
+                revision.summary["request_sha256"][:8] or "-",
+                "current" if revision.current else "",
+            )
+            for revision in history
+        ],
+        numbers=("version", "stored"),
+    )
+    return 0

@@ -1,0 +1,90 @@
+"""The command `brdfdb list`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import brdfdb
+from brdfdb.errors import StoreError
+from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
+
+if TYPE_CHECKING:
+    from brdfdb.store.reader import Store
+
+HELP = "List the materials and families of the store, or the built-in presets."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the store and the choice of presets."""
+    add_store(parser)
+    parser.add_argument("--presets", action="store_true", help="list the presets, which recipes can name")
+    add_snapshot(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print a line for each material and family."""
+    if options.presets:
+        _print_presets()
+        return 0
+    root: Path = options.store
+    store = brdfdb.open(root, snapshot=options.snapshot)
+    damaged = _print_materials(store, root) + _print_families(store)
+    if damaged:
+        raise StoreError("; ".join(damaged))
+    return 0
+
+
+def _print_presets() -> None:
+    from brdfdb.materials import presets
+    from brdfdb_pipelines import terminal
+
+    rows = [(m.name, m.title, m.model, m.source) for m in presets().values()]
+    terminal.print_table(f"{len(rows)} presets", ("material", "title", "model", "source"), rows)
+
+
+def _print_materials(store: Store, root: Path) -> list[str]:
+    """Print a line for each material from its pointer alone; return a sentence for each damaged one."""
+    from brdfdb_pipelines import terminal
+
+    rows, damaged, incomplete = [], [], []
+    for name in store:
+        try:
+            head = store.summary(name)
+            if not (head["title"] and head["model"]):  # the pointer of a whole table has both
+                incomplete.append(f"{name} {head['revision']} {store.metadata(name).gaps}")
+        except StoreError as error:
+            damaged.append(str(error))
+            continue
+        rows.append((name, head["title"], head["model"], terminal.error(head.get("error_p99")), head["revision"]))
+    terminal.print_table(
+        f"{len(rows)} materials in {root}",
+        ("material", "title", "model", "error (p99)", "revision"),
+        rows,
+        numbers=("error (p99)",),
+    )
+    for sentence in incomplete:
+        print(terminal.plain(sentence))
+    return damaged
+
+
+def _print_families(store: Store) -> list[str]:
+    """Print a line for each family from its record alone; return a sentence for each damaged one."""
+    from brdfdb_pipelines import terminal
+
+    rows, damaged = [], []
+    for name in store.families():
+        try:
+            record = store.family_content(name)
+        except StoreError as error:
+            damaged.append(str(error))
+            continue
+        axes = ", ".join(f"{x} {v[0]:g} to {v[-1]:g}" for x, v in record.get("axes", {}).items())
+        p99 = record.get("error", {}).get("overall", {}).get("p99")
+        tables = str(len(record.get("members", ())))
+        rows.append((name, record.get("title", ""), record.get("model", ""), tables, axes, terminal.error(p99)))
+    if rows:
+        columns = ("family", "title", "model", "tables", "over", "error (p99)")
+        terminal.print_table(f"{len(rows)} families", columns, rows, numbers=("tables", "error (p99)"))
+    return damaged

@@ -1,0 +1,131 @@
+"""The command `brdfdb lookup`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import brdfdb
+from brdfdb.errors import ParameterError
+from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
+
+if TYPE_CHECKING:
+    from brdfdb.store.family import Family
+    from brdfdb.tables.table import Table
+
+HELP = "Print f_r [1/sr] of a material, or a family, at one pair of directions."
+
+_ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the material, the directions, the wavelengths and the form of the answer."""
+    parser.add_argument("name", metavar="NAME")
+    for angle in _ANGLES:
+        parser.add_argument(angle, type=float, metavar=angle.upper(), help="degrees")
+    add_store(parser)
+    parser.add_argument("--wavelength-nm", type=float, nargs="+", metavar="NM", help="default: all of the table")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="X=VALUE", help="a parameter of a family, as recipes write it"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--with-error", action="store_true", help="print the stated error of each value, too")
+    add_snapshot(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print f_r [1/sr] at the directions [degree], and the specular reflectance [1] where there is a specular part."""
+    import numpy as np
+
+    from brdfdb.geometry import radians
+
+    angles_deg = [getattr(options, angle) for angle in _ANGLES]
+    for angle, value in zip(_ANGLES, angles_deg, strict=True):
+        if not math.isfinite(value):
+            raise ParameterError(angle, f"{value} is not a number of degrees", value)
+        if angle.startswith("theta") and not 0.0 <= value <= 180.0:
+            raise ParameterError(angle, f"{value:g} is outside [0, 180] degrees", value, (0.0, 180.0))
+    root: Path = options.store
+    store = brdfdb.open(root, snapshot=options.snapshot)
+    source: Table | Family
+    point: dict[str, Any] = {}
+    if options.name not in store and options.name in store.families():
+        source = store.family(options.name)
+        written = _swept(source, options.set)
+        point = _in_model_units(source, written)
+        head: dict[str, Any] = {"family": options.name, "parameters": written}
+        specular_part = source.record.specular_error is not None
+    else:
+        source = store[options.name]
+        if options.set:
+            raise ParameterError(f"--set {options.set[0]}", f"{options.name} is a material, whose parameters are fixed")
+        head = {"material": options.name, "revision": source.revision}
+        specular_part = source.specular is not None
+    theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
+    error = None
+    if options.with_error:
+        stated = source.lookup_with_error(theta_i, phi_i, theta_r, phi_r, options.wavelength_nm, **point)
+        brdf, error = (np.atleast_1d(values) for values in stated)
+    else:
+        brdf = np.atleast_1d(source.lookup(theta_i, phi_i, theta_r, phi_r, options.wavelength_nm, **point))
+    specular = np.atleast_1d(source.specular_reflectance(theta_i, options.wavelength_nm, **point))
+    wavelengths = source.wavelength_nm if options.wavelength_nm is None else options.wavelength_nm
+    if options.json:
+        answer = {
+            **head,
+            "unit": "1/sr",
+            "wavelength_nm": None if wavelengths is None else list(wavelengths),
+            "brdf": brdf.tolist(),
+            **({} if error is None else {"error": error.tolist()}),
+            "specular_reflectance": specular.tolist(),
+        }
+        print(json.dumps(answer))
+        return 0
+    for index, value in enumerate(brdf):
+        at = "" if wavelengths is None else f"{wavelengths[index]:g} nm  "
+        mirrored = f"  and {specular[index]:.6g} of the light in the exact mirror direction" if specular_part else ""
+        within = "" if error is None else f" +- {error[index]:.2g}"
+        print(f"{at}{value:.6g}{within} /sr{mirrored}")
+    return 0
+
+
+def _swept(family: Family, settings: Sequence[str]) -> dict[str, float]:
+    """Return the swept parameters from ``name=value``, each within its range and in the unit of recipes."""
+    axes = family.record.axes
+    values: dict[str, float] = {}
+    for setting in settings:
+        name, _, text = setting.partition("=")
+        if name not in axes:
+            raise ParameterError(
+                f"--set {setting}", f"the parameters of {family.name} are {', '.join(axes)}", setting, tuple(axes)
+            )
+        try:
+            values[name] = float(text)
+        except ValueError:
+            raise ParameterError(f"--set {setting}", f"give a number, such as {name}={axes[name][0]:g}", text) from None
+    for name, nodes in axes.items():
+        low, high = nodes[0], nodes[-1]
+        if name not in values:
+            raise ParameterError("--set", f"{name} is missing, {family.name} needs a value in [{low:g}, {high:g}]")
+        if not low <= values[name] <= high:
+            raise ParameterError(
+                f"--set {name}={values[name]:.9g}",
+                f"outside [{low:g}, {high:g}] of {family.name}",
+                values[name],
+                (low, high),
+            )
+    return {name: values[name] for name in axes}
+
+
+def _in_model_units(family: Family, written: Mapping[str, float]) -> dict[str, float]:
+    """Return parameters by the names and in the units of the model: angles in radians."""
+    from brdfdb.geometry import radians
+
+    return {
+        parameter.name: float(radians(written[name])) if parameter.unit == "rad" else written[name]
+        for name, parameter in family.record.parameters.items()
+    }

@@ -1,0 +1,31 @@
+"""The command `brdfdb rollback`."""
+
+from __future__ import annotations
+
+import argparse
+
+from brdfdb_pipelines.commands._arguments import add_store
+
+HELP = "Make another revision of a material current, after verifying it."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the material, the revision and the store."""
+    parser.add_argument("name", metavar="NAME")
+    parser.add_argument("revision", metavar="REVISION", help="such as r000001; `brdfdb history NAME` lists them")
+    add_store(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Make the revision current, and print which one was."""
+    from brdfdb.store import revisions
+
+    name, revision = options.name, options.revision
+    before = revisions.rollback(options.store, name, revision)
+    if not before:
+        print(f"{name}: {revision} is current; its HEAD.json was missing or damaged")
+    elif before != revision:
+        print(f"{name}: {revision} is current, {before} was")
+    else:
+        print(f"{name}: {revision} stays current")
+    return 0

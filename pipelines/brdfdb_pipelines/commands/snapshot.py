@@ -1,0 +1,70 @@
+"""The command `brdfdb snapshot`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from brdfdb.errors import ParameterError
+from brdfdb_pipelines.commands._arguments import add_store
+
+HELP = (
+    "Give the current revisions of all materials and families of the store a name that never changes; without a name, "
+    "list the snapshots."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the name and the store."""
+    parser.add_argument("name", nargs="?", metavar="NAME", help="lower-case letters, digits and single hyphens")
+    add_store(parser)
+    parser.add_argument("--remove", action="store_true", help="remove the snapshot; the revisions stay until gc")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Make, remove or list snapshots."""
+    from brdfdb.store import snapshots
+
+    if options.remove and options.name is None:
+        raise ParameterError("snapshot", "--remove needs the NAME of a snapshot")
+    if options.remove:
+        snapshots.remove(options.store, options.name)
+        print(f"{options.name} is removed; `brdfdb gc` removes the revisions that nothing else keeps")
+    elif options.name is not None:
+        _create(options.store, options.name)
+    else:
+        _list(options.store)
+    return 0
+
+
+def _create(root: Path, name: str) -> None:
+    """Name the current revisions of all materials, and print the digest to cite."""
+    from brdfdb.store import snapshots
+    from brdfdb.store.reader import Store
+    from brdfdb_pipelines import terminal
+
+    with terminal.progress() as bar:
+        task = bar.add_task("reading every file", total=len(Store(root)))
+        digest = snapshots.create(root, name, lambda: bar.advance(task))
+    print(f"{_contents(root, name)}; sha256 {digest}")
+
+
+def _list(root: Path) -> None:
+    """Print a line for each snapshot of a store."""
+    from brdfdb.store.paths import snapshot_path
+    from brdfdb.store.reader import Store
+    from brdfdb.store.sealed_json import seal_of
+    from brdfdb.store.snapshot_record import snapshot_names
+
+    names = snapshot_names(Store(root).root)
+    for name in names:
+        print(f"{_contents(root, name)}; sha256 {seal_of(snapshot_path(root, name))}")
+    if not names:
+        print(f"no snapshots in {root}")
+
+
+def _contents(root: Path, name: str) -> str:
+    from brdfdb.store.snapshot_record import read_snapshot
+
+    content = read_snapshot(root, name)
+    return f"{name}: {len(content['materials'])} materials, {len(content['families'])} families"

@@ -1,0 +1,120 @@
+"""Tables without a source: what can be judged of the table alone is, the rest says why it is not, nothing crashes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from brdfdb.audit import FINDINGS, MaterialAudit, audit
+from brdfdb.audit.energy import Energy
+from brdfdb.audit.finding import NotJudged
+from brdfdb.audit.nodes import Nodes
+from brdfdb.audit.reciprocity import Reciprocity
+from brdfdb.audit.smoothness import Smoothness
+from brdfdb.audit.table_error import TableError
+from brdfdb.audit.values import Values
+from brdfdb.materials import FunctionSource
+from brdfdb.parameters import Floats
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.planner import plan
+from brdfdb.tables.table import Table
+from tests.audit.a_table import ANISOTROPIC, ISOTROPIC, lambert, tabulated, written
+from tests.benchmarks.sound_materials import built
+
+WHY = "; the table does not say what its source is, or this program does not have its model"
+ALONE = {"nodes", "table_error", "sampling", "validity"}
+
+
+def glossy(wi: Floats, wr: Floats, _: Floats | None) -> Floats:
+    """A reciprocal f_r [1/sr] with a lobe, and less than 1 of albedo."""
+    half = wi + wr
+    tan2 = (half[:, 0] ** 2 + half[:, 1] ** 2) / half[:, 2] ** 2
+    return np.asarray(0.1 + 0.3 * np.exp(-tan2 / 0.09))
+
+
+GLOSSY = FunctionSource(brdf=glossy, name="glossy", title="Glossy by hand", provenance="a test", alpha=0.3)
+
+
+@cache
+def planned() -> Table:
+    return built(plan(GLOSSY, None, 0.05))
+
+
+def not_judged(found: MaterialAudit) -> set[str]:
+    return {key for key, each in found.findings.items() if isinstance(each, NotJudged)}
+
+
+@pytest.mark.parametrize("grid", [ISOTROPIC, ANISOTROPIC], ids=["isotropic", "anisotropic"])
+def test_a_bare_table_is_audited_alone(grid: object) -> None:
+    table = lambert(0.5, grid)
+    found = audit(replace(table, attrs={}))
+    assert (found.verdict, found.model, not_judged(found)) == ("passes", "", ALONE)
+    energy, reciprocity = found.of(Energy), found.of(Reciprocity)
+    assert energy.model is None
+    assert energy.verdict == "conserves"
+    assert energy.table.max_albedo == pytest.approx(0.5, rel=1e-6)
+    assert (reciprocity.model_random, reciprocity.model_lobe) == (None, None)
+    assert reciprocity.table_random.max < 1e-6
+    assert found.of(Smoothness).model == []
+    assert found.problems() == []
+    with pytest.raises(LookupError, match="nodes of made-up is not judged"):
+        found.of(Nodes)
+    sentences = {each.finding: each for each in found.sentences}
+    assert set(sentences) == set(FINDINGS)
+    for key in ALONE:
+        assert sentences[key].word == "not judged"
+        assert sentences[key].text.endswith(
+            "; the table does not say what its source is, or this program does not have its model"
+        )
+    written([found])
+
+
+def test_what_is_wrong_with_a_bare_table_violates() -> None:
+    table = replace(lambert(0.5), attrs={})
+    bright, negative, lopsided = (table.brdf.copy() for _ in range(3))
+    bright *= np.float32(2.5)
+    negative[1, 2, 1] = -0.1
+    lopsided[1, 2, 1] = 0.1
+    assert audit(replace(table, values=bright)).of(Energy).verdict == "violates"
+    assert audit(replace(table, values=negative)).of(Values).verdict == "violates"
+    found = audit(replace(table, values=lopsided))
+    assert (found.verdict, found.of(Reciprocity).verdict) == ("violates", "violates")
+    accepted = audit(replace(table, values=bright), accept_excess=True)  # which is accepted of models
+    assert accepted.verdict == "violates"
+
+
+def test_a_table_of_a_function_that_a_store_gives_back_is_audited_alone() -> None:
+    found = audit(planned())
+    assert (found.verdict, not_judged(found)) == ("passes", ALONE)
+    assert isinstance(reason := found.findings["nodes"], NotJudged)
+    assert reason.reason == (
+        "values at nodes are compared with those of the source; the source of this table, Glossy by hand, is a "
+        "function, which the store does not hold"
+    )
+    assert found.of(Reciprocity).table_lobe is not None  # whose width the store keeps
+    written([found])
+
+
+def test_a_table_is_held_against_the_function_that_is_given() -> None:
+    found = audit(planned(), source=GLOSSY)
+    assert (found.verdict, not_judged(found)) == ("passes", {"sampling", "validity"})
+    assert found.of(Nodes).wrong == 0
+    assert found.of(TableError).fresh_p99 < 0.1
+    assert found.of(Energy).model is not None
+    assert found.of(Energy).model.max_albedo == pytest.approx(found.of(Energy).table.max_albedo, rel=0.05)
+    other = FunctionSource(
+        brdf=lambda *at: 0.8 * glossy(*at), name="glossy", title="Darker", provenance="a test", alpha=0.3
+    )
+    wrong = audit(planned(), source=other)
+    assert (wrong.of(Nodes).verdict, wrong.of(TableError).verdict) == ("violates", "violates")
+    assert wrong.of(TableError).likeness.startswith("the model times 1.2")  # 1 / 0.8
+    written([found, wrong])
+
+
+def test_a_table_of_a_function_on_a_plain_grid() -> None:
+    table = tabulated(GLOSSY, ISOTROPIC)
+    assert not_judged(audit(table, source=GLOSSY)) == {"sampling", "validity"}
+    assert Layout(GLOSSY, ISOTROPIC).shape == table.values.shape

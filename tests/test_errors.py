@@ -1,0 +1,97 @@
+"""Errors: one base class, fields that callers read, and what is left of them after another process raised them."""
+
+from __future__ import annotations
+
+import importlib
+import pickle
+import pkgutil
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import pytest
+
+import brdfdb
+import brdfdb_api
+import brdfdb_pipelines
+from brdfdb.errors import (
+    BrdfdbError,
+    BusyError,
+    MaterialError,
+    MissingExtraError,
+    ParameterError,
+    StoreError,
+    UnknownFamilyError,
+    UnknownMaterialError,
+    UnknownRevisionError,
+    WriteError,
+    import_extra,
+)
+from brdfdb.scenes.choice import InfeasibleError
+from brdfdb.tables.planner import check_tolerance
+from brdfdb_pipelines.recipe_file import RecipeError
+from brdfdb_pipelines.scene_file import SceneError
+
+RECIPE_ERROR = RecipeError("grids.isotropic.theta_i_deg", "must start at 0")
+RECIPE_ERROR.file = "a.toml"
+ERRORS = [
+    ParameterError("tolerance", "2 is outside [0, 1]", 2.0, (0.0, 1.0)),
+    MaterialError("foam", "rho", "2 is outside [0, 1]", 2.0, (0.0, 1.0)),
+    InfeasibleError("tolerance", "1e-09 is finer than the truth is known", 1e-9),
+    SceneError("spheres", "lights", "there is no light"),
+    RECIPE_ERROR,
+    StoreError("no store at a"),
+    UnknownMaterialError("fome", ["foam", "brass"]),
+    UnknownFamilyError("fome", ["foam"]),
+    UnknownRevisionError("foam has no revision r000009"),
+    WriteError("cannot write a.exr"),
+    BusyError("another build is at work on foam"),
+    MissingExtraError("uvicorn is not installed"),
+]
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_an_error_is_the_same_after_pickling(error: BrdfdbError) -> None:
+    copy = pickle.loads(pickle.dumps(error))
+    assert type(copy) is type(error)
+    assert str(copy) == str(error)
+    assert vars(copy) == vars(error)
+
+
+def test_an_error_of_another_process_keeps_its_fields() -> None:
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
+        error = executor.submit(check_tolerance, 2.0).exception()
+    assert isinstance(error, ParameterError)
+    assert (error.parameter, error.sentence) == ("tolerance", "2 is outside [0.0001, 0.5]")
+    assert (error.value, error.allowed) == (2.0, (0.0001, 0.5))
+
+
+def test_every_error_of_the_packages_has_the_base_class() -> None:
+    for package in (brdfdb, brdfdb_pipelines, brdfdb_api):
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            for name, kind in vars(importlib.import_module(module.name)).items():
+                if isinstance(kind, type) and issubclass(kind, Exception) and kind.__module__.startswith("brdfdb"):
+                    assert issubclass(kind, BrdfdbError), f"{module.name}.{name}"
+
+
+def test_sentences_name_what_is_wrong() -> None:
+    assert str(ERRORS[0]) == "tolerance: 2 is outside [0, 1]"
+    assert str(ERRORS[1]) == "foam: rho: 2 is outside [0, 1]"
+    assert str(RECIPE_ERROR) == "a.toml: grids.isotropic.theta_i_deg: must start at 0"
+    assert str(SceneError("spheres", "", "is recorded")) == "spheres: is recorded"
+    assert str(UnknownMaterialError("fome", ["foam", "brass"])) == "no material 'fome' in the store; closest: foam"
+
+
+def test_a_parameter_error_is_a_value_error_and_an_unknown_name_a_key_error() -> None:
+    assert issubclass(ParameterError, ValueError)
+    assert issubclass(UnknownMaterialError, KeyError)
+    assert issubclass(UnknownRevisionError, KeyError)
+
+
+def test_a_module_of_an_extra_is_imported_or_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert import_extra("jinja2").__name__ == "jinja2"
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingExtraError, match=r"^distributed is not installed; .* 'brdfdb\[dask\]'$"):
+        import_extra("distributed")
+    with pytest.raises(ModuleNotFoundError):
+        import_extra("brdfdb.nowhere")
