@@ -77,7 +77,7 @@ def _oren_nayar() -> Figure:
             ),
             Statement(
                 says="the fit never exceeds 1 for sigma of 40 degrees and more",
-                where="known of the form: eqs 27-29",
+                where="property of the form: eqs 27-29",
                 seen=f"of {len(rough)} sigma from 40 to 90 degrees the largest albedo is {largest(rough[roughest])}, "
                 f"sigma = {roughest:g}",
                 holds=max(float(albedo.max()) for albedo in rough.values()) <= 1.0,
@@ -85,14 +85,14 @@ def _oren_nayar() -> Figure:
             Statement(
                 says="the surface that is fitted, with two bounces, reflects less than it receives: the excess belongs "
                 "to the fit",
-                where="known of the form: eqs 8-20 and 47, integrated",
+                where="property of the form: eqs 8-20 and 47, integrated",
                 seen=f"sigma = 20 degrees: at most {largest(surface, _FEW_DEG)}, where the fit has "
                 f"{largest(fit[20.0])}",
                 holds=float(surface.max()) < 1.0,
             ),
             Statement(
                 says="Fujii's form reflects the share rho at grazing, and less elsewhere",
-                where="known of the form: its normalisation",
+                where="property of the form: its normalisation",
                 seen=f"largest {fujii.max():.4f} at {THETA_DEG[fujii.argmax()]:g} degrees, smallest {fujii.min():.4f}",
                 holds=bool(np.all(np.diff(fujii) > 0.0) and close(fujii[-1], 1.0)),
             ),
@@ -154,13 +154,13 @@ def _he_torrance() -> Figure:
             ),
             Statement(
                 says="where slopes are gentle all light near normal incidence is reflected: 1.000",
-                where="known of the model: eqs 71-84 with |F|^2 = 1",
+                where="property of the model: eqs 71-84 with |F|^2 = 1",
                 seen=f"sigma_0 / tau of 0.02 and 0.05, up to 30 degrees: {gentle.min():.4f} to {gentle.max():.4f}",
                 holds=close(gentle, 1.0),
             ),
             Statement(
                 says="towards grazing the albedo falls: light is scattered once, and shadowed light is lost",
-                where="known of the model: eqs 23-25",
+                where="property of the model: eqs 23-25",
                 seen=f"at 89.9 degrees between {min(albedo[-1] for albedo in everything):.3f} and "
                 f"{max(albedo[-1] for albedo in everything):.3f} in all nine cases",
                 holds=all(albedo[-1] < 0.5 * albedo[0] for albedo in everything),
@@ -168,7 +168,7 @@ def _he_torrance() -> Figure:
             Statement(
                 says="before it falls it passes 1: 1.042 at 80 degrees for sigma_0 / tau of 0.05, 1.037 at 85.5 for "
                 "0.02",
-                where="known of the model: sigma of eq. 53 differs between viewers",
+                where="property of the model: sigma of eq. 53 differs between viewers",
                 seen=f"{at(by_slope[0.05], 80.0):.3f} at 80 degrees and {at(total, 85.5):.3f} at 85.5",
                 holds=close((at(by_slope[0.05], 80.0), at(total, 85.5)), (1.042, 1.037)),
             ),
@@ -269,7 +269,7 @@ def _minnaert() -> Figure:
             Statement(
                 says="rho is the reflectance along the normal, not that of the surface: it reflects 2 rho / (k + 1) of "
                 "uniform light",
-                where="known of the form: the albedo is rho cos(theta_i)^(k - 1)",
+                where="property of the form: the albedo is rho cos(theta_i)^(k - 1)",
                 seen=f"k = 0.6: {albedos[0.6][0]:.6f} along the normal, and {mean:.5f} of uniform light, where the "
                 f"closed form is {2.0 / 1.6:.5f}",
                 holds=close(albedos[0.6][0], 1.0, TOLERANCE) and close(mean, 2.0 / 1.6, 1e-5),

@@ -72,7 +72,7 @@ def _ward() -> Figure:
             ),
             Statement(
                 says="the lobe reflects about cos(theta_i) for small alpha, 0.49 at 60 degrees for alpha of 0.1",
-                where="known of the form: eq. 5a; the weight of a sample at the peak of the lobe is cos(theta_i)",
+                where="property of the form: eq. 5a; the weight of a sample at the peak of the lobe is cos(theta_i)",
                 seen=f"{middle['ward']:.3f} at 60 degrees for alpha of 0.1; for 0.05 within {off:.4f} of cos(theta_i) "
                 "up to 80 degrees",
                 holds=close(middle["ward"], 0.49, 0.005) and off < _SMALL,
@@ -156,7 +156,7 @@ def _ward_normal() -> Figure:
         statements=[
             Statement(
                 says="the albedo of each form along the normal has a closed form, or is a single integral",
-                where="known of the forms: their weights under eq. 7, averaged",
+                where="property of the forms: their weights under eq. 7, averaged",
                 seen=f"the quadrature over the hemisphere is within {worst:.1g} of it",
                 holds=worst < EXACT,
             ),
@@ -219,7 +219,7 @@ def _ward_samples() -> Figure:
             ),
             Statement(
                 says="the mean of the weights f_r cos(theta_r) / pdf is the albedo",
-                where="known of the form: eq. 7 as a density",
+                where="property of the form: eq. 7 as a density",
                 seen=f"up to 89.9 degrees within {off:.1g} of the quadrature, with 16384 samples for each light",
                 holds=off < _SAMPLED,
             ),

@@ -264,7 +264,7 @@ def _kept(aluminum: Surface, plastic: Surface) -> Statement:
     return Statement(
         says="close to the normal a field keeps its direction in space: s turns to p as sin² of the azimuth between "
         "light and viewer",
-        where="known of the form: eqs 61 to 64 for θ_i = θ_r → 0, where F_s = -F_p",
+        where="property of the form: eqs 61 to 64 for θ_i = θ_r → 0, where F_s = -F_p",
         seen=f"At θ_i = θ_r = 1° the share that leaves as p is within {max(off):.0e} of sin²(φ_r - φ_i).",
         threshold_from="a limit: second order in the angle of 1°",
         holds=max(off) < 1e-3,
@@ -301,7 +301,7 @@ def _mirror() -> Statement:
     values = np.linalg.svd(J, compute_uv=False) ** 2
     return Statement(
         says="a mirror that absorbs nothing reflects every state of polarization completely",
-        where="known of the form: energy, with |F_s| = |F_p| = 1 in eqs 61 to 64",
+        where="property of the form: energy, with |F_s| = |F_p| = 1 in eqs 61 to 64",
         seen=f"With n + ik = 1 + 10000i the squared singular values of the Jones matrix are {values.min():.4f} to "
         f"{values.max():.4f} at {angles[0].size} pairs of directions.",
         threshold_from="conservation: all light of any state, within 1 %",
@@ -319,7 +319,7 @@ def _reciprocal(aluminum: Surface) -> Statement:
     off = np.abs(back - sign @ np.swapaxes(forth, -1, -2) @ sign).max(axis=(-1, -2)) / forth[..., 0, 0]
     return Statement(
         says="with light and viewer exchanged, the Mueller matrix is its own transpose, except for the sign of U",
-        where="known of the form: reciprocity of polarised light",
+        where="property of the form: reciprocity of polarised light",
         seen=f"The two differ by {off.max():.0e} of m_00 at most, at {off.size} pairs of directions of aluminum.",
         threshold_from="a closed form: reciprocity, to rounding",
         holds=bool(off.max() < ROUNDING),

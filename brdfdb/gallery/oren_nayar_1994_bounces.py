@@ -137,7 +137,7 @@ def _strips(lines: list[_Bounces], lights_deg: list[float]) -> Statement:
     second = max(float(np.abs(line.second / line.summed[1] - 1.0).max()) for line in lines)
     return Statement(
         says="eqs 10 to 20, averaged over the slopes, are the first and the second bounce",
-        where="known of the form: view factors of strips, which use none of eqs 11 to 20",
+        where="property of the form: view factors of strips, which use none of eqs 11 to 20",
         seen=f"The sums differ by {direct:.2%} of direct light at most, and by {second:.2%} of the second bounce, for "
         f"θ_i of {listed(lights_deg, '.0f')}°.",
         threshold_from="an independent evaluation: strips and their strings, within the error of the sums",
@@ -267,7 +267,7 @@ def _exact_in_planes() -> Statement:
     off = float((np.abs(_weighted(*grid) - exact) / exact.mean()).max())
     return Statement(
         says="in the plane of incidence and across it, eqs 40 to 43 are the integral of eq. 23",
-        where="known of the form: appendix B.1, and the integral facet by facet",
+        where="property of the form: appendix B.1, and the integral facet by facet",
         seen=f"For facets of 20 and 40° they differ by {off:.1e} of the mean at most.",
         threshold_from="an independent evaluation: facets at 360 azimuths, within the error of their sum",
         holds=off < SAME,
@@ -301,14 +301,14 @@ def _factor(factors: dict[float, Floats], limits: list[float]) -> list[Statement
     return [
         Statement(
             says="where nothing is hidden the factor of eq. 48 is that of eq. 47",
-            where="known of the form: eqs 47 and 48 with m_s = m_v = 0",
+            where="property of the form: eqs 47 and 48 with m_s = m_v = 0",
             seen=f"For facets of {listed(factors, '.0f')}° they differ by {off:.0e} of it at most.",
             threshold_from="a closed form: eqs 47 and 48, to rounding",
             holds=off < 1e-9,
         ),
         Statement(
             says="where nearly all is hidden the factor of eq. 48 is 4 cos θ_a / (1 + cos θ_a) times that of eq. 47",
-            where="known of the form: the strings of eq. 20 where m_s and m_v tend to 1",
+            where="property of the form: the strings of eq. 20 where m_s and m_v tend to 1",
             seen=f"For facets of {listed(factors, '.0f')}° it is {listed(last, '.3f')} times as large with 98 % "
             f"hidden; the limits are {listed(limits, '.3f')}.",
             threshold_from="a limit: the strings of eq. 20, within 2 % at 0.98",
@@ -380,7 +380,7 @@ def evaluation() -> Figure:
             ),
             Statement(
                 says="eq. 48 brightens the forward direction: with eq. 47 radiance at the horizon is lower",
-                where="known of the form: eq. 48 is above eq. 47 where most of a cavity is hidden, for slopes below "
+                where="property of the form: eq. 48 is above eq. 47 where most of a cavity is hidden, for slopes below "
                 "70.5°",
                 seen=f"At θ_r = -90° the paper's own evaluation is {totals[0][0] / totals[1][0] - 1.0:+.1%} of the "
                 f"facets' radiance off, at 0° {at(totals[0], 0.0) / at(totals[1], 0.0) - 1.0:+.2%}.",

@@ -71,7 +71,7 @@ def _image() -> Figure:
             Statement(
                 says="the half vectors that lean along the wider axis mirror light from the x axis to "
                 "sin(theta_r) cos(phi_r) = -sin(theta_i): a straight streak in this projection, a cone about x",
-                where="known of the form: Fig. 5 and eq. 5a, exponent with alpha_x < alpha_y",
+                where="property of the form: Fig. 5 and eq. 5a, exponent with alpha_x < alpha_y",
                 seen=f"up to 0.3 on both sides of the plane of incidence, the largest f_r is within {off:.4f} of that "
                 "line",
                 holds=off < _ON_THE_RIDGE,
@@ -151,7 +151,7 @@ def _slices() -> Figure:
             Statement(
                 says="1 / sqrt(cos(theta_r)) draws the peak of a slice beyond the mirror direction, so that "
                 "theta_r - theta_i = alpha^2 tan(theta_r)",
-                where="known of the form: eq. 5a, derivative of its logarithm for small alpha",
+                where="property of the form: eq. 5a, derivative of its logarithm for small alpha",
                 seen=f"at theta_i = {SLICES_DEG[-1]:g} degrees it lies {beyond_deg[0]:.2f} degrees beyond "
                 f"along x and {beyond_deg[1]:.2f} along y; the condition gives {expected_deg[0]:.2f} and "
                 f"{expected_deg[1]:.2f}",

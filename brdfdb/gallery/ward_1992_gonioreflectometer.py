@@ -132,7 +132,7 @@ def _second_order() -> Statement:
     return Statement(
         says="a sphere images points near its middle onto the opposite side: the error of eq. 3 is of second order in "
         "D / R",
-        where="known of the form: the middle of a sphere is its own image, without coma",
+        where="property of the form: the middle of a sphere is its own image, without coma",
         seen=f"From D / R of {spread[0]:g} to {spread[1]:g} it grows with the power {slope:.3f}.",
         threshold_from="a limit: the second power for small D / R",
         holds=abs(slope - 2.0) < 0.1,
