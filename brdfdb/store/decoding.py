@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import (
+    ParameterError,
     StoreError,
 )
 from brdfdb.store.paths import METADATA
@@ -38,7 +39,7 @@ def decode(name: str, path: Path, files: Whole, digest: str) -> Table:
         variable = "brdf" if "brdf" in stored else "parts"
         dims, axes = stored[variable].metadata.dimension_names or (), table.grid.names  # type: ignore[union-attr]
         if dims[: len(axes)] != axes:
-            raise ValueError(f"{variable}: its dimensions {dims} must begin with {axes}")
+            raise ParameterError(variable, f"its dimensions {dims} must begin with {axes}")
         return replace(table, digest=digest)
     except ValueError as error:  # written by another program
         raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, PrivateAttr, ValidationError
 
+from brdfdb.errors import ParameterError
 from brdfdb.materials.provenance import Assumption, KnownExcess
 from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.stated_error import Error
@@ -122,7 +123,7 @@ class TableMetadata(BaseModel):
     def known_interpolation(self) -> Interpolation:
         """Return the interpolation; ValueError if it is one that this program does not know."""
         if "interpolation" in self.strange:
-            raise ValueError(f"interpolation: {self.strange['interpolation']}")
+            raise ParameterError("interpolation", self.strange["interpolation"])
         return self.interpolation
 
     @property

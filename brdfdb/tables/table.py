@@ -242,16 +242,18 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     interpolation = TableMetadata.read(attrs).known_interpolation()
     variable = "brdf" if "brdf" in arrays else "parts"
     if variable not in arrays:
-        raise ValueError(f"brdf: neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
+        raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
     grid = Grid({axis: arrays[axis] for axis in axes_among(arrays)})
     specular, uniform = arrays.get("specular_reflectance"), arrays.get("uniform")
     wavelength_nm, spectra = arrays.get("wavelength"), arrays.get("spectra")
     spectrum = () if wavelength_nm is None else check_wavelengths(wavelength_nm).shape
     channels = spectrum if spectra is None else spectra.shape[:1]
     if arrays[variable].shape != (*grid.shape, *channels):  # kernels do not look
-        raise ValueError(f"{variable}: shape {arrays[variable].shape} is not {(*grid.shape, *channels)}, of its axes")
+        raise ParameterError(variable, f"shape {arrays[variable].shape} is not {(*grid.shape, *channels)}, of its axes")
     if spectra is not None and spectra.shape != (*channels, *spectrum):
-        raise ValueError(f"spectra: shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths")
+        raise ParameterError(
+            "spectra", f"shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths"
+        )
     return Table(
         name=name,
         revision=revision,

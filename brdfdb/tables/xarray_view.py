@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from brdfdb.errors import ParameterError
 from brdfdb.tables.grids import axes_among, directions
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.table import rebuilt
@@ -70,7 +71,9 @@ def with_brdf(dataset: xr.Dataset) -> xr.Dataset:
     if "brdf" in dataset:
         return dataset
     if "parts" not in dataset:
-        raise ValueError(f"brdf: neither it nor parts is among the arrays {', '.join(map(str, dataset)) or 'none'}")
+        raise ParameterError(
+            "brdf", f"neither it nor parts is among the arrays {', '.join(map(str, dataset)) or 'none'}"
+        )
     brdf = _Rebuilt(dataset)
     return dataset.assign(brdf=xr.Variable(brdf.dims, indexing.LazilyIndexedArray(brdf), VARIABLES["brdf"]))
 

@@ -6,6 +6,7 @@ import errno
 import json
 import re
 import shutil
+import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -28,6 +29,7 @@ from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.xarray_view import plain_attributes
 from brdfdb_pipelines import build_resources, cli
 from brdfdb_pipelines.build import Built, build
+from brdfdb_pipelines.exit_codes import BUG
 from brdfdb_pipelines.recipe_file import Job, Recipe, RecipeError, load
 from brdfdb_pipelines.workers import Workers
 
@@ -327,11 +329,14 @@ def test_a_build_that_is_broken_off_says_so_and_the_old_revision_is_served(
 
 
 def test_a_bug_in_the_program_keeps_its_traceback(
-    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     failing(monkeypatch, "foam", ZeroDivisionError("a bug"))
-    with pytest.raises(ZeroDivisionError, match="a bug"):
-        cli.main(["build", str(recipe), "--store", str(tmp_path), "--jobs", "1"])
+    assert cli.main(["build", str(recipe), "--store", str(tmp_path / "store"), "--jobs", "1"]) == BUG
+    (file,) = tmp_path.glob("brdfdb-*.txt")
+    assert capsys.readouterr().err.endswith(f"its traceback is in {file} (ZeroDivisionError: a bug)\n")
+    assert file.read_text(encoding="utf-8").endswith("\nZeroDivisionError: a bug\n")
 
 
 def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
