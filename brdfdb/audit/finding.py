@@ -188,7 +188,7 @@ class Subject:
 
     @cached_property
     def pairs(self) -> Pairs:
-        """f_r of table and source at the directions that several findings share."""
+        """Return f_r [1/sr] of table and source at the directions that several findings share."""
         return pairs_of(self.table, self.source)
 
     def not_judged(self, needs: str) -> NotJudged:
