@@ -1,4 +1,4 @@
-"""Every form of a material: models, approximations, printed forms and tables, as one type."""
+"""Every form of a source: models, approximations, printed forms and tables, as one type."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats, FormKind, ModelForm, bytes_of
 from brdfdb.store.family import Family
 from brdfdb.tables import tabulation
@@ -25,7 +25,7 @@ from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import POLE_END_DEG
 
-Kind = FormKind | Literal["table"]
+Kind = Literal[FormKind, "table"]
 Evaluate = Callable[[Floats, Floats], Floats]
 
 TOLERANCES = (0.1, 0.01, 0.001)
@@ -35,12 +35,12 @@ _UNFACTORED = 0.01  # the tolerance of the table that is shown with and without 
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """One way to get f_r of a material at some wavelengths.
+    """One way to get f_r of a source at some wavelengths.
 
     Attributes
     ----------
     key : str
-        Unique among those of a material: lower-case words joined by hyphens.
+        Unique among those of a source: lower-case words joined by hyphens.
     title : str
         A name for people, with the equation.
     kind : str
@@ -52,7 +52,7 @@ class Form:
         specular part is left out: it is the same for all.
     bytes : int
         Size of the numbers that an evaluation reads: parameters, spectra, and constants that kernels look up, or the
-        nodes of a table. Memory that it writes first is not counted.
+        nodes of a table; 0 of a function, whose numbers are not known. Memory that it writes first is not counted.
     dtype : float32 or float64
         That of the vectors to give it, and of the values.
     rounded : bool
@@ -75,40 +75,42 @@ class Form:
     copied: Callable[[], Evaluate] | None = None
 
 
-def forms(material: Material, wavelength_nm: ArrayLike | None, tolerances: Sequence[float] | None = None) -> list[Form]:
-    """Return every form of a material that the library has; the first one is exact.
+def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[float] | None = None) -> list[Form]:
+    """Return every form of a source that the library has; the first one is exact.
 
     Parameters
     ----------
-    material : Material
-        Of any model.
+    source : Source
+        A material of any model, or a function.
     wavelength_nm : array_like of shape (L,) [nm], or None
-        For spectral materials, and only for them.
+        For spectral sources, and only for them.
     tolerances : sequence of float, optional
-        Relative errors of planned tables, each in [1e-4, 0.5]; by default 0.1, 0.01 and, for a grey material, 0.001.
+        Relative errors of planned tables, each in [1e-4, 0.5]; by default 0.1, 0.01 and, for a grey source, 0.001.
         With an empty sequence there are no tables.
 
     Returns
     -------
     list of Form
-        The forms that the model names (`ModelSpec.forms`), or the model itself; then tables. Coarser rungs of the exact
-        form follow it: the ladder that an approximation is compared with. Tables hold the exact form where a model of
-        the registry is it (`ModelSpec.exact_model`); they are planned for the material's own model, which is as smooth.
+        The forms that a material's model names (`ModelSpec.forms`), or the source itself; then tables. Coarser rungs of
+        the exact form follow it: the ladder that an approximation is compared with. Tables hold the exact form where a
+        model of the registry is it (`ModelSpec.exact_model`); they are planned for the material's own model, which is
+        as smooth.
 
     Raises
     ------
     ValueError
-        If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
+        If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the source.
     """
     if tolerances is None:
-        tolerances = SPECTRAL_TOLERANCES if material.spectral else TOLERANCES
+        tolerances = SPECTRAL_TOLERANCES if source.spectral else TOLERANCES
     at = None if wavelength_nm is None else np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
-    found = list(_of_model(material, at))
-    if tolerances:
-        tabulated = _exact(material)
-        exact = found[0].python == f"models.{tabulated.model}"
-        found.extend(_tables(material, tabulated, at, tolerances, exact=exact))
-    return found
+    if not isinstance(source, Material):
+        itself = Form("function", source.title, "exact", "Source.brdf_at", source.brdf_at(at), 0)
+        return [itself, *_tables(source, source, at, tolerances, "table")]
+    found = list(_of_model(source, at))
+    tabulated = _exact(source)
+    title = "table" if found[0].python == f"models.{tabulated.model}" else "table of the fit"
+    return [*found, *_tables(source, tabulated, at, tolerances, title)]
 
 
 def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Form]:
@@ -135,7 +137,7 @@ def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> 
 
 
 def _single(form: Form) -> Form:
-    """A form with float32 in and out."""
+    """Return a form with float32 in and out."""
     return replace(
         form,
         key=f"{form.key}-float32",
@@ -167,22 +169,22 @@ def _exact(material: Material) -> Material:
 
 
 def _tables(
-    planned: Material,
-    material: Material,
+    planned: Source,
+    held: Source,
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float],
-    *,
-    exact: bool,
+    table: str,
 ) -> Iterator[Form]:
     """Yield planned tables, one of them also with its spectra whole, and the two grids that anybody would begin with.
 
-    They are planned for one material and hold another, which is as smooth and has the exact form if `exact`.
+    They are planned for one source and hold another, which is as smooth. Without tolerances there are none.
     """
-    table = "table" if exact else "table of the fit"
+    if not tolerances:
+        return
     for tolerance in dict.fromkeys(tolerances):
         percent = f"{100.0 * tolerance:g}"
         key = f"table-{percent.replace('.', '-')}"
-        layout = replace(plan(planned, wavelength_nm, tolerance), source=material)
+        layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
         yield _table(layout, key, f"{table}, planned for {percent} %")
         if layout.spectra is not None and tolerance == _UNFACTORED:
             yield _table(replace(layout, spectra=None), f"{key}-unfactored", f"the {percent} % table, spectra whole")
@@ -190,7 +192,7 @@ def _tables(
         (False, "table-even", "even angles"),
         (True, "table-halves", "half vectors"),
     ):
-        layout = Layout(material, _plain_grid(material, halves=halves), wavelength_nm)
+        layout = Layout(held, _plain_grid(held, halves=halves), wavelength_nm)
         yield _table(layout, key, f"{table}, {title}, linear")
 
 
@@ -200,7 +202,7 @@ def _table(layout: Layout, key: str, title: str) -> Form:
 
 
 def of_family(family: Family) -> Form:
-    """Lookups in the middle of a family: between the two middle values of each parameter."""
+    """Return lookups in the middle of a family: between the two middle values of each parameter."""
     at: dict[str, Any] = {}
     for name, nodes in family.axes.items():
         cell = (nodes.size - 2) // 2
@@ -217,7 +219,7 @@ def of_family(family: Family) -> Form:
 
 
 def of_table(table: Table, key: str, title: str) -> Form:
-    """A table that is in memory, at its own wavelengths."""
+    """Return a table that is in memory, at its own wavelengths."""
     count = 1 if table.wavelength_nm is None else table.wavelength_nm.size
 
     def evaluate(wi: Floats, wr: Floats) -> Floats:
@@ -231,13 +233,14 @@ def of_table(table: Table, key: str, title: str) -> Form:
     return Form(key, title, "table", "Table.lookup_vectors", evaluate, size, copied=copied)
 
 
-def _plain_grid(material: Material, *, halves: bool) -> Grid:
-    """A grid that nobody planned: every 5 degrees (10 of an anisotropic surface), or half vectors crowded at the peak.
+def _plain_grid(source: Source, *, halves: bool) -> Grid:
+    """Return a grid that nobody planned: even angles, or half vectors crowded at the peak.
 
-    The half vectors are those of the MERL database: theta_h as the square of an even axis.
+    Angles have a node every 5 degrees, or every 10 for an anisotropic source. Half vectors are those of the MERL
+    database: theta_h as the square of an even axis.
     """
-    spec, anisotropic = material.spec, material.anisotropic
-    turn = 90.0 if spec.lobe_axes is not None else 360.0
+    anisotropic = source.anisotropic
+    turn = 90.0 if source.elliptical else 360.0
     if halves:
         theta_h = 90.0 * np.linspace(0.0, 1.0, 31) ** 2
         if anisotropic:
@@ -245,7 +248,7 @@ def _plain_grid(material: Material, *, halves: bool) -> Grid:
             return Grid(dict(zip(ANISOTROPIC_HALF_DIFFERENCE_AXES, nodes, strict=True)))
         quarter = np.linspace(0.0, 90.0, 19)
         return Grid(dict(zip(HALF_DIFFERENCE_AXES, (theta_h, quarter, quarter), strict=True)))
-    end = POLE_END_DEG if spec.grazing_pole else 90.0
+    end = POLE_END_DEG if source.grazing_pole else 90.0
     if anisotropic:
         theta = np.linspace(0.0, end, 10)
         nodes = theta, np.linspace(0.0, turn, round(turn / 10.0) + 1), theta, np.linspace(0.0, 360.0, 37)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
-from brdfdb.integrals.sampling import sample
-from brdfdb.materials import Material
+from brdfdb.integrals.sampling import DIFFUSE, directions, mixture_density
+from brdfdb.materials import Source
 
 Array = NDArray[np.float64]
 
 SAMPLERS = {
-    "model": "the model's own: its lobe and cosine",
+    "model": "the source's own: its lobe and cosine",
     "cosine": "cosine of the polar angle",
     "uniform": "uniform over the hemisphere",
 }
@@ -51,7 +51,7 @@ class Work(NamedTuple):
 
 
 def works(
-    material: Material,
+    source: Source,
     wavelength_nm: float | None,
     *,
     rounds: int = ROUNDS,
@@ -62,10 +62,10 @@ def works(
 
     Parameters
     ----------
-    material : Material
-        Of any model. Its own model is sampled, without the specular part.
+    source : Source
+        A material or a function. It is sampled without the specular part.
     wavelength_nm : float [nm] or None
-        Of a spectral material.
+        For a spectral source.
     rounds : int
         Each has random numbers of its own, which all samplers share.
     samples : int
@@ -84,9 +84,7 @@ def works(
     the mean over its points of that of a point. Random numbers are drawn before the clock starts. Seeds are fixed:
     means and variances are the same in every run.
     """
-    arguments = material.arguments(None if wavelength_nm is None else np.array([wavelength_nm]))
-    parameters = {name: np.ravel(value)[0] if np.ndim(value) else value for name, value in arguments.items()}
-    draws = _draws(material, parameters)
+    draws = _draws(source, None if wavelength_nm is None else np.array([wavelength_nm]))
     numbers = np.empty((len(draws), 2, 3, rounds))
     for row in range(rounds):
         for problem, estimate in enumerate((_albedo, _sphere)):
@@ -103,23 +101,26 @@ def works(
     return {key: (Work(*numbers[number, 0]), Work(*numbers[number, 1])) for number, key in enumerate(draws)}
 
 
-def _draws(material: Material, parameters: dict[str, Any]) -> dict[str, Draw]:
+def _draws(source: Source, wavelength_nm: NDArray[np.float64] | None) -> dict[str, Draw]:
     """Return, for each sampler, a function of u1, u2 and directions of light: new directions, f_r cos over density."""
-    spec = material.spec
+    brdf = source.brdf_at(wavelength_nm)
 
-    def of_model(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
-        drawn = sample(spec, u1, u2, wi, **parameters)
-        return drawn.wr, drawn.weight
+    def of_source(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
+        lobe = source.lobe(wi[:, 2], wavelength_nm) or DIFFUSE
+        wr = directions(lobe, u1, u2, wi)
+        density = mixture_density(lobe, wi, wr)
+        reflected = brdf(wi, wr)[:, 0] * np.maximum(wr[:, 2], 0.0)
+        return wr, np.divide(reflected, density, where=density != 0.0, out=np.zeros(density.shape))
 
     def of_cosine(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
         wr = _around(np.sqrt(u1), np.sqrt(1.0 - u1), u2)
-        return wr, np.asarray(np.pi * spec.vectors(wi, wr, **parameters), dtype=np.float64)
+        return wr, np.asarray(np.pi * brdf(wi, wr)[:, 0])
 
     def uniformly(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
         wr = _around(np.sqrt(u1 * (2.0 - u1)), 1.0 - u1, u2)
-        return wr, np.asarray(2.0 * np.pi * wr[:, 2] * spec.vectors(wi, wr, **parameters), dtype=np.float64)
+        return wr, np.asarray(2.0 * np.pi * wr[:, 2] * brdf(wi, wr)[:, 0])
 
-    return dict(zip(SAMPLERS, (of_model, of_cosine, uniformly), strict=True))
+    return dict(zip(SAMPLERS, (of_source, of_cosine, uniformly), strict=True))
 
 
 def _around(sin_theta: Array, cos_theta: Array, u2: Array) -> Array:

@@ -23,7 +23,7 @@ from brdfdb.forms.tradeoff_document import (
     Saving,
     Work,
 )
-from brdfdb.materials import Material
+from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 from brdfdb.store.family import Family, Sweep
 from brdfdb.tables import error_measurement
@@ -38,21 +38,21 @@ SHARE, CONFIDENCE = 0.99, 0.95  # the percentile that is charted, and the confid
 
 
 def chart(
-    material: Material,
+    source: Source,
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float] | None = None,
     *,
     also: Sequence[Form] = (),
     tick: Callable[[], None] = lambda: None,
 ) -> Chart:
-    """Measure error and cost of every form of a material.
+    """Measure error and cost of every form of a source.
 
     Parameters
     ----------
-    material : Material
-        Of any model.
+    source : Source
+        A material of any model, or a function.
     wavelength_nm : array of shape (L,) [nm], or None
-        For spectral materials, and only for them.
+        For spectral sources, and only for them.
     tolerances : sequence of float, optional
         Of planned tables, as `catalogue.forms` takes them.
     also : sequence of Form
@@ -70,9 +70,9 @@ def chart(
     ValueError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
     """
-    forms = [*catalogue.forms(material, wavelength_nm, tolerances), *also]
+    forms = [*catalogue.forms(source, wavelength_nm, tolerances), *also]
     tick()
-    drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+    drawn = error_measurement.draw(source, wavelength_nm, DIRECTIONS, SEED)
     errors = _errors(forms, drawn)
     tick()
     batch, block, single = _timed(forms, drawn, tick)
@@ -81,7 +81,7 @@ def chart(
     middle = None if wavelength_nm is None else float(wavelength_nm[wavelength_nm.size // 2])
     samplers = [
         Sampler(key=key, title=sampler_efficiency.SAMPLERS[key], albedo=_work(albedo), sphere=_work(sphere))
-        for key, (albedo, sphere) in sampler_efficiency.works(material, middle).items()
+        for key, (albedo, sphere) in sampler_efficiency.works(source, middle).items()
     ]
     tick()
     seconds = np.stack([each.seconds for each in batch], axis=1)
@@ -91,10 +91,10 @@ def chart(
         return _front(forms, [error["l1"] for error in errors], costs)
 
     return Chart(
-        material=material.name,
-        title=material.title,
-        model=material.model,
-        parameters=material.file_parameters(),
+        material=source.name,
+        title=source.title,
+        model=source.model if isinstance(source, Material) else "function",
+        parameters=source.file_parameters() if isinstance(source, Material) else {},
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         directions=int(np.count_nonzero(drawn.above)),
         truth=forms[0].key,
@@ -180,27 +180,17 @@ def chart_family(
         If a member of `family` was built anew since it was recorded.
     """
     tolerances = SPECTRAL_TOLERANCES if tolerances is None else tolerances
-    middle = len(materials) // 2
-    kept: dict[str, tuple[int, Form]] = {}  # of each key the one next to the middle, which is timed
-    errors: list[dict[str, dict[str, Any]]] = []
-    for number, material in enumerate(materials):
-        forms = catalogue.forms(material, wavelength_nm, tolerances)
-        drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
-        errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
-        for form in forms:
-            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
-                kept[form.key] = number, form
-        tick()
+    kept, errors = _forms_of_members(materials, wavelength_nm, tolerances, tick)
     timed = [form for _, form in kept.values()]
     between = None if family is None else of_family(family)
-    drawn = error_measurement.draw(materials[middle], wavelength_nm, DIRECTIONS, SEED)
+    drawn = error_measurement.draw(materials[len(materials) // 2], wavelength_nm, DIRECTIONS, SEED)
     batch, block, single = _timed([*timed, *([between] if between else [])], drawn, tick)
     seconds = np.stack([each.seconds for each in batch], axis=1)
     fronts = []
     for found in errors:
-        here = [index for index, form in enumerate(timed) if form.key in found]
-        some = [timed[index] for index in here]
-        fronts.append(_front(some, [found[form.key]["l1"] for form in some], seconds[:, here]))
+        present = [index for index, form in enumerate(timed) if form.key in found]
+        rivals = [timed[index] for index in present]
+        fronts.append(_front(rivals, [found[form.key]["l1"] for form in rivals], seconds[:, present]))
     return FamilyChart(
         family=sweep.name,
         title=sweep.title,
@@ -228,6 +218,27 @@ def chart_family(
         ),
         fronts=fronts,
     )
+
+
+def _forms_of_members(
+    materials: Sequence[Material],
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerances: Sequence[float],
+    tick: Callable[[], None],
+) -> tuple[dict[str, tuple[int, Form]], list[dict[str, dict[str, Any]]]]:
+    """Return by key the form of the member next to the middle and its number; and by key the errors of each member."""
+    middle = len(materials) // 2
+    kept: dict[str, tuple[int, Form]] = {}
+    errors: list[dict[str, dict[str, Any]]] = []
+    for number, material in enumerate(materials):
+        forms = catalogue.forms(material, wavelength_nm, tolerances)
+        drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+        errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
+        for form in forms:
+            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
+                kept[form.key] = number, form
+        tick()
+    return kept, errors
 
 
 def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:

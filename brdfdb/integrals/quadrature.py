@@ -153,11 +153,7 @@ def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def spec_of(model: ModelSpec | str) -> ModelSpec:
     """A model by its name, or itself."""
-    if isinstance(model, ModelSpec):
-        return model
-    if model not in MODELS:
-        raise ParameterError("model", f"{model!r} is not one of {', '.join(MODELS)}", model, tuple(MODELS))
-    return MODELS[model]
+    return model if isinstance(model, ModelSpec) else MODELS[model]
 
 
 def _albedo(

@@ -278,7 +278,7 @@ def _materials(scene: Scene) -> dict[str, Source]:
     known: dict[str, Material] = presets()
     for name, table in scene.define.items():
         if name in known:
-            raise ParameterError(f"define.{name}", "is the name of a built-in material; give yours another")
+            raise ParameterError(f"define.{name}", "is the name of a preset; give yours another")
         try:
             known[name] = Material.from_table(name, table)
         except MaterialError as error:

@@ -62,8 +62,8 @@ def draw(
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
     light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
-    its own distribution hardly ever reaches the shoulder where the lobe ends. Viewers of a source without a lobe, or
-    of one that is not known, are all drawn over the hemisphere.
+    its own distribution hardly ever reaches the shoulder where the lobe ends. Viewers of a source without a lobe,
+    or of an unknown one, are all drawn over the hemisphere.
     """
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)

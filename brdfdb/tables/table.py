@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -19,38 +19,38 @@ from brdfdb.tables._interpolation import Axes, prepared
 from brdfdb.tables.grids import Axis, Grid, axes_among, check_wavelengths
 from brdfdb.tables.layout import PLAIN, Interpolation, Layout
 from brdfdb.tables.metadata import TableMetadata
-from brdfdb.tables.table_base import Described, Stated
+from brdfdb.tables.table_base import BaseTable
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
 _Ready = tuple[_kernels.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
-class Table(Described):
+class Table(BaseTable):
     """A decoded table: the values of one revision of one material, in memory.
 
     Attributes
     ----------
     name, revision : str
-        Which material, and which of its revisions.
+        Name of the material, and its revision.
     attrs : dict
-        What the store says of it: title, model, parameters, sources and more.
+        The attributes as stored; `metadata` is the typed record of them.
     grid : Grid
         The angular axes, in the order of the dimensions.
     wavelength_nm : array (L,) [nm] or None
         Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
     values : float32 array
-        Numbers over the angular axes and, last, the wavelengths, or the parts of a factored spectrum.
+        Numbers over the angular axes and, last, the wavelengths, or the coefficients of a factored spectrum.
     specular : float32 array (theta_i[, L]) [1] or None
-        Reflectance of the Dirac part, None if the model has none.
+        Reflectance of the specular part; None if the source has none.
     specular_theta_deg : array [degree] or None
-        Where; by default the nodes of the axis theta_i.
+        Its nodes; by default those of the axis theta_i.
     interpolation : Interpolation
-        How the numbers become f_r between the nodes; by default they are f_r and linear.
-    spectra : array (parts, L) or None
-        How the parts of a factored spectrum make up the wavelengths.
+        The way from the numbers to f_r between nodes; by default they are f_r, interpolated linearly.
+    spectra : array (coefficients, L) or None
+        The basis of a factored spectrum.
     uniform : array (L,) or (1,) [1/sr]
-        The part of f_r that is the same in all directions, which is not in `values`.
+        The uniform part of f_r, which is not in `values`.
     digest : str
         sha256 of the manifest of the revision; empty of a table that was not read from a store.
     n, k : array (L,) [1] or None
@@ -75,7 +75,7 @@ class Table(Described):
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
-        """The table of a layout, or of a part of its grid, before it is stored: without the Dirac part."""
+        """Make the table of a layout, or of a part of its grid, before it is stored: without the specular part."""
         return cls(
             name=layout.source.name,
             revision="",
@@ -110,7 +110,7 @@ class Table(Described):
 
     @property
     def nbytes(self) -> int:
-        """Of the arrays that lookups read."""
+        """Size [byte] of the arrays that lookups read."""
         arrays = (self.values, self.specular, self.spectra, self.uniform)
         return sum(array.nbytes for array in arrays if array is not None)
 
@@ -119,7 +119,6 @@ class Table(Described):
         """Whether the stored numbers are f_r itself."""
         return self.spectra is None and self.uniform is None and self.interpolation.plain
 
-    @overload
     def lookup(
         self,
         theta_i: ArrayLike,
@@ -127,60 +126,7 @@ class Table(Described):
         theta_r: ArrayLike,
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-    ) -> Floats: ...
-
-    @overload
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[True],
-    ) -> Stated: ...
-
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: bool = False,
-    ) -> Floats | Stated:
-        """Interpolate f_r.
-
-        Parameters
-        ----------
-        theta_i, phi_i, theta_r, phi_r : array_like [rad]
-            Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
-        wavelength_nm : float or array_like (M,) [nm], optional
-            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table. Between them
-            the numbers that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
-        with_error : bool
-            Give the error that the table states beside the values, between its wavelengths, too: see `Stated`.
-
-        Returns
-        -------
-        array [1/sr], or Stated
-            In the shape of the angles, with a last axis for the wavelengths of a spectral table, or M if an array of
-            wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is nan.
-            Beyond the last theta node of its grid the value is that of the node. float32 arrays in give float32 out.
-
-        Raises
-        ------
-        ValueError
-            If an angle or a wavelength is outside its range; the message names it. If an error is asked of a table
-            that states none, or between the wavelengths of a table of before version 3.
-        """
-        if with_error:
-            brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
-            return Stated(brdf, self._stated(checked_angles(theta_i, phi_i, theta_r, phi_r), brdf, wavelength_nm))
+    ) -> Floats:
         at = self._wavelengths(wavelength_nm)
         given: Sequence[ArrayLike] = (theta_i, phi_i, theta_r, phi_r)
         shape: tuple[int, ...] = ()
@@ -203,28 +149,7 @@ class Table(Described):
             checked_angles(*given)
         return values.reshape(shape + at.tail)[()]
 
-    @overload
-    def lookup_vectors(
-        self,
-        wi: ArrayLike,
-        wr: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-        *,
-        with_error: Literal[False] = False,
-    ) -> Floats: ...
-
-    @overload
-    def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: Literal[True]
-    ) -> Stated: ...
-
-    def lookup_vectors(
-        self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None, *, with_error: bool = False
-    ) -> Floats | Stated:
-        """`lookup` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
-        if with_error:
-            brdf = self.lookup_vectors(wi, wr, wavelength_nm)
-            return Stated(brdf, self._stated(checked_vectors(wi, wr), brdf, wavelength_nm))
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         at = self._wavelengths(wavelength_nm)
         vectors = checked_vectors(wi, wr)
         shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
@@ -235,7 +160,7 @@ class Table(Described):
 
     @functools.cached_property
     def _kernel(self) -> _Ready:
-        """What kernels need to know of the table."""
+        """The table as kernels read it."""
         grid, how = self.grid, self.interpolation
         # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
         overshoots = how.logarithm or how.cubic or grid.half_difference
@@ -250,25 +175,6 @@ class Table(Described):
         return rule, axes, self.values.reshape(-1), channels, spectra, uniform
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Interpolate the reflectance of the Dirac part; 0 for models that have none.
-
-        Parameters
-        ----------
-        theta_i : array_like [rad]
-            Angle of incidence, in [0, pi].
-        wavelength_nm : float or array_like (M,) [nm], optional
-            As in `lookup`.
-
-        Returns
-        -------
-        array [1]
-            Shaped as by `lookup`.
-
-        Raises
-        ------
-        ValueError
-            If theta_i or a wavelength is outside its range.
-        """
         at = self._wavelengths(wavelength_nm)
         given = np.asarray(theta_i)
         dtype = asked_for(theta_i)
@@ -283,7 +189,7 @@ class Table(Described):
 
     @functools.cached_property
     def _specular_rows(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """Nodes [rad] of the Dirac part, and its values there, a row a node; none of either where there is none."""
+        """Nodes [rad] of the specular part, and its values there, a row a node; empty arrays where there is none."""
         if self.specular is None:
             return np.empty(0), np.empty((0, 0), np.float32)
         at_deg = self.specular_theta_deg
@@ -304,9 +210,9 @@ def rebuilt(
     theta_i: Floats,
     theta_r: Floats,
 ) -> Floats:
-    """f_r [1/sr] at nodes, shape (..., L), from what is stored there, shape (..., parts or L); 0 below the horizon.
+    """Return f_r [1/sr] at nodes, shape (..., L), from the numbers there, shape (..., coefficients or L).
 
-    theta_i and theta_r [rad] broadcast to the shape of the nodes; uniform and spectra are those of a `Table`.
+    theta_i and theta_r [rad] broadcast to the shape of the nodes. It is 0 below the horizon.
     """
     wavelengths = numbers if spectra is None else numbers.astype(np.float64) @ spectra
     mu = np.maximum(np.cos(theta_i), COS_HORIZON) * np.maximum(np.cos(theta_r), COS_HORIZON)
@@ -315,7 +221,7 @@ def rebuilt(
 
 
 def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """One number after the other, and never writable: kernels are compiled anew for arrays that are, 10 s a time."""
+    """Return a flat array that is never writable: kernels are compiled anew for arrays that are, 10 s each time."""
     whole = array if array.shape == shape else np.broadcast_to(array, shape)
     flat = np.ascontiguousarray(whole, dtype=dtype).reshape(-1)
     flat.flags.writeable = False
@@ -323,7 +229,7 @@ def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDAr
 
 
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
-    """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
+    """Return the coordinates [rad] on a grid, of shape (axes, N), of unit vectors of shape (N, 3)."""
     x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
     rule = _kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False)
     flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
@@ -332,22 +238,22 @@ def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
 
 
 def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], attrs: Mapping[str, Any]) -> Table:
-    """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
-    metadata = TableMetadata.read(attrs)
-    if "interpolation" in metadata.strange:
-        raise ValueError(f"interpolation: {metadata.strange['interpolation']}")
+    """Return the table that the arrays and attributes of a stored group describe; ValueError if they do not fit."""
+    interpolation = TableMetadata.read(attrs).known_interpolation()
     variable = "brdf" if "brdf" in arrays else "parts"
     if variable not in arrays:
-        raise ValueError(f"brdf: neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
+        raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
     grid = Grid({axis: arrays[axis] for axis in axes_among(arrays)})
     specular, uniform = arrays.get("specular_reflectance"), arrays.get("uniform")
     wavelength_nm, spectra = arrays.get("wavelength"), arrays.get("spectra")
     spectrum = () if wavelength_nm is None else check_wavelengths(wavelength_nm).shape
     channels = spectrum if spectra is None else spectra.shape[:1]
     if arrays[variable].shape != (*grid.shape, *channels):  # kernels do not look
-        raise ValueError(f"{variable}: shape {arrays[variable].shape} is not {(*grid.shape, *channels)}, of its axes")
+        raise ParameterError(variable, f"shape {arrays[variable].shape} is not {(*grid.shape, *channels)}, of its axes")
     if spectra is not None and spectra.shape != (*channels, *spectrum):
-        raise ValueError(f"spectra: shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths")
+        raise ParameterError(
+            "spectra", f"shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths"
+        )
     return Table(
         name=name,
         revision=revision,
@@ -357,7 +263,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         values=arrays[variable],
         specular=None if specular is None else specular.astype(np.float32),
         specular_theta_deg=arrays.get("specular_theta_i"),
-        interpolation=metadata.interpolation,
+        interpolation=interpolation,
         spectra=spectra,
         uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),
         n=arrays.get("n"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb.geometry import Directions
+from brdfdb.geometry import Directions, checked_angles, checked_vectors
 from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -27,11 +28,11 @@ class Located(NamedTuple):
     Attributes
     ----------
     nodes : int64 array (M, 4)
-        The wavelengths of the table that count.
+        Numbers of the wavelengths of the table that count.
     weight : float64 array (M, 4)
         Their weights, as by `weights_of_nodes`.
     column : int64 array (M,)
-        Where a stated error stands for each: see `Error.limits`.
+        The column of `Error.limits` for each.
     tail : tuple of int
         The shape that the wavelengths add to that of the directions.
     """
@@ -53,23 +54,107 @@ class Stated(NamedTuple):
     Attributes
     ----------
     brdf : array [1/sr]
-        As by `Table.lookup`.
+        Values as by `Table.lookup`.
     error : array [1/sr]
         In the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
-        model. Between wavelengths, and in the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
+        source. Between wavelengths, and in the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
     """
 
     brdf: Floats
     error: Floats
 
 
-class Described:
-    """What a table in memory and one behind a service have in common; `Table` says what the attributes are."""
+class BaseTable(ABC):
+    """A table of one revision of a material, in memory or behind a service: lookups, metadata and stated error."""
 
     name: str
     revision: str
     attrs: Mapping[str, Any]
     wavelength_nm: Axis | None
+
+    @abstractmethod
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Interpolate f_r [1/sr].
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r : array_like [rad]
+            Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
+        wavelength_nm : float or array_like (M,) [nm], optional
+            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table. Between them
+            the numbers that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
+
+        Returns
+        -------
+        array [1/sr]
+            In the shape of the angles, with a last axis for the wavelengths of a spectral table, or M if an array of
+            wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is nan.
+            Beyond the last theta node of its grid the value is that of the node. float32 arrays in give float32 out.
+
+        Raises
+        ------
+        ParameterError
+            If an angle or a wavelength is outside its range.
+        StoreError, UnknownRevisionError
+            If the table is behind a service, and the service or the revision is gone.
+        """
+
+    @abstractmethod
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate f_r [1/sr] for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
+
+        Wavelengths, result and errors are those of `lookup`.
+        """
+
+    @abstractmethod
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Interpolate the reflectance [1] of the specular part; 0 for a model that has none.
+
+        Parameters
+        ----------
+        theta_i : array_like [rad]
+            Angle of incidence, in [0, pi].
+        wavelength_nm : float or array_like (M,) [nm], optional
+            As in `lookup`.
+
+        Returns
+        -------
+        array [1]
+            Shaped as by `lookup`.
+
+        Raises
+        ------
+        ParameterError, StoreError, UnknownRevisionError
+            As by `lookup`.
+        """
+
+    def lookup_with_error(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Stated:
+        """Interpolate f_r [1/sr], and give the error [1/sr] that the table states for each value.
+
+        Parameters and errors are those of `lookup`. ParameterError, too, if the table states no error, or a wavelength
+        is between those of a table that did not measure its error there (before version 3).
+        """
+        brdf = self.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
+        return Stated(brdf, self._stated(checked_angles(theta_i, phi_i, theta_r, phi_r), brdf, wavelength_nm))
+
+    def lookup_vectors_with_error(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Stated:
+        """Interpolate f_r [1/sr] for unit vectors, and give the stated error [1/sr]; as `lookup_with_error`."""
+        brdf = self.lookup_vectors(wi, wr, wavelength_nm)
+        return Stated(brdf, self._stated(checked_vectors(wi, wr), brdf, wavelength_nm))
 
     @functools.cached_property
     def metadata(self) -> TableMetadata:
@@ -96,13 +181,13 @@ class Described:
 
     def _stated(self, directions: Directions, brdf: Floats, wavelength_nm: ArrayLike | None) -> Floats:
         if self.error is None:
-            raise ParameterError("with_error", f"the table of {self.name} states no error; build it anew")
+            raise ParameterError("error", f"the table of {self.name} states no error; build it anew")
         return self.stated_by(self.error, directions, brdf, wavelength_nm)
 
     def stated_by(
         self, error: Error, directions: Directions, brdf: Floats, wavelength_nm: ArrayLike | None = None
     ) -> Floats:
-        """Return what an error at the wavelengths of the table says [1/sr] of values, in their shape.
+        """Return the error [1/sr] that is stated for values, in their shape.
 
         Raises
         ------
@@ -114,7 +199,7 @@ class Described:
             assert self.wavelength_nm is not None
             below = int(at.column.max()) - len(error.floor)
             raise ParameterError(
-                "with_error",
+                "error",
                 f"the error of {self.name} was not measured between its wavelengths of "
                 f"{self.wavelength_nm[below]:g} and {self.wavelength_nm[below + 1]:g} nm; build it anew",
             )
@@ -132,7 +217,7 @@ class Described:
         return {}
 
     def _wavelengths(self, wavelength_nm: ArrayLike | None) -> Located:
-        """Return where wavelengths [nm] lie on the axis of the table; ValueError if one is not allowed."""
+        """Locate wavelengths [nm] on the axis of the table; ParameterError if one is not allowed."""
         if wavelength_nm is None:
             return self._all_wavelengths
         if not isinstance(wavelength_nm, float):
@@ -174,7 +259,7 @@ class Described:
 
 
 def _on_axis(stored: NDArray[np.float64], wanted: NDArray[np.float64], tail: tuple[int, ...]) -> Located:
-    """Return where wavelengths [nm] lie among those of a table."""
+    """Locate wavelengths [nm] among those of a table."""
     below = np.searchsorted(stored, wanted, side="right") - 1
     column = np.where(stored[below] == wanted, below, stored.size + below)
     return Located(*weights_of_nodes(stored, wanted), column, tail)

@@ -177,7 +177,7 @@ def frame(layout: Layout) -> xr.Dataset:
         coordinates["wavelength"] = (
             "wavelength",
             wavelength_nm,
-            {"units": "nm", "long_name": "wavelength in vacuum"},
+            {"units": "nm", "long_name": "wavelength in vacuum", "standard_name": "radiation_wavelength"},
         )
     if (indices := source.refractive_indices(wavelength_nm)) is not None:
         for name, meaning, values in zip("nk", ("refractive index", "extinction coefficient"), indices, strict=True):

@@ -1,7 +1,8 @@
-"""f_r of a stored table as an xarray variable that is computed from its parts when it is read."""
+"""Tables as xarray Datasets: f_r over all axes, computed when it is read, and attributes that any file format takes."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,28 +12,80 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from brdfdb.errors import ParameterError
 from brdfdb.tables.grids import axes_among, directions
-from brdfdb.tables.layout import Interpolation
+from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.table import rebuilt
 from brdfdb.tables.tabulation import VARIABLES
 
+CF_VERSION = "CF-1.11"  # of the conventions that units, long_name and standard_name follow
+
+
+def opened(store: Any) -> xr.Dataset:
+    """Open a revision as a lazy Dataset with ``brdf`` [1/sr] over all axes.
+
+    Parameters
+    ----------
+    store : zarr store or str
+        The group of the revision: a zarr store, a directory, or an address that fsspec reads.
+
+    Returns
+    -------
+    Dataset
+        The stored arrays, and ``brdf`` where coefficients are stored in its place. Attributes are those of the table,
+        as `plain_attributes` gives them.
+    """
+    dataset = with_brdf(xr.open_zarr(store, chunks=None))
+    dataset.attrs = plain_attributes(dataset.attrs)
+    if "wavelength" in dataset.coords:  # tables built earlier do not have the name
+        dataset["wavelength"].attrs.setdefault("standard_name", "radiation_wavelength")
+    return dataset
+
+
+def plain_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes as text and numbers, which netCDF can hold, too.
+
+    Empty ones and null are left out. True and false become 1 and 0. Objects and lists of anything but numbers become
+    JSON text: ``json.loads(dataset.attrs["parameters"])``.
+    """
+    plain: dict[str, Any] = {"Conventions": CF_VERSION}
+    for key, value in attributes.items():
+        if isinstance(value, bool):
+            plain[key] = int(value)
+        elif isinstance(value, Mapping) or (isinstance(value, list) and not all(map(_is_number, value))):
+            plain[key] = json.dumps(value, ensure_ascii=False)
+        else:
+            plain[key] = value
+    return {key: value for key, value in plain.items() if value not in (None, "", [], "{}")}
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
 
 def with_brdf(dataset: xr.Dataset) -> xr.Dataset:
-    """A stored table with ``brdf`` [1/sr] over its axes and wavelengths: computed on demand where parts are stored."""
+    """Return a stored table with ``brdf`` [1/sr] over its axes and wavelengths, computed on demand if it is not stored.
+
+    ValueError if the dataset has neither ``brdf`` nor the coefficients that it is rebuilt from.
+    """
     if "brdf" in dataset:
         return dataset
+    if "parts" not in dataset:
+        raise ParameterError(
+            "brdf", f"neither it nor parts is among the arrays {', '.join(map(str, dataset)) or 'none'}"
+        )
     brdf = _Rebuilt(dataset)
     return dataset.assign(brdf=xr.Variable(brdf.dims, indexing.LazilyIndexedArray(brdf), VARIABLES["brdf"]))
 
 
 class _Rebuilt(BackendArray):
-    """What xarray indexes: f_r of the nodes and wavelengths that are asked for."""
+    """The array that xarray indexes: f_r [1/sr] at the nodes and wavelengths of a request."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._parts = dataset["parts"]
         self._spectra = dataset["spectra"].values if "spectra" in dataset else None
         self._uniform = np.atleast_1d(dataset["uniform"].values) if "uniform" in dataset else None
-        self._interpolation = Interpolation(**dataset.attrs["interpolation"])
+        self._interpolation = TableMetadata.read(dataset.attrs).known_interpolation()
         self._names = axes_among(self._parts.dims)
         self._nodes = [dataset[name].values for name in self._names]
         spectral = ("wavelength",) if "wavelength" in dataset.sizes else ()

@@ -94,7 +94,7 @@ def test_colours_of_more_points_than_are_worked_on_at_once(root: Path, store: St
         headers=BINARY,
         params={"output": "linear-srgb", "format": "npy", "error": "true"},
     )
-    spectra = store["copper-foil"].lookup(*np.radians(points.T), with_error=True)
+    spectra = store["copper-foil"].lookup_with_error(*np.radians(points.T))
     of = srgb_weights(tuple(VISIBLE_NM.tolist()))
     expected = np.stack([spectra.brdf @ of, spectra.error @ np.abs(of)])
     np.testing.assert_allclose(read_npy(answer.content), expected, rtol=1e-12, atol=1e-15)
@@ -147,7 +147,7 @@ def test_a_colour_of_very_many_wavelengths_is_refused(client: Client) -> None:
 @pytest.mark.parametrize("name", ["copper-foil", "grey-felt"])
 def test_the_stated_error_stands_beside_the_values(client: Client, store: Store, name: str) -> None:
     address = f"/v1/materials/{name}/lookup"
-    brdf, error = store[name].lookup(*RADIANS, with_error=True)
+    brdf, error = store[name].lookup_with_error(*RADIANS)
     answer = client.get(address, params={**POINT, "error": "true"}).json()
     np.testing.assert_array_equal(answer["brdf"], brdf)
     np.testing.assert_array_equal(answer["error"], error)
@@ -158,7 +158,7 @@ def test_the_stated_error_stands_beside_the_values(client: Client, store: Store,
 
 def test_the_error_of_a_colour_adds_up(client: Client, store: Store) -> None:
     answer = client.get(FOIL, params={**POINT, "error": "true", "output": "linear-srgb"}).json()
-    stated = store["copper-foil"].lookup(*RADIANS, with_error=True).error
+    stated = store["copper-foil"].lookup_with_error(*RADIANS).error
     np.testing.assert_allclose(answer["error"], stated @ np.abs(srgb_weights(tuple(VISIBLE_NM.tolist()))), **EXACT)
 
 

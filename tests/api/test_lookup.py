@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from brdfdb.errors import ParameterError
 from brdfdb.store.reader import Store
 from brdfdb.tables.table import Table
 from brdfdb_api.http.app import create_app
@@ -268,12 +269,24 @@ def test_the_number_is_told_in_full(client: Client) -> None:
     assert problem["detail"] == "theta_r: 180.00000000000003 is outside [0, 180] degrees"
 
 
-def test_an_error_that_names_no_parameter_is_ours(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "error",
+    [
+        ValueError("cannot reshape array of size 7 into shape (3,)"),
+        ValueError("wavelength_nm: a sentence that names a parameter is not an error about it"),
+        ParameterError("specular", "shape (3,) is not (2,)"),  # no client names this parameter
+    ],
+)
+def test_an_error_about_no_parameter_of_the_request_is_ours(
+    error: Exception, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fail(*_: Any, **__: Any) -> Any:
-        raise ValueError("cannot reshape array of size 7 into shape (3,)")
+        raise error
 
     monkeypatch.setattr(Table, "lookup", fail)
-    assert "reshape" not in client.problem("GET", f"{FOIL}?theta_i=1&theta_r=2", 500)["detail"]
+    problem = client.problem("GET", f"{FOIL}?theta_i=1&theta_r=2", 500)
+    assert str(error) not in problem["detail"]
+    assert "parameter" not in problem
 
 
 def test_shapes_that_do_not_broadcast(client: Client) -> None:

@@ -91,8 +91,8 @@ def test_wrong_arguments_are_refused_in_the_same_words(opened: Any, name: str, a
 
 def test_an_error_that_is_not_stated(opened: Any) -> None:
     assert opened["white-tile"].error is None
-    with pytest.raises(ValueError, match=r"^with_error: the table of white-tile states no error; build it anew$"):
-        opened["white-tile"].lookup(0.5, 0.0, 0.5, 0.0, with_error=True)
+    with pytest.raises(ValueError, match=r"^error: the table of white-tile states no error; build it anew$"):
+        opened["white-tile"].lookup_with_error(0.5, 0.0, 0.5, 0.0)
 
 
 # The same numbers
@@ -148,8 +148,8 @@ def test_errors_are_stated_as_by_a_table(root: Path, address: str, name: str, wa
     given = angles()
     wi, wr = unit_vector(given[0], given[1]), unit_vector(given[2], given[3])
     for found, expected in [
-        tuple(table.lookup(*given, wavelength_nm, with_error=True) for table in (there, here)),
-        tuple(table.lookup_vectors(wi, wr, wavelength_nm, with_error=True) for table in (there, here)),
+        tuple(table.lookup_with_error(*given, wavelength_nm) for table in (there, here)),
+        tuple(table.lookup_vectors_with_error(wi, wr, wavelength_nm) for table in (there, here)),
     ]:
         same(found.brdf, expected.brdf)
         # an error is a value times a limit: where the limits are the same, it is off by as much as the value

@@ -110,10 +110,6 @@ def test_albedo_is_the_integral_of_what_lookup_returns(grid: Grid, wavelengths: 
     np.testing.assert_allclose(albedo.ravel(), brute.ravel(), rtol=QUADRATURE_TOLERANCE)
 
 
-def test_the_parameters_above_cover_every_model() -> None:
-    assert set(PARAMETERS) == set(MODELS)
-
-
 @pytest.mark.parametrize("grid", [ISOTROPIC, UNEQUAL, ANISOTROPIC], ids=["isotropic", "unequal", "anisotropic"])
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_is_reciprocal_positive_and_finite_and_so_are_its_tables(model: str, grid: Grid) -> None:

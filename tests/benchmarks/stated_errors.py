@@ -93,7 +93,7 @@ def shares_of(table: Table, material: Material) -> dict[str, float]:
 
 def share(table: Table, material: Material, wi: Array, wr: Array, wavelength_nm: Array | None) -> float:
     """Return the share of values that are as near to the model as stated; the least of all wavelengths."""
-    found = table.lookup_vectors(wi, wr, wavelength_nm, with_error=True)
+    found = table.lookup_vectors_with_error(wi, wr, wavelength_nm)
     truth = error_measurement.model_values(material, wavelength_nm, wi, wr).reshape(found.brdf.shape)
     held = np.abs(found.brdf - truth) <= found.error + ROUNDING * truth
     return float(held.reshape(len(wi), -1).mean(axis=0).min())

@@ -72,7 +72,7 @@ def test_a_bug_without_a_directory_for_its_traceback_prints_it(
         ),
         (
             ModuleNotFoundError("No module named 'matplotlib.figure'", name="matplotlib.figure"),
-            "matplotlib is not installed; it comes with pip install 'brdfdb[report]' or pip install 'brdfdb[scenes]'",
+            "matplotlib is not installed; it comes with pip install 'brdfdb[scenes]' or pip install 'brdfdb[report]'",
         ),
     ],
 )
@@ -89,6 +89,16 @@ def test_a_module_of_no_extra_is_a_bug(tmp_path: Path, monkeypatch: pytest.Monke
     raising(monkeypatch, ModuleNotFoundError("No module named 'brdfdb.nowhere'", name="brdfdb.nowhere"))
     assert run("chart", "foam") == BUG
     assert "brdfdb.nowhere" in capsys.readouterr().err
+
+
+def test_options_of_every_command_stand_anywhere(tmp_path: Path, capsys: Captured) -> None:
+    for arguments in (
+        ("--debug", "export", "exr", "foam"),
+        ("export", "--debug", "exr", "foam"),
+        ("export", "exr", "foam", "--debug"),
+    ):
+        assert run(*arguments, "--store", tmp_path) == REFUSED
+        assert capsys.readouterr().err.startswith("Traceback")
 
 
 @pytest.mark.parametrize("place", [("--debug", "chart", "foam"), ("chart", "foam", "--debug")])

@@ -164,8 +164,8 @@ def test_a_family_of_he_torrance_is_as_far_off_as_it_states(copper: Path) -> Non
 def test_a_member_is_served_as_it_is(copper: Path) -> None:
     store = brdfdb.open(copper)
     family, table = store.family("rough-copper"), store["rough-copper-002"]
-    stated = family.lookup(0.5, 0.0, 0.6, 3.0, with_error=True, sigma_0_um=0.1, tau_um=1.2)
-    expected = table.lookup(0.5, 0.0, 0.6, 3.0, with_error=True)
+    stated = family.lookup_with_error(0.5, 0.0, 0.6, 3.0, sigma_0_um=0.1, tau_um=1.2)
+    expected = table.lookup_with_error(0.5, 0.0, 0.6, 3.0)
     np.testing.assert_array_equal(stated.brdf, expected.brdf)
     np.testing.assert_array_equal(stated.error, expected.error)
 
@@ -194,7 +194,7 @@ def test_a_family_is_listed_shown_and_looked_up(copper: Path, capsys: Captured) 
     assert run(copper, *asked, "--wavelength-nm", 500, "--json", "--with-error") == 0
     answer = json.loads(capsys.readouterr().out)
     angles = np.deg2rad([30.0, 0.0, 40.0, 170.0])
-    stated = family.lookup(*angles, [500.0], with_error=True, sigma_0_um=0.104, tau_um=1.05)
+    stated = family.lookup_with_error(*angles, [500.0], sigma_0_um=0.104, tau_um=1.05)
     assert (answer["brdf"], answer["error"]) == (stated.brdf.tolist(), stated.error.tolist())
     specular = family.specular_reflectance(angles[0], [500.0], sigma_0_um=0.104, tau_um=1.05)
     assert answer["specular_reflectance"] == specular.tolist()

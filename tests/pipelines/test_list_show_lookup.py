@@ -12,7 +12,7 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import presets
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
@@ -112,9 +112,7 @@ def test_lookup_prints_the_stated_error_between_wavelengths(planned: Path, capsy
     middle = float(0.5 * (wavelengths[0] + wavelengths[1]))
     command = ("lookup", "scene-copper-sphere", 30, 0, 30, 10, "--wavelength-nm", middle, "--with-error")
     assert run(*command, "--store", planned) == 0
-    found = brdfdb.open(planned)["scene-copper-sphere"].lookup(
-        *np.deg2rad([30.0, 0.0, 30.0, 10.0]), middle, with_error=True
-    )
+    found = brdfdb.open(planned)["scene-copper-sphere"].lookup_with_error(*np.deg2rad([30.0, 0.0, 30.0, 10.0]), middle)
     truth = presets()["scene-copper-sphere"].lookup(*np.deg2rad([30.0, 0.0, 30.0, 10.0]), middle)
     assert capsys.readouterr().out.startswith(f"{middle:g} nm  {found.brdf:.6g} +- {found.error:.2g} /sr")
     assert abs(found.brdf - truth) <= found.error
@@ -122,7 +120,7 @@ def test_lookup_prints_the_stated_error_between_wavelengths(planned: Path, capsy
 
 def test_lookup_prints_the_stated_error_beside_each_value(planned: Path, capsys: Captured) -> None:
     assert run("lookup", "rolled-brass", 30, 10, 20, 200, "--with-error", "--store", planned) == 0
-    found = brdfdb.open(planned)["rolled-brass"].lookup(*np.deg2rad([30.0, 10.0, 20.0, 200.0]), with_error=True)
+    found = brdfdb.open(planned)["rolled-brass"].lookup_with_error(*np.deg2rad([30.0, 10.0, 20.0, 200.0]))
     assert capsys.readouterr().out == f"{found.brdf:.6g} +- {found.error:.2g} /sr\n"
 
 
@@ -133,7 +131,7 @@ def test_lookup_as_json_has_the_stated_error_if_asked(planned: Path, capsys: Cap
     assert run(*command, "--with-error") == 0
     answer = json.loads(capsys.readouterr().out)
     table = brdfdb.open(planned)["scene-copper-sphere"]
-    found = table.lookup(*np.deg2rad([30.0, 0.0, 20.0, 180.0]), with_error=True)
+    found = table.lookup_with_error(*np.deg2rad([30.0, 0.0, 20.0, 180.0]))
     assert answer.pop("error") == found.error.tolist()
     assert answer == without
 

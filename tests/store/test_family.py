@@ -14,9 +14,10 @@ from brdfdb import models
 from brdfdb.errors import StoreError
 from brdfdb.forms.catalogue import of_family, of_table
 from brdfdb.materials import Material
-from brdfdb.store.family import Family, FamilyRecord, Sweep, blended, path_of, read_record, stencil
+from brdfdb.store.family import Family, FamilyRecord, Sweep, blended, read_record, stencil
 from brdfdb.store.family_records import POINTS, measure, parameter_points
-from brdfdb.store.manifest import sealed
+from brdfdb.store.paths import family_path
+from brdfdb.store.sealed_json import sealed
 from brdfdb.tables import error_measurement
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
@@ -171,7 +172,7 @@ def test_what_a_family_states_between_wavelengths_holds(families: Families) -> N
         wavelength = rng.uniform(WAVELENGTHS[0], WAVELENGTHS[-1], 1)
         drawn = error_measurement.draw(material, wavelength, 20, 2000 + number)
         wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
-        stated = family.lookup_vectors(wi, wr, wavelength, with_error=True, **at)
+        stated = family.lookup_vectors_with_error(wi, wr, wavelength, **at)
         truth = error_measurement.model_values(material, wavelength, wi, wr)
         held.append(np.abs(stated.brdf - truth) <= stated.error)
     assert np.mean(np.concatenate(held)) >= 0.98  # promised
@@ -292,7 +293,7 @@ def test_values_are_shaped_as_those_of_a_table(families: Families) -> None:
     for wavelength in (None, 500.0, [500.0], [450.0, 600.0]):
         found, member = family.lookup(*angles, wavelength, **at), table.lookup(*angles, wavelength)
         assert (found.shape, found.dtype) == (member.shape, np.float32)
-        stated = family.lookup(*directions(6), wavelength, with_error=True, **at)
+        stated = family.lookup_with_error(*directions(6), wavelength, **at)
         assert stated.error.shape == stated.brdf.shape == member.shape
         specular = family.specular_reflectance(directions(6)[0], wavelength, **at)
         assert specular.shape == member.shape
@@ -307,8 +308,8 @@ def test_angles_and_vectors_agree(families: Families) -> None:
     family, _ = families["brushed"]
     wi, wr = np.array([0.6, 0.0, 0.8]), np.array([-0.48, 0.36, 0.8])
     theta, phi = np.arccos(0.8), np.arctan2(0.36, -0.48)
-    stated = family.lookup_vectors(wi, wr, with_error=True, alpha_x=0.12)
-    angles = family.lookup(theta, 0.0, theta, phi, with_error=True, alpha_x=0.12)
+    stated = family.lookup_vectors_with_error(wi, wr, alpha_x=0.12)
+    angles = family.lookup_with_error(theta, 0.0, theta, phi, alpha_x=0.12)
     assert stated.brdf == pytest.approx(angles.brdf, rel=1e-6)  # measured: 1e-15
     # between members the error is that of the family, in this band of theta_i
     assert stated.error / stated.brdf == pytest.approx(family.error.p99[3][0], rel=1e-12)
@@ -331,7 +332,7 @@ def test_members_at_other_wavelengths_are_refused(families: Families) -> None:
 
 def test_a_record_comes_back_and_a_damaged_one_is_named(tmp_path: Path, families: Families) -> None:
     record = families["copper"][0].record
-    path = path_of(tmp_path, "copper")
+    path = family_path(tmp_path, "copper")
     path.parent.mkdir()
     content = json.loads(json.dumps(record.model_dump(mode="json")))
     path.write_bytes(sealed(content))

@@ -152,7 +152,7 @@ def stating(name: str, *wavelength_nm: float) -> Table:
 
 def held(table: Table, material: Material, wi: np.ndarray, wr: np.ndarray, at: np.ndarray | None = None) -> float:
     """The share of values that are as near to the model as stated."""
-    found = table.lookup_vectors(wi, wr, at, with_error=True)
+    found = table.lookup_vectors_with_error(wi, wr, at)
     truth = model_values(material, at, wi, wr).reshape(found.brdf.shape)
     return float(np.mean(np.abs(found.brdf - truth) <= found.error))
 
@@ -214,9 +214,9 @@ def test_an_error_of_before_is_read_and_refused_between_wavelengths() -> None:
     table = stating("scene-copper-sphere", *WAVELENGTHS)
     attrs = {"error": {k: v for k, v in table.attrs["error"].items() if k not in ("places", "between")}}
     before = replace(table, attrs=attrs)
-    assert before.lookup(0.5, 0.0, 0.5, 2.0, 550.0, with_error=True).error > 0.0
-    with pytest.raises(ValueError, match=r"^with_error: .* not measured between its wavelengths of 550 and 700 nm"):
-        before.lookup(0.5, 0.0, 0.5, 2.0, [420.0, 600.0], with_error=True)
+    assert before.lookup_with_error(0.5, 0.0, 0.5, 2.0, 550.0).error > 0.0
+    with pytest.raises(ValueError, match=r"^error: .* not measured between its wavelengths of 550 and 700 nm"):
+        before.lookup_with_error(0.5, 0.0, 0.5, 2.0, [420.0, 600.0])
 
 
 @pytest.mark.parametrize("count", [150, 200, 300, 500, 3000])

@@ -127,7 +127,7 @@ def test_the_dirac_part_of_a_planned_table_has_nodes_of_its_own() -> None:
 @KINDS
 def test_the_stated_error_has_the_shape_of_the_values(kind: str) -> None:
     table = table_of(kind)
-    found = table.lookup(*ANGLES, with_error=True)
+    found = table.lookup_with_error(*ANGLES)
     assert found.error.shape == found.brdf.shape
     assert (found.error > 0.0).all()
     np.testing.assert_array_equal(found.brdf, table.lookup(*ANGLES))

@@ -23,7 +23,7 @@ FOLDER = files("brdfdb_api").joinpath("explorer")
 # Media types of all files of the explorer: those of the folder, and the list of its views
 MEDIA = {file.name: _TYPES[PurePath(file.name).suffix] for file in FOLDER.iterdir()} | {_VIEWS: SCRIPT}
 
-# plotly writes style attributes, and reads its pictures back from data: and blob: addresses
+# plotly writes style attributes, and reads its pictures from data: and blob: addresses
 POLICY = "; ".join(
     (
         *("default-src 'none'", "script-src 'self'", "style-src 'self' 'unsafe-inline'"),
@@ -38,13 +38,13 @@ pages = APIRouter(include_in_schema=False)
 
 @pages.get("/")
 def index(request: Request) -> Response:
-    """The explorer."""
+    """Return the page of the explorer."""
     return explorer_file(request, "index.html")
 
 
 @pages.get("/explorer/plotly.js")
 def plotly(request: Request) -> Response:
-    """The library that draws; its address in the page holds its version, so that it is fetched once."""
+    """Return plotly.js; its address holds the version, so that a browser fetches it once."""
     packed = "gzip" in request.headers.get("accept-encoding", "")
     content, tag = _plotly(packed=packed)
     headers = {
@@ -61,7 +61,7 @@ def plotly(request: Request) -> Response:
 
 @pages.get("/explorer/{file}")
 def explorer_file(request: Request, file: str) -> Response:
-    """A file of the explorer, of those that there are."""
+    """Return a file of the explorer."""
     if file not in MEDIA:
         raise RequestError(404, "the explorer has no such file")
     content, tag = _file(file)

@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
     error = None
     if options.with_error:
-        stated = source.lookup(theta_i, phi_i, theta_r, phi_r, options.wavelength_nm, with_error=True, **point)
+        stated = source.lookup_with_error(theta_i, phi_i, theta_r, phi_r, options.wavelength_nm, **point)
         brdf, error = (np.atleast_1d(values) for values in stated)
     else:
         brdf = np.atleast_1d(source.lookup(theta_i, phi_i, theta_r, phi_r, options.wavelength_nm, **point))

@@ -1,0 +1,112 @@
+"""The registry of models: ours, those of installed packages, and those of files that the user names."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import importlib.util
+import os
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.parameters import ModelSpec
+
+GROUP = "brdfdb.models"  # of entry points: each gives a ModelSpec, or several
+VARIABLE = "BRDFDB_MODELS"  # paths of Python files, separated as those of PATH are
+
+
+class Registry(dict[str, ModelSpec]):
+    """Models by name. A name that it lacks raises `ParameterError`."""
+
+    def __missing__(self, name: str) -> ModelSpec:
+        raise ParameterError("model", f"{name!r} is not one of {', '.join(self)}", name, tuple(self))
+
+    def add(self, specs: Iterable[ModelSpec], origin: str) -> None:
+        """Add models of somebody else; BrdfdbError if one has a name that is taken, `origin` being its package or file.
+
+        Either all are added, or none.
+        """
+        new: dict[str, ModelSpec] = {}
+        for spec in specs:
+            if not isinstance(spec, ModelSpec):
+                raise BrdfdbError(f"{origin}: {spec!r:.80} is not a brdfdb.parameters.ModelSpec")
+            if spec.name in self or spec.name in new:
+                raise BrdfdbError(f"{origin}: the name {spec.name!r} is that of another model; choose another name")
+            new[spec.name] = spec
+        self.update(new)
+
+    def add_packages(self) -> None:
+        """Add the models of installed packages, which name them as entry points of the group `GROUP`.
+
+        Raises
+        ------
+        BrdfdbError
+            If an entry point cannot be loaded, gives no model, or one whose name is taken.
+        """
+        for entry in importlib.metadata.entry_points(group=GROUP):
+            origin = f"entry point {entry.name} = {entry.value}"
+            try:
+                found: Any = entry.load()
+                specs = [found] if isinstance(found, ModelSpec) else list(found)
+            except Exception as error:
+                raise BrdfdbError(f"{origin}: {_said(error)}") from error
+            self.add(specs, origin)
+
+    def add_files(self, paths: Iterable[str | os.PathLike[str]]) -> None:
+        """Add the models of Python files, for this process and those that it starts.
+
+        Parameters
+        ----------
+        paths : iterable of path
+            Each file is run once. Every `ModelSpec` among its global names is added, but those that it imports from
+            here.
+
+        Raises
+        ------
+        BrdfdbError
+            If a file does not exist, raises, defines no model, or one whose name is taken.
+        """
+        for path in paths:
+            file = Path(path).absolute()
+            self._add_file(file)
+            known = [each for each in os.environ.get(VARIABLE, "").split(os.pathsep) if each]
+            if str(file) not in (str(Path(each).absolute()) for each in known):
+                os.environ[VARIABLE] = os.pathsep.join([*known, str(file)])
+
+    def add_environment(self) -> None:
+        """Add the models of the files that the environment variable `VARIABLE` names, as `add_files` does."""
+        self.add_files([path for path in os.environ.get(VARIABLE, "").split(os.pathsep) if path])
+
+    def _add_file(self, file: Path) -> None:
+        # the same name in every process, so that what the file defines can be pickled
+        name = f"brdfdb_models_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
+        if name in sys.modules:
+            return
+        if not file.is_file():
+            raise BrdfdbError(f"{file}: no such file of models")
+        description = importlib.util.spec_from_file_location(name, file)
+        if description is None or description.loader is None:
+            raise BrdfdbError(f"{file}: a file of models has a name that ends in .py")
+        module = importlib.util.module_from_spec(description)
+        sys.modules[name] = module
+        try:
+            try:
+                description.loader.exec_module(module)
+            except Exception as error:
+                raise BrdfdbError(f"{file}: {_said(error)}") from error
+            ours = {id(spec) for spec in self.values()}
+            specs = {id(each): each for each in vars(module).values() if isinstance(each, ModelSpec)}
+            new = [spec for key, spec in specs.items() if key not in ours]
+            if not new:
+                raise BrdfdbError(f"{file}: it defines no brdfdb.parameters.ModelSpec")
+            self.add(new, str(file))
+        except BrdfdbError:
+            del sys.modules[name]
+            raise
+
+
+def _said(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}".partition("\n")[0]

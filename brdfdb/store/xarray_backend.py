@@ -1,0 +1,96 @@
+"""Backend of xarray: ``xarray.open_dataset(path, engine="brdfdb")`` for a revision, a material or a service."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+from xarray.backends import BackendEntrypoint
+
+import brdfdb
+from brdfdb.errors import ParameterError, StoreError
+from brdfdb.store.http_client import remote_dataset
+from brdfdb.store.paths import METADATA, marker_path, number_of, store_of
+from brdfdb.store.reader import Store
+from brdfdb.tables.xarray_view import opened
+
+
+class BrdfdbBackend(BackendEntrypoint):
+    """Read tables of brdfdb lazily, with ``brdf`` [1/sr] over all axes."""
+
+    description = "Tables of brdfdb: f_r over all axes, computed when it is read"
+    open_dataset_parameters = ("filename_or_obj", "drop_variables", "material", "revision", "snapshot")
+
+    def open_dataset(  # type: ignore[override]
+        self,
+        filename_or_obj: str | os.PathLike[str],
+        *,
+        drop_variables: str | Iterable[str] | None = None,
+        material: str | None = None,
+        revision: str | None = None,
+        snapshot: str | None = None,
+    ) -> xr.Dataset:
+        """Open a table as a lazy Dataset.
+
+        Parameters
+        ----------
+        filename_or_obj : path or address
+            A store (``brdf-store``) or a service (``http://127.0.0.1:8000``), with the keyword `material`; or a
+            material (``brdf-store/materials/NAME``); or a revision (``brdf-store/materials/NAME/r000001``, of a service
+            ``http://127.0.0.1:8000/v1/store/materials/NAME/r000001``), be it a copy outside of a store.
+        drop_variables : str or iterable of str, optional
+            Variables to leave out, such as ``parts``.
+        material : str, optional
+            Name of a material of the store.
+        revision : str, optional
+            Its revision; by default the current one.
+        snapshot : str, optional
+            Name of a snapshot of the store, whose revision of the material is opened.
+
+        Returns
+        -------
+        Dataset
+            As `Store.dataset` gives it.
+
+        Raises
+        ------
+        ParameterError
+            If a store or a service is named without a material.
+        StoreError, UnknownMaterialError, UnknownRevisionError
+            If there is no such table, or it is damaged.
+        """
+        place = os.fspath(filename_or_obj)
+        if material is not None:
+            dataset = brdfdb.open(place, snapshot=snapshot).dataset(material, revision)
+        elif place.startswith(("http://", "https://")):
+            if not number_of(place.rstrip("/").rpartition("/")[2]):
+                raise ParameterError("material", f"{place} is not the address of a revision; name one of its materials")
+            dataset = remote_dataset(place.rstrip("/"))
+        else:
+            dataset = _local(Path(place).absolute(), revision, snapshot)
+        dropped = [drop_variables] if isinstance(drop_variables, str) else list(drop_variables or ())
+        return dataset.drop_vars(dropped, errors="ignore")
+
+    def guess_can_open(self, filename_or_obj: Any) -> bool:
+        """Return True for the directory of a store; revisions are zarr groups, which others read, too."""
+        return isinstance(filename_or_obj, str | os.PathLike) and marker_path(Path(filename_or_obj)).is_file()
+
+
+def _local(path: Path, revision: str | None, snapshot: str | None) -> xr.Dataset:
+    """Open the directory of a material or of a revision."""
+    if marker_path(path).is_file():
+        names = ", ".join(list(Store(path))[:5]) or "none"
+        raise ParameterError("material", f"{path} is a store; name one of its materials, such as {names}")
+    if (root := store_of(path / "r000001")) is not None:
+        return Store(root, snapshot=snapshot).dataset(path.name, revision)
+    if (root := store_of(path)) is not None:
+        return Store(root, snapshot=snapshot).dataset(path.parent.name, path.name)
+    if not (path / METADATA).is_file():
+        raise StoreError(f"no table at {path}: name a revision, a material of a store, or a store with `material`")
+    try:
+        return opened(path)
+    except (ValueError, FileNotFoundError) as error:
+        raise StoreError(f"{path} is no table: {error}") from error
