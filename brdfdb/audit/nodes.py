@@ -29,6 +29,7 @@ class Nodes(Finding):
     """The numbers that a table stores, beside those that its source gives at the same nodes."""
 
     key = "nodes"
+    order = 4
     title = "Nodes"
     columns = ("nodes",)
     explanation = "What is stored against what the model gives at the same nodes: the same but for rounding."

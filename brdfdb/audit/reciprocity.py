@@ -44,6 +44,7 @@ class Reciprocity(Finding):
     """
 
     key = "reciprocity"
+    order = 2
     title = "Reciprocity"
     columns = ("reciprocity",)
     explanation = (

@@ -43,6 +43,7 @@ class Sampling(Finding):
     """The sampler of the model at the parameters of the material, for some lights."""
 
     key = "sampling"
+    order = 7
     title = "Sampling"
     columns = ("sampling",)
     explanation = (

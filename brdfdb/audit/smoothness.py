@@ -76,6 +76,7 @@ class Smoothness(Finding):
     """Jumps of the model across its branches, and of the table across the seams of its grid."""
 
     key = "smoothness"
+    order = 5
     title = "Smoothness"
     columns = ("smoothness",)
     explanation = (

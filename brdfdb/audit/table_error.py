@@ -31,6 +31,7 @@ class TableError(Finding):
     """The table less the model, over planes of incidence, and at fresh directions against what the table states."""
 
     key = "table_error"
+    order = 6
     title = "Table error"
     columns = ("table error",)
     explanation = (

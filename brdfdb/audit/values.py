@@ -16,6 +16,7 @@ class Values(Finding):
     """The stored values themselves, and those of f_r that come of them."""
 
     key = "values"
+    order = 3
     title = "Values"
     columns = ("values",)
     explanation = (
