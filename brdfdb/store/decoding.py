@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import (
+    ParameterError,
     StoreError,
 )
 from brdfdb.store.paths import METADATA
