@@ -160,7 +160,7 @@ def test_the_core_alone_tabulates_and_looks_up(core: Path, tmp_path: Path) -> No
 def test_a_missing_extra_is_a_sentence_that_names_it(
     core: Path, tmp_path: Path, command: list[str], extra: str
 ) -> None:
-    from brdfdb.store.staging import make_store
+    from brdfdb.store.marker import make_store
 
     make_store(tmp_path / "store")
     arguments = [part.format(store=tmp_path / "store") for part in command]

@@ -90,12 +90,11 @@ def chart(
     def front(costs: Floats) -> list[str]:
         return _front(forms, [error["l1"] for error in errors], costs)
 
-    about = source.attributes()
     return Chart(
         material=source.name,
         title=source.title,
-        model=about.get("model", ""),
-        parameters=about.get("parameters", {}),
+        model=source.model if isinstance(source, Material) else "function",
+        parameters=source.file_parameters() if isinstance(source, Material) else {},
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         directions=int(np.count_nonzero(drawn.above)),
         truth=forms[0].key,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import WriteError
 from brdfdb.scenes.scene import Scene
 from brdfdb.spectra import colour_science, illuminant_spectrum, srgb_weights, xyz_weights
 
@@ -105,7 +106,7 @@ def write_channels(
     try:
         OpenEXR.File(whole, arrays).write(str(path))
     except RuntimeError as error:
-        raise OSError(f"cannot write {path}: {error}") from error
+        raise WriteError(f"cannot write {path}: {error}") from error
 
 
 def _weights(scene: Scene) -> Array:

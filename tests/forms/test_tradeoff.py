@@ -247,7 +247,7 @@ def test_a_function_is_charted_by_itself_and_its_tables() -> None:
 
     source = FunctionSource(brdf=half_lambert, name="half", title="Half of Lambert", provenance="a test")
     found = chart(source, None, (0.1,))
-    assert (found.material, found.model, found.parameters) == ("half", "", {})
+    assert (found.material, found.model, found.parameters) == ("half", "function", {})
     assert [point.key for point in found.points] == ["function", "table-10", "table-even", "table-halves"]
     assert found.truth == "function"
     assert max(point.l1 for point in found.points) < 1e-6

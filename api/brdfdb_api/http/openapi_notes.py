@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+from brdfdb.formats import EXPORTERS, Option, options_of
 from brdfdb_api.http.responses import NPY, Problem
 
 ANGLE_SCHEMA = {"anyOf": [{"type": "number"}, {"type": "array", "items": {}}]}
@@ -88,8 +90,27 @@ ERROR = _parameter(
 )
 
 
+def _option(option: Option) -> dict[str, Any]:
+    schema: dict[str, Any] = {"type": "string", "default": option.default}
+    if isinstance(option.default, bool):
+        schema |= {"enum": ["false", "true"], "default": str(option.default).lower()}
+    elif option.choices:
+        schema["enum"] = list(option.choices)
+    else:
+        ends = {"minimum": option.low, "maximum": option.high}
+        schema |= {"type": "number", **{end: value for end, value in ends.items() if math.isfinite(value)}}
+    return _parameter(option.name, schema, option.help)
+
+
+# Of all formats: an option that a format does not have is refused
+EXPORT_OPTIONS = [
+    _option(option)
+    for option in {name: option for each in EXPORTERS.values() for name, option in options_of(each).items()}.values()
+]
+
+
 def answers(model: type | None, *statuses: int, media: dict[str, str] | None = None) -> dict[int | str, dict[str, Any]]:
-    """What OpenAPI says of the answers of an address: `model` at 200 or other media, and `statuses`."""
+    """Return the OpenAPI description of the answers of an address: `model` at 200 or other media, and `statuses`."""
     others: dict[int, dict[str, Any]] = {
         304: {"description": "The ETag in If-None-Match still holds"},
         404: {"description": "No such material or revision; the closest names are listed", "model": Problem},

@@ -57,6 +57,6 @@ def run(options: argparse.Namespace) -> int:
     stem = directory / Path(name).stem
     for write, suffix in ((image.write_png, ".png"), (image.write_exr, ".exr")):
         write(stem.with_name(stem.name + suffix), scene, radiance)
-    points = sum(len(each.at) for each in view.points)
-    print(f"{stem}.png and {stem.name}.exr: {view.width} x {view.height} pixels, {points} points")
+    count = sum(len(points.at) for points in view.points)
+    print(f"{stem}.png and {stem.name}.exr: {view.width} x {view.height} pixels, {count} points")
     return 0
