@@ -64,8 +64,13 @@ class Reciprocity(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Reciprocity:
         """Judge a table and its source; without a source the table alone."""
-        found = reciprocity_of(subject.table, subject.pairs)
-        return found if subject.source else found.model_copy(update={"model_random": None, "model_lobe": None})
+        both = reciprocity_of(subject.table, subject.pairs)
+        return both if subject.source else both.model_copy(update={"model_random": None, "model_lobe": None}).judged()
+
+    def judged(self) -> Reciprocity:
+        """Return the same asymmetries with the verdict that follows from them."""
+        good = all(pairs.tolerance is None or pairs.max <= pairs.tolerance for _, pairs in self.named())
+        return self.model_copy(update={"verdict": "passes" if good else "violates"})
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the largest asymmetry of those that are judged."""
@@ -118,8 +123,7 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
         table_nodes=None if table.grid.half_difference else _node_asymmetry(table),
         verdict="passes",
     )
-    good = all(each.tolerance is None or each.max <= each.tolerance for _, each in found.named())
-    return found if good else found.model_copy(update={"verdict": "violates"})
+    return found.judged()
 
 
 def _interpolant_tolerance(grid: Grid) -> float | None:
