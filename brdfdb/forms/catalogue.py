@@ -1,4 +1,4 @@
-"""Every form of a material: models, approximations, printed forms and tables, as one type."""
+"""Every form of a source: models, approximations, printed forms and tables, as one type."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ _UNFACTORED = 0.01  # the tolerance of the table that is shown with and without 
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """One way to get f_r of a material at some wavelengths.
+    """One way to get f_r of a source at some wavelengths.
 
     Attributes
     ----------
     key : str
-        Unique among those of a material: lower-case words joined by hyphens.
+        Unique among those of a source: lower-case words joined by hyphens.
     title : str
         A name for people, with the equation.
     kind : str
@@ -52,7 +52,7 @@ class Form:
         specular part is left out: it is the same for all.
     bytes : int
         Size of the numbers that an evaluation reads: parameters, spectra, and constants that kernels look up, or the
-        nodes of a table. Memory that it writes first is not counted.
+        nodes of a table; 0 of a function, whose numbers are not known. Memory that it writes first is not counted.
     dtype : float32 or float64
         That of the vectors to give it, and of the values.
     rounded : bool
@@ -81,7 +81,7 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
     Parameters
     ----------
     source : Source
-        Material, function, or table of a store.
+        A material of any model, or a function.
     wavelength_nm : array_like of shape (L,) [nm], or None
         For spectral sources, and only for them.
     tolerances : sequence of float, optional
@@ -91,8 +91,8 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
     Returns
     -------
     list of Form
-        The forms that the model names (`ModelSpec.forms`), or the source itself; then tables. Coarser rungs of the
-        exact form follow it: the ladder that an approximation is compared with. Tables hold the exact form where a
+        The forms that a material's model names (`ModelSpec.forms`), or the source itself; then tables. Coarser rungs of
+        the exact form follow it: the ladder that an approximation is compared with. Tables hold the exact form where a
         model of the registry is it (`ModelSpec.exact_model`); they are planned for the material's own model, which is
         as smooth.
 
@@ -105,14 +105,12 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         tolerances = SPECTRAL_TOLERANCES if source.spectral else TOLERANCES
     at = None if wavelength_nm is None else np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
     if not isinstance(source, Material):
-        itself = Form("function", source.title, "exact", "Source.brdf_at", source.brdf_at(at), 0)
-        return [itself, *(_tables(source, source, at, tolerances, exact=True) if tolerances else ())]
+        itself = Form("function", source.title, "exact", f"source {source.name}", source.brdf_at(at), 0)
+        return [itself, *_tables(source, source, at, tolerances, "table")]
     found = list(_of_model(source, at))
-    if tolerances:
-        tabulated = _exact(source)
-        exact = found[0].python == f"models.{tabulated.model}"
-        found.extend(_tables(source, tabulated, at, tolerances, exact=exact))
-    return found
+    tabulated = _exact(source)
+    title = "table" if found[0].python == f"models.{tabulated.model}" else "table of the fit"
+    return [*found, *_tables(source, tabulated, at, tolerances, title)]
 
 
 def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Form]:
@@ -139,7 +137,7 @@ def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> 
 
 
 def _single(form: Form) -> Form:
-    """A form with float32 in and out."""
+    """Return a form with float32 in and out."""
     return replace(
         form,
         key=f"{form.key}-float32",
@@ -172,21 +170,21 @@ def _exact(material: Material) -> Material:
 
 def _tables(
     planned: Source,
-    source: Source,
+    held: Source,
     wavelength_nm: NDArray[np.float64] | None,
     tolerances: Sequence[float],
-    *,
-    exact: bool,
+    table: str,
 ) -> Iterator[Form]:
     """Yield planned tables, one of them also with its spectra whole, and the two grids that anybody would begin with.
 
-    They are planned for one source and hold another, which is as smooth and has the exact form if `exact`.
+    They are planned for one source and hold another, which is as smooth. Without tolerances there are none.
     """
-    table = "table" if exact else "table of the fit"
+    if not tolerances:
+        return
     for tolerance in dict.fromkeys(tolerances):
         percent = f"{100.0 * tolerance:g}"
         key = f"table-{percent.replace('.', '-')}"
-        layout = replace(plan(planned, wavelength_nm, tolerance), source=source)
+        layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
         yield _table(layout, key, f"{table}, planned for {percent} %")
         if layout.spectra is not None and tolerance == _UNFACTORED:
             yield _table(replace(layout, spectra=None), f"{key}-unfactored", f"the {percent} % table, spectra whole")
@@ -194,7 +192,7 @@ def _tables(
         (False, "table-even", "even angles"),
         (True, "table-halves", "half vectors"),
     ):
-        layout = Layout(source, _plain_grid(source, halves=halves), wavelength_nm)
+        layout = Layout(held, _plain_grid(held, halves=halves), wavelength_nm)
         yield _table(layout, key, f"{table}, {title}, linear")
 
 
@@ -204,7 +202,7 @@ def _table(layout: Layout, key: str, title: str) -> Form:
 
 
 def of_family(family: Family) -> Form:
-    """Lookups in the middle of a family: between the two middle values of each parameter."""
+    """Return lookups in the middle of a family: between the two middle values of each parameter."""
     at: dict[str, Any] = {}
     for name, nodes in family.axes.items():
         cell = (nodes.size - 2) // 2
@@ -221,7 +219,7 @@ def of_family(family: Family) -> Form:
 
 
 def of_table(table: Table, key: str, title: str) -> Form:
-    """A table that is in memory, at its own wavelengths."""
+    """Return a table that is in memory, at its own wavelengths."""
     count = 1 if table.wavelength_nm is None else table.wavelength_nm.size
 
     def evaluate(wi: Floats, wr: Floats) -> Floats:
@@ -236,9 +234,10 @@ def of_table(table: Table, key: str, title: str) -> Form:
 
 
 def _plain_grid(source: Source, *, halves: bool) -> Grid:
-    """A grid that nobody planned: every 5 degrees (10 of an anisotropic surface), or half vectors crowded at the peak.
+    """Return a grid that nobody planned: even angles, or half vectors crowded at the peak.
 
-    The half vectors are those of the MERL database: theta_h as the square of an even axis.
+    Angles have a node every 5 degrees, or every 10 for an anisotropic source. Half vectors are those of the MERL
+    database: theta_h as the square of an even axis.
     """
     anisotropic = source.anisotropic
     turn = 90.0 if source.elliptical else 360.0

@@ -16,7 +16,7 @@ from brdfdb.materials import Source
 Array = NDArray[np.float64]
 
 SAMPLERS = {
-    "model": "the model's own: its lobe and cosine",
+    "model": "the source's own: its lobe and cosine",
     "cosine": "cosine of the polar angle",
     "uniform": "uniform over the hemisphere",
 }
@@ -63,9 +63,9 @@ def works(
     Parameters
     ----------
     source : Source
-        It is sampled by its own lobe, without the specular part.
+        A material or a function. It is sampled without the specular part.
     wavelength_nm : float [nm] or None
-        Of a spectral source.
+        For a spectral source.
     rounds : int
         Each has random numbers of its own, which all samplers share.
     samples : int
@@ -101,12 +101,12 @@ def works(
     return {key: (Work(*numbers[number, 0]), Work(*numbers[number, 1])) for number, key in enumerate(draws)}
 
 
-def _draws(source: Source, at: Array | None) -> dict[str, Draw]:
+def _draws(source: Source, wavelength_nm: NDArray[np.float64] | None) -> dict[str, Draw]:
     """Return, for each sampler, a function of u1, u2 and directions of light: new directions, f_r cos over density."""
-    brdf = source.brdf_at(at)
+    brdf = source.brdf_at(wavelength_nm)
 
-    def of_lobe(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
-        lobe = source.lobe(wi[:, 2], at) or DIFFUSE
+    def of_source(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
+        lobe = source.lobe(wi[:, 2], wavelength_nm) or DIFFUSE
         wr = directions(lobe, u1, u2, wi)
         density = mixture_density(lobe, wi, wr)
         reflected = brdf(wi, wr)[:, 0] * np.maximum(wr[:, 2], 0.0)
@@ -114,13 +114,13 @@ def _draws(source: Source, at: Array | None) -> dict[str, Draw]:
 
     def of_cosine(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
         wr = _around(np.sqrt(u1), np.sqrt(1.0 - u1), u2)
-        return wr, np.asarray(np.pi * brdf(wi, wr)[:, 0], dtype=np.float64)
+        return wr, np.asarray(np.pi * brdf(wi, wr)[:, 0])
 
     def uniformly(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
         wr = _around(np.sqrt(u1 * (2.0 - u1)), 1.0 - u1, u2)
-        return wr, np.asarray(2.0 * np.pi * wr[:, 2] * brdf(wi, wr)[:, 0], dtype=np.float64)
+        return wr, np.asarray(2.0 * np.pi * wr[:, 2] * brdf(wi, wr)[:, 0])
 
-    return dict(zip(SAMPLERS, (of_lobe, of_cosine, uniformly), strict=True))
+    return dict(zip(SAMPLERS, (of_source, of_cosine, uniformly), strict=True))
 
 
 def _around(sin_theta: Array, cos_theta: Array, u2: Array) -> Array:

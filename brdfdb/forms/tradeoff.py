@@ -50,7 +50,7 @@ def chart(
     Parameters
     ----------
     source : Source
-        Material, function, or table of a store.
+        A material of any model, or a function.
     wavelength_nm : array of shape (L,) [nm], or None
         For spectral sources, and only for them.
     tolerances : sequence of float, optional
@@ -180,27 +180,17 @@ def chart_family(
         If a member of `family` was built anew since it was recorded.
     """
     tolerances = SPECTRAL_TOLERANCES if tolerances is None else tolerances
-    middle = len(materials) // 2
-    kept: dict[str, tuple[int, Form]] = {}  # of each key the one next to the middle, which is timed
-    errors: list[dict[str, dict[str, Any]]] = []
-    for number, material in enumerate(materials):
-        forms = catalogue.forms(material, wavelength_nm, tolerances)
-        drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
-        errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
-        for form in forms:
-            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
-                kept[form.key] = number, form
-        tick()
+    kept, errors = _forms_of_members(materials, wavelength_nm, tolerances, tick)
     timed = [form for _, form in kept.values()]
     between = None if family is None else of_family(family)
-    drawn = error_measurement.draw(materials[middle], wavelength_nm, DIRECTIONS, SEED)
+    drawn = error_measurement.draw(materials[len(materials) // 2], wavelength_nm, DIRECTIONS, SEED)
     batch, block, single = _timed([*timed, *([between] if between else [])], drawn, tick)
     seconds = np.stack([each.seconds for each in batch], axis=1)
     fronts = []
     for found in errors:
-        here = [index for index, form in enumerate(timed) if form.key in found]
-        some = [timed[index] for index in here]
-        fronts.append(_front(some, [found[form.key]["l1"] for form in some], seconds[:, here]))
+        present = [index for index, form in enumerate(timed) if form.key in found]
+        rivals = [timed[index] for index in present]
+        fronts.append(_front(rivals, [found[form.key]["l1"] for form in rivals], seconds[:, present]))
     return FamilyChart(
         family=sweep.name,
         title=sweep.title,
@@ -228,6 +218,27 @@ def chart_family(
         ),
         fronts=fronts,
     )
+
+
+def _forms_of_members(
+    materials: Sequence[Material],
+    wavelength_nm: NDArray[np.float64] | None,
+    tolerances: Sequence[float],
+    tick: Callable[[], None],
+) -> tuple[dict[str, tuple[int, Form]], list[dict[str, dict[str, Any]]]]:
+    """Return by key the form of the member next to the middle and its number; and by key the errors of each member."""
+    middle = len(materials) // 2
+    kept: dict[str, tuple[int, Form]] = {}
+    errors: list[dict[str, dict[str, Any]]] = []
+    for number, material in enumerate(materials):
+        forms = catalogue.forms(material, wavelength_nm, tolerances)
+        drawn = error_measurement.draw(material, wavelength_nm, DIRECTIONS, SEED)
+        errors.append(dict(zip((form.key for form in forms), _errors(forms, drawn), strict=True)))
+        for form in forms:
+            if form.key not in kept or abs(number - middle) <= abs(kept[form.key][0] - middle):
+                kept[form.key] = number, form
+        tick()
+    return kept, errors
 
 
 def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:

@@ -2,11 +2,12 @@
 
 One module a paper, with the same stems as `brdfdb.models` and no code in common with it. All functions are scalar, take
 int, float, str or mpf (a str is read as the exact decimal) and return an mpf of 40 digits, or a tuple or matrix of
-them; ``float()`` makes it a float64. (`oren_nayar_1994.gaussian` and `he_torrance_1991.aperture_diffuse`, integrals
-over two and four angles, are float64 throughout.) Angles are radians, ``delta_phi = phi_r - phi_i`` with 0 back towards
-the light and pi the mirror half plane; values are f_r in 1/sr without a cosine. Directions are meant above the horizon,
-theta in [0, pi/2]: nothing is clipped or checked here. Where a paper is misprinted the corrected equation stands, and
-the docstring says so.
+them; ``float()`` makes it a float64. (`oren_nayar_1994.gaussian` and `he_torrance_1991_aperture.aperture_diffuse`,
+integrals over two and four angles, are float64 throughout.)
+
+Angles are radians, ``delta_phi = phi_r - phi_i`` with 0 back towards the light and pi the mirror half plane; values are
+f_r in 1/sr without a cosine. Directions are meant above the horizon, theta in [0, pi/2]: nothing is clipped or checked
+here. Where a paper is misprinted the corrected equation stands, and the docstring says so.
 
 Importing `brdfdb` imports neither this package nor mpmath: `brdfdb.atlas` and the tests do.
 """

@@ -43,7 +43,7 @@ def difference(scene: Scene, radiance: ArrayLike, other: ArrayLike) -> Array:
     """
     colour = colour_science()
     white = colour.XYZ_to_xy(_weights(scene).sum(axis=0))
-    first, second = (colour.XYZ_to_Lab(np.maximum(xyz(scene, each), 0.0), white) for each in (radiance, other))
+    first, second = (colour.XYZ_to_Lab(np.maximum(xyz(scene, picture), 0.0), white) for picture in (radiance, other))
     return np.asarray(colour.delta_E(first, second, method="CIE 2000"))
 
 

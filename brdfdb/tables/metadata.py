@@ -95,7 +95,7 @@ class TableMetadata(BaseModel):
         try:
             return cls.model_validate(known)
         except ValidationError as error:
-            strange = {str(each["loc"][0]): each["msg"] for each in error.errors(include_url=False)}
+            strange = {str(item["loc"][0]): item["msg"] for item in error.errors(include_url=False)}
         metadata = cls.model_validate({key: value for key, value in known.items() if key not in strange})
         metadata._strange.update(strange)
         return metadata
@@ -129,9 +129,9 @@ class TableMetadata(BaseModel):
     @property
     def gaps(self) -> str:
         """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""
-        said = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
-        said += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
-        return ", and ".join(said)
+        phrases = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
+        phrases += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
+        return ", and ".join(phrases)
 
 
 def _words(key: str) -> str:

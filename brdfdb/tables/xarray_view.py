@@ -79,7 +79,7 @@ def with_brdf(dataset: xr.Dataset) -> xr.Dataset:
 
 
 class _Rebuilt(BackendArray):
-    """What xarray indexes: f_r of the nodes and wavelengths that are asked for."""
+    """The array that xarray indexes: f_r [1/sr] at the nodes and wavelengths of a request."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._parts = dataset["parts"]

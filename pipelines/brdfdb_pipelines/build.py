@@ -13,20 +13,14 @@ from typing import Any
 from brdfdb.errors import BusyError, ParameterError, StoreError
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
-from brdfdb.store.manifest import Entry, read_manifest
-from brdfdb.store.staging import (
-    Block,
-    Lock,
-    discard,
-    make_store,
-    point_to,
-    prepare,
-    publish,
-    remove_begun,
-    write_block,
-    write_frame,
-    writing,
-)
+from brdfdb.store.files import Entry
+from brdfdb.store.lock import Lock, writing
+from brdfdb.store.manifest import read_manifest
+from brdfdb.store.marker import make_store
+from brdfdb.store.paths import material_path, revision_path
+from brdfdb.store.pointer import point_to
+from brdfdb.store.publication import publish_staged
+from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
 from brdfdb_pipelines import build_resources, workers
 from brdfdb_pipelines.build_progress import Event, Tally
 from brdfdb_pipelines.build_survey import Survey, head_of, survey
@@ -253,7 +247,7 @@ class _Builder:
 
     def _is_current(self, job: Job, revision: str) -> None:
         name = job.material.name
-        stored = read_manifest(self.root / "materials" / name / revision, None)[0]["summary"]["bytes"]
+        stored = read_manifest(revision_path(self.root, name, revision), None)[0]["summary"]["bytes"]
         self.built[name] = Built(job, "unchanged", revision, stored)
         self.report({"event": "unchanged", "material": name, "revision": revision})
 
@@ -316,9 +310,9 @@ class _Builder:
             return True
         if standing.state == "adoptable":
             with writing(self.root, name):
-                point_to(self.root / "materials" / name, standing.revision)
+                point_to(material_path(self.root, name), standing.revision)
             discard(self.root, name, job.request)  # the build that made this revision may have been killed
-            stored = read_manifest(self.root / "materials" / name / standing.revision, None)[0]["summary"]["bytes"]
+            stored = read_manifest(revision_path(self.root, name, standing.revision), None)[0]["summary"]["bytes"]
             self.built[name] = Built(job, "adopted", standing.revision, stored, standing.why)
             self.report({"event": "adopted", "material": name, "revision": standing.revision, "why": standing.why})
         else:
@@ -354,7 +348,7 @@ class _Builder:
     def _framed(self, table: _Table, future: Future[dict[str, Entry]]) -> None:
         files = self._result(table.name, future)
         if files is not None:
-            revision, stored = publish(self.root, table.name, table.staging, {**table.files, **files})
+            revision, stored = publish_staged(self.root, table.name, table.staging, {**table.files, **files})
             why = table.survey.standing.why
             self.built[table.name] = Built(table.job, "published", revision, stored, why, table.survey.shape)
             self.report(

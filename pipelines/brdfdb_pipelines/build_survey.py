@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from brdfdb.errors import BusyError
+from brdfdb.store.lock import Lock
+from brdfdb.store.paths import material_path, pointer_path, request_path
 from brdfdb.store.revisions import Standing, standing
-from brdfdb.store.staging import Lock, directory_of, planned, prepare
+from brdfdb.store.staging import planned, prepare
 from brdfdb.tables.layout import Layout, digest
 from brdfdb_pipelines import build_resources
 from brdfdb_pipelines.recipe_file import Job
@@ -50,7 +52,7 @@ def survey(root: str, job: Job) -> Survey:
     layout = Layout.from_document(json.loads(text))
     rest = layout.size // layout.shape[0]
     values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
-    staged = build_resources.stored_bytes([directory_of(store, name, digest(request)) / "table"])
+    staged = build_resources.stored_bytes([request_path(store, name, digest(request)) / "table"])
     disk = max(0, build_resources.table_bytes(layout) - staged)
     return Survey(status, head, text, tuple(layout.shape), values, build_resources.task_bytes(layout), disk)
 
@@ -58,6 +60,6 @@ def survey(root: str, job: Job) -> Survey:
 def head_of(root: Path, name: str) -> str:
     """Return the text of the pointer of a material; empty where it cannot be read."""
     try:
-        return (root / "materials" / name / "HEAD.json").read_text(encoding="utf-8", errors="replace")
+        return pointer_path(material_path(root, name)).read_text(encoding="utf-8", errors="replace")
     except OSError:
         return ""

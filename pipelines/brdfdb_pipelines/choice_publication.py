@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -78,13 +77,13 @@ def _is_there(store: Store, name: str, layout: Layout) -> bool:
     wanted = frame(layout)
     try:
         store.verify(name)
-        stored = store.dataset(name)
+        stored, metadata = store.dataset(name), store.metadata(name)
     except StoreError:
         return False
-    attributes = json.loads(json.dumps(wanted.attrs)) | {"reason": stored.attrs.get("reason")}
+    known = metadata.attributes()
     return (
-        "error" in stored.attrs
-        and attributes.items() <= stored.attrs.items()
+        metadata.error is not None
+        and all(known.get(key) == value for key, value in wanted.attrs.items() if key != "reason")
         and all(key in stored and np.array_equal(stored[key], value) for key, value in wanted.variables.items())
     )
 

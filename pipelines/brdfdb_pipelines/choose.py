@@ -15,12 +15,13 @@ from brdfdb.scenes import image, sample_positions
 from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Look, Seen, check_feasible, choose
 from brdfdb.scenes.choice_document import Choice, Price, Weigh, describe, statement, within
 from brdfdb.scenes.gbuffer import View, gather, gather_at
-from brdfdb.scenes.offered_forms import Candidate, candidates
+from brdfdb.scenes.offered_forms import OfferedForm, offered_forms
 from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.renderer import Reflector, reflectors
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
-from brdfdb.store.staging import make_store, remove_begun
+from brdfdb.store.marker import make_store
+from brdfdb.store.staging import remove_begun
 from brdfdb_pipelines import terminal
 from brdfdb_pipelines.choice_publication import Built, build, with_reason
 from brdfdb_pipelines.scene_file import SceneError, load
@@ -100,7 +101,7 @@ def _run(
         task = bar.add_task("tabulating, timing", total=2 * len(materials))
         offered, prices = {}, {}
         for key, reflector in materials.items():
-            offered[key] = candidates(reflector.source, reflector.wavelength_nm, tolerances)
+            offered[key] = offered_forms(reflector.source, reflector.wavelength_nm, tolerances)
             bar.advance(task)
             prices[key] = _prices(offered[key], *_pairs(view, key), weigh)
             bar.advance(task)
@@ -153,7 +154,7 @@ def _run(
 
 
 def _looks(
-    scene: Scene, view: View, offered: Mapping[str, Sequence[Candidate]], materials: Mapping[str, Reflector]
+    scene: Scene, view: View, offered: Mapping[str, Sequence[OfferedForm]], materials: Mapping[str, Reflector]
 ) -> tuple[Look, Callable[[int], Look | None]]:
     """Return the scene where forms are compared, and a function from the number of a check to fresh places."""
     truths = {key: forms[0] for key, forms in offered.items()}
@@ -190,12 +191,12 @@ def _pairs(view: View, material: str) -> tuple[Array, Array]:
     return wi[mixed], wr[mixed]
 
 
-def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> list[Price]:
+def _prices(forms: Sequence[OfferedForm], wi: Array, wr: Array, weigh: Weigh) -> list[Price]:
     """Return the costs of forms at the wavelengths of the scene."""
-    times = timing.times([candidate.form for candidate in forms], wi, wr, most=TIMED, rounds=ROUNDS)
+    times = timing.times([offered.form for offered in forms], wi, wr, most=TIMED, rounds=ROUNDS)
     prices = []
-    for candidate, time in zip(forms, times, strict=True):
-        form = candidate.form
+    for offered, time in zip(forms, times, strict=True):
+        form = offered.form
         ns = time.quartiles_ns[1] * form.evaluate(wi[:1].astype(form.dtype), wr[:1].astype(form.dtype)).size
         # relative to the exact form in the same round: a busy machine slows both down
         shares = time.seconds / times[0].seconds
@@ -204,7 +205,7 @@ def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> l
     return prices
 
 
-def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]) -> None:
+def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[OfferedForm]], chosen: Mapping[str, Decision]) -> None:
     """Write the comparison as a picture, and the exact and the chosen one as spectral EXR."""
     from brdfdb_pipelines import choice_picture
 

@@ -99,7 +99,7 @@ def test_openapi_is_served(client: Client) -> None:
         ("GET", f"{FOIL}/lobe", "/v1/materials/{name}/lobe", 200),
         ("GET", f"{FOIL}/lobe?view=hemisphere&output=xyz", "/v1/materials/{name}/lobe", 200),
         ("GET", f"{FOIL}/lobe?format=npy", "/v1/materials/{name}/lobe", 200),
-        ("GET", f"{FOIL}/slice.exr", "/v1/materials/{name}/slice.exr", 200),
+        ("GET", f"{FOIL}/export/exr", "/v1/materials/{name}/export/{file_format}", 200),
         ("GET", f"{FOIL}/audit", "/v1/materials/{name}/audit", 404),
         ("GET", f"{FOIL}/download.zarr", "/v1/materials/{name}/download.zarr", 200),
         ("GET", "/v1/store/materials/copper-foil/r000001/brdf/c/0/0/0/0", STORED, 200),

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import publish_dataset
 from brdfdb_api.http.app import create_app
 from brdfdb_api.serving.settings import Settings
 from brdfdb_api.serving.shelf import Shelf
@@ -144,7 +144,7 @@ def test_material(client: Client, store: Store) -> None:
     links = material["links"]
     assert client.get(links["self"]).json() == material
     assert client.get(links["revision"]).json()["links"]["lookup"] == f"{FOIL}/revisions/r000001/lookup"
-    for name in ("materials", "albedo", "lobe", "slice.exr", "download.zarr"):
+    for name in ("materials", "albedo", "lobe", "export/exr", "download.zarr"):
         assert client.get(links[name]).status_code == 200
     assert client.get(links["lookup"], params={"theta_i": 1, "theta_r": 2}).status_code == 200
     assert client.get(f"{links['store']}/zarr.json").status_code == 200
@@ -292,7 +292,7 @@ def test_an_answer_of_a_revision_is_kept_for_good(own: Path) -> None:
 
 @pytest.mark.parametrize("revision", ["r000002", "r1", "latest", "%2e%2e", "..%2fr000001"])
 @pytest.mark.parametrize(
-    "rest", ["", "/lookup?theta_i=1&theta_r=2", "/albedo", "/lobe", "/slice.exr", "/download.zarr"]
+    "rest", ["", "/lookup?theta_i=1&theta_r=2", "/albedo", "/lobe", "/export/exr", "/download.zarr"]
 )
 def test_an_unknown_revision(client: Client, revision: str, rest: str) -> None:
     problem = client.problem("GET", f"{FOIL}/revisions/{revision}{rest}", 404)

@@ -11,10 +11,11 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from brdfdb.formats import exr
+from brdfdb.formats._exr_file import write_slice
 from brdfdb.geometry import directions_from_half_difference
 from brdfdb.spectra import srgb_weights
 from brdfdb.store.reader import Store
+from brdfdb.tables import slices
 from brdfdb.tables.albedo import directional_albedo
 from tests.api.a_store import NPY, VISIBLE_NM, Client, client_of, degrees, publish, read_npy
 
@@ -151,16 +152,16 @@ def test_a_lobe_at_more_wavelengths_than_an_answer_holds_is_refused(client: Clie
 def test_a_slice_is_what_the_export_writes(
     client: Client, store: Store, tmp_path: Path, address: str, query: str, kind: str
 ) -> None:
-    answer = client.get(f"{address}/slice.exr{query}")
+    answer = client.get(f"{address}/export/exr{query}")
     name = address.rpartition("/")[2]
     assert answer.headers["content-disposition"] == f'attachment; filename="{name}_{kind}.exr"'
     at = (30.0, 10.0) if "theta_i" in query else (45.0, 0.0)
     image = {
-        "lobe": lambda: exr.lobe_map(store[name], theta_i_deg=at[0], phi_i_deg=at[1]),
-        "in_plane": lambda: exr.in_plane_slice(store[name], phi_i_deg=0.0),
-        "half_difference": lambda: exr.half_difference_slice(store[name], phi_h_deg=0.0),
+        "lobe": lambda: slices.lobe_map(store[name], theta_i_deg=at[0], phi_i_deg=at[1]),
+        "in_plane": lambda: slices.in_plane_slice(store[name], phi_i_deg=0.0),
+        "half_difference": lambda: slices.half_difference_slice(store[name], phi_h_deg=0.0),
     }[kind]()
-    exr.write(tmp_path / "expected.exr", image, store[name])
+    write_slice(tmp_path / "expected.exr", image, store[name])
     found, expected = (
         pixels(content, tmp_path) for content in (answer.content, (tmp_path / "expected.exr").read_bytes())
     )
@@ -171,7 +172,7 @@ def test_a_slice_is_what_the_export_writes(
 
 
 def test_a_slice_of_16_bits(client: Client, tmp_path: Path) -> None:
-    channels = pixels(client.get(f"{FELT}/slice.exr?half=true").content, tmp_path)
+    channels = pixels(client.get(f"{FELT}/export/exr?half=true").content, tmp_path)
     assert {values.dtype for values in channels.values()} == {np.dtype(np.float16)}
 
 
@@ -184,7 +185,7 @@ def pixels(content: bytes, folder: Path) -> dict[str, Any]:
 
 @pytest.mark.parametrize("query", ["kind=map", "theta_i=-1", "half=perhaps", "wavelength_nm=500"])
 def test_a_bad_slice_names_the_parameter(client: Client, query: str) -> None:
-    assert client.problem("GET", f"{FOIL}/slice.exr?{query}", 422)["parameter"] == query.partition("=")[0]
+    assert client.problem("GET", f"{FOIL}/export/exr?{query}", 422)["parameter"] == query.partition("=")[0]
 
 
 # Verdicts

@@ -14,8 +14,9 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb import spectra
-from brdfdb.formats import exr
+from brdfdb.formats import _exr_file, exr
 from brdfdb.geometry import unit_vector
+from brdfdb.tables import slices
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.stated_error import Error, Overall
 
@@ -30,7 +31,7 @@ RGB_RTOL = 1e-6  # a sum of 41 float32 products; worst seen 2e-7
 
 VISIBLE_NM = np.linspace(380.0, 780.0, 41)
 REDDISH = np.where(VISIBLE_NM > 600.0, 1.0, 0.125)
-SLICES = (exr.half_difference_slice, exr.in_plane_slice, exr.lobe_map)
+SLICES = (slices.half_difference_slice, slices.in_plane_slice, slices.lobe_map)
 WAVELENGTHS = {
     "grey": None,
     "spectral": VISIBLE_NM,
@@ -93,11 +94,11 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, Floats]]:
         return dict(file.header()), {name: channel.pixels.copy() for name, channel in file.channels().items()}
 
 
-def slice_of(values: Floats, wavelength_nm: Floats | None) -> exr.Slice:
-    return replace(exr.in_plane_slice(table(ward_like)), values=values, wavelength_nm=wavelength_nm)
+def slice_of(values: Floats, wavelength_nm: Floats | None) -> slices.Slice:
+    return replace(slices.in_plane_slice(table(ward_like)), values=values, wavelength_nm=wavelength_nm)
 
 
-def lobe_position(image: exr.Slice) -> tuple[float, float]:
+def lobe_position(image: slices.Slice) -> tuple[float, float]:
     """Where a lobe map peaks: degrees to the right of the centre, degrees upwards."""
     row, column = np.unravel_index(np.argmax(image.values), image.values.shape)
     pitch = 180.0 / 256
@@ -111,11 +112,11 @@ def lobe_position(image: exr.Slice) -> tuple[float, float]:
 @pytest.mark.parametrize("make", SLICES)
 @pytest.mark.parametrize("kind", WAVELENGTHS)
 def test_every_pixel_of_every_channel_reads_back(
-    tmp_path: Path, kind: str, make: Callable[[Table], exr.Slice], half: bool
+    tmp_path: Path, kind: str, make: Callable[[Table], slices.Slice], half: bool
 ) -> None:
     source = table(ward_like, WAVELENGTHS[kind])
     image = make(source)
-    exr.write(tmp_path / "slice.exr", image, source, half=half)
+    _exr_file.write_slice(tmp_path / "slice.exr", image, source, half=half)
     header, channels = read(tmp_path / "slice.exr")
 
     if source.wavelength_nm is None:
@@ -138,11 +139,11 @@ def test_every_pixel_of_every_channel_reads_back(
 
 
 def test_a_strided_and_a_transposed_slice_are_written_right(tmp_path: Path) -> None:
-    full = exr.in_plane_slice(table(ward_like, VISIBLE_NM))
+    full = slices.in_plane_slice(table(ward_like, VISIBLE_NM))
     transposed = np.moveaxis(np.ascontiguousarray(np.moveaxis(full.values, -1, 0)), 0, -1)
     for values, wavelength_nm in ((full.values[..., ::2], VISIBLE_NM[::2]), (transposed, VISIBLE_NM)):
         assert not values.flags.c_contiguous
-        exr.write(tmp_path / "slice.exr", slice_of(values, wavelength_nm), table(ward_like))
+        _exr_file.write_slice(tmp_path / "slice.exr", slice_of(values, wavelength_nm), table(ward_like))
         _, channels = read(tmp_path / "slice.exr")
         assert len(channels) == 3 + wavelength_nm.size
         for index, wavelength in enumerate(wavelength_nm):
@@ -151,13 +152,13 @@ def test_a_strided_and_a_transposed_slice_are_written_right(tmp_path: Path) -> N
 
 def test_half_clips_to_the_largest_half_and_counts(tmp_path: Path) -> None:
     values = np.array([[0.1, 65504.0, 65505.0], [1e6, np.inf, np.nan]], dtype=np.float32)
-    exr.write(tmp_path / "half.exr", slice_of(values, None), table(ward_like), half=True)
+    _exr_file.write_slice(tmp_path / "half.exr", slice_of(values, None), table(ward_like), half=True)
     header, channels = read(tmp_path / "half.exr")
     expected = np.array([[0.1, 65504.0, 65504.0], [65504.0, 65504.0, np.nan]], dtype=np.float16)
     np.testing.assert_array_equal(channels["G"], expected)
     assert header["brdf:half"] == "values above 65504 are written as 65504: 9 in all channels"  # 3 pixels in R, G, B
 
-    exr.write(tmp_path / "float.exr", slice_of(values, None), table(ward_like))
+    _exr_file.write_slice(tmp_path / "float.exr", slice_of(values, None), table(ward_like))
     header, channels = read(tmp_path / "float.exr")
     np.testing.assert_array_equal(channels["G"], values)
     assert "brdf:half" not in header
@@ -176,7 +177,7 @@ def test_half_clips_to_the_largest_half_and_counts(tmp_path: Path) -> None:
 )
 def test_channel_names_follow_the_spectral_layout(tmp_path: Path, wavelength_nm: list[float], names: list[str]) -> None:
     source = table(ward_like, np.array(wavelength_nm))
-    exr.write(tmp_path / "slice.exr", exr.in_plane_slice(source), source)
+    _exr_file.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
     header, channels = read(tmp_path / "slice.exr")
     assert set(channels) == {*"RGB", *names}
     assert all(re.fullmatch(r"T\.\d+,\d+nm", name) for name in names)
@@ -187,14 +188,14 @@ def test_channel_names_follow_the_spectral_layout(tmp_path: Path, wavelength_nm:
 def test_equal_wavelengths_are_refused(tmp_path: Path) -> None:
     source = table(ward_like, np.array([500.0, 550.0, 550.0]))
     with pytest.raises(ValueError, match=r"channel T\.550,0nm occurs twice"):
-        exr.write(tmp_path / "slice.exr", exr.in_plane_slice(source), source)
+        _exr_file.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_reddish_spectrum_is_red_and_a_flat_one_is_white(tmp_path: Path) -> None:
     for spectrum in (REDDISH, np.ones(41)):
         source = table(ward_like, VISIBLE_NM, spectrum)
-        exr.write(tmp_path / "slice.exr", exr.in_plane_slice(source), source)
+        _exr_file.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
         header, channels = read(tmp_path / "slice.exr")
         assert header["brdf:rgb"] == "linear sRGB, D65"
         if spectrum is REDDISH:
@@ -208,126 +209,11 @@ def test_a_reddish_spectrum_is_red_and_a_flat_one_is_white(tmp_path: Path) -> No
 @pytest.mark.parametrize("kind", ["grey", "one wavelength", "two wavelengths"])
 def test_without_colour_the_file_says_so(tmp_path: Path, kind: str) -> None:
     source = table(ward_like, WAVELENGTHS[kind])
-    exr.write(tmp_path / "slice.exr", exr.in_plane_slice(source), source)
+    _exr_file.write_slice(tmp_path / "slice.exr", slices.in_plane_slice(source), source)
     header, _ = read(tmp_path / "slice.exr")
     assert header["brdf:rgb"].startswith("grey: colour was not measured")
     assert ("mean over the wavelengths" in header["brdf:rgb"]) == (kind != "grey")
     assert ("spectralLayoutVersion" in header) == (kind != "grey")
-
-
-# What the pictures show
-
-
-def test_half_difference_axes_in_closed_form() -> None:
-    angle_deg = np.arange(90) + 0.5
-    theta_h, theta_d = np.deg2rad(angle_deg), np.deg2rad(angle_deg[::-1, np.newaxis])
-
-    def cosine_of_light(theta_i: Floats, _phi_i: Floats, _theta_r: Floats, _phi_r: Floats) -> Floats:
-        return np.cos(theta_i)
-
-    def cosine_of_phase_angle(theta_i: Floats, phi_i: Floats, theta_r: Floats, phi_r: Floats) -> Floats:
-        return np.asarray(2.0 + np.sum(unit_vector(theta_i, phi_i) * unit_vector(theta_r, phi_r), axis=-1))
-
-    light = exr.half_difference_slice(table(cosine_of_light)).values
-    np.testing.assert_allclose(light, np.cos(theta_h) * np.cos(theta_d), rtol=FLOAT32_RTOL)
-    phase = exr.half_difference_slice(table(cosine_of_phase_angle)).values
-    np.testing.assert_allclose(phase, np.tile(2.0 + np.cos(2.0 * theta_d), (1, 90)), rtol=FLOAT32_RTOL)
-
-
-def test_half_difference_slice_of_a_half_vector_lobe_depends_on_x_only() -> None:
-    def blinn(theta_i: Floats, phi_i: Floats, theta_r: Floats, phi_r: Floats) -> Floats:
-        half = unit_vector(theta_i, phi_i) + unit_vector(theta_r, phi_r)
-        return np.asarray(half[..., 2] / np.linalg.norm(half, axis=-1))
-
-    values = exr.half_difference_slice(table(blinn)).values
-    expected = np.cos(np.deg2rad(np.arange(90) + 0.5))
-    # towards the top light and viewer oppose each other and their sum cancels: worst seen 8e-13 before rounding
-    np.testing.assert_allclose(values, np.tile(expected, (90, 1)), rtol=FLOAT32_RTOL)
-    assert np.all(np.argmax(values, axis=1) == 0)  # the lobe is on the left edge
-
-
-def test_half_difference_slice_turns_with_phi_h() -> None:
-    def along_x(theta_i: Floats, phi_i: Floats, theta_r: Floats, phi_r: Floats) -> Floats:
-        half = unit_vector(theta_i, phi_i) + unit_vector(theta_r, phi_r)
-        return np.asarray(np.exp(-((half[..., 0] / half[..., 2]) ** 2)))
-
-    across = exr.half_difference_slice(table(along_x), phi_h_deg=90.0)
-    assert across.fixed_deg == (("phi_h", 90.0), ("phi_d", 90.0))
-    np.testing.assert_allclose(across.values, 1.0, rtol=FLOAT32_RTOL)
-    assert exr.half_difference_slice(table(along_x)).values[45, 60] < 0.1
-
-
-def test_below_the_horizon_is_zero() -> None:
-    ones = table(lambda theta_i, _phi_i, _theta_r, _phi_r: np.ones_like(theta_i))
-    angle_deg = np.arange(90) + 0.5
-    assert np.all(exr.half_difference_slice(ones).values == 1.0)
-    assert np.all(exr.in_plane_slice(ones).values == 1.0)
-    # with phi_d = 0 the light leans theta_h + theta_d away from the normal; on the diagonal that is 90 degrees
-    values = exr.half_difference_slice(ones, phi_d_deg=0.0).values
-    lean_deg = angle_deg + angle_deg[::-1, np.newaxis]
-    assert np.all(values[lean_deg > 90.0] == 0.0)
-    assert np.all(values[lean_deg < 90.0] == 1.0)
-
-    x_deg = (np.arange(256) + 0.5) * 180.0 / 256 - 90.0
-    inside = np.hypot(x_deg, x_deg[:, np.newaxis]) < 90.0
-    np.testing.assert_array_equal(exr.lobe_map(ones).values, inside.astype(np.float32))
-
-
-def test_in_plane_lobes_are_on_their_diagonals() -> None:
-    rows = np.arange(90)
-    theta_i_deg = 89.5 - rows
-    mirror = exr.in_plane_slice(table(MIRROR)).values
-    np.testing.assert_array_equal(np.argmax(mirror, axis=1) - 89.5, theta_i_deg)
-    retro = exr.in_plane_slice(table(RETRO)).values
-    np.testing.assert_array_equal(np.argmax(retro, axis=1) - 89.5, -theta_i_deg)
-    np.testing.assert_allclose(mirror[rows, 179 - rows], 1.0, rtol=FLOAT32_RTOL)
-
-
-@pytest.mark.parametrize("phi_i_deg", [0.0, 30.0, -135.0])
-@pytest.mark.parametrize(
-    ("turned_deg", "right", "up"), [(180.0, 45.0, 0.0), (0.0, -45.0, 0.0), (90.0, 0.0, -45.0), (-90.0, 0.0, 45.0)]
-)
-def test_lobe_map_has_the_light_left_and_the_mirror_right(
-    turned_deg: float, right: float, up: float, phi_i_deg: float
-) -> None:
-    lobe = table(lobe_towards(lambda theta_i: theta_i, turned_deg))
-    position = lobe_position(exr.lobe_map(lobe, phi_i_deg=phi_i_deg))
-    assert position == pytest.approx((right, up), abs=180.0 / 256)
-
-
-def test_lobe_map_peaks_at_the_mirror_angle_of_its_light() -> None:
-    image = exr.lobe_map(table(MIRROR), theta_i_deg=20.0)
-    assert image.fixed_deg == (("theta_i", 20.0), ("phi_i", 0.0))
-    assert lobe_position(image) == pytest.approx((20.0, 0.0), abs=180.0 / 256)
-
-
-def test_phi_i_turns_the_surface_under_the_slices() -> None:
-    def brushed(theta_i: Floats, phi_i: Floats, theta_r: Floats, phi_r: Floats) -> Floats:
-        return np.asarray(2.0 + np.cos(2.0 * phi_i) * (np.sin(theta_i) * np.sin(theta_r) * np.cos(phi_r)) ** 2)
-
-    along = exr.in_plane_slice(table(brushed)).values
-    across = exr.in_plane_slice(table(brushed), phi_i_deg=90.0).values
-    sine2 = np.sin(np.deg2rad(np.arange(180) - 89.5)) ** 2
-    np.testing.assert_allclose(along, 2.0 + sine2[:89:-1, np.newaxis] * sine2, rtol=FLOAT32_RTOL)
-    np.testing.assert_allclose(across, 2.0, rtol=FLOAT32_RTOL)
-    # at phi_i = 90 degrees the x axis of the surface runs vertically through the lobe map
-    lobe = exr.lobe_map(table(brushed), phi_i_deg=90.0).values
-    np.testing.assert_allclose(lobe[128, 20:236], 2.0, rtol=1e-4)
-    assert np.all(lobe[[20, 235], 128] < 1.6)
-
-
-@pytest.mark.parametrize("theta_i_deg", [-1.0, 90.5, np.nan])
-def test_a_light_below_the_horizon_is_refused(theta_i_deg: float) -> None:
-    with pytest.raises(ValueError, match=r"theta_i_deg: \S+ is outside \[0, 90\] degrees"):
-        exr.lobe_map(table(MIRROR), theta_i_deg=theta_i_deg)
-
-
-@pytest.mark.parametrize(
-    ("shape", "wavelength_nm"), [((2, 3, 4), None), ((2, 3), np.ones(1)), ((2, 3, 4), np.ones(3)), ((2,), None)]
-)
-def test_a_slice_of_the_wrong_shape_is_refused(shape: tuple[int, ...], wavelength_nm: Floats | None) -> None:
-    with pytest.raises(ValueError, match=r"is not \(height, width"):
-        slice_of(np.zeros(shape, dtype=np.float32), wavelength_nm)
 
 
 # Attributes
@@ -344,10 +230,19 @@ EXPECTED_AXES = {
 }
 
 
+def written(source: Table, folder: Path, *, half: bool = False) -> list[Path]:
+    """The files of all kinds of slices."""
+    paths = [folder / f"fake-brass_{kind}.exr" for kind in sorted(exr.kinds)]
+    for kind, path in zip(sorted(exr.kinds), paths, strict=True):
+        exr.write(source, path, kind=kind, half=half)
+    return paths
+
+
 def test_export_writes_three_files_with_their_attributes(tmp_path: Path) -> None:
     source = table(ward_like, VISIBLE_NM)
     folder = tmp_path / "new" / "folder"
-    paths = exr.export(source, folder)
+    folder.mkdir(parents=True)
+    paths = written(source, folder)
     assert [path.name for path in paths] == [f"fake-brass_{kind}.exr" for kind in EXPECTED_AXES]
     assert sorted(folder.iterdir()) == sorted(paths)
     for path, (kind, (x, y, fixed)) in zip(paths, EXPECTED_AXES.items(), strict=True):
@@ -380,7 +275,7 @@ def test_export_writes_three_files_with_their_attributes(tmp_path: Path) -> None
 def test_an_image_says_what_it_leaves_out_of_a_table_with_a_dirac_part(tmp_path: Path) -> None:
     source = table(ward_like)
     cast(Any, source).specular = np.array([0.25, 0.5], dtype=np.float32)
-    exr.write(tmp_path / "lobe.exr", exr.lobe_map(source), source)
+    _exr_file.write_slice(tmp_path / "lobe.exr", slices.lobe_map(source), source)
     header, _ = read(tmp_path / "lobe.exr")
     assert header["brdf:dirac"] == "not in this image: up to 0.5 of the light leaves in the exact mirror direction"
 
@@ -397,21 +292,21 @@ def test_an_image_says_the_error_that_its_table_states(tmp_path: Path) -> None:
         overall=Overall(**overall),
         **dict.fromkeys(overall, numbers),
     )
-    exr.write(tmp_path / "lobe.exr", exr.lobe_map(source), source)
+    _exr_file.write_slice(tmp_path / "lobe.exr", slices.lobe_map(source), source)
     header, _ = read(tmp_path / "lobe.exr")
     assert header["brdf:error_p99"] == "0.0123"
 
 
 def test_export_in_half_replaces_the_files(tmp_path: Path) -> None:
-    first = exr.export(table(ward_like), tmp_path)
-    assert exr.export(table(ward_like), tmp_path, half=True) == first
+    first = written(table(ward_like), tmp_path)
+    assert written(table(ward_like), tmp_path, half=True) == first
     assert sorted(tmp_path.iterdir()) == sorted(first)
     assert all(read(path)[1]["R"].dtype == np.float16 for path in first)
 
 
 def test_angles_and_wavelengths_survive_to_the_last_bit(tmp_path: Path) -> None:
     source = table(ward_like, np.array([632.8, 1000.0 / 3.0]))
-    exr.write(tmp_path / "slice.exr", exr.lobe_map(source, theta_i_deg=0.1 + 0.2), source)
+    _exr_file.write_slice(tmp_path / "slice.exr", slices.lobe_map(source, theta_i_deg=0.1 + 0.2), source)
     header, _ = read(tmp_path / "slice.exr")
     assert float(header["brdf:theta_i_deg"]) == 0.1 + 0.2
     assert [float(text) for text in header["brdf:wavelength_nm"].split()] == [632.8, 1000.0 / 3.0]
@@ -423,15 +318,15 @@ def test_angles_and_wavelengths_survive_to_the_last_bit(tmp_path: Path) -> None:
 def test_a_disk_that_fills_up_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:
     resource = pytest.importorskip("resource")
     source = table(ward_like)
-    image = exr.lobe_map(source)
+    image = slices.lobe_map(source)
     path = tmp_path / "slice.exr"
-    exr.write(path, image, source)
+    _exr_file.write_slice(path, image, source)
     before = path.read_bytes()
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) // 2, limits[1]))
     try:
         with pytest.raises(OSError, match=r"cannot write .*slice\.exr: "):
-            exr.write(path, replace(image, values=image.values + 1.0), source)
+            _exr_file.write_slice(path, replace(image, values=image.values + 1.0), source)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert list(tmp_path.iterdir()) == [path]
@@ -440,13 +335,10 @@ def test_a_disk_that_fills_up_leaves_the_old_file_and_no_other(tmp_path: Path) -
 
 def test_unwritable_places_are_an_os_error(tmp_path: Path) -> None:
     source = table(ward_like)
-    image = exr.in_plane_slice(source)
+    image = slices.in_plane_slice(source)
     with pytest.raises(OSError, match=r"cannot write .*nowhere.*slice\.exr: .*No such file"):
-        exr.write(tmp_path / "nowhere" / "slice.exr", image, source)
+        _exr_file.write_slice(tmp_path / "nowhere" / "slice.exr", image, source)
     (tmp_path / "folder").mkdir()
     with pytest.raises(IsADirectoryError):
-        exr.write(tmp_path / "folder", image, source)
+        _exr_file.write_slice(tmp_path / "folder", image, source)
     assert list(tmp_path.iterdir()) == [tmp_path / "folder"]
-    (tmp_path / "file").write_text("in the way")
-    with pytest.raises(OSError, match="File exists"):
-        exr.export(source, tmp_path / "file")

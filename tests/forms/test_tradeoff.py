@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from brdfdb.forms.catalogue import Kind
 from brdfdb.forms.tradeoff import STEPS, chart, chart_family, ranks
 from brdfdb.forms.tradeoff_document import Chart, FamilyChart
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import Material, presets
+from brdfdb.materials import FunctionSource, Material, presets
 from brdfdb.store.family import Sweep
 from brdfdb.tables.error_measurement import Draw, classes, draw, mean_error
 from brdfdb.tables.places import BANDS_DEG
@@ -238,6 +239,20 @@ def test_the_g_of_a_family_is_that_of_eq_79_along_the_normal(coppers: FamilyChar
     assert coppers.diagnostic is not None
     assert (coppers.diagnostic.symbol, coppers.diagnostic.title) == ("g", "g along the normal, eq. 79")
     np.testing.assert_allclose(coppers.diagnostic.values, expected, rtol=5e-3)  # three digits
+
+
+def test_a_function_is_charted_by_itself_and_its_tables() -> None:
+    def half_lambert(wi: Any, wr: Any, _: Any) -> Any:
+        return np.full(len(wi), 0.5 / np.pi) + 0.0 * wr[:, 2]
+
+    source = FunctionSource(brdf=half_lambert, name="half", title="Half of Lambert", provenance="a test")
+    found = chart(source, None, (0.1,))
+    assert (found.material, found.model, found.parameters) == ("half", "function", {})
+    assert [point.key for point in found.points] == ["function", "table-10", "table-even", "table-halves"]
+    assert found.truth == "function"
+    assert max(point.l1 for point in found.points) < 1e-6
+    (own,) = [sampler for sampler in found.samplers if sampler.key == "model"]
+    assert own.albedo.variance < 1e-20  # the cosine draws it exactly
 
 
 def test_errors_of_a_member_are_those_of_its_chart(coppers: FamilyChart, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,6 +10,7 @@ import pytest
 from brdfdb.figure import Curve, Figure, Panel
 from brdfdb.gallery.he_torrance_1991 import FIGURES
 from brdfdb.reference import he_torrance_1991 as reference
+from brdfdb.reference import he_torrance_1991_aperture
 from brdfdb.spectra import refractive_index
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
@@ -147,8 +148,8 @@ def test_curves_are_over_their_value_in_the_mirror_direction(number: int) -> Non
 def through_apertures(theta_i: float, x: float, surface: dict[str, float], a: float) -> float:
     arguments = np.deg2rad(theta_i), np.deg2rad(abs(x)), np.pi if x > 0.0 else 0.0, CONE, CONE
     return (
-        float(reference.aperture_specular(*arguments, **surface))
-        + reference.aperture_diffuse(*arguments, **surface)
+        float(he_torrance_1991_aperture.aperture_specular(*arguments, **surface))
+        + he_torrance_1991_aperture.aperture_diffuse(*arguments, **surface)
         + a / np.pi
     )
 
@@ -200,7 +201,7 @@ def test_blue_plastic_is_in_absolute_values() -> None:
         assert at(drawn, -30.0) == pytest.approx(0.15 / np.pi, rel=DIGITS)
         for x in (theta_i, theta_i + 2.0):
             arguments = np.deg2rad(theta_i), np.deg2rad(x), np.pi, CONE, CONE
-            expected = float(reference.aperture_specular(*arguments, **smooth)) + 0.15 / np.pi
+            expected = float(he_torrance_1991_aperture.aperture_specular(*arguments, **smooth)) + 0.15 / np.pi
             assert at(drawn, x) == pytest.approx(expected, rel=DIGITS)
 
 

@@ -68,7 +68,10 @@ function audited(audit) {
 
 function links({ links: to, audit }) {
   const wanted = [["material", to.self], ["albedo", to.albedo], ...(audit ? [["audit", to.audit]] : []),
-    ["table (zarr)", to["download.zarr"]], ["slice (EXR)", to["slice.exr"]]];
+    ["table (zarr)", to["download.zarr"]], ...Object.entries(to).flatMap(([key, href]) => {
+      const [kind, format] = key.split("/"); // a file of every format that the service exports
+      return kind === "export" ? [[format.toUpperCase(), href]] : [];
+    })];
   return wanted.map(([text, href]) => element("a", { href: href.replace(/^\//, "") }, text));
 }
 

@@ -11,7 +11,9 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from brdfdb.errors import StoreError
-from brdfdb.store.manifest import check_manifest, manifest_of, sha256_of
+from brdfdb.store.files import sha256_of
+from brdfdb.store.manifest import check_manifest
+from brdfdb.store.paths import manifest_path
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.openapi_notes import answers
 from brdfdb_api.http.responses import cache_headers, not_modified
@@ -72,7 +74,7 @@ def _located(request: Request, name: str, revision: str | None) -> tuple[Path, s
     """
     shelf = shelf_of(request)
     group, digest = shelf.store.located(name, revision or shelf.head(name))
-    if not manifest_of(group).is_file():
+    if not manifest_path(group).is_file():
         raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
     return group, digest
 

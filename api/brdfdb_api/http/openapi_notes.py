@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+from brdfdb.formats import EXPORTERS, Option, options_of
 from brdfdb_api.http.responses import NPY, Problem
 
 ANGLE_SCHEMA = {"anyOf": [{"type": "number"}, {"type": "array", "items": {}}]}
@@ -86,6 +88,25 @@ ERROR = _parameter(
     {"type": "string", "enum": ["false", "true"], "default": "false"},
     "the error that the table states beside the values; not of a model",
 )
+
+
+def _option(option: Option) -> dict[str, Any]:
+    schema: dict[str, Any] = {"type": "string", "default": option.default}
+    if isinstance(option.default, bool):
+        schema |= {"enum": ["false", "true"], "default": str(option.default).lower()}
+    elif option.choices:
+        schema["enum"] = list(option.choices)
+    else:
+        ends = {"minimum": option.low, "maximum": option.high}
+        schema |= {"type": "number", **{end: value for end, value in ends.items() if math.isfinite(value)}}
+    return _parameter(option.name, schema, option.help)
+
+
+# Of all formats: an option that a format does not have is refused
+EXPORT_OPTIONS = [
+    _option(option)
+    for option in {name: option for each in EXPORTERS.values() for name, option in options_of(each).items()}.values()
+]
 
 
 def answers(model: type | None, *statuses: int, media: dict[str, str] | None = None) -> dict[int | str, dict[str, Any]]:

@@ -7,6 +7,7 @@ import gzip
 import hashlib
 import importlib.metadata
 from importlib.resources import files
+from pathlib import PurePath
 
 from fastapi import APIRouter
 from starlette.requests import Request
@@ -16,17 +17,11 @@ from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.responses import not_modified
 
 SCRIPT = "text/javascript; charset=utf-8"
-MEDIA = {
-    "index.html": "text/html; charset=utf-8",
-    "explorer.css": "text/css; charset=utf-8",
-    **dict.fromkeys(
-        (
-            *("main.js", "state.js", "series.js", "api.js", "list.js", "controls.js"),
-            *("facts.js", "figures.js", "hemisphere.js", "sphere.js", "copy.js", "dom.js", "cut.js", "scales.js"),
-        ),
-        SCRIPT,
-    ),
-}
+_TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": SCRIPT}
+_VIEWS = "views.js"
+FOLDER = files("brdfdb_api").joinpath("explorer")
+# Media types of all files of the explorer: those of the folder, and the list of its views
+MEDIA = {file.name: _TYPES[PurePath(file.name).suffix] for file in FOLDER.iterdir()} | {_VIEWS: SCRIPT}
 
 # plotly writes style attributes, and reads its pictures from data: and blob: addresses
 POLICY = "; ".join(
@@ -79,9 +74,19 @@ def explorer_file(request: Request, file: str) -> Response:
 @functools.cache
 def _file(name: str) -> tuple[bytes, str]:
     """Return a file of the explorer and its digest."""
-    content = files("brdfdb_api").joinpath("explorer", name).read_bytes()
+    content = _views() if name == _VIEWS else FOLDER.joinpath(name).read_bytes()
     content = content.replace(b"PLOTLY_VERSION", importlib.metadata.version("plotly").encode())
     return content, hashlib.sha256(content).hexdigest()[:16]
+
+
+def _views() -> bytes:
+    """Return a script that exports VIEWS: the views of all modules ``view_*.js`` by name, in their order."""
+    modules = sorted(name for name in MEDIA if name.startswith("view_"))
+    lines = [f'import view{number} from "./{name}";' for number, name in enumerate(modules)]
+    views = ", ".join(f"view{number}" for number in range(len(modules)))
+    lines.append("const by = (a, b) => a.order - b.order;")
+    lines.append(f"export const VIEWS = Object.fromEntries([{views}].sort(by).map((view) => [view.name, view]));")
+    return ("\n".join(lines) + "\n").encode()
 
 
 @functools.cache

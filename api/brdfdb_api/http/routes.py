@@ -15,6 +15,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import Scope
 
+from brdfdb.formats import EXPORTERS
 from brdfdb_api.http import middleware, openapi_notes
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import FIELDS, OPTIONS, Options, Points, evaluate, parsed
@@ -190,7 +191,8 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "revisions": revisions,
         "links": {
             "self": address,
-            **{key: f"{address}/{key}" for key in ("lookup", "albedo", "lobe", "slice.exr", "audit", "download.zarr")},
+            **{key: f"{address}/{key}" for key in ("lookup", "albedo", "lobe", "audit", "download.zarr")},
+            **{f"export/{file_format}": f"{address}/export/{file_format}" for file_format in EXPORTERS},
             "store": f"/v1/store/materials/{name}/{table.revision}",
             "revision": f"/v1/materials/{name}/revisions/{table.revision}",
             "materials": "/v1/materials",

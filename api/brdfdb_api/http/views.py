@@ -1,22 +1,24 @@
-"""Views of a material for pages and reports: albedos, lobes, EXR slices, and the findings of the audit."""
+"""Views of a material for pages and reports: albedos, lobes, files of other formats, and the findings of the audit."""
 
 from __future__ import annotations
 
 import tempfile
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Path, Query
 from numpy.typing import NDArray
 from starlette.requests import Request
 from starlette.responses import Response
 
+from brdfdb.errors import ParameterError
+from brdfdb.formats import EXPORTERS, options_of, parsed_options
 from brdfdb.geometry import radians
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import Options, Points, evaluate, parsed
-from brdfdb_api.http.openapi_notes import LOBE_NPY_ANSWER, LOBE_OPTIONS, WAVELENGTHS, answers
+from brdfdb_api.http.openapi_notes import EXPORT_OPTIONS, LOBE_NPY_ANSWER, LOBE_OPTIONS, WAVELENGTHS, answers
 from brdfdb_api.http.responses import (
     JSON,
     NPY,
@@ -36,7 +38,6 @@ from brdfdb_api.http.routes import both, checked_size, query_names, shelf_of
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-EXR = "image/x-exr"
 View = Literal["cut", "hemisphere", "half-difference"]
 
 _CUT = np.arange(-90.0, 91.0)  # theta_r [degree], negative back towards the light
@@ -175,42 +176,37 @@ def _directions(view: View, theta_i: float, phi_i: float) -> tuple[dict[str, NDA
 
 
 @both(
-    "/slice.exr",
+    "/export/{file_format}",
     router=views,
     tags=["views"],
-    dependencies=[query_names("kind", "theta_i", "phi_i", "half")],
-    responses=answers(None, 304, 404, 422, 503, media={EXR: "R, G, B and a channel a wavelength, f_r in 1/sr"}),
+    responses=answers(None, 304, 404, 422, 503, media={each.media_type: each.summary for each in EXPORTERS.values()}),
+    openapi_extra={"parameters": EXPORT_OPTIONS},
 )
-def slice_exr(
+def export(
     request: Request,
     name: str,
-    kind: Annotated[
-        Literal["half_difference", "in_plane", "lobe"],
-        Query(description="theta_h and theta_d; theta_i and theta_r; or all viewers of one light"),
-    ] = "lobe",
-    theta_i: Incidence = 45.0,
-    phi_i: Azimuth = 0.0,
-    half: Annotated[bool, Query(description="16 bit floats, to look at; else 32 bit")] = False,
+    file_format: Annotated[str, Path(json_schema_extra={"enum": [*EXPORTERS]})],
     revision: str | None = None,
 ) -> Response:
-    """Return a slice of the table as an OpenEXR file, as `brdfdb export exr` writes it."""
-    from brdfdb.formats import exr
-
+    """Return the table, or a slice of it, as a file of another format, as `brdfdb export` writes it."""
+    if file_format not in EXPORTERS:
+        raise RequestError(404, f"{file_format!r} is no format; there are {', '.join(EXPORTERS)}")
+    exporter = EXPORTERS[file_format]
+    query, _ = parsed(request.scope["query_string"], tuple(options_of(exporter)))
+    try:
+        options = parsed_options(exporter, query)
+    except ParameterError as error:
+        raise RequestError(422, str(error), error.parameter) from None
     table = shelf_of(request).table(name, revision)
-    headers = cache_headers(tag_of(table), "exr", immutable=revision is not None)
-    headers["Content-Disposition"] = f'attachment; filename="{name}_{kind}.exr"'
+    headers = cache_headers(tag_of(table), file_format, immutable=revision is not None)
+    kind = f"_{options.get('kind', exporter.kinds[0])}" if exporter.kinds else ""
+    headers["Content-Disposition"] = f'attachment; filename="{name}{kind}{exporter.suffix}"'
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
-    if kind == "lobe":
-        image = exr.lobe_map(table, theta_i_deg=theta_i, phi_i_deg=phi_i)
-    elif kind == "in_plane":
-        image = exr.in_plane_slice(table, phi_i_deg=phi_i)
-    else:
-        image = exr.half_difference_slice(table, phi_h_deg=phi_i)
-    with tempfile.TemporaryDirectory() as folder:  # OpenEXR can write only files
-        exr.write(Path(folder) / "slice.exr", image, table, half=half)
-        content = (Path(folder) / "slice.exr").read_bytes()
-    return Response(content, media_type=EXR, headers=headers)
+    with tempfile.TemporaryDirectory() as folder:  # formats write files
+        path = FilePath(folder) / f"export{exporter.suffix}"
+        exporter.write(table, path, **options)
+        return Response(path.read_bytes(), media_type=exporter.media_type, headers=headers)
 
 
 @both(

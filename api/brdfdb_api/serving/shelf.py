@@ -14,8 +14,9 @@ from weakref import WeakKeyDictionary
 import orjson
 
 from brdfdb.errors import StoreError, UnknownMaterialError
+from brdfdb.store.decoding import read_metadata
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.reader import Store, read_metadata
+from brdfdb.store.reader import Store
 from brdfdb_api.serving.colours import swatch
 from brdfdb_api.serving.settings import Settings
 

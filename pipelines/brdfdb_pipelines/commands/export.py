@@ -1,26 +1,41 @@
-"""The command `brdfdb export FORMAT`."""
+"""The command `brdfdb export FORMAT`: one subcommand a format of `brdfdb.formats.EXPORTERS`."""
 
 from __future__ import annotations
 
 import argparse
 
 from brdfdb.errors import ParameterError
+from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options
 from brdfdb_pipelines.commands._arguments import add_out, add_store
 
-HELP = "Write slices of tables as image files."
+HELP = "Write tables as files of other formats."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the format and its arguments."""
     # a command a format: argparse takes no NAME after an option that follows another positional argument
-    formats = parser.add_subparsers(required=True, metavar="FORMAT")
-    sentence = "Write slices of tables as OpenEXR files."
-    exr = formats.add_parser("exr", help=sentence, description=sentence)
-    exr.add_argument("names", nargs="*", metavar="NAME", help="materials")
-    add_store(exr)
-    exr.add_argument("--all", action="store_true", help="every material of the store")
-    add_out(exr, "brdf-exr")
-    exr.add_argument("--half", action="store_true", help="16-bit floats, for viewing (default: 32-bit, for data)")
+    formats = parser.add_subparsers(required=True, metavar="FORMAT", dest="file_format")
+    for name, exporter in EXPORTERS.items():
+        sentence = f"Write {exporter.summary}."
+        command = formats.add_parser(name, help=sentence, description=sentence)
+        command.add_argument("names", nargs="*", metavar="NAME", help="materials")
+        add_store(command)
+        command.add_argument("--all", action="store_true", help="every material of the store")
+        add_out(command, f"brdf-{name}")
+        for option in options_of(exporter).values():
+            _add(command, option)
+
+
+def _add(command: argparse.ArgumentParser, option: Option) -> None:
+    flag, target = f"--{option.name.replace('_', '-')}", f"option_{option.name}"
+    if option.default is False:
+        command.add_argument(flag, dest=target, action="store_const", const="true", help=option.help)
+    elif option.choices:
+        text = f"{option.help}: {', '.join(option.choices)} (default: all of them)"
+        command.add_argument(flag, dest=target, metavar=option.name.upper(), help=text)
+    else:
+        text = f"{option.help} (default: {option.default:g})"
+        command.add_argument(flag, dest=target, metavar="X", help=text)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -29,5 +44,8 @@ def run(options: argparse.Namespace) -> int:
 
     if bool(options.names) == options.all:
         raise ParameterError("export", "name materials, or give --all")
-    export.run_exr(options.store, options.names, options.out, half=options.half)
+    exporter = EXPORTERS[options.file_format]
+    texts = {name: getattr(options, f"option_{name}") for name in options_of(exporter)}
+    given = parsed_options(exporter, {name: text for name, text in texts.items() if text is not None})
+    export.run(options.store, options.names, options.out, options.file_format, given)
     return 0

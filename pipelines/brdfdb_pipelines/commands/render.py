@@ -28,13 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Render the scene, write NAME.png and NAME.exr, and print where they are."""
-    from brdfdb.errors import ParameterError
+    from brdfdb.errors import ParameterError, import_extra
     from brdfdb.scenes import image
     from brdfdb.scenes.gbuffer import gather
     from brdfdb.scenes.recorded_directions import Recorded
     from brdfdb.scenes.renderer import reflectors, render
     from brdfdb_pipelines import scene_file, terminal
 
+    for module in ("matplotlib.image", "OpenEXR"):  # before the time is spent
+        import_extra(module)
     name, directory = options.scene, options.out
     scene = scene_file.load(name)
     if isinstance(scene.objects[0].shape, Recorded) and (options.width is not None or options.across is not None):

@@ -18,7 +18,9 @@ def f_r(w: Directions, rho_0: ArrayLike, k: ArrayLike, Theta: ArrayLike, rho_c: 
     cos_g = w.cos_i * w.cos_r + w.sin_i * w.sin_r * w.cos_dphi
     F = (1.0 - T**2) / (1.0 + T**2 + 2.0 * T * cos_g) ** 1.5
     tan_i, tan_r = w.sin_i / w.cos_i, w.sin_r / w.cos_r
-    G = np.sqrt(np.maximum(tan_i**2 + tan_r**2 - 2.0 * tan_i * tan_r * w.cos_dphi, 0.0))
+    cos = w.cos_dphi
+    less = w.sin_dphi**2 / (1.0 + np.abs(cos)) + np.abs(cos) - cos  # 1 - cos, with its digits at the hot spot
+    G = np.sqrt((tan_i - tan_r) ** 2 + 2.0 * tan_i * tan_r * less)
     M = (w.cos_i * w.cos_r * (w.cos_i + w.cos_r)) ** k_1
     return finished(RHO_0.check(rho_0) / np.pi * M * F * (1.0 + (1.0 - RHO_C.check(rho_c)) / (1.0 + G)), w)
 

@@ -1,0 +1,142 @@
+"""OpenEXR files of slices: channels, header and attributes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import uuid
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from brdfdb import spectra
+from brdfdb.errors import ParameterError, WriteError
+from brdfdb.tables.slices import Slice
+from brdfdb.tables.table import Table
+
+QUANTITY = "f_r"
+UNIT = "1/sr"
+HALF_MAX = 65504.0
+
+RGB_COLOUR = "linear sRGB, D65"
+RGB_GREY = "grey: colour was not measured"
+RGB_MEAN = "grey: colour was not measured, mean over the wavelengths"
+
+
+def _dirac(specular: NDArray[np.float32]) -> str:
+    """Return a sentence on what an image leaves out of a table with a specular part."""
+    return f"not in this image: up to {specular.max():.4g} of the light leaves in the exact mirror direction"
+
+
+def write_slice(path: str | os.PathLike[str], image: Slice, table: Table, half: bool = False) -> None:
+    """Write a slice as an OpenEXR file, ZIP compressed: whole, or not at all.
+
+    Parameters
+    ----------
+    path : path
+        The file; one that is there is replaced.
+    image : Slice
+        Pixels and axes.
+    table : Table
+        Table of the slice: its name, revision and model go into the header.
+    half : bool
+        Write 16-bit floats, for viewing, instead of 32-bit floats, for computing. Values above 65504, the largest
+        16-bit float, are written as 65504, and the attribute ``brdf:half`` counts them.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written.
+    ParameterError
+        If two wavelengths are equal.
+
+    Notes
+    -----
+    Channels: R, G, B for viewers, and one a wavelength in the reflective layout of Fichet et al. (2021,
+    ``fichet2021``), ``T.550,0nm``. The pixels are f_r itself [1/sr], which can exceed 1; the specular part of a
+    mirror-like material is no part of f_r and not in the file. R, G, B are linear sRGB under D65 where the wavelengths
+    cover the visible range, else all three are the value, averaged over the wavelengths.
+
+    The attributes begin with ``brdf:``. Angles and wavelengths are strings, as OpenEXR rounds a number to 32 bits; the
+    pixel centres are a pair of 64 bit floats. ``brdf:error_p99`` is the relative error against the model that 99 of
+    100 values of the table stay within, as the table states it.
+    """
+    path = Path(path)
+    rgb, rgb_meaning = _rgb(image)
+    pixels = {name: rgb[..., index] for index, name in enumerate("RGB")}
+    header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header |= _attributes(image, table)
+    header["brdf:rgb"] = rgb_meaning
+    if image.wavelength_nm is not None:
+        names = _spectral_channels(image.wavelength_nm)
+        pixels |= {name: image.values[..., index] for index, name in enumerate(names)}
+        header["spectralLayoutVersion"] = "1.0"
+        header["brdf:wavelength_nm"] = " ".join(_decimals(image.wavelength_nm))
+    if half:
+        clipped = sum(int(np.count_nonzero(np.abs(array) > HALF_MAX)) for array in pixels.values())
+        header["brdf:half"] = f"values above {HALF_MAX:g} are written as {HALF_MAX:g}: {clipped} in all channels"
+        pixels = {name: np.clip(array, -HALF_MAX, HALF_MAX).astype(np.float16) for name, array in pixels.items()}
+
+    # OpenEXR reads a strided array as if it were contiguous: wrong pixels and no error.
+    channels = {name: np.ascontiguousarray(array) for name, array in pixels.items()}
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        OpenEXR.File(header, channels).write(str(temporary))
+        os.replace(temporary, path)
+    except RuntimeError as error:  # what OpenEXR raises for a missing directory and for a full disk alike
+        raise WriteError(f"cannot write {path}: {error}") from error
+    finally:
+        with contextlib.suppress(OSError):  # there only after a failure
+            temporary.unlink()
+
+
+def _rgb(image: Slice) -> tuple[NDArray[np.float32], str]:
+    """Return R, G, B of a slice, shape (H, W, 3), and their meaning in words."""
+    if image.wavelength_nm is None:
+        grey, meaning = image.values, RGB_GREY
+    elif spectra.covers_visible(image.wavelength_nm):
+        return np.asarray(spectra.linear_srgb(image.wavelength_nm, image.values), dtype=np.float32), RGB_COLOUR
+    else:
+        grey, meaning = image.values.mean(axis=-1, dtype=np.float64).astype(np.float32), RGB_MEAN
+    return np.repeat(grey[..., np.newaxis], 3, axis=-1), meaning
+
+
+def _attributes(image: Slice, table: Table) -> dict[str, Any]:
+    """Return the header entries that describe the pixels."""
+    attributes: dict[str, Any] = {
+        "brdf:material": str(table.name),
+        "brdf:revision": str(table.revision),
+        "brdf:model": table.metadata.model or "",
+        "brdf:title": table.metadata.title or "",
+        "brdf:quantity": QUANTITY,
+        "brdf:unit": UNIT,
+        "brdf:dirac": "none" if table.specular is None else _dirac(table.specular),
+        "brdf:error_p99": "not measured" if table.error is None else repr(table.error.overall.p99),
+        "brdf:slice": image.kind,
+        "brdf:description": image.description,
+    }
+    for letter, axis in (("x", image.x), ("y", image.y)):
+        attributes[f"brdf:{letter}_axis"] = axis.name
+        attributes[f"brdf:{letter}_unit"] = axis.unit
+        attributes[f"brdf:{letter}_direction"] = axis.direction
+        attributes[f"brdf:{letter}_first_last"] = np.array([axis.first, axis.last])
+    return attributes | {f"brdf:{name}_deg": repr(float(angle)) for name, angle in image.fixed_deg}
+
+
+def _decimals(wavelength_nm: NDArray[Any]) -> list[str]:
+    """Return the shortest decimals that read back as the wavelengths, padded with zeros to one number of places."""
+    shortest = [np.format_float_positional(value, trim="0") for value in wavelength_nm.astype(np.float64)]
+    places = max(len(text.partition(".")[2]) for text in shortest)
+    return [text + "0" * (places - len(text.partition(".")[2])) for text in shortest]
+
+
+def _spectral_channels(wavelength_nm: NDArray[Any]) -> list[str]:
+    """Return channel names such as ``T.550,0nm``; ValueError where two wavelengths would share one."""
+    names = [f"T.{text.replace('.', ',')}nm" for text in _decimals(wavelength_nm)]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise ParameterError("wavelength_nm", f"the wavelength of channel {repeated[0]} occurs twice")
+    return names

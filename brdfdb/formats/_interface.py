@@ -1,0 +1,128 @@
+"""The interface of a file format, and its options as command line and HTTP give them: as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from brdfdb.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a format.
+
+    Attributes
+    ----------
+    name : str
+        Name of the keyword argument.
+    default : bool, float or str
+        Value that is used if none is given; its type is that of the option.
+    help : str
+        A few words for people, with the unit.
+    low, high : float
+        Range of a number, both ends included.
+    choices : tuple of str
+        Values of a text.
+    """
+
+    name: str
+    default: bool | float | str
+    help: str
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+
+    def parse(self, text: str) -> bool | float | str:
+        """Return the value that a text stands for.
+
+        Raises
+        ------
+        ParameterError
+            If the option cannot have it.
+        """
+        if isinstance(self.default, bool):
+            if text not in ("true", "false"):
+                raise ParameterError(self.name, f"{text!r} is neither true nor false", text, ("true", "false"))
+            return text == "true"
+        if isinstance(self.default, str):
+            if text not in self.choices:
+                raise ParameterError(self.name, f"{text!r} is not one of {', '.join(self.choices)}", text, self.choices)
+            return text
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not self.low <= value <= self.high:
+            allowed = f"a number in [{self.low:g}, {self.high:g}]"
+            raise ParameterError(self.name, f"{text!r} is not {allowed}", text, (self.low, self.high))
+        return value
+
+
+class Exporter(Protocol):
+    """A format that tables are written to: a module of `brdfdb.formats`, or another object with these names.
+
+    It is imported whenever the program starts: what is heavy, it imports when it writes.
+
+    Attributes
+    ----------
+    suffix : str
+        End of the names of its files, with the dot.
+    media_type : str
+        Media type over HTTP.
+    summary : str
+        A few words on what is written.
+    kinds : tuple of str
+        Kinds of files that are made of one table, a file each: values of the keyword argument `kind`. Empty where one
+        file holds the table.
+    options : tuple of Option
+        All other keyword arguments.
+    write : callable
+        ``write(table, path, **options)`` writes one file, whole or not at all.
+    """
+
+    suffix: str
+    media_type: str
+    summary: str
+    kinds: tuple[str, ...]
+    options: tuple[Option, ...]
+    write: Callable[..., None]
+
+
+class Importer(Protocol):
+    """A format that is read: a module of `brdfdb.formats`, or another object with these names.
+
+    Attributes
+    ----------
+    suffix : str
+        End of the names of its files, with the dot.
+    read : callable
+        ``read(path)`` returns samples or a table.
+    """
+
+    suffix: str
+    read: Callable[..., Any]
+
+
+def options_of(exporter: Exporter) -> dict[str, Option]:
+    """Return all options of a format by name, the kind of file among them."""
+    kinds = exporter.kinds
+    kind = [Option("kind", kinds[0], "kind of file", choices=kinds)] if kinds else []
+    return {option.name: option for option in (*kind, *exporter.options)}
+
+
+def parsed_options(exporter: Exporter, texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return keyword arguments of `Exporter.write` from texts by name.
+
+    Raises
+    ------
+    ParameterError
+        If an option is not one of the format, or cannot have its value.
+    """
+    options = options_of(exporter)
+    for name, text in texts.items():
+        if name not in options:
+            raise ParameterError(name, f"the options of this format are {', '.join(options)}", text, tuple(options))
+    return {name: options[name].parse(text) for name, text in texts.items()}

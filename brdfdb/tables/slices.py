@@ -1,0 +1,184 @@
+"""Slices of a table: the half/difference image, the plane of incidence and the lobe over the hemisphere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb import geometry
+from brdfdb.errors import ParameterError
+from brdfdb.tables.table import Table
+
+LOBE_SIZE = 256
+LEFT_TO_RIGHT = "left to right"
+BOTTOM_TO_TOP = "bottom to top"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a slice: `first` and `last` are the pixel centres where `direction` starts and where it ends."""
+
+    name: str
+    first: float
+    last: float
+    direction: str
+    unit: str = "degree"
+
+
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """A picture of a table: f_r [1/sr] over two angles, row 0 at the top as in an image file.
+
+    Attributes
+    ----------
+    kind : str
+        "half_difference", "in_plane" or "lobe".
+    description : str
+        How to read the picture, in words.
+    x, y : Axis
+        What the columns and the rows are.
+    fixed_deg : tuple of (str, float)
+        The angles that are the same in every pixel, by name [degrees].
+    values : float32 array, shape (H, W) or (H, W, L) [1/sr]
+        Without and with a wavelength axis.
+    wavelength_nm : float array, shape (L,), or None
+        The wavelengths of the last axis of `values` [nm].
+
+    Raises
+    ------
+    ValueError
+        If the shape of `values` does not fit `wavelength_nm`.
+    """
+
+    kind: str
+    description: str
+    x: Axis
+    y: Axis
+    fixed_deg: tuple[tuple[str, float], ...]
+    values: NDArray[np.float32]
+    wavelength_nm: NDArray[Any] | None
+
+    def __post_init__(self) -> None:
+        spectral = () if self.wavelength_nm is None else self.wavelength_nm.shape
+        if self.values.ndim < 2 or self.values.shape[2:] != spectral:
+            raise ParameterError(
+                "values", f"shape {self.values.shape} is not (height, width, *{spectral})", self.values.shape
+            )
+
+
+def half_difference_slice(table: Table, *, phi_h_deg: float = 0.0, phi_d_deg: float = 90.0) -> Slice:
+    """The image slice of a table: theta_h to the right, theta_d upwards, one pixel a degree.
+
+    Parameters
+    ----------
+    table : Table
+        What is sliced.
+    phi_h_deg : float [degree]
+        Azimuth of the half vector; matters for anisotropic tables only.
+    phi_d_deg : float [degree]
+        Azimuth of the light about the half vector. At 90 degrees, the usual choice for pictures of measured
+        materials, light and viewer are equally far from the normal and no pixel is below the horizon.
+
+    Returns
+    -------
+    Slice
+        Shape (90, 90) or (90, 90, L) [1/sr]; 0 where light or viewer is below the horizon. Column x is
+        theta_h = x + 0.5 degrees, row y is theta_d = 89.5 - y degrees: the specular lobe is on the left edge, grazing
+        incidence along the top, retroreflection along the bottom.
+    """
+    theta_h_deg = np.arange(90) + 0.5
+    theta_d_deg = theta_h_deg[::-1, np.newaxis]
+    directions = geometry.directions_from_half_difference(
+        *(geometry.radians(angle) for angle in (theta_h_deg, phi_h_deg, theta_d_deg, phi_d_deg))
+    )
+    return Slice(
+        kind="half_difference",
+        description="specular lobe on the left edge, grazing incidence at the top, retroreflection at the bottom",
+        x=Axis("theta_h", 0.5, 89.5, LEFT_TO_RIGHT),
+        y=Axis("theta_d", 0.5, 89.5, BOTTOM_TO_TOP),
+        fixed_deg=(("phi_h", phi_h_deg), ("phi_d", phi_d_deg)),
+        values=np.asarray(table.lookup(*directions), dtype=np.float32),
+        wavelength_nm=table.wavelength_nm,
+    )
+
+
+def in_plane_slice(table: Table, *, phi_i_deg: float = 0.0) -> Slice:
+    """The plane of incidence: theta_r with a sign to the right, theta_i upwards, one pixel a degree.
+
+    Parameters
+    ----------
+    table : Table
+        What is sliced.
+    phi_i_deg : float [degree]
+        Azimuth of the light; matters for anisotropic tables only.
+
+    Returns
+    -------
+    Slice
+        Shape (90, 180) or (90, 180, L) [1/sr]. Column x is theta_r = x - 89.5 degrees, positive on the mirror side
+        (phi_r = phi_i + 180 degrees) and negative back towards the light (phi_r = phi_i); row y is
+        theta_i = 89.5 - y degrees. The mirror direction is the diagonal from the middle of the bottom edge to the top
+        right corner, retroreflection the one to the top left corner.
+    """
+    signed_deg = np.arange(180) - 89.5
+    theta_i_deg = np.arange(90)[::-1, np.newaxis] + 0.5
+    phi_r_deg = phi_i_deg + np.where(signed_deg > 0.0, 180.0, 0.0)
+    directions = (geometry.radians(angle) for angle in (theta_i_deg, phi_i_deg, np.abs(signed_deg), phi_r_deg))
+    return Slice(
+        kind="in_plane",
+        description="theta_r is positive on the mirror side and negative back towards the light",
+        x=Axis("signed theta_r", -89.5, 89.5, LEFT_TO_RIGHT),
+        y=Axis("theta_i", 0.5, 89.5, BOTTOM_TO_TOP),
+        fixed_deg=(("phi_i", phi_i_deg),),
+        values=np.asarray(table.lookup(*directions), dtype=np.float32),
+        wavelength_nm=table.wavelength_nm,
+    )
+
+
+def lobe_map(table: Table, *, theta_i_deg: float = 45.0, phi_i_deg: float = 0.0) -> Slice:
+    """The hemisphere of viewing directions for one light, as a disc whose radius is theta_r.
+
+    Parameters
+    ----------
+    table : Table
+        What is sliced.
+    theta_i_deg : float [degree]
+        Polar angle of the light, 0 to 90.
+    phi_i_deg : float [degree]
+        Azimuth of the light; matters for anisotropic tables only.
+
+    Returns
+    -------
+    Slice
+        Shape (256, 256) or (256, 256, L) [1/sr], 0 outside the disc. The surface is seen from above and turned so that
+        the light comes from the left: the point (x, y) degrees from the centre, x to the right and y upwards, is
+        x = -theta_r cos(phi_r - phi_i), y = -theta_r sin(phi_r - phi_i). Retroreflection is thus theta_i to the left
+        of the centre, the mirror direction theta_i to the right, and phi_r grows counter-clockwise.
+
+    Raises
+    ------
+    ValueError
+        If `theta_i_deg` is outside [0, 90].
+    """
+    if not 0.0 <= theta_i_deg <= 90.0:
+        raise ParameterError("theta_i_deg", f"{theta_i_deg:g} is outside [0, 90] degrees", theta_i_deg, (0.0, 90.0))
+    pitch = 180.0 / LOBE_SIZE
+    x_deg = (np.arange(LOBE_SIZE) + 0.5) * pitch - 90.0
+    y_deg = x_deg[::-1, np.newaxis]
+    # the corners reach theta_r = 127 degrees: below the horizon, where a table is 0
+    theta_r_deg = np.hypot(x_deg, y_deg)
+    phi_r_deg = phi_i_deg + geometry.degrees(np.arctan2(-y_deg, -x_deg))
+    directions = (geometry.radians(angle) for angle in (theta_i_deg, phi_i_deg, theta_r_deg, phi_r_deg))
+    edge = 90.0 - 0.5 * pitch
+    return Slice(
+        kind="lobe",
+        description="radius = theta_r, seen from above, light from the left, mirror direction on the right",
+        x=Axis("-theta_r cos(phi_r - phi_i)", -edge, edge, LEFT_TO_RIGHT),
+        y=Axis("-theta_r sin(phi_r - phi_i)", -edge, edge, BOTTOM_TO_TOP),
+        fixed_deg=(("theta_i", theta_i_deg), ("phi_i", phi_i_deg)),
+        values=np.asarray(table.lookup(*directions), dtype=np.float32),
+        wavelength_nm=table.wavelength_nm,
+    )

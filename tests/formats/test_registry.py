@@ -1,0 +1,103 @@
+"""A format that is added to the registry is a command and an address without any other change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb.errors import ParameterError
+from brdfdb.formats import EXPORTERS, IMPORTERS, Option, options_of, parsed_options
+from brdfdb.materials import Material
+from brdfdb.store.staging import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
+from tests.api.a_store import client_of
+from tests.pipelines.command import Captured, run
+
+
+def write(table: Any, path: Path, *, digits: float = 4.0) -> None:
+    lines = ["theta_i,theta_r,delta_phi,brdf"]
+    for index in np.ndindex(*table.grid.shape):
+        at = [nodes[i] for nodes, i in zip(table.axes_deg.values(), index, strict=True)]
+        lines.append(",".join(f"{value:.{digits:.0f}g}" for value in (*at, table.brdf[index])))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+CSV = SimpleNamespace(
+    suffix=".csv",
+    media_type="text/csv",
+    summary="f_r at the nodes of a table as text",
+    kinds=(),
+    options=(Option("digits", 4.0, "significant digits", low=1.0, high=9.0),),
+    write=write,
+)
+FIRST = "theta_i,theta_r,delta_phi,brdf\n0,0,0,0.159\n"
+
+
+@pytest.fixture
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A store with one grey table, and the format in the registry."""
+    monkeypatch.setitem(EXPORTERS, "csv", CSV)
+    table = {"title": "Grey", "model": "lambert", "source": "no paper", "parameters": {"rho": 0.5}}
+    grid = Grid({"theta_i": [0, 80], "theta_r": [0, 80], "delta_phi": [0, 90, 180]})
+    publish_dataset(tmp_path / "store", "grey", tabulate(Layout(Material.from_table("grey", table), grid)))
+    return tmp_path / "store"
+
+
+def test_a_format_of_fifteen_lines_is_a_command(store: Path, tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "out"
+    assert run("export", "csv", "grey", "--digits", "3", "--store", store, "--out", out) == 0
+    assert capsys.readouterr().out.startswith("1 CSV files, ")
+    assert (out / "grey.csv").read_text(encoding="utf-8").startswith(FIRST)
+    assert run("export", "csv", "grey", "--digits", "12", "--store", store, "--out", out) == 2
+    assert capsys.readouterr().err == "brdfdb: digits: '12' is not a number in [1, 9]\n"
+    assert run("export", "exr", "--all", "--store", store, "--out", out, "--kind", "in_plane", "--half") == 0
+    assert sorted(path.name for path in out.iterdir()) == ["grey.csv", "grey_in_plane.exr"]
+
+
+def test_a_format_of_fifteen_lines_is_an_address(store: Path) -> None:
+    client = client_of(store)
+    answer = client.get("/v1/materials/grey/export/csv?digits=3")
+    assert answer.text.startswith(FIRST)
+    assert answer.headers["content-type"].startswith("text/csv")
+    assert answer.headers["content-disposition"] == 'attachment; filename="grey.csv"'
+    assert client.get("/v1/materials/grey").json()["links"]["export/csv"] == "/v1/materials/grey/export/csv"
+    assert client.problem("GET", "/v1/materials/grey/export/csv?digits=x", 422)["parameter"] == "digits"
+    assert client.problem("GET", "/v1/materials/grey/export/csv?kind=lobe", 422)["parameter"] == "kind"
+    assert "there are exr, csv" in client.problem("GET", "/v1/materials/grey/export/merl", 404)["detail"]
+
+
+def test_modules_of_the_room_are_found() -> None:
+    assert list(EXPORTERS) == ["exr"]
+    assert dict(IMPORTERS) == {}
+    for exporter in EXPORTERS.values():
+        assert exporter.suffix.startswith(".")
+        assert "/" in exporter.media_type
+
+
+@pytest.mark.parametrize(
+    ("texts", "sentence"),
+    [
+        ({"kind": "map"}, "kind: 'map' is not one of lobe, half_difference, in_plane"),
+        ({"half": "perhaps"}, "half: 'perhaps' is neither true nor false"),
+        ({"theta_i": "91"}, "theta_i: '91' is not a number in [0, 90]"),
+        ({"theta_i": "nan"}, "theta_i: 'nan' is not a number in [0, 90]"),
+        ({"phi_i": "east"}, "phi_i: 'east' is not a number in [-720, 720]"),
+        ({"size": "3"}, "size: the options of this format are kind, theta_i, phi_i, half"),
+    ],
+)
+def test_an_option_that_is_not_allowed_is_named(texts: dict[str, str], sentence: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        parsed_options(EXPORTERS["exr"], texts)
+    assert (str(caught.value), caught.value.parameter) == (sentence, next(iter(texts)))
+
+
+def test_options_are_parsed_to_the_types_of_their_defaults() -> None:
+    texts = {"kind": "lobe", "theta_i": "30", "half": "true"}
+    assert parsed_options(EXPORTERS["exr"], texts) == {"kind": "lobe", "theta_i": 30.0, "half": True}
+    assert [type(each.default) for each in options_of(EXPORTERS["exr"]).values()] == [str, float, float, bool]

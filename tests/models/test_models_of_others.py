@@ -1,0 +1,189 @@
+"""Models of other people: a package with an entry point and a file, built, audited, charted and served as ours are."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.forms import catalogue
+from brdfdb.materials import Material
+from brdfdb.models import MODELS
+from brdfdb.models.registry import VARIABLE, Registry
+from brdfdb.parameters import ModelSpec
+from tests.api.a_store import client_of
+from tests.pipelines.command import run
+
+PACKAGE = Path(__file__).parent / "rpv_package"
+FILE = PACKAGE / "rpv_1993.py"
+FLOAT32 = 1e-6  # of a node
+RECIPE = """
+materials = ["savanna"]
+wavelengths_nm = [550]
+[grids]
+isotropic = { theta_i_deg = [0, 30, 60, 80], theta_r_deg = [0, 30, 60, 80], delta_phi_deg = [0, 60, 120, 180] }
+spectral = { theta_i_deg = [0, 80], theta_r_deg = [0, 80], delta_phi_deg = [0, 180] }
+anisotropic = { theta_i_deg = [0, 80], phi_i_deg = [0, 360], theta_r_deg = [0, 80], phi_r_deg = [0, 360] }
+[define.savanna]
+title = "Savanna"
+model = "rpv"
+source = "made up"
+parameters = { rho_0 = 0.06, k = 0.7, Theta = -0.2, rho_c = 0.3 }
+"""
+PARAMETERS = {"rho_0": 0.06, "k": 0.7, "Theta": -0.2, "rho_c": 0.3}
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store that another process built, with a worker process of its own; both were told of the file."""
+    root = tmp_path_factory.mktemp("rpv")
+    (root / "recipe.toml").write_text(RECIPE, encoding="utf-8")
+    command = [sys.executable, "-c", "import sys; from brdfdb_pipelines import cli; sys.exit(cli.main())"]
+    command += ["--models", str(FILE), "build", "recipe.toml", "--store", "store", "--processes", "--jobs", "1"]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return root / "store"
+
+
+@pytest.fixture
+def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModelSpec]:
+    """The model of the package, which Python finds as it finds what pip installs."""
+    monkeypatch.syspath_prepend(str(PACKAGE))
+    MODELS.add_packages()
+    yield MODELS["rpv"]
+    del MODELS["rpv"], sys.modules["rpv_1993"]
+
+
+@pytest.fixture
+def registry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Registry]:
+    """An empty registry; files that it loads are forgotten after the test."""
+    monkeypatch.setenv(VARIABLE, "")
+    before = set(sys.modules)
+    yield Registry()
+    for name in set(sys.modules) - before:
+        if name.startswith("brdfdb_models_"):
+            del sys.modules[name]
+
+
+# rho_0, k, Theta, rho_c; light and viewer [degree]; pi f_r, worked out by hand:
+# 0.1 / sqrt(0.5 * 1.5) * (1 + 1 / (1 + sqrt 3)), and 0.2 * 2 * 0.75 / 0.5^3 * 1.5
+HAND = [((0.1, 0.5, 0.0, 0.0), (60.0, 0.0), 0.157735027), ((0.2, 2.0, -0.5, 0.5), (0.0, 0.0), 3.6)]
+
+
+@pytest.mark.parametrize(("parameters", "theta_deg", "expected"), HAND)
+def test_rpv_has_the_values_that_a_hand_works_out(
+    installed: ModelSpec, parameters: tuple[float, ...], theta_deg: tuple[float, float], expected: float
+) -> None:
+    named = dict(zip(("rho_0", "k", "Theta", "rho_c"), parameters, strict=True))
+    theta_i, theta_r = np.deg2rad(theta_deg)
+    assert np.pi * installed.evaluate(theta_i, 0.0, theta_r, 0.0, **named) == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_table_of_their_model_is_that_of_the_model(store: Path, installed: ModelSpec) -> None:
+    table = brdfdb.open(store)["savanna"]
+    angles = np.deg2rad([30.0, 0.0, 60.0, 120.0])
+    expected = installed.evaluate(*angles, **PARAMETERS)
+    assert table.lookup(*angles) == pytest.approx(expected, rel=FLOAT32)
+
+
+@pytest.mark.usefixtures("installed")
+def test_their_model_is_audited(store: Path, tmp_path: Path) -> None:
+    report = tmp_path / "audit.json"
+    assert run("audit", "--no-figures", "--store", store, "--report", report) == 0
+    (entry,) = json.loads(report.read_bytes())["materials"]
+    assert (entry["model"], entry["verdict"]) == ("rpv", "passes")
+    judged = ("reciprocity", "nodes", "smoothness", "sampling")
+    assert {entry["findings"][finding]["verdict"] for finding in judged} == {"passes"}
+    assert entry["findings"]["validity"]["limits"] == []
+
+
+def test_their_model_is_served(store: Path, installed: ModelSpec) -> None:
+    client = client_of(store)
+    asked = {"theta_i": 37.0, "phi_i": 0.0, "theta_r": 51.0, "phi_r": 100.0, "from": "model"}
+    answer = client.get("/v1/materials/savanna/lookup", params=asked)
+    assert answer.status_code == 200, answer.text
+    values = installed.evaluate(*np.deg2rad([37.0, 0.0, 51.0, 100.0]), **PARAMETERS)
+    np.testing.assert_allclose(np.ravel(answer.json()["brdf"]), values, rtol=1e-12)
+
+
+def test_their_model_is_charted_by_itself(installed: ModelSpec) -> None:
+    material = Material(name="savanna", title="Savanna", model="rpv", parameters=PARAMETERS, source="made up")
+    exact, single = catalogue.forms(material, None, ())
+    assert (exact.title, exact.python) == (f"{installed.title}, {installed.equation}", "models.rpv")
+    assert single.dtype is np.float32
+
+
+def test_a_process_without_the_model_says_so(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(ParameterError, match=r"^model: 'rpv' is not one of lambert, "):
+        MODELS["rpv"]
+    assert run("list", "--store", store) == 0
+    assert "savanna" in capsys.readouterr().out
+
+
+def test_a_file_is_added_once_and_named_to_processes_that_come_later(registry: Registry) -> None:
+    registry.add_files([FILE, FILE])
+    assert list(registry) == ["rpv"]
+    assert os.environ[VARIABLE] == str(FILE)
+    registry.add_environment()
+    assert list(registry) == ["rpv"]
+
+
+CLASH = "from dataclasses import replace\nfrom brdfdb.models.lambert import SPEC\nMINE = replace(SPEC, version=9)\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        pytest.param(None, "no such file of models", id="missing"),
+        pytest.param("raise RuntimeError('boo\\nhoo')", "RuntimeError: boo", id="raises"),
+        pytest.param("x = (", r"SyntaxError: .*", id="syntax"),
+        pytest.param("from brdfdb.models.lambert import SPEC", r"it defines no .*ModelSpec", id="none"),
+        pytest.param(CLASH, "the name 'lambert' is that of another model; choose another name", id="clash"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused_in_a_sentence(
+    registry: Registry, tmp_path: Path, text: str | None, sentence: str
+) -> None:
+    registry.update(MODELS)
+    file = tmp_path / "mine.py"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    for _ in range(2):  # it is no better the second time
+        with pytest.raises(BrdfdbError, match=rf"^{file}: {sentence}$"):
+            registry.add_files([file])
+    assert registry == dict(MODELS)
+    assert os.environ[VARIABLE] == ""
+
+
+def test_an_entry_point_that_gives_no_model_is_refused(
+    registry: Registry, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    about = tmp_path / "bad-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: bad\nVersion: 1.0\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    for value, sentence in (
+        ("json:JSONEncoder", r"TypeError: .*"),
+        ("json:__all__", r"'dump' is not a .*ModelSpec"),
+        ("nowhere:SPEC", r"ModuleNotFoundError: No module named 'nowhere'"),
+    ):
+        (about / "entry_points.txt").write_text(f"[brdfdb.models]\nbad = {value}\n", encoding="utf-8")
+        with pytest.raises(BrdfdbError, match=rf"^entry point bad = {value}: {sentence}$"):
+            registry.add_packages()
+    assert not registry
+
+
+def test_the_command_line_takes_files_before_and_after_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for arguments in (("--models", tmp_path / "a.py", "list"), ("list", "--models", tmp_path / "a.py")):
+        assert run(*arguments) == 2
+        assert capsys.readouterr().err == f"brdfdb: {tmp_path / 'a.py'}: no such file of models\n"
