@@ -26,12 +26,12 @@ UNIT_LENGTH = 1e-5  # how far from 1 the length of a unit vector may be; float32
 
 
 def radians(angle_deg: ArrayLike) -> NDArray[np.float64]:
-    """Degrees to radians (90 degrees gives exactly the float64 nearest pi/2)."""
+    """Return degrees in radians (90 degrees gives exactly the float64 nearest pi/2)."""
     return np.deg2rad(np.asarray(angle_deg, dtype=np.float64))
 
 
 def degrees(angle: ArrayLike) -> NDArray[np.float64]:
-    """Radians to degrees."""
+    """Return radians in degrees."""
     return np.rad2deg(np.asarray(angle, dtype=np.float64))
 
 
@@ -215,7 +215,7 @@ def _unit_vectors(name: str, w: ArrayLike) -> Floats:
 
 
 def asked_for(*directions: ArrayLike) -> np.dtype[Any]:
-    """float32 if the arrays among the directions are, else float64."""
+    """Return float32 if the arrays among the directions are, else float64."""
     arrays = [each for each in directions if isinstance(each, np.ndarray | np.generic)]
     single = bool(arrays) and np.result_type(*arrays) == np.float32
     return np.dtype(np.float32 if single else np.float64)
@@ -245,14 +245,14 @@ def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Fl
 
 
 def unit_vector(theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-    """The unit vectors, shape (..., 3), of directions (theta, phi) [rad]."""
+    """Return the unit vectors, shape (..., 3), of directions (theta, phi) [rad]."""
     sin_theta = np.sin(theta)
     x, y, z = np.broadcast_arrays(sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta))
     return np.stack([x, y, z], axis=-1)
 
 
 def spherical_angles(w: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The angles (theta, phi) [rad] of vectors of shape (..., 3); phi in (-pi, pi], 0 at the pole."""
+    """Return the angles (theta, phi) [rad] of vectors of shape (..., 3); phi in (-pi, pi], 0 at the pole."""
     x, y, z = np.moveaxis(np.asarray(w, dtype=np.float64), -1, 0)
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
@@ -260,7 +260,7 @@ def spherical_angles(w: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.floa
 def directions_from_half_difference(
     theta_h: ArrayLike, phi_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Directions of light and viewer from half/difference angles (Rusinkiewicz 1998, ``rusinkiewicz1998``).
+    """Return directions of light and viewer from half/difference angles (Rusinkiewicz 1998, ``rusinkiewicz1998``).
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ def _against(
     seconds: Floats,
     forms: Sequence[Form],
 ) -> dict[str, Any]:
-    """The cheapest rung that is as accurate as a form, and the ratio of their times: fields of a `Point`."""
+    """Return the cheapest rung that is as accurate as a form, and the ratio of their times: fields of a `Point`."""
     if forms[number].kind in ("exact", "quadrature"):
         return {"rung": None, "saving": None}
     own = errors[number]
@@ -263,7 +263,7 @@ def _timed(
 
 
 def _front(forms: Sequence[Form], l1: Sequence[float], costs: Floats) -> list[str]:
-    """Keys of the forms worth having, of which costs has a column each."""
+    """Return keys of the forms worth having, of which costs has a column each."""
     # black is free, and has an l1 of 1
     rivals = [
         index
@@ -274,7 +274,7 @@ def _front(forms: Sequence[Form], l1: Sequence[float], costs: Floats) -> list[st
 
 
 def _described(form: Form, batch: timing.Times, block: timing.Times, single: timing.Times) -> dict[str, Any]:
-    """The fields of a `Form`."""
+    """Return the fields of a `Form`."""
     return {
         "key": form.key,
         "title": form.title,
@@ -289,7 +289,7 @@ def _described(form: Form, batch: timing.Times, block: timing.Times, single: tim
 
 
 def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[str, Any]]:
-    """Of each form against the first one: the errors of a `Point`, to three digits."""
+    """Return the errors of each form against the first one, as a `Point` has them, to three digits."""
     truth = forms[0].evaluate(drawn.wi, drawn.wr)
     classes = error_measurement.classes(drawn)
     rows = []
@@ -309,7 +309,7 @@ def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[s
 
 
 def _tail(errors: Floats) -> tuple[float, float | None]:
-    """Confidence interval of the 99th percentile of errors (N, L), at the worst wavelength: two of the errors.
+    """Return confidence interval of the 99th percentile of errors (N, L), at the worst wavelength: two of the errors.
 
     Directions count as independent. They are stratified in theta_i, which makes the interval wider than it need be.
     """

@@ -43,7 +43,7 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dt
 
 
 def by_rows_of_vectors(loop: Loop, directions: Vectors, scalars: Sequence[Floats]) -> Floats:
-    """As `by_rows`, of unit vectors: ``loop(w_i, w_r, scalars, values)`` with vectors of shape (rows or 1, length, 3).
+    """Call ``loop(w_i, w_r, scalars, values)`` as `by_rows` does, with unit vectors of shape (rows or 1, length, 3).
 
     The loop itself writes 0 below the horizon and nan where a vector is nan; values have the dtype asked for.
     """
@@ -57,7 +57,7 @@ def by_rows_of_vectors(loop: Loop, directions: Vectors, scalars: Sequence[Floats
 
 
 def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int, tuple[int, ...]]:
-    """Rows, their length, and the shape that scalars broadcast to."""
+    """Return rows, their length, and the shape that scalars broadcast to."""
     along = bool(shape) and all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in scalars)
     leading = (*shape[:-1], 1) if along else shape
     length = shape[-1] if along else 1

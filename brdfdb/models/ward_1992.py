@@ -37,7 +37,7 @@ def ward(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Floats:
-    """BRDF of the elliptical Gaussian model; isotropic (eq. 4) where alpha_x equals alpha_y.
+    """Return the BRDF [1/sr] of the elliptical Gaussian model; isotropic (eq. 4) where alpha_x equals alpha_y.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def ward_half_vector(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Floats:
-    """BRDF of the elliptical Gaussian model as its half-vector form computes it; isotropic where the alphas are equal.
+    """Return the BRDF [1/sr] of the elliptical Gaussian model in its half-vector form; isotropic for equal alphas.
 
     Parameters
     ----------
