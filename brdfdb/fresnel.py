@@ -134,8 +134,8 @@ def half_sum_and_difference(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) ->
 
 
 def _pair(fill: Callable[..., None], cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
-    arrays = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (cos_theta, n, k)))
+    arrays = np.broadcast_arrays(*(np.asarray(array, dtype=np.float64) for array in (cos_theta, n, k)))
     first, second = np.empty((2, arrays[0].size), dtype=np.complex128)
-    fill(*(np.ravel(each) for each in arrays), first, second)
+    fill(*(np.ravel(array) for array in arrays), first, second)
     shape = arrays[0].shape
     return first.reshape(shape)[()], second.reshape(shape)[()]

@@ -216,7 +216,7 @@ def _unit_vectors(name: str, w: ArrayLike) -> Floats:
 
 def asked_for(*directions: ArrayLike) -> np.dtype[Any]:
     """Return float32 if the arrays among the directions are, else float64."""
-    arrays = [each for each in directions if isinstance(each, np.ndarray | np.generic)]
+    arrays = [array for array in directions if isinstance(array, np.ndarray | np.generic)]
     single = bool(arrays) and np.result_type(*arrays) == np.float32
     return np.dtype(np.float32 if single else np.float64)
 
@@ -232,13 +232,13 @@ def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Fl
     def aligned(array: NDArray[Any]) -> NDArray[Any]:
         return array.reshape(array.shape + (1,) * trailing)
 
-    shape = np.broadcast_shapes(np.shape(values), *(aligned(each).shape for each in directions.given), own)
+    shape = np.broadcast_shapes(np.shape(values), *(aligned(angle).shape for angle in directions.given), own)
     result: Floats = values if np.shape(values) == shape else np.broadcast_to(values, shape)
     if np.any(directions.below):
         result = np.where(aligned(directions.below), 0.0, result)
-    for each in directions.given:
-        if np.any(np.isnan(each)):
-            result = np.where(aligned(np.isnan(each)), np.nan, result)
+    for angle in directions.given:
+        if np.any(np.isnan(angle)):
+            result = np.where(aligned(np.isnan(angle)), np.nan, result)
     if result.dtype != directions.dtype or not result.flags.writeable:
         result = result.astype(directions.dtype)
     return result[()]

@@ -64,7 +64,7 @@ def white(_: Mapping[str, Any]) -> dict[str, float]:
 
 def bytes_of(arguments: Arguments) -> int:
     """Return the size [byte] of the arguments of a model call in float64."""
-    return 8 * sum(int(np.size(each)) for each in arguments.values())
+    return 8 * sum(int(np.size(value)) for value in arguments.values())
 
 
 class ModelForm(NamedTuple):

@@ -126,7 +126,7 @@ def check_illuminant(name: str) -> str:
 
 def check_observer(name: str) -> str:
     """Return the name of a standard observer of the CIE, or raise a ValueError with all names."""
-    names = [each for each in colour_science().MSDS_CMFS if "Standard Observer" in each]
+    names = [observer for observer in colour_science().MSDS_CMFS if "Standard Observer" in observer]
     if name not in names:
         raise ParameterError("observer", f"{name!r} is not one of {', '.join(names)}", name, tuple(names))
     return name

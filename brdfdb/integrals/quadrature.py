@@ -257,11 +257,11 @@ def spectral_albedo(
     """
     _check_tolerance(tolerance)
     width = np.broadcast(*parameters.values()).size
-    each = [{name: np.ravel(value)[w % np.size(value)] for name, value in parameters.items()} for w in range(width)]
+    sets = [{name: np.ravel(value)[w % np.size(value)] for name, value in parameters.items()} for w in range(width)]
 
     def brdf(wi: Array, wr: Array) -> Floats:
         with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in each]  # in one row: models are faster so
+            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in sets]  # in one row: models are faster so
         return np.stack(values, axis=-1).reshape(*wr.shape[:-1], width)
 
     lobe = narrowest(spec, float(np.cos(theta_i)), parameters)

@@ -285,8 +285,8 @@ def series_table(terms: int) -> NDArray[np.float64]:
     values = np.empty(V.size)
     _series(np.ravel(np.broadcast_to(g, V.shape)), np.ravel(V), values)
     series = np.einsum("kx,pxqy,ly->pkql", to_series, values.reshape(V.shape), to_series, optimize=True)
-    powers = [np.polynomial.chebyshev.cheb2poly(each) for each in np.eye(terms)]
-    return np.ascontiguousarray(series @ np.array([np.pad(each, (0, terms - each.size)) for each in powers]))
+    powers = [np.polynomial.chebyshev.cheb2poly(row) for row in np.eye(terms)]
+    return np.ascontiguousarray(series @ np.array([np.pad(row, (0, terms - row.size)) for row in powers]))
 
 
 @loop

@@ -197,12 +197,12 @@ def scattered(
     lanes, geometry, width = np.empty((6, BLOCK)), np.empty((5, BLOCK)), surface.shape[1]
     for start in range(0, f_r.shape[0], BLOCK):
         count = min(BLOCK, f_r.shape[0] - start)
-        for each in range(5):
+        for column in range(5):
             for j in range(count):
-                geometry[each, j] = features[each, start + j]
-        for each in range(6):
+                geometry[column, j] = features[column, start + j]
+        for column in range(6):
             for j in range(count):
-                lanes[each, j] = surface[each, min(start + j, width - 1)]
+                lanes[column, j] = surface[column, min(start + j, width - 1)]
         _evaluate(geometry, lanes, series, reach, f_r[start : start + count], work, index)
 
 
@@ -211,9 +211,9 @@ def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], series: int
     """Evaluate as `scattered` does, for unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
-    for each in range(6):
+    for column in range(6):
         for j in range(BLOCK):
-            lanes[each, j] = surface[each, 0]
+            lanes[column, j] = surface[column, 0]
     for start in range(0, f_r.shape[0], BLOCK):
         count = min(BLOCK, f_r.shape[0] - start)
         i, r = w_i[start : start + count].reshape(-1), w_r[start : start + count].reshape(-1)
@@ -264,8 +264,8 @@ def angle_rows(
         if lane == 0:
             rows = min(BLOCK, f_r.shape[0] - row)
             for i in range(rows):
-                for each in range(10):
-                    lanes[each, i] = scalars[row + i, each]
+                for column in range(10):
+                    lanes[column, i] = scalars[row + i, column]
             _roughness(lanes[:4], lanes[4:], g_over_vz2[:rows], shadow[:rows])
         s, f, turned = scalars[row], f_r[row], one_plus_cos[min(row, one_plus_cos.shape[0] - 1)]
         correlation, n, k, uniform = s[5], s[7], s[8], s[9]

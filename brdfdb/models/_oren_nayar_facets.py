@@ -354,10 +354,10 @@ def gaussian(*features: Floats, lit: bool = True, bounce: bool = True, nodes: in
         Of the quadrature in each piece of a ray of slopes and each panel of azimuths, in [1, NODES]. NODES is the
         model; fewer make a coarser and faster integral of the same integrand.
     """
-    shape = np.broadcast_shapes(*(np.shape(each) for each in features))
+    shape = np.broadcast_shapes(*(np.shape(feature) for feature in features))
     columns = np.empty((len(features), int(np.prod(shape))))
-    for column, each in zip(columns, features, strict=True):
-        column[:] = np.broadcast_to(each, shape).ravel()
+    for column, feature in zip(columns, features, strict=True):
+        column[:] = np.broadcast_to(feature, shape).ravel()
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     with np.errstate(all="ignore"):  # as `elementwise`: nan goes through
         _gaussian_loop(columns, _gauss_legendre(nodes), _gauss_legendre(NODES), lit, bounce, direct, bounced)

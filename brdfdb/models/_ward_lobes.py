@@ -196,5 +196,5 @@ def lossless(parameters: Mapping[str, float]) -> dict[str, float]:
 
 def wide_lobe(cos_i: Floats, **parameters: ArrayLike) -> Lobe:
     """Return `lobe` for eq. (5b), which falls off more slowly than the Gaussian; the rest goes to the hemisphere."""
-    found = lobe(cos_i, **parameters)
-    return found._replace(share=np.minimum(found.share, _WIDE_SHARE))
+    narrow = lobe(cos_i, **parameters)
+    return narrow._replace(share=np.minimum(narrow.share, _WIDE_SHARE))

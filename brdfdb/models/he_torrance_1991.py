@@ -192,16 +192,16 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
     `reach`, in (0, 1], is that of `log_series`: less than 1 is a coarser sum. `surface` holds `Surface.features`, n, k
     and the uniform part [1/sr]; they broadcast with the directions.
     """
-    uniform = all(np.size(each) == 1 for each in surface)
+    uniform = all(np.size(feature) == 1 for feature in surface)
     if isinstance(directions, Vectors) and uniform:
 
         def rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
             vector_rows(w_i, w_r, series, reach, scalars, values)
 
         return by_rows_of_vectors(rows, directions, surface)
-    shape = np.broadcast_shapes(*(np.shape(each) for each in (*directions.given, *surface)))
+    shape = np.broadcast_shapes(*(np.shape(feature) for feature in (*directions.given, *surface)))
     pair = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
-    by_azimuth = all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in (*pair, *surface))
+    by_azimuth = all(np.ndim(feature) == 0 or np.shape(feature)[-1] == 1 for feature in (*pair, *surface))
     if series == WHOLE and reach == 1.0 and shape and shape[-1] > 1 and by_azimuth:
         terms = TERMS_OF_FLOAT32 if directions.dtype == np.float32 else TERMS
         table = series_table(terms) if shape[-1] >= WORTH_THE_TABLE else np.empty((1, 1, 1, terms))
@@ -214,11 +214,11 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
         )
     v_xy2, _ = v_squared(directions)
     features = np.empty((5, *shape))
-    for i, each in enumerate((*pair, v_xy2)):
-        features[i] = each
+    for i, feature in enumerate((*pair, v_xy2)):
+        features[i] = feature
     constants = np.empty((6, 1)) if uniform else np.empty((6, *shape))
-    for i, each in enumerate(surface):
-        constants[i] = np.reshape(each, ()) if uniform else each
+    for i, feature in enumerate(surface):
+        constants[i] = np.reshape(feature, ()) if uniform else feature
     values: NDArray[np.float64] = np.empty(shape)
     if values.size:
         scattered(features.reshape(5, -1), constants.reshape(6, -1), series, reach, values.reshape(-1))

@@ -49,7 +49,7 @@ def he_torrance_very_rough(
     Returns
     -------
     array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan. It has no specular part.
+        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan; no specular part.
 
     Raises
     ------

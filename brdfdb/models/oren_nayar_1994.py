@@ -314,7 +314,7 @@ def oren_nayar_parts(
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     parameters = {"rho": RHO.check(rho), "sigma": SIGMA.check(sigma)}
-    direct, total = (oren_nayar(*angles.given, **parameters, interreflection=each) for each in (False, True))
+    direct, total = (oren_nayar(*angles.given, **parameters, interreflection=bounce) for bounce in (False, True))
     return _apart(angles, direct, total, **parameters)
 
 
@@ -322,7 +322,7 @@ def oren_nayar_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, si
     """`oren_nayar_parts` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
     vectors = checked_vectors(wi, wr)
     parameters = {"rho": RHO.check(rho), "sigma": SIGMA.check(sigma)}
-    direct, total = (oren_nayar_vectors(wi, wr, **parameters, interreflection=each) for each in (False, True))
+    direct, total = (oren_nayar_vectors(wi, wr, **parameters, interreflection=bounce) for bounce in (False, True))
     return _apart(vectors, direct, total, **parameters)
 
 
