@@ -59,6 +59,10 @@ class MaterialError(ParameterError):
         return f"{self.material}: {super().__str__()}"
 
 
+class WriteError(BrdfdbError, OSError):
+    """A file that cannot be written, where the library that writes it does not say which error it met."""
+
+
 class StoreError(BrdfdbError):
     """A store that is missing, damaged, of another version, or cannot be written."""
 

@@ -144,3 +144,28 @@ def test_the_core_alone_tabulates_and_looks_up(core: Path, tmp_path: Path) -> No
     value, loaded = found.stdout.splitlines()
     assert float(value) == pytest.approx(float(brdfdb.open(store)["rolled-brass"].lookup(0.5, 0.0, 0.5, 3.14159)))
     assert loaded == "[]"
+
+
+@pytest.mark.parametrize(
+    ("command", "extra"),
+    [
+        (["audit", "--store", "{store}"], "report"),
+        (["chart", "rolled-brass"], "report"),
+        (["render", "clay-vase"], "scenes"),
+        (["serve", "--store", "{store}"], "serve"),
+        (["export", "exr", "rolled-brass", "--store", "{store}"], "scenes"),
+        (["build", "--scheduler", "tcp://127.0.0.1:1"], "dask"),
+    ],
+)
+def test_a_missing_extra_is_a_sentence_that_names_it(
+    core: Path, tmp_path: Path, command: list[str], extra: str
+) -> None:
+    from brdfdb.store.marker import make_store
+
+    make_store(tmp_path / "store")
+    arguments = [part.format(store=tmp_path / "store") for part in command]
+    done = _run(core, "-m", "brdfdb_pipelines.cli", *arguments)
+    assert done.returncode == 2, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("brdfdb: ")
+    assert f"pip install 'brdfdb[{extra}]'" in line

@@ -24,6 +24,7 @@ from brdfdb.errors import (
     UnknownFamilyError,
     UnknownMaterialError,
     UnknownRevisionError,
+    WriteError,
     import_extra,
 )
 from brdfdb.scenes.choice import InfeasibleError
@@ -43,6 +44,7 @@ ERRORS = [
     UnknownMaterialError("fome", ["foam", "brass"]),
     UnknownFamilyError("fome", ["foam"]),
     UnknownRevisionError("foam has no revision r000009"),
+    WriteError("cannot write a.exr"),
     BusyError("another build is at work on foam"),
     MissingExtraError("uvicorn is not installed"),
 ]

@@ -22,11 +22,11 @@ from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb_api.http.protocol import BoundedProtocol
 from brdfdb_api.serving.settings import Settings
 
-PAUSE_S = 1.0  # before a worker is replaced
-GRACE_S = 10  # for requests that are being answered when the server is told to stop
+PAUSE_S = 1.0  # time before a failed worker is replaced [s]
+GRACE_S = 10  # time for requests in flight when the server stops [s]
 
 LOG = logging.getLogger("brdfdb.server")
-OTHERS = ("uvicorn", LOG.name, "py.warnings")  # loggers beside that of requests
+OTHERS = ("uvicorn", LOG.name, "py.warnings")  # loggers other than that of requests
 
 
 class ServerError(BrdfdbError):
@@ -60,7 +60,7 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
     """
     if not 0 <= port <= 65535:
         raise ParameterError("port", f"{port} is outside [0, 65535]", port, (0, 65535))
-    os.environ["BRDFDB_STORE"] = str(store_dir)  # workers read it
+    os.environ["BRDFDB_STORE"] = str(store_dir)  # the workers read it
     if snapshot is not None:
         os.environ["BRDFDB_SNAPSHOT"] = snapshot
     settings = Settings.from_environment()
@@ -74,25 +74,25 @@ def serve(store_dir: Path, host: str, port: int, workers: int = 1, snapshot: str
         if workers == 1:
             uvicorn.Server(config).run(sockets=[listener])
         else:
-            # where workers count, so that any of them can tell what all did
+            # directory where workers write their counts, so that each can report all of them
             counts = stack.enter_context(tempfile.TemporaryDirectory(prefix="brdfdb-metrics-"))
             asyncio.run(_keep(workers, listener, counts))
 
 
 async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
-    """Keep so many workers until told to stop; ServerError where one ends by an error of its own."""
+    """Keep a number of workers running until a signal; ServerError if one ends with an error of its own."""
     loop, stopping = asyncio.get_running_loop(), asyncio.Event()
     command = (sys.executable, "-P", "-m", "brdfdb_api.server", str(listener.fileno()))
     environment = {**os.environ, "PROMETHEUS_MULTIPROC_DIR": counts}
 
     def stop() -> None:
-        listener.close()  # before the workers close theirs: it would let in what nobody answers
+        listener.close()  # before the workers close theirs: it would accept connections that nobody answers
         stopping.set()
         for number in (signal.SIGINT, signal.SIGTERM):
-            loop.remove_signal_handler(number)  # told again, this process does not wait
+            loop.remove_signal_handler(number)  # a second signal ends this process at once
 
     async def worker() -> int:
-        # In a group of its own: Ctrl-C is for this process. Its stdin ends when it is to stop, or this process is gone.
+        # In a process group of its own: Ctrl-C goes to this process only. The worker stops when its stdin ends.
         process = await asyncio.create_subprocess_exec(
             *command, stdin=asyncio.subprocess.PIPE, pass_fds=[listener.fileno()], process_group=0, env=environment
         )
@@ -108,7 +108,7 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
         status = 0
         while not stopping.is_set():
             status = await worker()
-            if status > 0 and not stopping.is_set():  # it would fail again; one that was killed, may not
+            if status > 0 and not stopping.is_set():  # it would fail again; a killed worker is replaced
                 stop()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(stopping.wait(), PAUSE_S)
@@ -122,7 +122,7 @@ async def _keep(workers: int, listener: socket.socket, counts: str) -> None:
 
 
 def _work(descriptor: int) -> None:
-    """Be a worker, of the socket that the parent listens on."""
+    """Run a worker on the socket that the parent listens on."""
     server = uvicorn.Server(_config())
 
     def wait() -> None:
@@ -154,7 +154,7 @@ def _config() -> uvicorn.Config:
 
 
 class _Lines(logging.Formatter):
-    """What the server says beside its requests: lines of JSON, too."""
+    """Formatter of other messages of the server as lines of JSON."""
 
     def format(self, record: logging.LogRecord) -> str:
         line = {"time": round(record.created, 3), "failed": record.getMessage().strip()}
@@ -165,7 +165,7 @@ class _Lines(logging.Formatter):
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """SIGTERM is as Ctrl-C, and neither an error: uvicorn raises them again when all is answered."""
+    """Treat SIGTERM like Ctrl-C, and neither as an error: uvicorn raises them again after the last answer."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with contextlib.suppress(KeyboardInterrupt):
@@ -177,13 +177,13 @@ def _ended_by_signals() -> Iterator[None]:
 def _listening(host: str, port: int) -> socket.socket:
     """Return a socket that listens; ServerError where that is not possible."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # asyncio sends small answers at once (TCP_NODELAY) only on a socket that names its protocol: else each takes 40 ms.
+    # asyncio sets TCP_NODELAY only on a socket that names its protocol; without it, each small answer takes 40 ms.
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
         listener.listen(1024)
-    except (OSError, UnicodeError) as error:  # the latter of a name with a label that is empty or too long
+    except (OSError, UnicodeError) as error:  # UnicodeError: a label of the name is empty or too long
         listener.close()
         reason = error.strerror if isinstance(error, OSError) else "not the name of a machine"
         raise ServerError(f"cannot listen on {host}, port {port}: {reason}") from error

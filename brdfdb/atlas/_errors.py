@@ -1,4 +1,4 @@
-"""What the figures of the atlas are made of: forms over a sweep, their errors, and what is stated of them."""
+"""Building blocks of the atlas: forms over a sweep, their errors, and the statements about them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,24 @@ from brdfdb.misprints import MISPRINTS, Kind, Misprint
 
 Array = NDArray[np.float64]
 Arguments = Mapping[str, Any]
+Drawing = Callable[[], Figure]
 
-LARGEST = 10.0  # what the brightest colour of a map stands for
-NONE = 1e-17  # drawn for an error of 0, and for smaller ones: a truth is rounded to float64
+# Relative errors that the models promise. Worst measured errors of closed forms: 9.9e-16 for Oren and Nayar, 8.8e-13
+# for He et al. with the sum of eq. 78 and 8e-16 without it, 3.4e-11 for Ward at an alpha of 1e-6
+CLOSED = 1e-10
+SINGLE = 2e-5  # Promised for float32. Worst measured: 4.4e-8, 3.8e-8 and 4.8e-8
+
+LARGEST = 10.0  # error that the brightest colour of a map stands for
+NONE = 1e-17  # drawn for an error of 0 and for smaller errors, because a truth is rounded to float64
 ERROR = "relative error (1e-17: none)"
-FAILS = 100.0  # a form that is off by so many times what ours is held to is said to fail
+FAILS = 100.0  # A form fails where its error exceeds this multiple of the tolerance of our form
+
+CORNER = 1e-13  # drawn for a distance of 0 on a logarithmic axis
+DISTANCES = [*np.logspace(-0.5, -12.0, 24), CORNER]  # from a corner of the directions [rad]
+TRUTH = "Truth: 40 digits."
+LIGHT = "light [degrees from the normal]"
+VIEWER = "viewer [degrees from the normal]"
+OFF_LIGHT = "viewer off the light [radians]"
 
 BY_KEY = {misprint.key: misprint for misprint in MISPRINTS}
 PROOFS: Mapping[str, Proof] = {
@@ -30,7 +43,7 @@ PROOFS: Mapping[str, Proof] = {
     **_proofs_he_torrance.PROOFS,
     **_proofs_ward.PROOFS,
 }
-# How a figure names the form that is not right, in its caption and its legend, and how it draws it
+# Names and roles of the form that is not right: in the caption, in the legend, and as drawn
 LEADS: Mapping[Kind, str] = {"printed": "Printed", "customary": "Customary", "words": "In words alone"}
 LABELS: Mapping[Kind, str] = {"printed": "as printed", "customary": "as is customary", "words": "as the words say"}
 ROLES: Mapping[Kind, Role] = {"printed": "printed", "customary": "textbook", "words": "printed"}
@@ -39,7 +52,7 @@ PAPERS = {"orennayar1994": "Oren and Nayar 1994", "he1991": "He et al. 1991", "w
 
 @dataclass(frozen=True)
 class Form:
-    """One way to compute something."""
+    """One way to compute a quantity."""
 
     label: str
     role: Role
@@ -47,25 +60,33 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Measured:
-    """A panel, and the errors of each of its forms, nan where a form gives no finite number."""
+class ErrorPanel:
+    """A panel, and the errors of each of its forms; nan where a form gives no finite number."""
 
     panel: Panel | Map
     errors: list[tuple[str, Role, Array]]
 
 
 def directions(theta_i: float, theta_r: float, delta_phi: float) -> dict[str, Any]:
-    """Arguments of a model, from degrees."""
+    """Return the angles [rad] that a model takes, from angles in degrees."""
     return {"theta_i": radians(theta_i), "phi_i": 0.0, "theta_r": radians(theta_r), "phi_r": radians(delta_phi)}
 
 
 def lobe(alpha: ArrayLike) -> dict[str, Any]:
-    """Parameters of a lobe of Ward's alone, round, that should reflect all light."""
+    """Return the parameters of Ward's round lobe alone, with a specular reflectance of 1."""
     return {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
 
 
+def zero(distance: float) -> float:
+    """Return the distance that a point of the logarithmic axis stands for: 0 at `CORNER`."""
+    return 0.0 if distance == CORNER else distance
+
+
 def relative(value: Any, truth: Any, scale: float | None = None) -> float:
-    """abs(value - truth) over abs(truth), or over `scale`; of matrices the largest of each; nan where not finite."""
+    """Return the relative error [1] of a value, or its error over `scale`.
+
+    Of matrices it is the largest error over the largest element. A value that is not finite has nan.
+    """
     value = np.asarray(value, dtype=np.complex128)
     if not np.isfinite(value).all():
         return np.nan
@@ -75,10 +96,9 @@ def relative(value: Any, truth: Any, scale: float | None = None) -> float:
 def errors(
     evaluate: Callable[..., Any], arguments: Iterable[Arguments], truths: Iterable[Any], scale: float | None = None
 ) -> Array:
-    """`relative` at each of the arguments; one at a time, since not every form broadcasts."""
-    with np.errstate(all="ignore"):  # what a form overflows or divides by 0 is what is looked for
-        found = [relative(evaluate(**row), truth, scale) for row, truth in zip(arguments, truths, strict=True)]
-    return np.array(found)
+    """Return the `relative` errors of a form, evaluated point by point because not every form broadcasts."""
+    with np.errstate(all="ignore"):  # The atlas looks for overflow and division by 0
+        return np.array([relative(evaluate(**row), truth, scale) for row, truth in zip(arguments, truths, strict=True)])
 
 
 def sweep(
@@ -91,51 +111,55 @@ def sweep(
     title: str = "",
     log_x: bool = False,
     scale: float | None = None,
-) -> Measured:
-    """A panel of relative errors over x; `arguments` are those of a form, and of its truth, at x."""
-    rows = [arguments(float(each)) for each in x]
+) -> ErrorPanel:
+    """Return a panel of relative errors over x; `arguments` gives those of the forms and of the truth at x."""
+    rows = [arguments(float(value)) for value in x]
     truths = [rounded(truth(**row)) for row in rows]
     measured = [(form.label, form.role, errors(form.evaluate, rows, truths, scale)) for form in forms]
-    curves = [curve_of(named(label, found), axis(x), np.maximum(found, NONE), role) for label, role, found in measured]
+    curves = [
+        curve_of(with_gaps(label, deviations), axis(x), np.maximum(deviations, NONE), role)
+        for label, role, deviations in measured
+    ]
     y_label = ERROR if scale is None else ERROR.replace("relative error", f"error over {scale:.3g}/sr")
     panel = Panel(title=title, x_label=x_label, y_label=y_label, curves=curves, log_x=log_x, log_y=True)
-    return Measured(panel, measured)
+    return ErrorPanel(panel, measured)
 
 
 def axis(x: Sequence[float] | Array) -> list[float]:
-    return [float(f"{each:.6g}") for each in x]
+    """Return the values of an axis to six digits."""
+    return [float(f"{value:.6g}") for value in x]
 
 
 def rounded(truth: Any) -> Any:
-    """A number or a 2x2 matrix of mpmath as float64 or complex128."""
+    """Return a number or a 2x2 matrix of mpmath as float64 or complex128."""
     if hasattr(truth, "rows"):
         return np.array([[complex(truth[row, column]) for column in range(2)] for row in range(2)])
     return float(truth)
 
 
-def named(label: str, found: Array) -> str:
-    """A label that tells of gaps: one at the end of a curve is not seen."""
-    gaps = int(np.isnan(found).sum())
-    return label if gaps == 0 else f"{label} (nan or inf at {gaps} of {found.size})"
+def with_gaps(label: str, deviations: Array) -> str:
+    """Return a label with the number of gaps, because a gap at the end of a curve cannot be seen."""
+    gaps = int(np.isnan(deviations).sum())
+    return label if gaps == 0 else f"{label} (nan or inf at {gaps} of {deviations.size})"
 
 
-def error_map(x: Array, y: Array, form: Form, found: Array, *, x_label: str, y_label: str) -> Measured:
-    """A map of the errors of one form over logarithmic axes, x running fastest."""
+def error_map(x: Array, y: Array, form: Form, deviations: Array, *, x_label: str, y_label: str) -> ErrorPanel:
+    """Return a map of the errors of one form over logarithmic axes; x runs fastest."""
     panel = Map(
-        title=named(form.label, found),
+        title=with_gaps(form.label, deviations),
         x_label=x_label,
         y_label=y_label,
         value_label=ERROR,
         x=axis(x),
         y=axis(y),
-        values=rows(np.maximum(found.reshape(y.size, x.size), NONE), 3),
+        values=rows(np.maximum(deviations.reshape(y.size, x.size), NONE), 3),
         log_x=True,
         log_y=True,
         log=True,
         low=NONE,
         high=LARGEST,
     )
-    return Measured(panel, [(form.label, form.role, found)])
+    return ErrorPanel(panel, [(form.label, form.role, deviations)])
 
 
 def figure(
@@ -144,58 +168,86 @@ def figure(
     where: str,
     title: str,
     caption: str,
-    measured: Sequence[Measured],
+    measured: Sequence[ErrorPanel],
     *,
     within: float,
     more: Sequence[Statement] = (),
 ) -> Figure:
-    """A figure with a statement a form, that ours stays `within` and that the others do not, and with `more`.
+    """Return a figure with one statement per form, and with the statements in `more`.
 
-    `where` names the equations; the paper is added.
+    Our form has to stay within `within`, the others have to fail. `where` names the equations; the paper is added.
     """
-    found: dict[tuple[str, Role], list[Array]] = {}
-    for label, role, values in (each for panel in measured for each in panel.errors):
-        found.setdefault((label, role), []).append(values)
+    by_form: dict[tuple[str, Role], list[Array]] = {}
+    for label, role, deviations in (entry for panel in measured for entry in panel.errors):
+        by_form.setdefault((label, role), []).append(deviations)
     source = f"{where}, {PAPERS[paper]}"
     statements = [
-        (stays if role == "ours" else fails)(label, np.concatenate(values), within, source)
-        for (label, role), values in found.items()
+        (stays if role == "ours" else fails)(label, np.concatenate(deviations), within, source)
+        for (label, role), deviations in by_form.items()
     ]
-    panels: list[Panel | Map | Picture] = [each.panel for each in measured]
+    panels: list[Panel | Map | Picture] = [entry.panel for entry in measured]
     return Figure(key=key, paper=paper, title=title, caption=caption, panels=panels, statements=[*statements, *more])
 
 
-def stays(label: str, found: Array, within: float, where: str) -> Statement:
-    worst, gaps = worst_of(found)
+def figure_of_sweep(
+    key: str,
+    paper: str,
+    where: str,
+    title: str,
+    x: Sequence[float] | Array,
+    x_label: str,
+    arguments: Callable[[float], Arguments],
+    truth: Callable[..., Any],
+    forms: Sequence[Form],
+    *,
+    caption: str,
+    within: float,
+    log_x: bool = False,
+) -> Figure:
+    """Return a figure with one panel, the `sweep` of some forms over x."""
+    panel = sweep(x, x_label, arguments, truth, forms, log_x=log_x)
+    return figure(key, paper, where, title, caption, [panel], within=within)
+
+
+def stays(label: str, deviations: Array, within: float, where: str) -> Statement:
+    """Return the statement that a form stays within a tolerance of the truth."""
+    worst, gaps = worst_of(deviations)
     return Statement(
         says=f"{label}: within {within:.2g} of the truth everywhere",
         where=where,
-        seen=f"off by {worst:.2g} at most, of {found.size} points",
+        seen=f"off by {worst:.2g} at most, of {deviations.size} points",
         holds=gaps == 0 and worst <= within,
     )
 
 
-def fails(label: str, found: Array, within: float, where: str) -> Statement:
-    worst, gaps = worst_of(found)
-    seen = [f"off by up to {worst:.2g}"] * (gaps < found.size) + [f"nan or inf at {gaps}"] * (gaps > 0)
+def fails(label: str, deviations: Array, within: float, where: str) -> Statement:
+    """Return the statement that a form exceeds `FAILS` times a tolerance, or gives no finite number."""
+    worst, gaps = worst_of(deviations)
+    seen = [f"off by up to {worst:.2g}"] * (gaps < deviations.size) + [f"nan or inf at {gaps}"] * (gaps > 0)
     return Statement(
         says=f"{label}: off by more than {FAILS * within:.2g} somewhere, or no number at all",
         where=where,
-        seen=f"{', '.join(seen)}, of {found.size} points",
+        seen=f"{', '.join(seen)}, of {deviations.size} points",
         holds=gaps > 0 or worst > FAILS * within,
     )
 
 
-def worst_of(found: Array) -> tuple[float, int]:
-    """The largest error of all that are finite, and how many are not."""
-    gaps = np.isnan(found)
-    return float(np.max(found[~gaps], initial=0.0)), int(gaps.sum())
+def worst_of(deviations: Array) -> tuple[float, int]:
+    """Return the largest finite error [1] and the number of errors that are not finite."""
+    gaps = np.isnan(deviations)
+    return float(np.max(deviations[~gaps], initial=0.0)), int(gaps.sum())
 
 
 def of_misprint(
-    key: str, title: str, caption: str, measured: Sequence[Measured], *, within: float, more: Sequence[Statement] = ()
+    key: str,
+    title: str,
+    caption: str,
+    measured: Sequence[ErrorPanel],
+    *,
+    within: float,
+    more: Sequence[Statement] = (),
 ) -> Figure:
-    """Return the figure of a misprint: its kind and both forms stand before the caption, its proof among `more`."""
+    """Return the figure of a misprint: its kind and both forms precede the caption, its proof follows `more`."""
     entry = BY_KEY[key]
     where = entry.equation
     if where[0].isdigit():
@@ -219,12 +271,26 @@ def misprint(
     truth: Callable[..., Any],
     *,
     caption: str,
-    within: float,
+    within: float = CLOSED,
     log_x: bool = False,
     scale: float | None = None,
-) -> Figure:
-    """The figure of a misprint: the printed form and ours over x, the other arguments those where the two differ."""
+) -> tuple[str, Drawing]:
+    """Return the key of a misprint and the function that draws its figure: both forms over one quantity x.
+
+    The arguments that `arguments` does not give are those of the entry, where the two forms differ.
+    """
     entry = BY_KEY[key]
-    forms = [wrong(entry), Form("ours", "ours", entry.corrected)]
-    panel = sweep(x, x_label, lambda each: {**entry.where, **arguments(each)}, truth, forms, log_x=log_x, scale=scale)
-    return of_misprint(key, title, caption, [panel], within=within)
+
+    def draw() -> Figure:
+        panel = sweep(
+            x,
+            x_label,
+            lambda value: {**entry.where, **arguments(value)},
+            truth,
+            [wrong(entry), Form("ours", "ours", entry.corrected)],
+            log_x=log_x,
+            scale=scale,
+        )
+        return of_misprint(key, title, caption, [panel], within=within)
+
+    return key, draw

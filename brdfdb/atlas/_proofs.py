@@ -1,4 +1,4 @@
-"""Physical laws that the right forms obey and the printed ones break, computed without reference and kernels."""
+"""Physical laws that the right forms obey and the printed ones break, computed without reference or kernels."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ Array = NDArray[np.float64]
 Form = Callable[..., Any]
 Law = Callable[[Form], float]
 
-BREAKS = 3.0  # a form that is off by so many times what the right one is allowed is said to break the law
+BREAKS = 3.0  # A form breaks the law where its deviation exceeds this multiple of `Proof.within`
 
 
 @dataclass(frozen=True)
 class Proof:
-    """A law, and by how much a form is off it.
+    """A law, and the deviation of a form from it.
 
-    `off` takes a form, as an entry of `brdfdb.misprints` has two, and returns the largest deviation from what the law
-    demands; nan where the form gives no finite number. `within` is what the arithmetic of the law itself, a quadrature
-    or a count of rays, leaves open.
+    `deviation` takes one of the two forms of an entry of `brdfdb.misprints`. It returns the largest deviation from the
+    law, or nan where the form gives no finite number. `within` is the error of the law's own arithmetic, such as a
+    quadrature or a count of rays.
     """
 
     says: str
-    off: Law
+    deviation: Law
     within: float
 
 
 def proved(entry: Misprint, proof: Proof, where: str) -> Statement:
     """Return the statement that the right form obeys the law and the printed one breaks it."""
     with np.errstate(all="ignore"):
-        right, printed = proof.off(entry.corrected), proof.off(entry.as_printed)
+        right, printed = proof.deviation(entry.corrected), proof.deviation(entry.as_printed)
     seen = "no finite number" if np.isnan(printed) else f"off by {printed:.2g}"
     return Statement(
         says=f"physical proof: {proof.says}",
@@ -47,18 +47,18 @@ def proved(entry: Misprint, proof: Proof, where: str) -> Statement:
     )
 
 
-NAMES = {"printed": "the printed form", "customary": "the customary form", "words": "what the words say"}
+NAMES = {"printed": "the printed form", "customary": "the customary form", "words": "the form of the words"}
 
 
 def largest(deviations: Iterable[Any]) -> float:
-    """Return the largest absolute value; nan if one of them is not finite."""
-    values = np.concatenate([np.ravel(np.abs(each)) for each in deviations])
+    """Return the largest absolute value, or nan if one value is not finite."""
+    values = np.concatenate([np.ravel(np.abs(deviation)) for deviation in deviations])
     return float(values.max()) if np.isfinite(values).all() else np.nan
 
 
 @functools.cache
 def hemisphere(polar: int, azimuths: int) -> tuple[Array, Array, Array]:
-    """Return theta of shape (polar, 1), phi, and the weights cos(theta) d omega of sums over a hemisphere."""
+    """Return theta [rad] of shape (polar, 1), phi [rad], and the weights cos(theta) d omega [sr] of a hemisphere."""
     x, w = np.polynomial.legendre.leggauss(polar)
     theta = (x[:, np.newaxis] + 1.0) * np.pi / 4.0
     phi = (np.arange(azimuths) + 0.5) * 2.0 * np.pi / azimuths
@@ -67,7 +67,7 @@ def hemisphere(polar: int, azimuths: int) -> tuple[Array, Array, Array]:
 
 
 def albedo(form: Form, theta_i: float, polar: int, azimuths: int, **arguments: Any) -> float:
-    """Return the share [1] of the light from theta_i that a form reflects, a plain sum over the hemisphere."""
+    """Return the directional albedo [1] of a form by a plain sum over the hemisphere."""
     theta_r, phi_r, weights = hemisphere(polar, azimuths)
     f_r = form(theta_i=theta_i, phi_i=0.0, theta_r=theta_r, phi_r=phi_r, **arguments)
     return float(np.sum(f_r * weights))

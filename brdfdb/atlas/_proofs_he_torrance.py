@@ -1,4 +1,4 @@
-"""Laws for He et al. 1991: images in mirrors, slopes that are seen, diffraction, energy, scales, and eq. 56 itself."""
+"""Laws for He et al. 1991: images in mirrors, visible slopes, diffraction, energy, scales, and eq. 56 itself."""
 
 from __future__ import annotations
 
@@ -11,26 +11,28 @@ import numpy as np
 from brdfdb.atlas._proofs import Array, Form, Proof, albedo, largest
 from brdfdb.geometry import unit_vector
 
-_MIRROR = {"n": 1e-3, "k": 1e4}  # |F| is 1 to 1e-7, its phase 2e-4 off
+_MIRROR = {"n": 1e-3, "k": 1e4}  # |F| is 1 within 1e-7. The phase of F is off by 2e-4
 _PAIRS = ((50.0, 30.0, 60.0), (70.0, 65.0, 170.0), (45.0, 45.0, 90.0), (20.0, 80.0, 130.0))
 _BACK = ((40.0, 40.0, 0.0), (70.0, 70.0, 0.0))
 _FIG_8 = {"wavelength_nm": 500.0, "sigma_0_um": 0.28, "tau_um": 1.77}
-_PHASE = 1e-3
-_SLOPES = 1e-6  # of the trapezoid rule over 20 001 slopes; worst seen: 6e-8
-_WAVES = 1e-3  # what diffraction of a plate of 2000 wavelengths leaves beyond the angles that are summed: 3e-4
-_SUMMED = 1e-7  # of Gauss's rule for eq. 56; worst seen: 1e-12
+# Tolerances of the laws
+_PHASE = 1e-3  # of images in a mirror, because of the phase of F
+_SLOPES = 1e-6  # of the trapezoid rule over 20 001 slopes. Worst measured: 6e-8
+_WAVES = 1e-3  # A plate of 2000 wavelengths diffracts 3e-4 of the light beyond the summed angles
+_SUMMED = 1e-7  # of Gauss's rule for eq. 56. Worst measured: 1e-12
 _ENERGY = 5e-3  # of a plain sum over the hemisphere
 
 
 def _directions(pair: tuple[float, float, float]) -> dict[str, float]:
+    """Return the angles [rad] of theta_i, theta_r and phi_r - phi_i in degrees."""
     theta_i, theta_r, delta_phi = np.deg2rad(pair)
     return {"theta_i": theta_i, "phi_i": 0.0, "theta_r": theta_r, "phi_r": delta_phi}
 
 
 def _image(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> Array:
-    """Return the Jones matrix of a perfect mirror: E_r = 2 n (n.E) - E, no field is left along its surface.
+    """Return the Jones matrix [1] of a perfect mirror: E_r = 2 n (n.E) - E, without a field along its surface.
 
-    The mirror is the facet between light and viewer; s and p are those of the surface whose normal is z. Eqs 61 to 64
+    The mirror is the facet that bisects light and viewer. s and p refer to the surface whose normal is z. Eqs 61 to 64
     are this field with the opposite sign, which no intensity shows.
     """
     k_i, k_r = -unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
@@ -44,19 +46,20 @@ def _image(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> Array:
 
 
 def _off_image(form: Form, pairs: tuple[tuple[float, float, float], ...]) -> float:
+    """Return the largest difference [1] of a Jones matrix from the image in a perfect mirror."""
     return largest(form(**_directions(pair), **_MIRROR) - _image(**_directions(pair)) for pair in pairs)
 
 
 def _lost_by_a_mirror(form: Form) -> float:
-    """Return how far the largest and smallest share of light reflected, squared singular values, are from 1."""
+    """Return the largest deviation [1] from 1 of the squared singular values, the extreme shares of reflected light."""
     return largest(np.linalg.svd(form(**_directions(pair), **_MIRROR), compute_uv=False) ** 2 - 1.0 for pair in _PAIRS)
 
 
 @functools.cache
 def _seen(theta: float, slope: float) -> tuple[float, float]:
-    """Return the share of facets that face a direction, and their area across it over that of the mean surface.
+    """Return the share [1] of facets that face a direction, and their projected area [1] over that of the surface.
 
-    Slopes along the direction are Gaussian, with the deviation sqrt(2) sigma_0 / tau of the correlation of eq. 48.
+    The slopes along the direction are Gaussian, with the deviation sqrt(2) sigma_0 / tau of the correlation of eq. 48.
     """
     deviation, cos, sin = math.sqrt(2.0) * slope, math.cos(theta), math.sin(theta)
     top = 10.0 * deviation if cos >= 10.0 * deviation * sin else cos / sin
@@ -66,7 +69,7 @@ def _seen(theta: float, slope: float) -> tuple[float, float]:
 
 
 def _unseen_area(form: Form) -> float:
-    """Return the relative error of S_1 / cos(theta), the share of facing facets over their area."""
+    """Return the relative error [1] of S_1 / cos(theta), the share of facing facets over their area."""
     cosines, slope = (0.0, 0.05, 0.3, 0.8), 0.2
     expected = [_seen(math.acos(cos), slope) for cos in cosines]
     return largest(
@@ -76,37 +79,40 @@ def _unseen_area(form: Form) -> float:
 
 
 def _smiths_integral(form: Form) -> float:
-    def off(theta: float, slope: float) -> float:
+    """Return the relative error [1] of S_1 against Smith's integral over slopes."""
+
+    def error(theta: float, slope: float) -> float:
         share, area = _seen(theta, slope)
         return float(form(theta=theta, slope=slope) * area / (share * math.cos(theta)) - 1.0)
 
-    return largest(off(theta, slope) for slope in (0.16, 0.5) for theta in np.deg2rad([50.0, 70.0, 85.0]))
+    return largest(error(theta, slope) for slope in (0.16, 0.5) for theta in np.deg2rad([50.0, 70.0, 85.0]))
 
 
 def _mirror_facets(form: Form) -> float:
-    """Return the relative error of G; mirror facets give 4 v_z^2 (i.h) / h_z d(slopes) / d(omega_r)."""
+    """Return the relative error [1] of G; mirror facets give 4 v_z^2 (i.h) / h_z d(slopes) / d(omega_r)."""
     return largest(
         form(**_directions(pair)) / _spread(**_directions(pair)) - 1.0 for pair in (*_PAIRS, *_BACK, (0.0, 0.0, 0.0))
     )
 
 
 def _spread(theta_i: float, phi_i: float, theta_r: float, phi_r: float) -> float:
+    """Return G [1] by the change of the mirrored direction with the slopes of a facet."""
     w_i, w_r = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
     h = w_i + w_r
-    at, step = -h[:2] / h[2], 1e-5
+    center, step = -h[:2] / h[2], 1e-5
 
     def reflected(slopes: Array) -> Array:
         normal = np.array([-slopes[0], -slopes[1], 1.0]) / math.sqrt(1.0 + slopes @ slopes)
         return np.asarray(2.0 * (normal @ w_i) * normal - w_i)
 
-    columns = [(reflected(at + step * e) - reflected(at - step * e))[:2] / (2.0 * step) for e in np.eye(2)]
+    columns = [(reflected(center + step * e) - reflected(center - step * e))[:2] / (2.0 * step) for e in np.eye(2)]
     density = w_r[2] / abs(float(np.linalg.det(np.stack(columns))))
     return float(4.0 * h[2] ** 2 * (w_i @ h) / h[2] * density)
 
 
 def _diffracted_by_a_plate(form: Form) -> float:
-    """Return the relative error of a mirror's reflectance; 2000 x 2000 wavelengths of it diffract all light."""
-    half, step = 1000.0, 2e-5  # of the edge, in wavelengths; of a direction cosine
+    """Return the relative error [1] of the reflectance of a mirror; a plate of 2000 x 2000 wavelengths diffracts it."""
+    half, step = 1000.0, 2e-5  # half of the edge [wavelengths], and step of a direction cosine
     u = np.arange(-0.3, 0.3, step)
     # A (sinc v_x L_x)^2 (sinc v_y L_y)^2, A = 4 L_x L_y; d omega cos(theta_r) = du_x du_y
     along = np.sum(2.0 * half * np.sinc(2.0 * half * u) ** 2) * step
@@ -114,17 +120,19 @@ def _diffracted_by_a_plate(form: Form) -> float:
 
 
 def _more_than_arrives(form: Form) -> float:
-    excess = (albedo(form, np.deg2rad(theta), 120, 180, **_FIG_8) - 1.0 for theta in (0.0, 60.0, 89.9))
-    return largest(np.maximum(0.0, each) for each in excess)
+    """Return the largest excess [1] of the directional albedo over 1."""
+    excesses = (albedo(form, np.deg2rad(theta), 120, 180, **_FIG_8) - 1.0 for theta in (0.0, 60.0, 89.9))
+    return largest(np.maximum(0.0, excess) for excess in excesses)
 
 
 def _all_lengths_doubled(form: Form) -> float:
+    """Return the relative change [1] of f_r when all lengths, the wavelength too, are doubled."""
     doubled = {name: 2.0 * value for name, value in _FIG_8.items()}
     return largest(form(**_directions(p), **doubled) / form(**_directions(p), **_FIG_8) - 1.0 for p in _PAIRS)
 
 
 def _not_transmitted(form: Form) -> float:
-    """Return the error of a reflectance: 1 less the energy that enters, by fields continuous across the surface."""
+    """Return the error [1] of a reflectance: 1 less the energy that enters, by fields continuous across the surface."""
 
     def reflected(cos: float, n: float, k: float) -> float:
         index = complex(n, k)
@@ -141,22 +149,24 @@ def _not_transmitted(form: Form) -> float:
 
 
 def _far_from_the_mirror(form: Form) -> float:
-    """Return what a nearly flat metal sends 30 degrees beside the mirror direction, over what goes there."""
+    """Return f_r of a nearly flat metal 30 degrees beside the mirror direction, over its value there [1]."""
     flat = {"wavelength_nm": 500.0, "sigma_0_um": 0.28, "tau_um": 14.0, "n": 0.8126, "k": 6.048}
     return largest([form(**_directions((45.0, 15.0, 180.0)), **flat)])
 
 
 def _uniform(form: Form) -> float:
+    """Return the error [1] of the albedo of the uniform part."""
     return largest(np.pi * form(a=a) - a for a in (0.1, 0.5, 0.9))
 
 
 def _waves_of_eq_56(form: Form, cases: tuple[tuple[float, float], ...]) -> float:
+    """Return the relative error [1] of the sum of eq. 78 against the integral of eq. 56."""
     return largest(form(g=g, V=V) / _scattered(g, V) - 1.0 for g, V in cases)
 
 
 @functools.cache
 def _scattered(g: float, V: float) -> float:
-    """Return the left side of eq. 56 less its coherent part, over pi tau^2: an integral over t = r^2 / tau^2."""
+    """Return the left side of eq. 56 without its coherent part, over pi tau^2 [1]: an integral over t = r^2 / tau^2."""
     x, w = np.polynomial.legendre.leggauss(24)
     edges = np.concatenate([[0.0], np.geomspace(1e-3 / (1.0 + g), 60.0, 60)])
     half = np.diff(edges)[:, np.newaxis] / 2.0
@@ -168,32 +178,34 @@ def _scattered(g: float, V: float) -> float:
 
 
 def _sum_off_waves(form: Form) -> float:
+    """Return the relative error [1] of the sum of eq. 78, also where g is large."""
     return _waves_of_eq_56(form, ((0.5, 1.0), (9.0, 0.0), (18.5, 20.0), (800.0, 100.0)))
 
 
 def _limit_off_waves(form: Form) -> float:
+    """Return the relative error [1] of the sum of eq. 78 where its limit is used."""
     return _waves_of_eq_56(form, ((18.5, 0.0), (18.5, 60.0), (100.0, 100.0)))
 
 
 def _residual(form: Form) -> float:
-    """Return by how much z_0 does not solve eq. 81, in sigma_0."""
+    """Return the residual [sigma_0] of z_0 in eq. 81."""
 
-    def off(theta: float, slope: float) -> Any:
+    def residual(theta: float, slope: float) -> Any:
         K = 2.0 * math.tan(theta) * math.erfc(1.0 / (2.0 * slope * math.tan(theta))) / 4.0
         z = form(theta_i=theta, theta_r=theta, slope=slope)
         return math.sqrt(math.pi / 2.0) * z - K * np.exp(-0.5 * z * z)
 
-    return largest(off(theta, slope) for theta in np.deg2rad([70.0, 85.0, 89.0]) for slope in (0.16, 1.0))
+    return largest(residual(theta, slope) for theta in np.deg2rad([70.0, 85.0, 89.0]) for slope in (0.16, 1.0))
 
 
 PROOFS = {
     "uniform-diffuse-without-pi": Proof("the uniform diffuse part reflects the share a of the light", _uniform, 1e-12),
     "hemispherical-for-bidirectional": Proof("a nearly flat metal mirrors", _far_from_the_mirror, 1e-3),
     "shadowing-divided-by-cosines": Proof(
-        "what is seen of facing facets has the area of the surface", _unseen_area, _SLOPES
+        "the visible parts of facing facets have the area of the surface", _unseen_area, _SLOPES
     ),
     "lambda-without-gaussian": Proof(
-        "Smith's integral over slopes: what is seen has the area of the surface", _smiths_integral, _SLOPES
+        "Smith's integral over slopes: the visible parts have the area of the surface", _smiths_integral, _SLOPES
     ),
     "one-matrix-for-two": Proof("the image in a perfect mirror", lambda form: _off_image(form, _PAIRS), _PHASE),
     "two-pi-in-the-cone": Proof("diffraction by a large plate, summed over directions", _diffracted_by_a_plate, _WAVES),
@@ -202,14 +214,14 @@ PROOFS = {
     ),
     "sign-of-m-ps": Proof("a perfect mirror's Jones matrix is unitary", _lost_by_a_mirror, 1e-6),
     "intensities-without-shadowing": Proof("|F| = 1: no more is reflected than arrives", _more_than_arrives, _ENERGY),
-    "squares-without-moduli": Proof("what is not reflected enters: Poynting's theorem", _not_transmitted, 1e-12),
+    "squares-without-moduli": Proof("light that is not reflected enters: Poynting's theorem", _not_transmitted, 1e-12),
     "four-dot-products": Proof("solid angles into which mirror facets spread the light", _mirror_facets, 1e-6),
     "v-without-wave-number": Proof(
-        "with all lengths doubled, the wavelength too, light goes the same ways", _all_lengths_doubled, 1e-9
+        "light goes the same ways when all lengths are doubled, the wavelength too", _all_lengths_doubled, 1e-9
     ),
-    "ten-terms": Proof("the integral over the surface of eq. 56, which the sum stands for", _sum_off_waves, _SUMMED),
+    "ten-terms": Proof("the integral over the surface of eq. 56, which the sum replaces", _sum_off_waves, _SUMMED),
     "beckmanns-limit": Proof(
-        "the integral over the surface of eq. 56, which the sum stands for", _limit_off_waves, _SUMMED
+        "the integral over the surface of eq. 56, which the sum replaces", _limit_off_waves, _SUMMED
     ),
     "root-search": Proof("z_0 solves eq. 81", _residual, 1e-12),
     "local-normal-for-z": Proof("the image in a perfect mirror", lambda form: _off_image(form, _PAIRS), _PHASE),

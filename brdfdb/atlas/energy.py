@@ -1,4 +1,4 @@
-"""Energy: what models reflect of the light from one direction, where it is too much, closed forms beside it."""
+"""Energy: directional albedos of the models, where they exceed 1, and closed forms beside them."""
 
 from __future__ import annotations
 
@@ -32,11 +32,12 @@ from brdfdb.reference import he_torrance_1991
 
 _PLAIN_SIGMA_DEG = (0.0, 10.0, 20.0, 30.0, 40.0)
 _ROUGH_SIGMA_DEG = (40.0, 45.0, 50.0, 60.0, 70.0, 80.0, 90.0)
-_FEW_DEG = THETA_DEG[::4]  # of a model that is an integral itself
-_PERFECT = {"n": 1e-3, "k": 1e4, "wavelength_nm": 500.0}  # |F|^2 is 1 to 1e-8 up to 89.9 degrees
+_FEW_DEG = THETA_DEG[::4]  # angles for a model that is an integral itself
+_PERFECT = {"n": 1e-3, "k": 1e4, "wavelength_nm": 500.0}  # |F|^2 is 1 within 1e-8 up to 89.9 degrees
 
 
 def _oren_nayar() -> Figure:
+    """Draw the albedos of Oren and Nayar's forms with rho of 1."""
     fit = {sigma: albedo_of("oren_nayar", rho=1.0, sigma=radians(sigma)) for sigma in _PLAIN_SIGMA_DEG}
     rough = {sigma: albedo_of("oren_nayar", rho=1.0, sigma=radians(sigma)) for sigma in _ROUGH_SIGMA_DEG}
     sigma2 = float(radians(20.0)) ** 2
@@ -82,8 +83,8 @@ def _oren_nayar() -> Figure:
                 holds=max(float(albedo.max()) for albedo in rough.values()) <= 1.0,
             ),
             Statement(
-                says="the surface that is fitted, with two bounces, reflects less than it receives: the excess is the "
-                "fit's",
+                says="the surface that is fitted, with two bounces, reflects less than it receives: the excess belongs "
+                "to the fit",
                 where="known of the form: eqs 8-20 and 47, integrated",
                 seen=f"sigma = 20 degrees: at most {largest(surface, _FEW_DEG)}, where the fit has "
                 f"{largest(fit[20.0])}",
@@ -106,6 +107,8 @@ def _oren_nayar() -> Figure:
 
 
 def _he_torrance() -> Figure:
+    """Draw the albedos of He and Torrance's model with a Fresnel reflectance of 1."""
+
     def lossless(sigma_0_um: float, slope: float) -> Array:
         return albedo_of("he_torrance", sigma_0_um=sigma_0_um, tau_um=sigma_0_um / slope, a=0.0, **_PERFECT)
 
@@ -156,16 +159,16 @@ def _he_torrance() -> Figure:
                 holds=close(gentle, 1.0),
             ),
             Statement(
-                says="towards grazing the albedo falls: light is scattered once, and what is shadowed is lost",
+                says="towards grazing the albedo falls: light is scattered once, and shadowed light is lost",
                 where="known of the model: eqs 23-25",
-                seen=f"at 89.9 degrees between {min(each[-1] for each in everything):.3f} and "
-                f"{max(each[-1] for each in everything):.3f} in all nine cases",
-                holds=all(each[-1] < 0.5 * each[0] for each in everything),
+                seen=f"at 89.9 degrees between {min(albedo[-1] for albedo in everything):.3f} and "
+                f"{max(albedo[-1] for albedo in everything):.3f} in all nine cases",
+                holds=all(albedo[-1] < 0.5 * albedo[0] for albedo in everything),
             ),
             Statement(
                 says="before it falls it passes 1: 1.042 at 80 degrees for sigma_0 / tau of 0.05, 1.037 at 85.5 for "
                 "0.02",
-                where="known of the model: sigma of eq. 53 is another one for each viewer",
+                where="known of the model: sigma of eq. 53 differs between viewers",
                 seen=f"{at(by_slope[0.05], 80.0):.3f} at 80 degrees and {at(total, 85.5):.3f} at 85.5",
                 holds=close((at(by_slope[0.05], 80.0), at(total, 85.5)), (1.042, 1.037)),
             ),
@@ -177,13 +180,14 @@ def _he_torrance() -> Figure:
                 f"{at(specular, 85.5):.3f} is specular and {at(total - specular, 85.5):.3f} directional diffuse: "
                 f"roughness scatters more than the {1.0 - at(specular, 85.5):.3f} that it takes from the mirror. The "
                 f"largest is {largest(by_slope[worst])}, sigma_0 / tau = {worst:g}",
-                holds=max(float(each.max()) for each in everything) <= 1.0 + TOLERANCE,
+                holds=max(float(albedo.max()) for albedo in everything) <= 1.0 + TOLERANCE,
             ),
         ],
     )
 
 
 def _magnesium_oxide() -> Figure:
+    """Draw the albedo of the magnesium oxide of Fig. 9, and the largest uniform part that its surface allows."""
     ceramic = presets()["magnesium-oxide-ceramic"]
     (wavelength_nm,) = ceramic.wavelengths_nm or ()
     surface = ceramic.arguments(wavelength_nm)
@@ -199,7 +203,7 @@ def _magnesium_oxide() -> Figure:
     return Figure(
         key="energy-magnesium-oxide",
         paper="he1991",
-        title="The magnesium oxide of Fig. 9 and the room that its surface leaves",
+        title="The magnesium oxide of Fig. 9 and the largest a that its surface allows",
         caption=f"{ceramic.title}: sigma_0 = {surface['sigma_0_um']:g} um, tau = {surface['tau_um']:g} um, "
         f"n = {float(surface['n']):.4f} at {wavelength_nm:g} nm, a = {a:g}.",
         panels=[
@@ -240,9 +244,10 @@ def _magnesium_oxide() -> Figure:
 
 
 def _minnaert() -> Figure:
+    """Draw the albedos of Minnaert's law with rho of 1."""
     albedos = {k: albedo_of("minnaert", k=k, rho=1.0) for k in (0.3, 0.6, 0.9, 1.0)}
     nodes, weights = np.polynomial.legendre.leggauss(12)
-    root = 0.5 * (nodes + 1.0)  # of cos(theta_i): the albedo is a power of it
+    root = 0.5 * (nodes + 1.0)  # square root of cos(theta_i): the albedo is a power of it
     over_roots = albedo_of("minnaert", np.rad2deg(np.arccos(root**2)), k=0.6, rho=1.0)
     mean = float(np.sum(0.5 * weights * over_roots * 2.0 * root**2 * 2.0 * root))
     return Figure(
@@ -257,15 +262,16 @@ def _minnaert() -> Figure:
                 "0 <= k <= 1",
                 where="Oren and Nayar 1994, section 1; our reading: one that reflects no more than arrives",
                 seen=f"k = 0.6 reflects {at(albedos[0.6], 60.0):.3f} of the light at 60 degrees and "
-                f"{at(albedos[0.6], 89.0):.2f} at 89: 1 is left only along the normal, and everywhere at k = 1",
-                holds=max(float(each.max()) for each in albedos.values()) <= 1.0 + TOLERANCE,
+                f"{at(albedos[0.6], 89.0):.2f} at 89. The albedo is at most 1 only along the normal, and "
+                "everywhere at k = 1",
+                holds=max(float(albedo.max()) for albedo in albedos.values()) <= 1.0 + TOLERANCE,
             ),
             Statement(
-                says="rho is the reflectance along the normal, not that of the surface: of light from everywhere "
-                "2 rho / (k + 1) is reflected",
+                says="rho is the reflectance along the normal, not that of the surface: it reflects 2 rho / (k + 1) of "
+                "uniform light",
                 where="known of the form: the albedo is rho cos(theta_i)^(k - 1)",
-                seen=f"k = 0.6: {albedos[0.6][0]:.6f} along the normal, and of light from everywhere {mean:.5f}, where "
-                f"the closed form is {2.0 / 1.6:.5f}",
+                seen=f"k = 0.6: {albedos[0.6][0]:.6f} along the normal, and {mean:.5f} of uniform light, where the "
+                f"closed form is {2.0 / 1.6:.5f}",
                 holds=close(albedos[0.6][0], 1.0, TOLERANCE) and close(mean, 2.0 / 1.6, 1e-5),
             ),
         ],
@@ -273,11 +279,12 @@ def _minnaert() -> Figure:
 
 
 def _closed_forms() -> Figure:
+    """Draw albedos by quadrature beside their closed forms."""
     plastic = presets()["blue-plastic"]
     (wavelength_nm,) = plastic.wavelengths_nm or ()
     smooth = plastic.arguments(wavelength_nm) | {"a": 0.0}
     theta = radians(THETA_DEG)
-    mirror = [float(he_torrance_1991.smooth(each, float(smooth["n"]), float(smooth["k"]))) for each in theta]
+    mirror = [float(he_torrance_1991.smooth(theta_i, float(smooth["n"]), float(smooth["k"]))) for theta_i in theta]
     cases = {
         "Lambert, rho": (albedo_of("lambert", rho=0.7, tolerance=EXACT), np.full(theta.shape, 0.7)),
         "Minnaert, rho cos(theta_i)^(k - 1)": (
@@ -302,7 +309,7 @@ def _closed_forms() -> Figure:
                 title="abs(quadrature - closed form)",
                 x_label=THETA,
                 y_label="difference [1]",
-                curves=[difference(label, each) for label, each in off.items()],
+                curves=[difference(label, values) for label, values in off.items()],
                 log_y=True,
             ),
         ],
@@ -310,10 +317,10 @@ def _closed_forms() -> Figure:
             Statement(
                 says=f"the albedo of {label}",
                 where="closed form",
-                seen=f"quadrature is within {float(each.max()):.1g} of it up to 89.9 degrees",
-                holds=float(each.max()) < EXACT,
+                seen=f"the quadrature is within {float(values.max()):.1g} of it up to 89.9 degrees",
+                holds=float(values.max()) < EXACT,
             )
-            for label, each in off.items()
+            for label, values in off.items()
         ],
     )
 

@@ -11,6 +11,7 @@ from pydantic_core import CoreSchema
 
 from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, Verdict
 from brdfdb.audit.findings import FINDINGS
+from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
 
 
@@ -19,7 +20,7 @@ def _read(found: Any) -> Any:
     if not isinstance(found, Mapping):
         return found
     if unknown := [key for key in found if key not in FINDINGS]:
-        raise ValueError(f"findings: {unknown[0]!r} is not one of {', '.join(FINDINGS)}")
+        raise ParameterError("findings", f"{unknown[0]!r} is not one of {', '.join(FINDINGS)}")
     return {key: each if isinstance(each, Finding) else _one(key, each) for key, each in found.items()}
 
 

@@ -13,7 +13,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from brdfdb import spectra
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, WriteError
 from brdfdb.tables.slices import Slice
 from brdfdb.tables.table import Table
 
@@ -48,9 +48,9 @@ def write_slice(path: str | os.PathLike[str], image: Slice, table: Table, half: 
 
     Raises
     ------
-    OSError
+    WriteError
         If the file cannot be written.
-    ValueError
+    ParameterError
         If two wavelengths are equal.
 
     Notes
@@ -87,7 +87,7 @@ def write_slice(path: str | os.PathLike[str], image: Slice, table: Table, half: 
         OpenEXR.File(header, channels).write(str(temporary))
         os.replace(temporary, path)
     except RuntimeError as error:  # what OpenEXR raises for a missing directory and for a full disk alike
-        raise OSError(f"cannot write {path}: {error}") from error
+        raise WriteError(f"cannot write {path}: {error}") from error
     finally:
         with contextlib.suppress(OSError):  # there only after a failure
             temporary.unlink()

@@ -50,7 +50,7 @@ def write(
     ------
     ParameterError
         If an angle is outside its range, or two wavelengths are equal.
-    OSError
+    WriteError
         If the file cannot be written.
     """
     from brdfdb.formats._exr_file import write_slice

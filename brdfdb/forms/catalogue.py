@@ -105,7 +105,7 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         tolerances = SPECTRAL_TOLERANCES if source.spectral else TOLERANCES
     at = None if wavelength_nm is None else np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
     if not isinstance(source, Material):
-        itself = Form("function", source.title, "exact", "Source.brdf_at", source.brdf_at(at), 0)
+        itself = Form("function", source.title, "exact", f"source {source.name}", source.brdf_at(at), 0)
         return [itself, *_tables(source, source, at, tolerances, "table")]
     listed = list(_of_model(source, at))
     tabulated = _exact(source)

@@ -1,4 +1,4 @@
-"""The figures of the three papers, computed, with what the papers say one sees in them."""
+"""The figures of the three papers, computed, with the sentences of the papers about them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""He et al. 1991 by hand: closed forms that figures are held against, which share no code with the models."""
+"""He et al. 1991 by hand: closed forms to check the figures, which share no code with the models."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def smith(theta_deg: float, slope: float) -> float:
 
 
 def share_of_variance(theta_i_deg: float, theta_r_deg: float, slope: float) -> float:
-    """Return (sigma / sigma_0)^2 [1] of eqs 80 to 83; the root of eq. 81 is found by bisection."""
+    """Return (sigma / sigma_0)^2 [1] of eqs 80 to 83; bisection gives the root of eq. 81."""
     K = 0.0
     for theta_deg in (theta_i_deg, theta_r_deg):
         tan = math.tan(math.radians(theta_deg))
         K += tan * math.erfc(1.0 / (2.0 * slope * tan)) / 4.0 if tan > 0.0 else 0.0
-    low, high = 0.0, 1.0 + K  # of z_0 / sigma_0: sqrt(pi / 2) z = K exp(-z^2 / 2)
+    low, high = 0.0, 1.0 + K  # bounds of z = z_0 / sigma_0, with sqrt(pi / 2) z = K exp(-z^2 / 2)
     for _ in range(80):
         middle = 0.5 * (low + high)
         rising = math.sqrt(math.pi / 2.0) * middle > K * math.exp(-0.5 * middle * middle)
@@ -58,7 +58,7 @@ def specular(surface: dict[str, Any], theta_i_deg: float) -> float:
 def very_rough(slope: float, n: float, k: float, theta_i_deg: float, theta_r_deg: float) -> float:
     """Return f_r [1/sr] for sigma_0 / lambda -> infinity, eqs 71 to 84 with e^-b / g for the sum of eq. 78.
 
-    `slope` is sigma_0 / tau [1]. The viewer is in the plane of incidence: above 0 on the mirror side.
+    `slope` is sigma_0 / tau [1]. The viewer is in the plane of incidence, and its angle is positive on the mirror side.
     """
     i, r = math.radians(theta_i_deg), math.radians(theta_r_deg)
     v_x, v_z = math.sin(i) - math.sin(r), math.cos(i) + math.cos(r)
@@ -72,8 +72,8 @@ def very_rough(slope: float, n: float, k: float, theta_i_deg: float, theta_r_deg
 def half_width_deg(slope: float) -> float:
     """Return theta_r [degree] where the lobe of light along the normal has half its height, for large g.
 
-    |F|^2 is taken as constant and nothing as shadowed: f_r goes as exp(-tan^2(d) / (4 slope^2)) / (cos^4(d) cos(2 d)),
-    with d half of theta_r.
+    |F|^2 is constant and nothing is shadowed. Then f_r is proportional to
+    exp(-tan^2(d) / (4 slope^2)) / (cos^4(d) cos(2 d)), where d is half of theta_r.
     """
     d = np.deg2rad(np.linspace(0.0, 40.0, 40001))
     lobe = np.exp(-(np.tan(d) ** 2) / (4.0 * slope**2)) / (np.cos(d) ** 4 * np.cos(2.0 * d))
@@ -81,12 +81,13 @@ def half_width_deg(slope: float) -> float:
 
 
 def directional_diffuse(surface: dict[str, Any], theta_i_deg: float, theta_r_deg: float) -> float:
-    """Return f_r [1/sr] of the directional diffuse part by the reference; angles as in `very_rough`."""
+    """Return f_r [1/sr] of the directional diffuse part by the reference; angles are those of `very_rough`."""
     return _directional_diffuse(tuple(sorted(surface.items())), theta_i_deg, theta_r_deg)
 
 
 @cache
 def _directional_diffuse(surface: tuple[tuple[str, float], ...], theta_i_deg: float, theta_r_deg: float) -> float:
+    """Return f_r [1/sr] of the directional diffuse part; kept because the reference is slow."""
     arguments = {name: value for name, value in surface if name != "a"}
     angles = np.deg2rad(theta_i_deg), np.deg2rad(abs(theta_r_deg)), np.pi if theta_r_deg >= 0.0 else 0.0
     return float(reference.directional_diffuse(*angles, **arguments))

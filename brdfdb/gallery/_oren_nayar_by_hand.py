@@ -1,4 +1,4 @@
-"""Oren and Nayar 1994 by hand: their equations for single directions, which share no code with the models."""
+"""Oren and Nayar 1994 by hand: equations for single directions, which share no code with the models."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _SLOPES, _AZIMUTHS = 200, 360  # nodes of `facets`, for four digits
 
 
 class Direct(NamedTuple):
-    """A BRDF [1/sr] in two parts: light that met one facet, and light that met two."""
+    """A BRDF [1/sr] in two parts: light reflected by one facet, and light reflected by two."""
 
     direct: float
     bounced: float
@@ -20,9 +20,9 @@ class Direct(NamedTuple):
 
 @cache
 def facets(theta_i_deg: float, theta_r_deg: float, rho: float, sigma_deg: float) -> Direct:
-    """Return f_r of V-cavities with Gaussian slopes, eqs 8 to 22 and 26, as a plain sum over facets, to four digits.
+    """Return f_r [1/sr] of V-cavities with Gaussian slopes by a plain sum over facets, eqs 8 to 22 and 26.
 
-    The viewer is in the plane of incidence, above 0 on the side of the light, as on all lines across the hemisphere.
+    The sum has four digits. The viewer is in the plane of incidence. Its angle is positive on the side of the light.
     """
     sigma = math.radians(sigma_deg)
     reach = min(math.pi / 2.0, 6.0 * sigma)
@@ -47,7 +47,7 @@ def facets(theta_i_deg: float, theta_r_deg: float, rho: float, sigma_deg: float)
         cos_2 = np.cos(2.0 * theta_a)
         d = sum(sign * np.sqrt(np.maximum(x * x + 2.0 * x * y * cos_2 + y * y, 0.0)) for x, y, sign in terms)
         bounced = np.where((s_b > 0.0) & (v_a > 0.0), s_b * v_a / (a_n * v_n * s_n) * 0.5 * d, 0.0)
-    # Eq. (26), normalised over slope alone; the mean over azimuths is that of both facets of all cavities, eq. (22)
+    # Eq. (26), normalised over the slope. The mean over azimuths includes both facets of a cavity, eq. (22)
     weight = np.exp(-(theta_a[:, 0] ** 2) / (2.0 * sigma**2)) * np.sin(theta_a[:, 0])
     weight /= weight.sum()
     return Direct(
@@ -56,7 +56,7 @@ def facets(theta_i_deg: float, theta_r_deg: float, rho: float, sigma_deg: float)
 
 
 def fit(theta_i_deg: float, theta_r_deg: float, rho: float, sigma_deg: float) -> Direct:
-    """Return f_r of the functional approximation, eqs 27 and 28; directions as in `facets`."""
+    """Return f_r [1/sr] of the functional approximation, eqs 27 and 28; directions are those of `facets`."""
     s2, cos = math.radians(sigma_deg) ** 2, 1.0 if theta_i_deg * theta_r_deg >= 0.0 else -1.0
     beta, alpha = sorted((math.radians(abs(theta_i_deg)), math.radians(abs(theta_r_deg))))
     C_1 = 1.0 - 0.5 * s2 / (s2 + 0.33)
@@ -66,7 +66,7 @@ def fit(theta_i_deg: float, theta_r_deg: float, rho: float, sigma_deg: float) ->
 
 
 def surface(theta_i_deg: float, theta_r_deg: float, sigma_deg: float) -> float:
-    """Return f_r [1/sr] of mirror-like facets, eq. 31 with F = 1 and E_0 = 1; directions as in `facets`."""
+    """Return f_r [1/sr] of mirror-like facets, eq. 31 with F = 1 and E_0 = 1; directions are those of `facets`."""
     i, r = math.radians(theta_i_deg), math.radians(theta_r_deg)
     theta_a, cos_half = abs(0.5 * (i + r)), math.cos(0.5 * (i - r))
     GAF = min(1.0, 2.0 * math.cos(theta_a) * min(math.cos(i), math.cos(r)) / cos_half)
@@ -77,7 +77,8 @@ def surface(theta_i_deg: float, theta_r_deg: float, sigma_deg: float) -> float:
 def cylinder(x: float, light_deg: float, rho: float, sigma_deg: float) -> float:
     """Return the radiance [1] of an upright cylinder of radius 1 at x, by eqs 27 and 28.
 
-    1 is a white Lambertian surface that faces the light, which is to the right of the camera by light_deg.
+    The unit is the radiance of a white Lambertian surface that faces the light. The light is light_deg to the right of
+    the camera.
     """
     viewer_deg = -math.degrees(math.asin(x))
     theta_i_deg = viewer_deg + light_deg

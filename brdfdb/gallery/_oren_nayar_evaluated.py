@@ -1,4 +1,4 @@
-"""The evaluation that Oren and Nayar 1994 drew: eqs 24 and 49, one slope in all azimuths, integrated by eq. 25."""
+"""The evaluation that Oren and Nayar 1994 drew: eqs 24 and 49 for one slope in all azimuths, integrated by eq. 25."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from brdfdb.models import oren_nayar_single_slope_parts
 from brdfdb.models.oren_nayar_1994 import Parts
 from brdfdb.parameters import Floats
 
-_NODES = 12  # Gauss-Legendre nodes of a piece; the integral is right to 2e-10
+_NODES = 12  # Gauss-Legendre nodes of a piece: the integral has an error of 2e-10
 _REACH = 6.0  # largest slope over sigma; steeper facets have 1.5e-8 of the weight
 
 
@@ -42,9 +42,9 @@ def evaluated_parts(
 
     Notes
     -----
-    Section 4.3 evaluates the integral (25) with eq. 24 for direct light. Eq. 49, of appendix B.2, is what it has for
-    the second bounce. The weight of eq. 26 is normalised over the slope. Slopes are integrated in pieces between those
-    from which on facets are shadowed, masked, or both (eqs 39 and 43), where the closed forms begin as square roots.
+    Section 4.3 evaluates eq. 25 with eq. 24 for direct light. For the second bounce it uses eq. 49 of appendix B.2.
+    The weight of eq. 26 is normalised over the slope. The integral is split at the slopes where shadowing, masking, or
+    both begin (eqs 39 and 43), because the closed forms start as square roots there.
 
     References
     ----------
@@ -73,6 +73,6 @@ def evaluated_parts(
 def evaluated(
     theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike, *, rho: float, sigma: float
 ) -> Floats:
-    """Return f_r [1/sr] of the paper's own evaluation; arguments as of `evaluated_parts`."""
+    """Return f_r [1/sr] of the paper's own evaluation; the arguments are those of `evaluated_parts`."""
     parts = evaluated_parts(theta_i, phi_i, theta_r, phi_r, rho=rho, sigma=sigma)
     return parts.direct + parts.interreflected

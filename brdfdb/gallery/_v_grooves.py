@@ -1,4 +1,4 @@
-"""V-grooves of Lambertian facets, all bounces of light between them: strips and the strings between their edges."""
+"""V-grooves of Lambertian facets with all bounces of light, by strips and the strings between their edges."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-STRIPS = 32  # of a facet; more strips change no bounce by 0.2 % of the radiance
-AZIMUTHS = 48  # of the grooves, spread over half a turn
+STRIPS = 32  # strips of a facet: more strips change no bounce by 0.2 % of the radiance
+AZIMUTHS = 48  # azimuths of the grooves, spread over half a turn
 SLOPES = 12  # Gauss-Legendre nodes of the slopes
 _REACH = 4.5  # largest slope over sigma; steeper facets have 4e-5 of the weight
 
@@ -16,8 +16,8 @@ _REACH = 4.5  # largest slope over sigma; steeper facets have 4e-5 of the weight
 def view_factors(theta_a: float, strips: int = STRIPS) -> Array:
     """Return the share of light [1] that a strip of one facet (row) sends to a strip of the other (column).
 
-    Hottel's crossed strings: half of the crossed distances less the straight ones, over the width of the strip. Facets
-    have the slope theta_a [rad] and width 1; strips count from the bottom of the groove.
+    Hottel's rule of crossed strings: the share is half of the crossed distances less the straight ones, over the width
+    of the strip. Facets have the slope theta_a [rad] and width 1. Strips count from the bottom of the groove.
     """
     edges = np.linspace(0.0, 1.0, strips + 1)
     x, y = edges[:, None], edges[None, :]
@@ -27,10 +27,10 @@ def view_factors(theta_a: float, strips: int = STRIPS) -> Array:
 
 
 def _met(slope: Array, theta_a: float) -> tuple[Array, Array]:
-    """Return <w, a> over cos(theta) [1] of both facets, (..., 2), and the width of each that a direction reaches [1].
+    """Return <w, a> over cos(theta) [1] of both facets, (..., 2), and the widths [1] that a direction reaches.
 
-    `slope` is tan(theta) cos(phi - phi_a) of the direction. A facet is reached from its upper edge downwards: the rest
-    lies behind the upper edge of the other facet.
+    `slope` is tan(theta) cos(phi - phi_a) of the direction. A direction reaches a facet from its upper edge downwards.
+    The rest lies behind the upper edge of the other facet.
     """
     facing = np.cos(theta_a) + np.sin(theta_a) * np.stack([slope, -slope], axis=-1)
     width = np.minimum(2.0 * np.cos(theta_a) / np.maximum(facing, 1e-300), 1.0)
@@ -38,7 +38,7 @@ def _met(slope: Array, theta_a: float) -> tuple[Array, Array]:
 
 
 def _on_strips(facing: Array, width: Array, strips: int) -> Array:
-    """Return <w, a> over cos(theta) [1] on each strip, (..., 2, strips); less where a part of one is hidden."""
+    """Return <w, a> over cos(theta) [1] on each strip, (..., 2, strips), reduced by the hidden part of the strip."""
     upper = np.linspace(0.0, 1.0, strips + 1)[1:]
     return facing[..., None] * np.clip((upper - 1.0 + width[..., None]) * strips, 0.0, 1.0)
 
@@ -46,27 +46,27 @@ def _on_strips(facing: Array, width: Array, strips: int) -> Array:
 def bounces(
     theta_i: float, theta_r: Array, delta_phi: Array, rho: float, sigma: float, orders: int, strips: int = STRIPS
 ) -> Array:
-    """Return f_r [1/sr] of Gaussian slopes bounce by bounce, shape (orders, viewers); the last row is all the rest.
+    """Return f_r [1/sr] of Gaussian slopes bounce by bounce, shape (orders, viewers).
 
     Parameters
     ----------
     theta_i : float [rad]
         Polar angle of the light.
     theta_r, delta_phi : array [rad]
-        Polar angles of viewers and their azimuths from the light, of one shape (viewers,).
+        Polar angles of viewers and their azimuths from the light, both of shape (viewers,).
     rho : float [1]
         Albedo of a facet, in [0, 1).
     sigma : float [rad]
         Standard deviation of the slope angle.
     orders : int
-        Rows of the result: bounces 1, 2, ..., and in the last row the sum of all later ones.
+        Rows of the result. The last row is the sum of all later bounces.
     strips : int
         Strips of a facet.
 
     Notes
     -----
-    The surface of Oren and Nayar 1994 (eqs 8 and 26), long grooves of which each facet is cut into strips of one
-    radiosity. The strips' view factors are exact; of the paper's equations of interreflection none is used.
+    The surface is that of Oren and Nayar 1994 (eqs 8 and 26): long grooves. Each facet is cut into strips, and a strip
+    has one radiosity. The view factors of strips are exact. No equation of the paper for interreflection is used.
     """
     azimuth = (np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS
     slope_i = np.tan(theta_i) * np.cos(azimuth)
@@ -81,13 +81,13 @@ def bounces(
         factors = view_factors(theta_a, strips)
         lit, seen = _met(slope_i, theta_a), _met(slope_r, theta_a)
         scale = weight / (2.0 * np.cos(theta_a) * np.pi * AZIMUTHS)
-        # direct light comes from where a facet is both lit and seen
+        # Direct light comes from the part of a facet that is both lit and seen
         total[0] += scale * rho * np.sum(lit[0] * seen[0] * np.minimum(lit[1], seen[1]), axis=(1, 2))
         left, viewed = rho * _on_strips(*lit, strips), scale / strips * _on_strips(*seen, strips)
         for order in range(1, orders - 1):
             left = rho * left[:, ::-1] @ factors.T
             total[order] += np.einsum("vafs,afs->v", viewed, left)
-        # all later bounces, of sums and differences of the two facets: (1 - rho F)^-1 and (1 + rho F)^-1
+        # All later bounces, by the sum and the difference of both facets: (1 - rho F)^-1 and (1 + rho F)^-1
         left = rho * left[:, ::-1] @ factors.T
         sums, differences = (left[:, 0] + left[:, 1]) / 2.0, (left[:, 0] - left[:, 1]) / 2.0
         even = np.linalg.solve(np.eye(strips) - rho * factors, sums.T).T

@@ -1,4 +1,4 @@
-"""He et al. 1991: the three parts of reflection, Fig. 6, and the roughness that is left at grazing angles, eq. 53."""
+"""He et al. 1991: the three parts of reflection, Fig. 6, and the effective roughness at grazing angles, eq. 53."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from brdfdb.gallery._he_torrance_cuts import (
     Cut,
     Surface,
     cut_of,
-    described,
-    measured,
+    measured_cuts,
+    parameters_text,
     reflected,
     specular,
     surface_of,
@@ -24,18 +24,18 @@ from brdfdb.models import he_torrance, he_torrance_aperture, he_torrance_parts, 
 from brdfdb.parameters import Floats
 
 GREEN_NM = 550.0
-LOWEST = 1e-3  # [1/sr] less is not drawn
-NARROW_SR = 1e-6  # of cones in which the lobe is flat
-PARTS_DEG = 60.0  # where all three parts of the table top are seen
-FAR = 10.0  # ratio of f_r: our reading of "far from ideal diffuse"
+LOWEST = 1e-3  # least f_r [1/sr] that is drawn
+NARROW_SR = 1e-6  # solid angle of cones in which the lobe is flat
+PARTS_DEG = 60.0  # angle at which all three parts of the table top are seen
+FAR = 10.0  # ratio of f_r for "far from ideal diffuse", our reading
 CONSERVED = 0.01  # share of the light that gentle slopes may lose or gain (section 3.1)
-SMALL = 0.1  # relative change: our reading of "somewhat"
+SMALL = 0.1  # relative change for "somewhat", our reading
 
 
 def fig_06() -> Figure:
-    """Return the parts of the light that one surface reflects."""
+    """Draw the three parts of the light that one surface reflects."""
     surface = surface_of("scene-plastic-table", GREEN_NM)
-    (total,) = measured(surface, np.array([PARTS_DEG]))
+    (total,) = measured_cuts(surface, np.array([PARTS_DEG]))
     parts = cut_of(lambda *angles: he_torrance_parts(*angles, **surface).directional_diffuse, PARTS_DEG)
     diffuse = cut_of(he_torrance, PARTS_DEG, **surface)
     uniform = np.full(parts.x_deg.shape, surface["a"] / np.pi)
@@ -44,9 +44,9 @@ def fig_06() -> Figure:
         key="he-torrance-1991-fig-06",
         paper="he1991",
         title="Fig. 6: the three parts of a light intensity distribution",
-        caption=f"The table top of Fig. 14 at θ_i = {PARTS_DEG:.0f}°: {described(surface)}. Fig. 6 is a sketch without "
-        "parameters. Light and receiver have cones of π/1024 sr. Beside it, how the parts share the light of surfaces "
-        "that reflect all (|F|² = 1, a = 0, τ = 5 µm), at normal incidence.",
+        caption=f"The table top of Fig. 14 at θ_i = {PARTS_DEG:.0f}°: {parameters_text(surface)}. Fig. 6 is a sketch "
+        "without parameters. Light and receiver have cones of π/1024 sr. The last panel has the shares of both "
+        "parts for surfaces that reflect all light (|F|² = 1, a = 0, τ = 5 µm), at normal incidence.",
         panels=[
             _parts_panel("polar", total, parts.f_r, uniform),
             _parts_panel("curves", total, parts.f_r, uniform),
@@ -72,6 +72,7 @@ def fig_06() -> Figure:
 
 
 def _parts_panel(kind: Literal["curves", "polar"], total: Cut, directional: Floats, uniform: Floats) -> Panel:
+    """Return a panel of the three parts over the angle of the viewer."""
     return Panel(
         kind=kind,
         title=f"θ_i = {PARTS_DEG:.0f}°",
@@ -87,15 +88,16 @@ def _parts_panel(kind: Literal["curves", "polar"], total: Cut, directional: Floa
 
 
 def _contained(surface: Surface) -> Statement:
+    """Return the statement that the specular part lies within its cone."""
     half_angle = float(np.arcsin(np.sqrt(NARROW_SR / np.pi)))
-    off = np.linspace(-3.0, 3.0, 25)  # axes of the cones apart, in half angles of a cone
+    off = np.linspace(-3.0, 3.0, 25)  # distance of the axes of both cones, in half angles of a cone
     theta = float(radians(PARTS_DEG))
     viewer = theta + off * half_angle
     cones: dict[str, Any] = {"incident_solid_angle_sr": NARROW_SR, "received_solid_angle_sr": NARROW_SR}
     through_cones = he_torrance_aperture(theta, 0.0, viewer, np.pi, **cones, **surface)
     spike = through_cones - he_torrance(theta, 0.0, viewer, np.pi, **surface)
     expected = float(specular(surface, PARTS_DEG)) / (np.cos(theta) * NARROW_SR)
-    # the area that two equal circles share, of one
+    # Area that two equal circles share, over the area of one
     apart = np.minimum(np.abs(off) / 2.0, 1.0)
     shared = 2.0 / np.pi * (np.arccos(apart) - apart * np.sqrt(1.0 - apart**2))
     most = float(np.abs(spike / expected - shared).max())
@@ -103,14 +105,15 @@ def _contained(surface: Surface) -> Statement:
         says="the specularly-reflected part is contained within the specular cone of reflection",
         where="section 3.2, on Fig. 6",
         seen=f"Through cones of {NARROW_SR:.0e} sr it is {float(spike.max()):.4g} /sr in the mirror direction, where "
-        f"ρ_s / (cos θ_i dω_i) of eq. 6 is {expected:.4g}. Around it it falls as the area that two circles share, to 0 "
-        f"where the cones no longer overlap, within {most:.0e} of its height.",
+        f"ρ_s / (cos θ_i dω_i) of eq. 6 is {expected:.4g}. Around that direction it falls with the area that two "
+        f"circles share, to 0 where the cones no longer overlap, within {most:.0e} of its height.",
         threshold_from="a closed form: eq. 6, and the area that two circles share",
         holds=most < 1e-3,
     )
 
 
 def _far_from_diffuse(surface: Surface, f_r: Floats) -> Statement:
+    """Return the statement that the directional diffuse part is far from ideal diffuse."""
     mean = float(reflected({**surface, "a": 0.0}, PARTS_DEG, specular=False)) / np.pi
     return Statement(
         says="the diffraction-scattered part shows a directional distribution which is far from ideal diffuse",
@@ -123,6 +126,7 @@ def _far_from_diffuse(surface: Surface, f_r: Floats) -> Statement:
 
 
 def _uniform(surface: Surface, rest: Floats) -> Statement:
+    """Return the statement that the rest of f_r is uniform diffuse."""
     added = float(reflected(surface, PARTS_DEG) - reflected({**surface, "a": 0.0}, PARTS_DEG))
     return Statement(
         says="the last part is uniform diffuse (Lambertian)",
@@ -135,28 +139,31 @@ def _uniform(surface: Surface, rest: Floats) -> Statement:
 
 
 class _Shares(NamedTuple):
+    """Shares [1] of the light in the specular and in the directional diffuse part."""
+
     specular: Floats
     diffuse: Floats
 
 
 def _shares() -> tuple[Floats, _Shares]:
-    """Return sigma_0 over the wavelength, and the parts [1] of all light that a perfect reflector shares out."""
+    """Return sigma_0 over the wavelength, and the shares of the parts for a surface that reflects all light."""
     over_wavelength = np.geomspace(0.01, 0.3, 9)
     mirror = {"wavelength_nm": GREEN_NM, "tau_um": 5.0, "n": 1.0, "k": 1e4, "a": 0.0}
-    surfaces = [{**mirror, "sigma_0_um": each * GREEN_NM / 1000.0} for each in over_wavelength.tolist()]
+    surfaces = [{**mirror, "sigma_0_um": ratio * GREEN_NM / 1000.0} for ratio in over_wavelength.tolist()]
     return over_wavelength, _Shares(
-        np.array([float(specular(each, 0.0)) for each in surfaces]),
-        np.array([float(reflected(each, 0.0, specular=False)) for each in surfaces]),
+        np.array([float(specular(surface, 0.0)) for surface in surfaces]),
+        np.array([float(reflected(surface, 0.0, specular=False)) for surface in surfaces]),
     )
 
 
 def _partition(shares: _Shares) -> Statement:
+    """Return the statement that roughness partitions the light between both parts."""
     total = shares.specular + shares.diffuse
     return Statement(
         says="the model partitions energy into specular and diffuse-like components according to the roughness of the "
         "surface",
         where="section 1",
-        seen=f"Of a surface that reflects all light the two parts add up to {total.min():.4f} to {total.max():.4f} at "
+        seen=f"For a surface that reflects all light the two parts add up to {total.min():.4f} to {total.max():.4f} at "
         f"normal incidence, while the specular share falls from {shares.specular[0]:.3f} to {shares.specular[-1]:.0e}.",
         threshold_from="conservation: all light that is received, within 1 %",
         holds=bool(
@@ -171,76 +178,90 @@ def _partition(shares: _Shares) -> Statement:
 ANGLES_DEG = np.append(np.arange(0.0, 85.0, 2.5), [85.0, 86.0, 87.0, 88.0, 88.5, 89.0])
 SLOPES = {"aluminum of Fig. 8": 0.28 / 1.77, "table top of Fig. 14": 0.1, "σ_0/τ = 0.05": 0.05}
 SIMULATED_DEG = np.array([45.0, 60.0, 70.0, 75.0, 80.0, 83.0, 86.0, 88.0, 89.0])
-LONG_NM = 1e7  # at this wavelength e^-g is 1, and rho_s over |F|^2 is S
+LONG_NM = 1e7  # wavelength at which e^-g is 1, so that rho_s over |F|^2 is S
 
 
-class _Seen(NamedTuple):
-    """Shadowing and effective roughness of a surface, for light and a viewer in the mirror direction."""
+class _Visible(NamedTuple):
+    """Shadowing and effective roughness of a surface, with the viewer in the mirror direction of the light."""
 
     shadowing: Floats  # S
     roughness: Floats  # sigma / sigma_0
 
 
-def _of_model(slope: float, angles_deg: Floats) -> _Seen:
-    """Return S and sigma / sigma_0 [1] as the specular part of the model shows them, at two wavelengths."""
+def _of_model(slope: float, angles_deg: Floats) -> _Visible:
+    """Return S and sigma / sigma_0 [1] of the model, from its specular part at two wavelengths."""
     cosine = np.cos(radians(angles_deg))
     sigma_0_um = 0.1
     surface = {"sigma_0_um": sigma_0_um, "tau_um": sigma_0_um / slope, "n": 1.0, "k": 1e4}
-    # at this wavelength g is (sigma / sigma_0)^2
+    # g is (sigma / sigma_0)^2 at this wavelength
     short_nm = 4.0 * np.pi * sigma_0_um * 1000.0 * cosine
-    short, long = (specular({**surface, "wavelength_nm": each}, angles_deg) for each in (short_nm, LONG_NM))
-    return _Seen(
+    short, long = (specular({**surface, "wavelength_nm": nm}, angles_deg) for nm in (short_nm, LONG_NM))
+    return _Visible(
         long / he_torrance_smooth(radians(angles_deg), n=surface["n"], k=surface["k"]),
         np.sqrt(np.maximum(-np.log(short / long), 0.0)),
     )
 
 
-def _of_profiles(slope: float, angles_deg: Floats) -> tuple[_Seen, Floats]:
-    """Return the same of a simulated profile, and the share that one direction alone reaches."""
+def _of_profiles(slope: float, angles_deg: Floats) -> tuple[_Visible, Floats]:
+    """Return S and sigma / sigma_0 [1] of a simulated profile, and the share [1] that one direction alone reaches."""
     heights = profile(1991)
-    there = [reached(heights, slope, float(each)) for each in radians(angles_deg)]
-    back = [reached(heights[::-1], slope, float(each))[::-1] for each in radians(angles_deg)]
-    both = [one & other for one, other in zip(there, back, strict=True)]
-    seen = _Seen(np.array([each.mean() for each in both]), np.array([heights[each].std() for each in both]))
-    return seen, np.array([each.mean() for each in there])
+    lit = [reached(heights, slope, float(angle)) for angle in radians(angles_deg)]
+    viewed = [reached(heights[::-1], slope, float(angle))[::-1] for angle in radians(angles_deg)]
+    both = [one & other for one, other in zip(lit, viewed, strict=True)]
+    visible = _Visible(
+        np.array([points.mean() for points in both]), np.array([heights[points].std() for points in both])
+    )
+    return visible, np.array([points.mean() for points in lit])
+
+
+def _g_with_sigma_0(surface: Surface, theta_deg: float | Floats) -> Floats:
+    """Return g [1] of the specular part with sigma_0 in place of the effective roughness."""
+    cosine = np.cos(radians(theta_deg))
+    return np.asarray((4.0 * np.pi * surface["sigma_0_um"] * 1000.0 * cosine / surface["wavelength_nm"]) ** 2)
+
+
+def _over_angles(title: str, y_label: str, models: dict[str, Floats], simulated: Floats) -> Panel:
+    """Return a panel of a quantity over the angle, by the model for some slopes and by simulation."""
+    return Panel(
+        title=title,
+        x_label="θ_i = θ_r [degree]",
+        y_label=y_label,
+        curves=[
+            *(curve_of(name, ANGLES_DEG, values) for name, values in models.items()),
+            curve_of("aluminum, simulated", SIMULATED_DEG, simulated, "truth"),
+        ],
+    )
 
 
 def effective_roughness() -> Figure:
-    """Return shadowing and effective roughness towards grazing, of the model and of simulated surfaces."""
+    """Draw shadowing and effective roughness towards grazing, of the model and of simulated surfaces."""
     slope = SLOPES["aluminum of Fig. 8"]
     aluminum = surface_of("roughened-aluminum-500nm")
-    models = {name: _of_model(each, ANGLES_DEG) for name, each in SLOPES.items()}
+    models = {name: _of_model(steepness, ANGLES_DEG) for name, steepness in SLOPES.items()}
     simulated, _ = _of_profiles(slope, SIMULATED_DEG)
     drawn = _of_model(slope, ANGLES_DEG)
     rho_s = specular(aluminum, ANGLES_DEG)
-    cosine = np.cos(radians(ANGLES_DEG))
-    g_0 = (4.0 * np.pi * aluminum["sigma_0_um"] * 1000.0 * cosine / aluminum["wavelength_nm"]) ** 2
+    g_0 = _g_with_sigma_0(aluminum, ANGLES_DEG)
     fixed = he_torrance_smooth(radians(ANGLES_DEG), n=aluminum["n"], k=aluminum["k"]) * drawn.shadowing * np.exp(-g_0)
     return Figure(
         key="he-torrance-1991-effective-roughness",
         paper="he1991",
         title="Effective roughness and shadowing at grazing angles",
         caption="Light and viewer in each other's mirror direction. S and σ are taken from ρ_s (eq. 73) at two "
-        "wavelengths. Simulated: a Gaussian profile of 6554 autocorrelation lengths, of which points count that both "
-        "reach; σ is the standard deviation of their heights. The paper has no such figure.",
+        "wavelengths. Simulated: a Gaussian profile of 6554 autocorrelation lengths. Its points count if both light "
+        "and viewer reach them; σ is the standard deviation of their heights. The paper has no such figure.",
         panels=[
-            Panel(
-                title="Effective roughness, eq. 53",
-                x_label="θ_i = θ_r [degree]",
-                y_label="σ / σ_0",
-                curves=[
-                    *(curve_of(name, ANGLES_DEG, each.roughness) for name, each in models.items()),
-                    curve_of("aluminum, simulated", SIMULATED_DEG, simulated.roughness, "truth"),
-                ],
+            _over_angles(
+                "Effective roughness, eq. 53",
+                "σ / σ_0",
+                {name: model.roughness for name, model in models.items()},
+                simulated.roughness,
             ),
-            Panel(
-                title="Shadowing, eq. 23",
-                x_label="θ_i = θ_r [degree]",
-                y_label="S",
-                curves=[
-                    *(curve_of(name, ANGLES_DEG, each.shadowing) for name, each in models.items()),
-                    curve_of("aluminum, simulated", SIMULATED_DEG, simulated.shadowing, "truth"),
-                ],
+            _over_angles(
+                "Shadowing, eq. 23",
+                "S",
+                {name: model.shadowing for name, model in models.items()},
+                simulated.shadowing,
             ),
             Panel(
                 title="Specular reflectance of aluminum at 0.5 µm",
@@ -256,21 +277,23 @@ def effective_roughness() -> Figure:
     )
 
 
-def _smaller(models: dict[str, _Seen]) -> Statement:
-    index = [int(np.searchsorted(ANGLES_DEG, each)) for each in (45.0, 75.0, 89.0)]
-    values = {name: each.roughness[index] for name, each in models.items()}
+def _smaller(models: dict[str, _Visible]) -> Statement:
+    """Return the statement that the effective roughness is smaller than sigma_0 at grazing angles."""
+    index = [int(np.searchsorted(ANGLES_DEG, angle)) for angle in (45.0, 75.0, 89.0)]
+    values = {name: model.roughness[index] for name, model in models.items()}
     rows = "; ".join(f"{name}: {listed(row, '.3f')}" for name, row in values.items())
     return Statement(
         says="when roughness valleys are shadowed or masked, the effective surface roughness can be significantly "
         "smaller than the rms roughness σ_0, especially at grazing angles of incidence or reflection",
         where="section 3.1",
-        seen=f"At 45, 75 and 89° σ / σ_0 is, {rows}.",
+        seen=f"σ / σ_0 at 45, 75 and 89°: {rows}.",
         threshold_from="our reading: significantly smaller is less than half",
         holds=all(row[0] > 0.99 and row[-1] < 0.5 for row in values.values()),
     )
 
 
 def _of_lit_parts(slope: float) -> Statement:
+    """Return the statement that sigma is the roughness of the lit and visible parts."""
     model, (simulated, _) = _of_model(slope, SIMULATED_DEG), _of_profiles(slope, SIMULATED_DEG)
     off = model.roughness / simulated.roughness - 1.0
     return Statement(
@@ -279,16 +302,17 @@ def _of_lit_parts(slope: float) -> Statement:
         where="appendix A.4, eqs 53 to 55",
         seen="On simulated surfaces with the slope of the aluminum the heights of such parts have a standard deviation "
         f"of {listed(simulated.roughness, '.2f')} σ_0 at {listed(SIMULATED_DEG, '.0f')}°; eq. 53 gives "
-        f"{listed(model.roughness, '.2f')}, which is {off.min():+.0%} to {off.max():+.0%} off: too late, then too far.",
+        f"{listed(model.roughness, '.2f')}, which is {off.min():+.0%} to {off.max():+.0%} off: it falls too late, and "
+        "then too far.",
         threshold_from="our reading: the roughness of lit parts is within 10 % of that of a simulation",
         holds=bool(np.abs(off).max() < SMALL),
     )
 
 
 def _smoother(slope: float) -> Statement:
+    """Return the statement that the surface appears somewhat smoother at 75 degrees."""
     ratio = float(_of_model(slope, np.array([75.0])).roughness[0])
-    aluminum = surface_of("roughened-aluminum-500nm")
-    g_0 = (4.0 * np.pi * aluminum["sigma_0_um"] * 1000.0 * np.cos(radians(75.0)) / aluminum["wavelength_nm"]) ** 2
+    g_0 = float(_g_with_sigma_0(surface_of("roughened-aluminum-500nm"), 75.0))
     return Statement(
         says="for 75° a specular peak emerges as the surface appears somewhat smoother to the incident radiation",
         where="section 4, on Fig. 8",
@@ -300,6 +324,7 @@ def _smoother(slope: float) -> Statement:
 
 
 def _shadowing(slope: float) -> list[Statement]:
+    """Return the statements on Smith's shadowing, of one direction and of both."""
     model, (simulated, alone) = _of_model(slope, SIMULATED_DEG), _of_profiles(slope, SIMULATED_DEG)
     one = np.sqrt(model.shadowing)
     off = float(np.abs(one - alone).max())
@@ -317,8 +342,8 @@ def _shadowing(slope: float) -> list[Statement]:
         Statement(
             says="S is the fraction of the surface that is both illuminated and viewed",
             where="appendix A.1, eq. 23",
-            seen=f"At 80° the mirror direction and the light share {simulated.shadowing[index]:.3f} of a simulated "
-            f"profile, where S is {model.shadowing[index]:.3f}. A viewer next to the light sees all that it reaches, "
+            seen=f"At 80° {simulated.shadowing[index]:.3f} of a simulated profile is lit and seen from the mirror "
+            f"direction, and S is {model.shadowing[index]:.3f}. A viewer next to the light sees all lit points, "
             f"{alone[index]:.3f}; S is the same {model.shadowing[index]:.3f} there.",
             threshold_from="our reading: the fraction is within 5 % of the surface",
             holds=abs(model.shadowing[index] - alone[index]) < 0.05,

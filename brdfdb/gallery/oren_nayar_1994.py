@@ -1,4 +1,4 @@
-"""The figures of Oren and Nayar 1994 by key, each a function that computes it."""
+"""The figures of Oren and Nayar 1994: a function by key."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures 12 and 13 of Oren and Nayar 1994: how well their approximations follow the integral."""
+"""Figures 12 and 13 of Oren and Nayar 1994: errors of their approximations against the integral."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from brdfdb.models import (
 )
 from brdfdb.parameters import Floats
 
-EXACT = 1e-9  # relative, between a closed form and the model
+EXACT = 1e-9  # relative difference of a closed form and the model
 
 
 class _Forms(NamedTuple):
@@ -47,12 +47,14 @@ class _Forms(NamedTuple):
 
 
 def _forms(theta_i_deg: float, delta_phi_deg: float = 0.0) -> _Forms:
+    """Return the radiance [E_0] of all forms for one light."""
     models = oren_nayar_gaussian, oren_nayar, oren_nayar_qualitative
     cosine = to_radiance(theta_i_deg)
     return _Forms(*(cosine * across(model, theta_i_deg, delta_phi_deg, **rough(30.0)) for model in models))
 
 
 def _side_by_side(title: str, forms: _Forms) -> Panel:
+    """Return a panel of the radiance of all forms."""
     return Panel(
         title=title,
         x_label=THETA_R_LABEL,
@@ -66,7 +68,7 @@ def _side_by_side(title: str, forms: _Forms) -> Panel:
 
 
 def fig_12() -> Figure:
-    """The functional approximation against the integral."""
+    """Draw Fig. 12: the functional approximation against the integral."""
     lights_deg = [15.0, 30.0, 45.0, 60.0, 75.0]
     lines = [_forms(light) for light in lights_deg]
     off = [distance(forms.functional, forms.integrated) for forms in lines]
@@ -83,7 +85,7 @@ def fig_12() -> Figure:
                 says="in all cases, the functional approximation proves to be very accurate",
                 where="section 4.3, Fig. 12",
                 seen=f"It is {listed(off, '.1%')} of the mean radiance off, root mean square, for θ_i of "
-                f"{listed(lights_deg, '.0f')}° (very accurate: {VERY_ACCURATE:.0%}); at worst "
+                f"{listed(lights_deg, '.0f')}° (very accurate: {VERY_ACCURATE:.0%}). The largest difference is "
                 f"{last[np.argmax(np.abs(last))]:+.0%} of the value, at θ_i = 75° and θ_r = "
                 f"{THETA_R[np.argmax(np.abs(last))]:.0f}°.",
                 holds=min(off) > 0.0 and max(off) < VERY_ACCURATE,
@@ -96,6 +98,7 @@ def fig_12() -> Figure:
 
 
 def _twice_reflected() -> Statement:
+    """Return the statement that the second bounce follows the square of the albedo."""
     dark, bright = 0.45, 0.9
     angles, sigma = (0.5, 0.0, 0.9, 2.5), float(radians(30.0))
     ratios = []
@@ -106,15 +109,15 @@ def _twice_reflected() -> Statement:
     return Statement(
         says="a factor of ρ/π for each of two bounces",
         where="eqs 12, 17 and 28: (ρ/π)² E_0",
-        seen=f"With ρ twice as large the second bounce is {listed(ratios, '.6f')} times as bright, by the functional "
+        seen=f"With twice the ρ the second bounce is {listed(ratios, '.6f')} times as bright, by the functional "
         "approximation and by the integral.",
         holds=bool(np.allclose(ratios, expected, rtol=EXACT)),
-        threshold_from="conservation: light that met two facets is absorbed twice",
+        threshold_from="conservation: light that two facets reflect is absorbed twice",
     )
 
 
 def fig_13() -> Figure:
-    """The qualitative model against the integral."""
+    """Draw Fig. 13: the qualitative model against the integral."""
     azimuths_deg = [0.0, 45.0, 90.0]
     lines = [_forms(GRAZING_LIGHT, azimuth) for azimuth in azimuths_deg]
     return Figure(
@@ -132,6 +135,7 @@ def fig_13() -> Figure:
 
 
 def _slight_sacrifice(lines: list[_Forms]) -> Statement:
+    """Return the statement on the accuracy that the qualitative model gives up."""
     functional = [distance(forms.functional, forms.integrated) for forms in lines]
     qualitative = [distance(forms.qualitative, forms.integrated) for forms in lines]
     forward = [float(values[0]) for values in lines[0]]
@@ -148,7 +152,7 @@ def _slight_sacrifice(lines: list[_Forms]) -> Statement:
 
 
 def _hemispheres() -> tuple[Floats, Floats, Floats, Floats]:
-    """theta_i, theta_r, phi_r - phi_i [rad] of pairs of directions, and weights of f_r: its albedo in uniform light."""
+    """Return theta_i, theta_r, phi_r - phi_i [rad] of pairs of directions, and the weights of f_r in uniform light."""
     theta, azimuth = radians(np.arange(5.0, 90.0, 10.0)), radians(np.arange(10.0, 180.0, 20.0))
     theta_i, theta_r, delta_phi = np.meshgrid(theta, theta, azimuth, indexing="ij")
     cosines = np.sin(2.0 * theta_i) * np.sin(2.0 * theta_r)
@@ -156,9 +160,10 @@ def _hemispheres() -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def _third_coefficient() -> Statement:
+    """Return the statement on the contribution of C_3."""
     theta_i, theta_r, delta_phi, weight = _hemispheres()
     total = oren_nayar(theta_i, 0.0, theta_r, delta_phi, **rough(30.0))
-    # The term has |cos(delta_phi)| alone; on the side of the light it is all by which eq. 27 and eq. 30 differ
+    # The term depends on |cos(delta_phi)|. On the side of the light it is the only difference of eqs 27 and 30
     folded = theta_i, 0.0, theta_r, np.minimum(delta_phi, np.pi - delta_phi)
     term = oren_nayar(*folded, **rough(30.0), interreflection=False) - oren_nayar_qualitative(*folded, **rough(30.0))
     share = float(np.sum(term * weight) / np.sum(total * weight))
@@ -171,15 +176,16 @@ def _third_coefficient() -> Statement:
     return Statement(
         says="the simulations showed that coefficient C_3 makes a relatively small contribution to the total radiance",
         where="section 4.4",
-        seen=f"{share:.2%}, with C_3 of eq. 27 {expected:.2%}, of what is reflected of uniform light at σ = 30° "
+        seen=f"It is {share:.2%} of the reflected part of uniform light, by C_3 of eq. 27 {expected:.2%}, at σ = 30° "
         f"(small: {SMALL:.0%}), but up to "
         f"{np.max(term / total):.0%} of the radiance, at θ_i, θ_r and φ_r - φ_i of {listed(where, '.1f')}°.",
         holds=share < SMALL and bool(np.isclose(share, expected, rtol=EXACT)),
-        threshold_from="our reading: small is a tenth; how small, the closed form of C_3 says",
+        threshold_from="our reading: small is a tenth; the closed form of C_3 gives the share",
     )
 
 
 def _note_7() -> Statement:
+    """Return the statement on the constant that compensates the missing interreflection."""
     theta_i, theta_r, delta_phi, weight = _hemispheres()
     angles = theta_i, 0.0, theta_r, delta_phi
     surface = float(np.sum(weight * oren_nayar_gaussian(*angles, **rough(30.0))))
@@ -190,7 +196,7 @@ def _note_7() -> Statement:
         says="discrepancies caused by the lack of the interreflection component in the qualitative model can be "
         "partially compensated by replacing the constant 0.33 in coefficient A with 0.57",
         where="note 7",
-        seen=f"Of uniform light the surface reflects {surface:.3f}, the model {printed:.3f} with 0.33 and "
+        seen=f"The surface reflects {surface:.3f} of uniform light, the model {printed:.3f} with 0.33 and "
         f"{changed:.3f} with 0.57.",
         holds=abs(changed - surface) < SMALL * abs(printed - surface),
         threshold_from="our reading: partially compensated, in uniform light, leaves a tenth or less",
@@ -198,12 +204,13 @@ def _note_7() -> Statement:
 
 
 def _smooth_qualitative() -> Statement:
+    """Return the statement that the qualitative model of a smooth surface is Lambert's."""
     flat = across(lambert, GRAZING_LIGHT, rho=RHO)
     off = float(np.abs(across(oren_nayar_qualitative, GRAZING_LIGHT, **rough(0.0)) / flat - 1.0).max())
     return Statement(
         says="the qualitative model also reduces to the Lambertian model when σ = 0",
         where="section 4.4",
-        seen=f"No further than {off:.1g} of it from ρ / π.",
+        seen=f"f_r differs from ρ / π by {off:.1g} of it at most.",
         holds=off <= ROUNDING,
         threshold_from="the paper's words: reduces to, in float64",
     )

@@ -1,4 +1,4 @@
-"""Figures of what Oren and Nayar 1994 leave out or approximate: later bounces, eq. 44 between planes, eq. 48."""
+"""Figures of the approximations of Oren and Nayar 1994: later bounces, eq. 44 between planes, and eq. 48."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from brdfdb.figure import Figure, Map, Panel, Statement, curve_of, listed, rows
 from brdfdb.gallery._oren_nayar_evaluated import evaluated, evaluated_parts
 from brdfdb.gallery._oren_nayar_lines import (
     PAPER,
+    RADIANCE,
     SMALL,
     THETA_R,
     THETA_R_LABEL,
@@ -20,6 +21,9 @@ from brdfdb.gallery._oren_nayar_lines import (
     curve,
     distance,
     left_past,
+    rough,
+    to_radiance,
+    very_accurate,
 )
 from brdfdb.gallery._v_grooves import bounces
 from brdfdb.geometry import degrees, radians
@@ -31,15 +35,14 @@ from brdfdb.models import (
 )
 from brdfdb.parameters import Floats
 
-RADIANCE = "radiance L_r, of E_0 = 1"
-RAPIDLY = 0.5  # our reading of "diminishes rapidly": a bounce has at most half of the one before
-SAME = 0.01  # of strips, slopes and azimuths that are summed, not integrated: 0.6 % at 88 degrees
-ORDERS = 5  # bounces 1 to 4, and all later ones
+RAPIDLY = 0.5  # ratio of bounces for "diminishes rapidly", our reading: at most half of the bounce before
+SAME = 0.01  # relative error of sums over strips, slopes and azimuths: 0.6 % at 88 degrees
+ORDERS = 5  # bounces 1 to 4, and the sum of all later bounces
 SAMPLES = {"Fig. 8, and wall plaster": (0.9, 30.0), "painted sandpaper": (0.8, 40.0), "white sand": (0.8, 35.0)}
 
 
 class _Bounces(NamedTuple):
-    """Radiance over VIEWERS_DEG, bounce by bounce (ORDERS, viewers), and the two parts of the model."""
+    """Radiance over VIEWERS_DEG, by bounce (ORDERS, viewers), and the two parts of the model."""
 
     summed: Floats
     direct: Floats
@@ -50,6 +53,7 @@ VIEWERS_DEG = np.arange(-88.0, 89.0, 4.0)
 
 
 def _bounces(theta_i_deg: float, rho: float, sigma_deg: float) -> _Bounces:
+    """Return the radiance [E_0] by bounce in the plane of incidence."""
     theta_i, sigma = float(radians(theta_i_deg)), float(radians(sigma_deg))
     theta_r, delta_phi = radians(np.abs(VIEWERS_DEG)), np.where(VIEWERS_DEG < 0.0, np.pi, 0.0)
     cosine = np.cos(theta_i)
@@ -59,7 +63,7 @@ def _bounces(theta_i_deg: float, rho: float, sigma_deg: float) -> _Bounces:
 
 
 def two_bounces() -> Figure:
-    """Bounces one by one, to see how good two are."""
+    """Draw the bounces one by one, to judge the approximation by two."""
     lights_deg = [30.0, 75.0]
     lines = {light: _bounces(light, 0.9, 30.0) for light in lights_deg}
     return Figure(
@@ -67,97 +71,100 @@ def two_bounces() -> Figure:
         paper=PAPER,
         title="Bounces of light in V-cavities, one by one",
         caption="σ = 30°, ρ = 0.90, plane of incidence. Each facet is cut into 32 strips that exchange light by their "
-        "view factors; no equation of the paper's interreflection is used. The paper says that it simulated this and "
-        "shows no figure; θ_i = 75° is that of Fig. 8.",
+        "view factors; no equation of the paper's interreflection is used. The paper mentions such a simulation but "
+        "shows no figure. θ_i = 75° is that of Fig. 8.",
         panels=[
             Panel(
                 title=f"θ_i = {light:.0f}°",
                 x_label=THETA_R_LABEL,
                 y_label=RADIANCE,
                 curves=[
-                    curve_of("all bounces", VIEWERS_DEG, each.summed.sum(axis=0), "truth"),
-                    curve_of("two bounces, eqs 10 to 20", VIEWERS_DEG, each.direct + each.second, "ours"),
-                    curve_of("second bounce", VIEWERS_DEG, each.summed[1]),
-                    curve_of("third", VIEWERS_DEG, each.summed[2]),
-                    curve_of("fourth", VIEWERS_DEG, each.summed[3]),
-                    curve_of("fifth and later", VIEWERS_DEG, each.summed[4]),
+                    curve_of("all bounces", VIEWERS_DEG, line.summed.sum(axis=0), "truth"),
+                    curve_of("two bounces, eqs 10 to 20", VIEWERS_DEG, line.direct + line.second, "ours"),
+                    curve_of("second bounce", VIEWERS_DEG, line.summed[1]),
+                    curve_of("third", VIEWERS_DEG, line.summed[2]),
+                    curve_of("fourth", VIEWERS_DEG, line.summed[3]),
+                    curve_of("fifth and later", VIEWERS_DEG, line.summed[4]),
                 ],
             )
-            for light, each in lines.items()
+            for light, line in lines.items()
         ],
         statements=[_diminishes(list(lines.values()), lights_deg), _good(), _strips(list(lines.values()), lights_deg)],
     )
 
 
 def _diminishes(lines: list[_Bounces], lights_deg: list[float]) -> Statement:
-    shares = [each.summed[1:4].mean(axis=1) / each.summed[:3].mean(axis=1) for each in lines]
-    said = "; ".join(
+    """Return the statement that the energy diminishes with each bounce."""
+    shares = [line.summed[1:4].mean(axis=1) / line.summed[:3].mean(axis=1) for line in lines]
+    ratios = "; ".join(
         f"{listed(share, '.2f')} for θ_i = {light:.0f}°" for share, light in zip(shares, lights_deg, strict=True)
     )
     return Statement(
         says="in the case of Lambertian surfaces, the energy in an incident light ray diminishes rapidly with each "
         "interreflection bounce",
         where="section 4.1.2",
-        seen=f"Bounces 2, 3 and 4 have these shares of the radiance of the bounce before, mean of the plane: {said} "
-        f"(rapidly: {RAPIDLY:.1f} or less). The share grows: what is left is left in the steepest cavities.",
+        seen=f"The mean radiance of bounces 2, 3 and 4 over that of the bounce before is {ratios} "
+        f"(rapidly: {RAPIDLY:.1f} or less). The ratio grows, because the steepest cavities keep the light.",
         threshold_from="our reading: a bounce that diminishes rapidly has at most half of the one before",
         holds=bool(np.max(shares) <= RAPIDLY),
     )
 
 
 def _good() -> Statement:
+    """Return the statement that two bounces are a good approximation."""
     off, worst = [], []
     for rho, sigma_deg in SAMPLES.values():
         lines = [_bounces(light, rho, sigma_deg) for light in (30.0, 60.0)]
-        totals = [each.summed.sum(axis=0) for each in lines]
+        totals = [line.summed.sum(axis=0) for line in lines]
         pairs = list(zip(lines, totals, strict=True))
-        off.append(max(distance(each.direct + each.second, total) for each, total in pairs))
-        worst.append(max(float((1.0 - (each.direct + each.second) / total).max()) for each, total in pairs))
+        off.append(max(distance(line.direct + line.second, total) for line, total in pairs))
+        worst.append(max(float((1.0 - (line.direct + line.second) / total).max()) for line, total in pairs))
     return Statement(
         says="simulations of the interreflection process were used to verify that this approximation (two bounces) is "
         "good",
         where="section 4.1.2",
-        seen=f"Of {', '.join(SAMPLES)} (θ_i of 30 and 60°) two bounces lack at most {listed(off, '.1%')} of "
-        f"the mean radiance, root mean square (good: {SMALL:.0%}); in single directions up to {listed(worst, '.0%')} "
-        "of the value.",
+        seen=f"For {', '.join(SAMPLES)} (θ_i of 30 and 60°) two bounces lack at most {listed(off, '.1%')} of "
+        f"the mean radiance, root mean square (good: {SMALL:.0%}), and in single directions up to "
+        f"{listed(worst, '.0%')} of the value.",
         threshold_from="our reading: good is within 10 % of the mean, root mean square",
         holds=max(off) < SMALL,
     )
 
 
 def _strips(lines: list[_Bounces], lights_deg: list[float]) -> Statement:
-    direct = max(float(np.abs(each.direct / each.summed[0] - 1.0).max()) for each in lines)
-    second = max(float(np.abs(each.second / each.summed[1] - 1.0).max()) for each in lines)
+    """Return the statement that the model has the first and the second bounce of the strips."""
+    direct = max(float(np.abs(line.direct / line.summed[0] - 1.0).max()) for line in lines)
+    second = max(float(np.abs(line.second / line.summed[1] - 1.0).max()) for line in lines)
     return Statement(
         says="eqs 10 to 20, averaged over the slopes, are the first and the second bounce",
         where="known of the form: view factors of strips, which use none of eqs 11 to 20",
         seen=f"The sums differ by {direct:.2%} of direct light at most, and by {second:.2%} of the second bounce, for "
         f"θ_i of {listed(lights_deg, '.0f')}°.",
-        threshold_from="an independent evaluation: strips and their strings, to what the sums leave",
+        threshold_from="an independent evaluation: strips and their strings, within the error of the sums",
         holds=max(direct, second) < SAME,
     )
 
 
-SLOPE_DEG = 30.0  # of the facets of the figure of eq. 44
+SLOPE_DEG = 30.0  # slope of the facets of the figure of eq. 44
 GRID_DEG = np.arange(2.5, 90.0, 5.0)
-TURN_DEG = 45.0  # half way between the planes that eq. 44 is exact in
+TURN_DEG = 45.0  # azimuth half way between the planes in which eq. 44 is exact
 
 
 def _integrated(theta_i: Floats, theta_r: Floats, delta_phi: Floats, theta_a: Floats, *, azimuths: int = 90) -> Floats:
-    """Return direct light [1/sr] of one slope in all azimuths, eq. 23, as a mean over azimuths of cavities; rho = 1."""
+    """Return direct f_r [1/sr] of one slope in all azimuths, eq. 23, by a mean over azimuths of cavities; rho = 1."""
     azimuth = (np.arange(azimuths) + 0.5) * np.pi / azimuths
-    arguments = (each[..., None] for each in (theta_i, np.zeros_like(theta_i), theta_r, delta_phi))
+    arguments = (angle[..., None] for angle in (theta_i, np.zeros_like(theta_i), theta_r, delta_phi))
     parts = oren_nayar_unidirectional_parts(*arguments, rho=1.0, theta_a=theta_a[..., None], phi_a=azimuth)
     return np.asarray(parts.direct.mean(axis=-1))
 
 
 def _weighted(theta_i: Floats, theta_r: Floats, delta_phi: Floats, theta_a: Floats) -> Floats:
-    """Return the same [1/sr] by eq. 44, from the closed forms in its two planes."""
+    """Return direct f_r [1/sr] of one slope in all azimuths by eq. 44, from the closed forms in its two planes."""
     return oren_nayar_single_slope_parts(theta_i, 0.0, theta_r, delta_phi, rho=1.0, theta_a=theta_a).direct
 
 
 def weighted_sum() -> Figure:
-    """Eq. 44 against the integral that it stands for, and eq. 48 against eq. 47."""
+    """Draw eq. 44 against the integral that it approximates, and eq. 48 against eq. 47."""
     turn = np.arange(0.0, 181.0, 3.0)
     lines = []
     for theta_deg in (60.0, 75.0, 85.0):
@@ -200,6 +207,7 @@ def weighted_sum() -> Figure:
 
 
 def _in_general() -> Statement:
+    """Return the statement that eq. 44 is in general very accurate."""
     slopes_deg = [10.0, 20.0, 30.0, 40.0, 50.0]
     turn = radians(np.arange(7.5, 180.0, 15.0))
     grid = np.meshgrid(radians(GRID_DEG), radians(GRID_DEG), turn, radians(slopes_deg), indexing="ij")
@@ -211,7 +219,7 @@ def _in_general() -> Statement:
     return Statement(
         says="the weighted sum of the radiance in the two planes (eq. 44) is in general very accurate",
         where="appendix B.1",
-        seen=f"Over all directions of uniform light and of viewers eq. 44 is {listed(off, '.1%')} of the mean off, "
+        seen=f"In uniform light, over all viewers, eq. 44 is {listed(off, '.1%')} of the mean off, "
         f"root mean square, for facets of {listed(slopes_deg, '.0f')}° (very accurate: {VERY_ACCURATE:.0%}).",
         threshold_from="our reading: very accurate is within 5 % of the mean, root mean square",
         holds=bool(np.max(off) < VERY_ACCURATE),
@@ -219,6 +227,7 @@ def _in_general() -> Statement:
 
 
 def _over_estimation() -> list[Statement]:
+    """Return the statements on the place and the size of the over-estimation of eq. 44."""
     turn = radians(np.arange(0.0, 181.0, 15.0))
     grid = np.meshgrid(radians(GRID_DEG), radians(GRID_DEG), turn, radians([SLOPE_DEG]), indexing="ij")
     off = _weighted(*grid) / _integrated(*grid) - 1.0
@@ -250,6 +259,7 @@ def _over_estimation() -> list[Statement]:
 
 
 def _exact_in_planes() -> Statement:
+    """Return the statement that eqs 40 to 43 are exact in their two planes."""
     grid = np.meshgrid(
         radians(GRID_DEG), radians(GRID_DEG), radians([0.0, 90.0, 180.0]), radians([20.0, 40.0]), indexing="ij"
     )
@@ -259,16 +269,16 @@ def _exact_in_planes() -> Statement:
         says="in the plane of incidence and across it, eqs 40 to 43 are the integral of eq. 23",
         where="known of the form: appendix B.1, and the integral facet by facet",
         seen=f"For facets of 20 and 40° they differ by {off:.1e} of the mean at most.",
-        threshold_from="an independent evaluation: facets at 360 azimuths, to what their sum leaves",
+        threshold_from="an independent evaluation: facets at 360 azimuths, within the error of their sum",
         holds=off < SAME,
     )
 
 
 def _interreflection_factors() -> tuple[Floats, dict[float, Floats], list[float]]:
-    """Return widths hidden [1], the factor of eq. 48 over that of eq. 47 by slope [degree], and its limits.
+    """Return hidden widths [1], the factor of eq. 48 over that of eq. 47 by slope [degree], and its limits.
 
-    Light and viewer stand opposite each other across the cavity, at the same angle. Where
-    tan(theta) = (1 + m) / (1 - m) cot(theta_a) each hides a width m of a facet (eqs 15 and 16).
+    Light and viewer stand opposite each other across the cavity, at the same angle. At
+    tan(theta) = (1 + m) / (1 - m) cot(theta_a) each of them hides a width m of a facet (eqs 15 and 16).
     """
     hidden = np.linspace(0.0, 0.98, 50)
     factors = {}
@@ -276,15 +286,16 @@ def _interreflection_factors() -> tuple[Floats, dict[float, Floats], list[float]
         slope = float(radians(slope_deg))
         theta = np.arctan((1.0 + hidden) / (1.0 - hidden) / np.tan(slope))
         exact = oren_nayar_unidirectional_parts(theta, 0.0, theta, np.pi, rho=1.0, theta_a=slope, phi_a=0.0)
-        # Eqs (17) and (22) with eq. (48); a factor of 1 / 2, since one of the two facets faces the viewer
+        # Eqs (17) and (22) with eq. (48). The factor of 1 / 2: one of the two facets faces the viewer
         facing = np.cos(slope) + np.sin(slope) * np.tan(theta)
         factor = np.pi * (1.0 - np.cos(slope)) * (1.0 - hidden) ** 2
         factors[slope_deg] = 0.5 / np.pi**2 * facing**2 / np.cos(slope) * factor / exact.interreflected
-    limits = [float(4.0 * np.cos(radians(each)) / (1.0 + np.cos(radians(each)))) for each in factors]
+    limits = [float(4.0 * np.cos(radians(slope)) / (1.0 + np.cos(radians(slope)))) for slope in factors]
     return hidden, factors, limits
 
 
 def _factor(factors: dict[float, Floats], limits: list[float]) -> list[Statement]:
+    """Return the statements on the factor of eq. 48 at both ends of the hidden width."""
     first, last = ([float(ratio[index]) for ratio in factors.values()] for index in (0, -1))
     off = float(np.abs(np.subtract(first, 1.0)).max())
     return [
@@ -307,14 +318,14 @@ def _factor(factors: dict[float, Floats], limits: list[float]) -> list[Statement
 
 
 def evaluation() -> Figure:
-    """Figs 8 and 12 by eqs 24 and 49, as the paper evaluates them."""
-    surface = {"rho": 0.9, "sigma": float(radians(30.0))}
+    """Draw Figs 8 and 12 by eqs 24 and 49, as the paper evaluates them."""
+    surface = rough(30.0)
     light = 75.0
-    cosine = float(np.cos(radians(light)))
+    cosine = to_radiance(light)
     own, facets = (across(model, light, **surface) for model in (evaluated_parts, oren_nayar_gaussian_parts))
     totals = [cosine * (parts.direct + parts.interreflected) for parts in (own, facets)]
     lights_deg = [15.0, 30.0, 45.0, 60.0, 75.0]
-    fits = [(across(oren_nayar, each, **surface), across(evaluated, each, **surface)) for each in lights_deg]
+    fits = [(across(oren_nayar, theta_i, **surface), across(evaluated, theta_i, **surface)) for theta_i in lights_deg]
     off = [distance(fit, numbers) for fit, numbers in fits]
     share = own.interreflected / (own.direct + own.interreflected)
     left = left_past(totals[0], light)
@@ -337,7 +348,7 @@ def evaluation() -> Figure:
             ),
             *(
                 Panel(
-                    title=f"Fig. 12, θ_i = {each:.0f}°",
+                    title=f"Fig. 12, θ_i = {theta_i:.0f}°",
                     x_label=THETA_R_LABEL,
                     y_label="f_r [1/sr]",
                     curves=[
@@ -345,32 +356,25 @@ def evaluation() -> Figure:
                         curve("functional approximation, eqs 27 and 28", fit, "ours"),
                     ],
                 )
-                for each, (fit, numbers) in zip(lights_deg, fits, strict=True)
-                if each in (30.0, 75.0)
+                for theta_i, (fit, numbers) in zip(lights_deg, fits, strict=True)
+                if theta_i in (30.0, 75.0)
             ),
         ],
         statements=[
-            Statement(
-                says="in all cases, the functional approximation proves to be very accurate",
-                where="section 4.3, Fig. 12",
-                seen=f"It is {listed(off, '.1%')} of the mean off the paper's own evaluation, root mean square, for "
-                f"θ_i of {listed(lights_deg, '.0f')}° (very accurate: {VERY_ACCURATE:.0%}).",
-                threshold_from="our reading: very accurate is within 5 % of the mean, root mean square",
-                holds=max(off) < VERY_ACCURATE,
-            ),
+            very_accurate(off, lights_deg, "section 4.3, Fig. 12"),
             Statement(
                 says="the cut-off occurs exactly at θ_r = θ_i",
                 where="section 4.3, Fig. 8",
-                seen=f"The sharpest bend is at {THETA_R[1:-1][np.argmin(np.diff(totals[0], 2))]:.0f}°; with the first "
-                f"degree past it radiance grows by {left:.0%} of what the last degree before it gave.",
+                seen=f"The sharpest bend is at {THETA_R[1:-1][np.argmin(np.diff(totals[0], 2))]:.0f}°. In the first "
+                f"degree past it radiance grows by {left:.0%} of its growth in the last degree before.",
                 threshold_from="the paper's words: exactly, to the degree that is drawn",
                 holds=bool(THETA_R[1:-1][np.argmin(np.diff(totals[0], 2))] == light and left < 1.0 - SMALL),
             ),
             Statement(
                 says="interreflections dominate in the forward direction",
                 where="section 4.3, Fig. 8",
-                seen=f"They are {at(share, -60.0):.0%} of the radiance at θ_r = -60°, {share.max():.1%} at "
-                f"{THETA_R[np.argmax(share)]:.0f}°, where most, and {at(share, 75.0):.1%} at 75°.",
+                seen=f"They are {at(share, -60.0):.0%} of the radiance at θ_r = -60°, at most {share.max():.1%} at "
+                f"{THETA_R[np.argmax(share)]:.0f}°, and {at(share, 75.0):.1%} at 75°.",
                 threshold_from="the paper's words: dominate, read as more than half",
                 holds=bool(share.max() > 0.5 and THETA_R[np.argmax(share)] < 0.0),
             ),

@@ -1,4 +1,4 @@
-"""Figures 8 to 11 of Oren and Nayar 1994: what their model predicts."""
+"""Figures 8 to 11 of Oren and Nayar 1994: predictions of their model."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from brdfdb.models import (
 )
 from brdfdb.parameters import Floats
 
-BY_HAND = 2e-3  # relative, between a plain sum over facets and the integral
+BY_HAND = 2e-3  # relative difference of a plain sum over facets and the integral
 
 
 def _facets(theta_r_deg: float, sigma_deg: float = 30.0) -> by_hand.Direct:
@@ -44,7 +44,7 @@ def _facets(theta_r_deg: float, sigma_deg: float = 30.0) -> by_hand.Direct:
 
 
 def fig_08() -> Figure:
-    """Radiance in the plane of incidence, with the second bounce and without."""
+    """Draw Fig. 8: radiance in the plane of incidence, with the second bounce and without."""
     cosine = to_radiance(GRAZING_LIGHT)
     parts = across(oren_nayar_gaussian_parts, GRAZING_LIGHT, **rough(30.0))
     direct, bounce = cosine * parts.direct, cosine * parts.interreflected
@@ -80,17 +80,19 @@ def fig_08() -> Figure:
 
 
 def _far_from_lambert(total: Floats, flat: Floats) -> Statement:
+    """Return the statement that radiance deviates from Lambert's."""
     share = total / flat
     return Statement(
         says="these radiance plots deviate substantially from Lambertian reflectance",
         where="section 4.3, Fig. 8",
-        seen=f"From {share.min():.2f} to {share.max():.2f} times the Lambertian radiance.",
+        seen=f"The radiance is {share.min():.2f} to {share.max():.2f} times the Lambertian.",
         holds=bool(share.min() < 1.0 - SMALL and share.max() > 1.0 + SMALL),
-        threshold_from="our reading: substantial is more than a tenth, to both sides",
+        threshold_from="our reading: substantial is more than a tenth, on both sides",
     )
 
 
 def _towards_the_source(total: Floats) -> Statement:
+    """Return the statement that radiance increases towards the source."""
     rising = between(total, -90.0, GRAZING_LIGHT)
     grows = at(total, GRAZING_LIGHT) / at(total, -80.0)
     expected = sum(_facets(GRAZING_LIGHT)) / sum(_facets(-80.0))
@@ -101,16 +103,17 @@ def _towards_the_source(total: Floats) -> Statement:
         f"or more with each degree. From -80° to 75° it is {grows:.3f} times, by a plain sum over facets "
         f"{expected:.3f}.",
         holds=bool(np.all(np.diff(rising) > 0.0) and np.isclose(grows, expected, rtol=BY_HAND)),
-        threshold_from="the paper's words: increases, at every degree; by how much, an independent evaluation",
+        threshold_from="the paper's words: increases, at every degree; an independent evaluation of the growth",
     )
 
 
 def _largest_towards_the_source(total: Floats) -> Statement:
+    """Return the statement that radiance is largest in the backward direction."""
     largest = THETA_R[np.argmax(total)]
     return Statement(
         says="in the backward (source) direction, the radiance is maximum",
         where="section 4.3, Fig. 8",
-        seen=f"Largest at θ_r = {largest:.0f}°, past the source, where it is "
+        seen=f"It is largest at θ_r = {largest:.0f}°, past the source, and there "
         f"{total.max() / at(total, GRAZING_LIGHT) - 1.0:.1%} more than at 75°.",
         holds=bool(largest >= GRAZING_LIGHT),
         threshold_from="the paper's words: in the backward direction, where θ_r exceeds θ_i",
@@ -118,6 +121,7 @@ def _largest_towards_the_source(total: Floats) -> Statement:
 
 
 def _cut_off() -> Statement:
+    """Return the statement that radiance is cut off at the angle of the light."""
     sigmas_deg = [10.0, 20.0, 30.0, 40.0]
     curves = [across(oren_nayar_gaussian, GRAZING_LIGHT, **rough(sigma_deg)) for sigma_deg in sigmas_deg]
     bends = [float(THETA_R[1:-1][np.argmin(np.diff(values, 2))]) for values in curves]
@@ -125,14 +129,15 @@ def _cut_off() -> Statement:
     return Statement(
         says='radiance gets "cut-off" when θ_r exceeds θ_i; exactly at θ_r = θ_i, and independent of roughness',
         where="section 4.3, Fig. 8",
-        seen=f"For σ of {listed(sigmas_deg, '.0f')}° the sharpest bend is at {listed(bends, '.0f')}°; with the first "
-        f"degree past it radiance grows by {listed(left, '.0%')} of what the last degree before it gave.",
+        seen=f"For σ of {listed(sigmas_deg, '.0f')}° the sharpest bend is at {listed(bends, '.0f')}°. In the first "
+        f"degree past it radiance grows by {listed(left, '.0%')} of its growth in the last degree before.",
         holds=bends == [GRAZING_LIGHT] * len(bends) and max(left) < 1.0 - SMALL,
         threshold_from="the paper's words: exactly at θ_i, to the degree of the line, for every roughness",
     )
 
 
 def _scaled_tangent(total: Floats) -> Statement:
+    """Return the statement that radiance varies as a scaled tangent."""
     low, high = -45.0, GRAZING_LIGHT
     middle = between(total, low, high)
     basis = np.stack([np.ones_like(middle), np.tan(radians(between(THETA_R, low, high)))], axis=1)
@@ -141,20 +146,21 @@ def _scaled_tangent(total: Floats) -> Statement:
     return Statement(
         says="in the middle section, radiance varies approximately as a scaled tan θ_r function with constant offset",
         where="section 4.3, Fig. 8",
-        seen=f"From {low:.0f}° to {high:.0f}°, {offset:.4f} + {scale:.4f} tan θ_r is off by {off:.1%} of the largest "
-        "value at most.",
+        seen=f"From {low:.0f}° to {high:.0f}°, {offset:.4f} + {scale:.4f} tan θ_r differs by at most {off:.1%} of the "
+        "largest value.",
         holds=off < SMALL,
         threshold_from="our reading: approximately is within a tenth of the largest value",
     )
 
 
 def _interreflections_dominate(share: Floats) -> Statement:
-    expected = [each.bounced / sum(each) for each in map(_facets, (-60.0, 0.0, 75.0))]
+    """Return the statement that interreflections dominate in the forward direction."""
+    expected = [f_r.bounced / sum(f_r) for f_r in map(_facets, (-60.0, 0.0, 75.0))]
     return Statement(
         says="interreflections dominate in the forward direction",
         where="section 4.3, Fig. 8",
-        seen=f"They are {at(share, -60.0):.0%} of the radiance at θ_r = -60°, {share.max():.1%} at "
-        f"{THETA_R[np.argmax(share)]:.0f}°, where most, {at(share, 0.0):.0%} at 0° and {at(share, 75.0):.1%} at 75°. "
+        seen=f"They are {at(share, -60.0):.0%} of the radiance at θ_r = -60°, at most {share.max():.1%} at "
+        f"{THETA_R[np.argmax(share)]:.0f}°, {at(share, 0.0):.0%} at 0° and {at(share, 75.0):.1%} at 75°. "
         f"By a plain sum over facets they are {listed(expected, '.1%')} at -60, 0 and 75°.",
         holds=bool(share.max() > 0.5 and THETA_R[np.argmax(share)] < 0.0)
         and bool(np.allclose([at(share, angle) for angle in (-60.0, 0.0, 75.0)], expected, rtol=BY_HAND)),
@@ -163,20 +169,21 @@ def _interreflections_dominate(share: Floats) -> Statement:
 
 
 def _not_symmetrical(total: Floats) -> Statement:
+    """Return the statement that radiance is not symmetrical about the normal."""
     ratio = at(total, 60.0) / at(total, -60.0)
     expected = sum(_facets(60.0)) / sum(_facets(-60.0))
     return Statement(
         says="Minnaert's function assumes that the radiance is symmetrical with respect to the surface normal; this "
         "assumption is incorrect",
         where="section 1",
-        seen=f"At θ_r = 60° it is {ratio:.3f} times what it is at -60°, by a plain sum over facets {expected:.3f}.",
+        seen=f"At θ_r = 60° it is {ratio:.3f} times the value at -60°, by a plain sum over facets {expected:.3f}.",
         holds=abs(ratio - 1.0) > SMALL and bool(np.isclose(ratio, expected, rtol=BY_HAND)),
-        threshold_from="our reading: not symmetrical is a tenth; how far, an independent evaluation says",
+        threshold_from="our reading: not symmetrical is a tenth; an independent evaluation of the ratio",
     )
 
 
 def fig_09() -> Figure:
-    """The effect of roughness."""
+    """Draw Fig. 9: the effect of roughness."""
     cosine = to_radiance(GRAZING_LIGHT)
     sigmas_deg = [0.0, 10.0, 20.0, 30.0, 40.0]
     curves = [cosine * across(oren_nayar_gaussian, GRAZING_LIGHT, **rough(sigma_deg)) for sigma_deg in sigmas_deg]
@@ -203,14 +210,14 @@ def fig_09() -> Figure:
             Statement(
                 says="when σ = 0, the model predicts exactly Lambertian reflectance",
                 where="section 4.3, Fig. 9",
-                seen=f"No further than {off:.1g} of it from ρ cos θ_i / π.",
+                seen=f"The radiance differs from ρ cos θ_i / π by {off:.1g} of it at most.",
                 holds=off <= ROUNDING,
                 threshold_from="the paper's words: exactly, in float64",
             ),
             Statement(
                 says="the deviation from Lambertian behavior increases dramatically with roughness",
                 where="section 4.3, Fig. 9",
-                seen=f"For σ of {listed(sigmas_deg[1:], '.0f')}° radiance is {listed(away[1:], '.0%')} from Lambert's, "
+                seen=f"For σ of {listed(sigmas_deg[1:], '.0f')}° radiance is {listed(away[1:], '.0%')} off Lambert's, "
                 f"root mean square over the plane. f_r at θ_r = -60° is {listed(forward)}, by a plain sum over facets "
                 f"{listed(expected)}.",
                 holds=bool(np.all(np.diff(away) > 0.0) and away[-1] > 2.0 * away[1])
@@ -223,7 +230,7 @@ def fig_09() -> Figure:
 
 
 def fig_10() -> Figure:
-    """The effect of the angle of incidence."""
+    """Draw Fig. 10: the effect of the angle of incidence."""
     lights_deg = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0]
     curves = [across(oren_nayar_gaussian, light, **rough(40.0)) for light in lights_deg]
     varies = [variation(values) for values in curves]
@@ -254,7 +261,7 @@ def fig_10() -> Figure:
             Statement(
                 says="as the incidence angle increases, the backscatter phenomenon begins to dominate",
                 where="section 4.3, Fig. 10",
-                seen=f"Back at the light f_r is {listed(back, '.2f')} times what it is in the mirror direction, for "
+                seen=f"Towards the light f_r is {listed(back, '.2f')} times the value in the mirror direction, for "
                 f"θ_i of {listed(lights_deg[1:], '.0f')}°.",
                 holds=back[0] > 1.0 and bool(np.all(np.diff(back) > 0.0)),
                 threshold_from="the paper's words: increases, and begins to dominate",
@@ -271,7 +278,7 @@ def fig_10() -> Figure:
                 says="the moon reflects more light back in the direction of the source than in the normal direction or "
                 "in the forward direction",
                 where="section 1",
-                seen=f"Back at the light f_r is {listed(behind, '.2f')} times what it is along the normal, for θ_i of "
+                seen=f"Towards the light f_r is {listed(behind, '.2f')} times the value along the normal, for θ_i of "
                 f"{listed(lights_deg[1:], '.0f')}°.",
                 holds=min(behind) > 1.0 and min(back) > 1.0,
                 threshold_from="the paper's words: more than in either direction",
@@ -281,7 +288,7 @@ def fig_10() -> Figure:
 
 
 def fig_11() -> Figure:
-    """Radiance outside the plane of incidence."""
+    """Draw Fig. 11: radiance outside the plane of incidence."""
     lights_deg, azimuths_deg = [60.0, GRAZING_LIGHT], [0.0, 30.0, 60.0, 90.0]
     lines = {
         light: [
@@ -293,8 +300,8 @@ def fig_11() -> Figure:
         key="oren-nayar-1994-fig-11",
         paper=PAPER,
         title="Fig. 11: radiance outside the plane of incidence",
-        caption="σ = 40°, ρ = 0.9, Gaussian slopes integrated. The caption prints no θ_i: 75° is that of the figures "
-        "around it, 60° is drawn to compare. The azimuths are our choice.",
+        caption="σ = 40°, ρ = 0.9, Gaussian slopes integrated. The caption prints no θ_i. 75° is the angle of the "
+        "figures around it, and 60° is for comparison. The azimuths are our choice.",
         panels=[
             Panel(
                 title=f"θ_i = {light:.0f}°",
@@ -315,6 +322,7 @@ def fig_11() -> Figure:
 
 
 def _perpendicular(lights_deg: list[float], lines: list[Floats]) -> Statement:
+    """Return the statement on viewers across the plane of incidence."""
     varies = [variation(values) for values in lines]
     outwards = between(lines[-1], 0.0, 90.0)
     far = between(THETA_R, 0.0, 90.0)[np.abs(outwards / outwards[0] - 1.0) <= SMALL].max()
@@ -323,15 +331,16 @@ def _perpendicular(lights_deg: list[float], lines: list[Floats]) -> Statement:
         "exhibits near-Lambertian characteristics",
         where="section 4.3, Fig. 11",
         seen=f"For θ_i of {listed(lights_deg, '.0f')}° the standard deviation over viewers is {listed(varies, '.0%')} "
-        f"of the mean (near: {SMALL:.0%}). For the last, radiance is within {SMALL:.0%} of that along the normal up to "
-        f"θ_r = {far:.0f}°, then grows to {outwards[-1] / outwards[0]:.2f} times that at the horizon, where shadowing "
-        "and masking overlap (eq. 43).",
+        f"of the mean (near: {SMALL:.0%}). For the last θ_i, radiance is within {SMALL:.0%} of its value along the "
+        f"normal up to θ_r = {far:.0f}°. Then it grows to {outwards[-1] / outwards[0]:.2f} times that value at the "
+        "horizon, where shadowing and masking overlap (eq. 43).",
         holds=max(varies) < SMALL,
         threshold_from="our reading: near is a tenth of the mean",
     )
 
 
 def _towards_the_source_in_azimuth(radiances: list[float]) -> Statement:
+    """Return the statement that radiance increases as the azimuth approaches that of the source."""
     return Statement(
         says="the radiance of rough diffuse surfaces increases as the viewer approaches the source direction",
         where="section 4",

@@ -15,27 +15,27 @@ from brdfdb.materials import presets
 from brdfdb.models import lambert_vectors, oren_nayar_gaussian_vectors, oren_nayar_vectors
 from brdfdb.parameters import Floats
 
-PIXELS = 96  # across a picture
-DIGITS = 3  # of a pixel
-# Across a cylinder of radius 1, from limb to limb but for a thousandth: at the limb itself f_r has a pole
+PIXELS = 96  # width of a picture
+DIGITS = 3  # digits of a pixel
+# Points across a cylinder of radius 1, a thousandth of the radius short of the limbs, where f_r has a pole
 ACROSS = np.linspace(-0.999, 0.999, 667)
-EXACT = 1e-9  # relative, between eqs 27 and 28 by hand and the model
-ASIDE_DEG = 20.0  # the light of Fig. 23 b, to the right of the camera
+EXACT = 1e-9  # relative difference of eqs 27 and 28 by hand and the model
+ASIDE_DEG = 20.0  # angle of the light of Fig. 23 b, to the right of the camera
 
 Vectors = Callable[..., Floats]
 
 
 def cylinder(model: Vectors, x: Floats, light_deg: float, **parameters: float) -> Floats:
-    """Radiance across an upright cylinder of radius 1, seen from far away.
+    """Return the radiance [1] across an upright cylinder of radius 1, seen from far away.
 
     Parameters
     ----------
     model : callable
         A function of `brdfdb.models` that takes unit vectors.
     x : array [1]
-        Where the cylinder is looked at, from -1, its left limb, to 1.
+        Places across the cylinder, from -1, its left limb, to 1.
     light_deg : float [degree]
-        The light, far away, to the right of the camera by that angle.
+        Angle of the distant light, to the right of the camera.
     **parameters : float
         Parameters of the model, in its units.
 
@@ -57,7 +57,10 @@ def cylinder(model: Vectors, x: Floats, light_deg: float, **parameters: float) -
 
 
 def sphere(model: Vectors, **parameters: float) -> Floats:
-    """Radiance of a sphere, PIXELS square, with the light at the camera; nan around it; the unit is `cylinder`'s."""
+    """Return the radiance [1] of a sphere, PIXELS square, in the unit of `cylinder`; nan around the sphere.
+
+    The light is at the camera.
+    """
     row = _pixels()
     x, y = np.meshgrid(row, -row)
     square = x**2 + y**2
@@ -67,15 +70,17 @@ def sphere(model: Vectors, **parameters: float) -> Floats:
 
 
 def _picture(title: str, radiance: Floats) -> Picture:
+    """Return a picture of radiances."""
     return Picture(title=title, radiance=rows(radiance, DIGITS))
 
 
 def _pixels() -> NDArray[np.float64]:
+    """Return the middles [1] of the pixels of a row, from -1 to 1."""
     return (2.0 * np.arange(PIXELS) + 1.0) / PIXELS - 1.0
 
 
 def _vase(light_deg: float) -> dict[str, Floats]:
-    """Radiance across the clay vase: the functional approximation, the integral, and Lambert's model."""
+    """Return the radiance [1] across the clay vase by the functional approximation, by the integral, and by Lambert."""
     material = presets()["clay-vase"].parameters
     rho, sigma = material["rho"], material["sigma"]
     return {
@@ -86,7 +91,7 @@ def _vase(light_deg: float) -> dict[str, Floats]:
 
 
 def fig_22() -> Figure:
-    """The clay vase by Lambert's model and by the paper's."""
+    """Draw Fig. 22: the clay vase by Lambert's model and by the paper's."""
     material = presets()["clay-vase"].parameters
     row = _pixels()
     lines = [
@@ -110,7 +115,7 @@ def fig_22() -> Figure:
                 says="Lambert's model predicts that the brightness of the cylindrical vase will decrease as we "
                 "approach the occluding boundaries on both sides; the real vase is very flat in appearance",
                 where="section 1, Fig. 1; section 6, Fig. 22",
-                seen=f"In the outermost of {PIXELS} columns Lambert's model leaves {edges[0]:.0%} of the largest "
+                seen=f"In the outermost of {PIXELS} columns Lambert's model has {edges[0]:.0%} of the largest "
                 f"radiance, the functional approximation {edges[1]:.0%}. By hand "
                 f"eqs 27 and 28 give {listed(expected, '.4f')} in the outermost column and in the middle.",
                 holds=edges[0] < edges[1]
@@ -124,7 +129,7 @@ def fig_22() -> Figure:
 
 
 def fig_23() -> Figure:
-    """Brightness across the clay vase."""
+    """Draw Fig. 23: brightness across the clay vase."""
     front, aside = _vase(0.0), _vase(ASIDE_DEG)
     names: dict[str, tuple[str, Role]] = {
         "integrated": ("integrated", "truth"),
@@ -135,8 +140,8 @@ def fig_23() -> Figure:
         key="oren-nayar-1994-fig-23",
         paper=PAPER,
         title="Fig. 23: brightness along the cross-section of the vase",
-        caption="ρ = 0.7, σ = 40°, the light at the camera (a) and 20° to the right of it (b). Each curve over its "
-        "largest value; that of the real vase is not in the text.",
+        caption="ρ = 0.7, σ = 40°, the light at the camera (a) and 20° to the right of it (b). Each curve is over its "
+        "largest value. The curve of the real vase is not in the text.",
         panels=[
             Panel(
                 title=title,
@@ -160,28 +165,32 @@ def fig_23() -> Figure:
 
 
 def _over_largest(radiance: Floats) -> Floats:
+    """Return the radiance over its largest value [1]."""
     return radiance / np.max(radiance)
 
 
 def _at(radiance: Floats, x: float) -> float:
-    """Radiance over its largest, where the vase is looked at."""
+    """Return the radiance over its largest value [1] at a place across the vase."""
     return float(_over_largest(radiance)[np.argmin(np.abs(ACROSS - x))])
 
 
 def _nearly_constant(lines: dict[str, Floats]) -> Statement:
+    """Return the statement that brightness is nearly constant over most of the vase."""
     flat = {name: float(np.mean(_over_largest(line) >= 1.0 - SMALL)) for name, line in lines.items()}
     return Statement(
         says="the brightness of the real vase remains nearly constant over most of the cross-section; the proposed "
         "model does very well in predicting this behavior, while the Lambertian model produces large brightness errors",
         where="section 6, Fig. 23 a",
-        seen=f"Within a tenth of the largest radiance are {flat['functional']:.0%} of the width by the functional "
-        f"approximation, {flat['integrated']:.0%} by the integral, {flat['lambert']:.0%} by Lambert's model.",
+        seen=f"The radiance is within a tenth of its largest over {flat['functional']:.0%} of the width by the "
+        f"functional approximation, {flat['integrated']:.0%} by the integral, {flat['lambert']:.0%} by Lambert's "
+        "model.",
         holds=flat["functional"] > 0.5 and flat["integrated"] > 0.5 and flat["lambert"] < 0.5,
         threshold_from="the paper's words: most, more than half; nearly, within a tenth by our reading",
     )
 
 
 def _to_zero_at_the_limbs(lines: dict[str, Floats]) -> Statement:
+    """Return the statement that brightness drops to zero at the limbs."""
     limb = {name: _at(line, -0.999) for name, line in lines.items()}
     return Statement(
         says="the brightness of the real vase drops quickly to zero very close to the limbs; the proposed model does "
@@ -189,27 +198,29 @@ def _to_zero_at_the_limbs(lines: dict[str, Floats]) -> Statement:
         where="section 6, Fig. 23 a",
         seen=f"A thousandth of the radius from the limb the functional approximation is at {limb['functional']:.0%} of "
         f"its largest radiance, the integral at {limb['integrated']:.0%}, Lambert's model at {limb['lambert']:.0%}: "
-        "eq. 27 ends at the limb with ρ E_0 C_2 / π, since tan β cos θ_i goes to 1 there.",
+        "eq. 27 tends to ρ E_0 C_2 / π at the limb, because tan β cos θ_i tends to 1 there.",
         holds=limb["functional"] < SMALL and limb["integrated"] < SMALL,
         threshold_from="our reading: zero is less than a tenth",
     )
 
 
 def _asymmetric(lines: dict[str, Floats]) -> Statement:
+    """Return the statement that light from the right makes brightness asymmetric."""
     left, right = _at(lines["functional"], -0.8), _at(lines["functional"], 0.8)
     absolute = [float(np.interp(x, ACROSS, lines["functional"])) for x in (-0.801, 0.801)]
     expected = [by_hand.cylinder(x, ASIDE_DEG, 0.7, 40.0) for x in (-0.801, 0.801)]
     return Statement(
         says="with illumination from 20° to the right of the sensor, the brightness variation is asymmetric",
         where="section 6, Fig. 23 b",
-        seen=f"Four fifths of the radius to the left of the middle it is {left:.0%} of the largest, to the right "
-        f"{right:.0%}. It is {listed(absolute, '.4f')}, by hand {listed(expected, '.4f')}.",
+        seen=f"Four fifths of the radius to the left of the middle the radiance is {left:.0%} of the largest, to the "
+        f"right {right:.0%}. It is {listed(absolute, '.4f')}, by hand {listed(expected, '.4f')}.",
         holds=right - left > SMALL and bool(np.allclose(absolute, expected, rtol=EXACT)),
         threshold_from="our reading: asymmetric is a tenth; a closed form, eqs 27 and 28 with the paper's ρ and σ",
     )
 
 
 def _right_limb(lines: dict[str, Floats]) -> Statement:
+    """Return the statement on the brightness close to the right limb."""
     limb = {name: _at(line, 0.95) for name, line in lines.items()}
     return Statement(
         says="the Lambertian model forces the brightness close to the right limb of the vase to drop much faster",
@@ -222,19 +233,20 @@ def _right_limb(lines: dict[str, Floats]) -> Statement:
 
 
 def _peaks(lines: dict[str, Floats]) -> Statement:
+    """Return the statement on the place of the brightest point."""
     peak = {name: float(ACROSS[np.argmax(line)]) for name, line in lines.items()}
     return Statement(
         says="the brightness peak predicted by the Lambertian model is significantly away from the actual peak",
         where="section 6, Fig. 23 b",
-        seen=f"It is at {peak['lambert']:.2f} of the radius to the right of the middle, that of the integral at "
-        f"{peak['integrated']:.2f}, of the functional approximation at {peak['functional']:.2f}.",
+        seen=f"It is at {peak['lambert']:.2f} of the radius to the right of the middle. The peak of the integral is at "
+        f"{peak['integrated']:.2f}, that of the functional approximation at {peak['functional']:.2f}.",
         holds=abs(peak["integrated"] - peak["lambert"]) > SMALL,
         threshold_from="our reading: significantly is a tenth of the radius",
     )
 
 
 def spheres() -> Figure:
-    """Spheres of four roughnesses, with the light at the camera."""
+    """Draw spheres of four roughnesses, with the light at the camera."""
     sigmas_deg = [0, 10, 20, 40]
     materials = [presets()[f"rendered-sphere-{sigma_deg}deg"].parameters for sigma_deg in sigmas_deg]
     images = [sphere(oren_nayar_vectors, **{**material, "interreflection": False}) for material in materials]
@@ -245,14 +257,14 @@ def spheres() -> Figure:
         key="oren-nayar-1994-spheres",
         paper=PAPER,
         title="Spheres rendered with eq. 27",
-        caption="The light is at the camera, ρ = 0.9 (our choice). Without eq. 28, as the paper names eq. 27 alone "
-        "here. 1 is a white Lambertian surface that faces the light.",
+        caption="The light is at the camera, ρ = 0.9 (our choice). Eq. 28 is left out, because the paper names eq. 27 "
+        "alone. 1 is a white Lambertian surface that faces the light.",
         panels=[_picture(f"σ = {sigma_deg}°", image) for sigma_deg, image in zip(sigmas_deg, images, strict=True)],
         statements=[
             Statement(
                 says="in the first case, σ = 0°, the sphere appears Lambertian",
                 where="section 6, spheres.tif",
-                seen=f"No pixel is further than {lambertian.max():.1g} from Lambert's model.",
+                seen=f"Pixels differ from Lambert's model by {lambertian.max():.1g} at most.",
                 holds=float(lambertian.max()) <= ROUNDING,
                 threshold_from="the paper's words: appears Lambertian, in float64",
             ),
@@ -268,7 +280,7 @@ def spheres() -> Figure:
                 "this has been widely observed and reported in the case of the full moon",
                 where="section 6, spheres.tif",
                 seen=f"The standard deviation at σ = 40° is {varies[-1]:.1%} of the mean (near: {SMALL:.0%}); with the "
-                f"second bounce of eq. 28, which the paper does not name here, {with_bounce:.1%}.",
+                f"second bounce of eq. 28, which the paper does not name for this image, {with_bounce:.1%}.",
                 holds=varies[-1] < SMALL,
                 threshold_from="our reading: near is a tenth of the mean",
             ),
@@ -277,11 +289,12 @@ def spheres() -> Figure:
 
 
 def _disc(image: Floats) -> Floats:
+    """Return the pixels of the sphere."""
     return image[np.isfinite(image)]
 
 
 def scenes() -> Figure:
-    """The cylinder of the rendered scenes, smooth and rough, under both lights."""
+    """Draw the cylinder of the rendered scenes, smooth and rough, under both lights."""
     lights_deg = [0.0, ASIDE_DEG]
     smooth, rough = (
         [

@@ -1,4 +1,4 @@
-"""Figures 15 to 21 of Oren and Nayar 1994: the model at the parameters of the measured samples, without their dots."""
+"""Figures 15 to 21 of Oren and Nayar 1994: the model with the parameters of the measured samples."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from brdfdb.gallery._oren_nayar_lines import (
     curve,
     distance,
     left_past,
+    very_accurate,
 )
 from brdfdb.materials import Material, presets
 from brdfdb.models import oren_nayar, oren_nayar_body_surface, oren_nayar_gaussian, torrance_sparrow
@@ -30,16 +31,17 @@ from brdfdb.parameters import Floats
 
 LIGHTS_DEG = [30.0, 45.0, 60.0]
 NORMALISED = "L_r(θ_r) / L_r(0)"
-EXACT = 1e-9  # relative, between a closed form and the model
-CLOSE_DEG = 10.0  # what "close to" a direction is taken for
+EXACT = 1e-9  # relative difference of a closed form and the model
+CLOSE_DEG = 10.0  # largest angle that is "close to" a direction, our reading
 
 
 def _normalised(f_r: Floats) -> Floats:
+    """Return f_r over its value along the normal [1]."""
     return f_r / at(f_r, 0.0)
 
 
 def _printed(material: Material) -> str:
-    """The parameters as the captions print them."""
+    """Return the parameters as the captions print them."""
     names = {"sigma_deg": "σ = {:g}°", "rho": "ρ = {:.2f}", "k_s": "k_s/k_b = {:g}"}
     values = material.file_parameters()
     return ", ".join(text.format(values[name]) for name, text in names.items() if name in values)
@@ -48,12 +50,13 @@ def _printed(material: Material) -> str:
 class _Lines(NamedTuple):
     """Normalised radiance of one sample over THETA_R."""
 
-    evaluated: Floats  # eqs 24 and 49, what the paper drew
-    facets: Floats  # eq. 47, without the approximations (44) and (48)
-    functional: Floats  # the fit that is tabulated
+    evaluated: Floats  # eqs 24 and 49, which the paper drew
+    facets: Floats  # eq. 47, without the approximations of eqs 44 and 48
+    functional: Floats  # the fit, which tables hold
 
 
 def _panel(theta_i_deg: float, lines: _Lines, where: str = "") -> Panel:
+    """Return a panel of all three forms for one light."""
     return Panel(
         title=f"θ_i = {theta_i_deg:.0f}°{where}",
         x_label=THETA_R_LABEL,
@@ -67,26 +70,21 @@ def _panel(theta_i_deg: float, lines: _Lines, where: str = "") -> Panel:
 
 
 def _rough(material: Material, theta_i_deg: float, delta_phi_deg: float = 0.0) -> _Lines:
+    """Return the normalised radiance [1] of a sample without a surface part."""
     rho, sigma = material.parameters["rho"], material.parameters["sigma"]
     models = evaluated, oren_nayar_gaussian, oren_nayar
     return _Lines(*(_normalised(across(model, theta_i_deg, delta_phi_deg, rho=rho, sigma=sigma)) for model in models))
 
 
 def _accurate(lines: list[_Lines], lights_deg: list[float]) -> Statement:
-    off = [distance(each.functional, each.evaluated) for each in lines]
-    return Statement(
-        says="in all cases, the functional approximation proves to be very accurate",
-        where="section 4.3",
-        seen=f"It is {listed(off, '.1%')} of the mean off the paper's own evaluation, root mean square, for θ_i of "
-        f"{listed(lights_deg, '.0f')}° (very accurate: {VERY_ACCURATE:.0%}).",
-        threshold_from="our reading: very accurate is within 5 % of the mean, root mean square",
-        holds=max(off) < VERY_ACCURATE,
-    )
+    """Return the statement that the functional approximation is very accurate."""
+    return very_accurate([distance(line.functional, line.evaluated) for line in lines], lights_deg, "section 4.3")
 
 
 def _assumptions(lines: list[_Lines], lights_deg: list[float]) -> Statement:
-    off = [distance(each.evaluated, each.facets) for each in lines]
-    forward = [each.evaluated[0] / each.facets[0] - 1.0 for each in lines]
+    """Return the statement that the paper's evaluation validates its assumptions."""
+    off = [distance(line.evaluated, line.facets) for line in lines]
+    forward = [line.evaluated[0] / line.facets[0] - 1.0 for line in lines]
     return Statement(
         says="the numerical evaluation of the model (equation 25) demonstrates not only its accuracy but also the "
         "validity of all assumptions made while developing it",
@@ -94,16 +92,16 @@ def _assumptions(lines: list[_Lines], lights_deg: list[float]) -> Statement:
         seen=f"Facet by facet, with eq. 47 in place of eq. 48, radiance is {listed(off, '.1%')} of the mean off, root "
         f"mean square, for θ_i of {listed(lights_deg, '.0f')}°. At the horizon away from the light the paper's own "
         f"evaluation is {listed(forward, '+.1%')} brighter.",
-        threshold_from="our reading: assumptions are valid that change radiance by less than 5 % of the mean",
+        threshold_from="our reading: valid assumptions change radiance by less than 5 % of the mean",
         holds=max(off) < VERY_ACCURATE,
     )
 
 
 def _in_plane(number: int, sample: str) -> Figure:
-    """Samples A to C in the plane of incidence."""
+    """Draw one of samples A to C in the plane of incidence."""
     material = presets()[sample]
     lines = [_rough(material, light) for light in LIGHTS_DEG]
-    own = [(light, each.evaluated) for light, each in zip(LIGHTS_DEG, lines, strict=True)]
+    own = [(light, line.evaluated) for light, line in zip(LIGHTS_DEG, lines, strict=True)]
     rising = [between(values, -90.0, light) for light, values in own]
     past = [at(values, light + 5.0) / at(values, light) for light, values in own]
     angles = "" if number == 15 else " The angles are those of Fig. 15."
@@ -127,9 +125,9 @@ def _in_plane(number: int, sample: str) -> Figure:
                 says="the small peak noticed near the source direction is different from what is described by our "
                 "model",
                 where=f"section 5, Fig. {number}",
-                seen=f"The model has no peak there: five degrees past θ_i of {listed(LIGHTS_DEG, '.0f')}° it is at "
+                seen=f"The model has no peak there: five degrees past θ_i of {listed(LIGHTS_DEG, '.0f')}° it has "
                 f"{listed(past, '.3f')} times the radiance at θ_i.",
-                threshold_from="the paper's words: the peak is not the model's, which goes on rising",
+                threshold_from="the paper's words: the peak is not the model's, which continues to rise",
                 holds=min(past) > 1.0,
             ),
             _accurate(lines, LIGHTS_DEG),
@@ -139,12 +137,12 @@ def _in_plane(number: int, sample: str) -> Figure:
 
 
 def fig_18() -> Figure:
-    """Sample C outside the plane of incidence."""
+    """Draw Fig. 18: sample C outside the plane of incidence."""
     material = presets()["white-sand"]
     lights_deg, azimuths_deg = [60.0, 75.0], [45.0, 60.0]
     lines = [_rough(material, light, azimuth) for light, azimuth in zip(lights_deg, azimuths_deg, strict=True)]
     sides = [
-        (at(each.evaluated, -light), at(each.evaluated, light)) for light, each in zip(lights_deg, lines, strict=True)
+        (at(line.evaluated, -light), at(line.evaluated, light)) for light, line in zip(lights_deg, lines, strict=True)
     ]
     return Figure(
         key="oren-nayar-1994-fig-18",
@@ -173,7 +171,7 @@ def fig_18() -> Figure:
 
 
 def _with_surface(number: int, sample: str) -> Figure:
-    """Samples D to F: body and surface, eq. 32."""
+    """Draw one of samples D to F: body and surface, eq. 32."""
     material = presets()[sample]
     rho, sigma = material.parameters["rho"], material.parameters["sigma"]
     sums = [across(oren_nayar_body_surface, light, **material.parameters) for light in LIGHTS_DEG]
@@ -205,7 +203,7 @@ def _with_surface(number: int, sample: str) -> Figure:
 
 
 def _sum_by_hand(material: Material, theta_i_deg: float, theta_r_deg: float) -> float:
-    """Return f_r [1/sr] of eq. 32 in the plane of incidence, with k_b = 1 and E_0 = pi, by hand."""
+    """Return f_r [1/sr] of eq. 32 by hand in the plane of incidence, with k_b = 1 and E_0 = pi."""
     printed = material.file_parameters()
     body = by_hand.fit(theta_i_deg, theta_r_deg, float(printed["rho"]), float(printed["sigma_deg"])).direct
     surface = by_hand.surface(theta_i_deg, theta_r_deg, float(printed["sigma_deg"]))
@@ -213,6 +211,7 @@ def _sum_by_hand(material: Material, theta_i_deg: float, theta_r_deg: float) -> 
 
 
 def _approaching(number: int, sums: list[Floats], material: Material) -> Statement:
+    """Return the statement that radiance increases towards the source."""
     last = [between(total, light / 2.0, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     grows = [at(total, light) / at(total, 10.0) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     expected = [_sum_by_hand(material, light, light) / _sum_by_hand(material, light, 10.0) for light in LIGHTS_DEG]
@@ -229,18 +228,20 @@ def _approaching(number: int, sums: list[Floats], material: Material) -> Stateme
 
 
 def _cut_off(number: int, sums: list[Floats]) -> Statement:
+    """Return the statement that radiance is cut off in the direction of the source."""
     left = [left_past(total, light) for light, total in zip(LIGHTS_DEG, sums, strict=True)]
     return Statement(
         says="the cut-off in radiance that takes place in the source direction",
         where=f"section 5, Fig. {number}",
-        seen=f"With the first degree past θ_i of {listed(LIGHTS_DEG, '.0f')}° radiance grows by {listed(left, '.0%')} "
-        "of what the last degree before it gave.",
+        seen=f"In the first degree past θ_i of {listed(LIGHTS_DEG, '.0f')}° radiance grows by {listed(left, '.0%')} "
+        "of its growth in the last degree before.",
         holds=max(left) < 1.0 - SMALL,
         threshold_from="our reading: a cut-off leaves less than nine tenths of the slope",
     )
 
 
 def _foam(sums: list[Floats], bodies: list[Floats], material: Material) -> Statement:
+    """Return the statement that the surface of the foam brightens the forward direction."""
     forward = [at(total, -80.0) / float(between(total, -80.0, 0.0).min()) for total in sums]
     over_normal = [at(total, -80.0) / at(total, 0.0) for total in sums]
     expected = [_sum_by_hand(material, light, -80.0) / _sum_by_hand(material, light, 0.0) for light in LIGHTS_DEG]
@@ -248,9 +249,9 @@ def _foam(sums: list[Floats], bodies: list[Floats], material: Material) -> State
     return Statement(
         says="for the foam sample, the surface reflectance component is a radiance increase in the forward direction",
         where="section 5, Fig. 19",
-        seen=f"At θ_r = -80° radiance is {listed(forward, '.2f')} times its lowest between there and the normal, for "
-        f"θ_i of {listed(LIGHTS_DEG, '.0f')}°; that of the body alone {listed(alone, '.2f')} times. Over "
-        f"that along the normal it is {listed(over_normal, '.4f')}, by hand {listed(expected, '.4f')}.",
+        seen=f"At θ_r = -80° radiance is {listed(forward, '.2f')} times its lowest value from there to the normal, "
+        f"for θ_i of {listed(LIGHTS_DEG, '.0f')}°; that of the body alone {listed(alone, '.2f')} times. Over its "
+        f"value along the normal it is {listed(over_normal, '.4f')}, by hand {listed(expected, '.4f')}.",
         holds=forward[-1] > 1.0 and max(alone) <= 1.0 and bool(np.allclose(over_normal, expected, rtol=EXACT)),
         threshold_from="the paper's words: an increase, where the body has none; a closed form, eqs 27, 31 and 32 with "
         "k_s/k_b = 0.019 and E_0 = π",
@@ -258,7 +259,7 @@ def _foam(sums: list[Floats], bodies: list[Floats], material: Material) -> State
 
 
 def _lobes(theta_i_deg: float) -> dict[float, Floats]:
-    """Eq. 31 of the samples that have a surface, by their σ [degree]."""
+    """Return f_r [1/sr] of eq. 31 of the samples that have a surface, by their σ [degree]."""
     samples = [presets()[name] for name in ("foam", "wood-shavings", "cotton-towel")]
     return {
         sample.file_parameters()["sigma_deg"]: across(torrance_sparrow, theta_i_deg, sigma=sample.parameters["sigma"])
@@ -267,26 +268,28 @@ def _lobes(theta_i_deg: float) -> dict[float, Floats]:
 
 
 def _peak() -> Statement:
+    """Return the statement on the direction of the peak of eq. 31."""
     peaks = {light: [float(-THETA_R[np.argmax(lobe)]) for lobe in _lobes(light).values()] for light in LIGHTS_DEG}
     rows = "; ".join(f"{listed(row, '.0f')}° for θ_i = {light:.0f}°" for light, row in peaks.items())
     return Statement(
         says="the Torrance-Sparrow model predicts a peak in the forward direction (close to the specular direction)",
         where="section 5, eq. 31",
         seen=f"For σ of {listed(list(_lobes(LIGHTS_DEG[0])), '.0f')}° the peak is forward, but at θ_r of {rows} "
-        f"(close: {CLOSE_DEG:.0f}°): eq. 31 has 1 / cos θ_r, which a lobe this wide follows until masking sets in.",
+        f"(close: {CLOSE_DEG:.0f}°): eq. 31 has 1 / cos θ_r, and so wide a lobe follows it until masking begins.",
         holds=all(abs(peak - light) <= CLOSE_DEG for light, row in peaks.items() for peak in row),
         threshold_from="our reading: close is within 10°",
     )
 
 
 def _deviation(lobe: Floats) -> float:
-    """Return the standard deviation [degree] of θ_r under a lobe, short of the horizon, where eq. 31 has a pole."""
+    """Return the standard deviation [degree] of θ_r under a lobe, without the horizon, where eq. 31 has a pole."""
     theta_r = THETA_R[1:-1]
     mean = np.average(theta_r, weights=lobe)
     return float(np.sqrt(np.average((theta_r - mean) ** 2, weights=lobe)))
 
 
 def _width() -> Statement:
+    """Return the statement that the lobe of eq. 31 widens with roughness."""
     lobes = {sigma_deg: lobe[1:-1] for sigma_deg, lobe in _lobes(45.0).items()}
     widths = [_deviation(lobe) for lobe in lobes.values()]
     expected = [
@@ -299,7 +302,7 @@ def _width() -> Statement:
         seen=f"At θ_i = 45° the standard deviation of θ_r under eq. 31 is {listed(widths, '.3f')}°, for σ of "
         f"{listed(list(lobes), '.0f')}°; by hand {listed(expected, '.3f')}°.",
         holds=bool(np.all(np.diff(widths) > 0.0) and np.allclose(widths, expected, rtol=EXACT)),
-        threshold_from="the paper's words: wider, with each σ; by how much, the closed form of eq. 31",
+        threshold_from="the paper's words: wider, with each σ; the closed form of eq. 31 gives the width",
     )
 
 

@@ -1,4 +1,4 @@
-"""Ward 1992: slices and highlights of the elliptical Gaussian model; its lobes and forms are next door."""
+"""Ward 1992: slices and highlights of the elliptical Gaussian model, and all figures of its lobe."""
 
 from __future__ import annotations
 
@@ -17,27 +17,29 @@ from brdfdb.gallery._ward_slices import (
     VIEWERS_DEG,
     WIDTH,
     Array,
-    described,
     f_r_of,
     half_widths_deg,
     isotropic,
+    parameters_text,
     slice_of,
 )
+from brdfdb.gallery._ward_sphere import CAMERA_DEG, LIGHT_DEG, points_at
 from brdfdb.gallery.ward_1992_forms import forms, lobes
-from brdfdb.geometry import HALF_PI, degrees, radians, unit_vector
+from brdfdb.geometry import degrees, radians
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.materials import Material, presets
 
-_CAMERA_DEG, _LIGHT_DEG = 35.0, 75.0  # above the equator of the sphere
-_WHITE = 0.2  # of the brightest point: the diffuse part is seen, too
-_ON_THE_RIDGE = 0.01  # in the projected plane; the ridge is 0.06 wide on each side
-_BENT = 0.1  # of the thickness of a highlight: what makes it a crescent
-_SECOND_ORDER = 0.1  # of what the first order of a series in alpha gives, for alpha up to 0.16
-_NEAR_TOTAL = 0.05  # of rho_s: our reading of "will equal"; "accurate as long as alpha is not much greater than 0.2"
+_WHITE = 0.2  # share of the brightest point that is white, so that the diffuse part shows, too
+_ON_THE_RIDGE = 0.01  # tolerance in the projected plane; the ridge is 0.06 wide on each side
+_BENT = 0.1  # share of the thickness of a highlight by which a crescent is bent
+_SECOND_ORDER = 0.1  # share of the first order of a series in alpha, for alpha up to 0.16
+_NEAR_TOTAL = (
+    0.05  # share of rho_s for "will equal", our reading; "accurate as long as alpha is not much greater than 0.2"
+)
 
 
 def _image() -> Figure:
-    """Fig. 4: all that the gonioreflectometer sees at once."""
+    """Draw Fig. 4: the hemisphere that the gonioreflectometer sees at once."""
     aluminum = presets()["rolled-aluminum"]
     theta_i = float(radians(30.0))
     axis = np.linspace(-1.0, 1.0, 61)
@@ -52,8 +54,8 @@ def _image() -> Figure:
         key="ward-1992-fig-04",
         paper="ward1992",
         title="Fig. 4: the highlight of rolled aluminum over the hemisphere",
-        caption=f"{described(aluminum)}, lit from (theta_i, phi_i) = (30, 0) degrees, from x > 0; after Fig. 4, a "
-        "photograph. A viewer stands where its direction, projected on the surface, falls.",
+        caption=f"{parameters_text(aluminum)}, lit from (theta_i, phi_i) = (30, 0) degrees, from x > 0; after Fig. 4, "
+        "a photograph. The axes are the direction of the viewer, projected on the surface.",
         panels=[
             Map(
                 x_label="sin(theta_r) cos(phi_r)",
@@ -70,16 +72,17 @@ def _image() -> Figure:
                 says="the half vectors that lean along the wider axis mirror light from the x axis to "
                 "sin(theta_r) cos(phi_r) = -sin(theta_i): a straight streak in this projection, a cone about x",
                 where="known of the form: Fig. 5 and eq. 5a, exponent with alpha_x < alpha_y",
-                seen=f"up to 0.3 on both sides of the plane of incidence, f_r is largest within {off:.4f} of that line",
+                seen=f"up to 0.3 on both sides of the plane of incidence, the largest f_r is within {off:.4f} of that "
+                "line",
                 holds=off < _ON_THE_RIDGE,
-                threshold_from="a closed form: the mirror direction of half vectors along y; the lines that are "
-                f"searched leave {_ON_THE_RIDGE:g}, a sixth of half the width of the streak",
+                threshold_from="a closed form: the mirror direction of half vectors along y, within "
+                f"{_ON_THE_RIDGE:g}, a sixth of half the width of the streak",
             ),
             Statement(
                 says='"Unfinished aluminum exhibits anisotropy from rolling during its manufacture"',
                 where="Fig. 6, caption",
                 seen=f"lit along the normal, the lobe falls to half its peak {widths[0]:.2f} degrees off along x and "
-                f"{widths[1]:.2f} along y, where alpha of .04 and .09 lead to {expected[0]:.2f} and {expected[1]:.2f}",
+                f"{widths[1]:.2f} along y; alpha of .04 and .09 lead to {expected[0]:.2f} and {expected[1]:.2f}",
                 holds=bool(np.allclose(widths, expected, rtol=WIDTH)),
                 threshold_from="the paper's number: alpha of the table in section 6, by eq. 5a",
             ),
@@ -88,7 +91,7 @@ def _image() -> Figure:
 
 
 def _projected(material: Material, theta_i: float, x: Array, y: Array) -> Array:
-    """f_r of viewers by their projection on the surface, [y][x]; nan outside of the hemisphere."""
+    """Return f_r [1/sr] by the projection of the viewer on the surface, [y][x]; nan outside of the hemisphere."""
     x_r, y_r = np.meshgrid(x, y)
     sin_r = np.hypot(x_r, y_r)
     inside = sin_r < 1.0
@@ -97,7 +100,7 @@ def _projected(material: Material, theta_i: float, x: Array, y: Array) -> Array:
 
 
 def _slices() -> Figure:
-    """Fig. 6: slices in the plane of incidence."""
+    """Draw Fig. 6: slices in the plane of incidence."""
     aluminum = presets()["rolled-aluminum"]
     panels = [
         Panel(
@@ -122,8 +125,8 @@ def _slices() -> Figure:
         key="ward-1992-fig-06",
         paper="ward1992",
         title="Fig. 6: the elliptical Gaussian fit of unfinished aluminum, in the plane of incidence",
-        caption=f"{described(aluminum)}. Fig. 6 shows a slice at 6 angles, which the text does not name, in one "
-        "plane, of which it does not say how it lies to the rolling: ours are in the planes along both axes. Its "
+        caption=f"{parameters_text(aluminum)}. Fig. 6 shows a slice at 6 angles, which the text does not name. The "
+        "text does not say either how the plane lies to the rolling, so ours are in the planes along both axes. The "
         "measured points are not printed as numbers.",
         panels=list(panels),
         statements=[
@@ -133,24 +136,24 @@ def _slices() -> Figure:
                 where="section 4.1, of eq. 4; 5a inherits it",
                 seen=f"light and viewer exchanged, at 6 angles and 24 azimuths: {asymmetry:.1g} of f_r apart at most",
                 holds=asymmetry < ROUNDING,
-                threshold_from="the paper's words: symmetric, but for rounding",
+                threshold_from="the paper's words: symmetric, except for rounding",
             ),
             Statement(
                 says='"the normalization of the above anisotropic model is such that the total surface reflectance '
                 'will equal the diffuse reflectance coefficient, rho_d, plus the ... coefficient, rho_s"',
                 where="section 4.2",
-                seen=f"lit along the normal the surface reflects {total:.4f}, rho_d + rho_s is {reflectances:g}; of "
-                f"rho_s {100.0 * missing:.2f} % is missing, where 3 (alpha_x^2 + alpha_y^2) / 2 is "
+                seen=f"lit along the normal the surface reflects {total:.4f}, rho_d + rho_s is {reflectances:g}; "
+                f"{100.0 * missing:.2f} % of rho_s is missing, and 3 (alpha_x^2 + alpha_y^2) / 2 is "
                 f"{100.0 * first_order:.2f} %",
                 holds=0.0 < missing < _NEAR_TOTAL and abs(missing / first_order - 1.0) < _SECOND_ORDER,
                 threshold_from="conservation: eq. 5a integrated for small alpha, within a tenth for the next order",
             ),
             Statement(
-                says="1 / sqrt(cos(theta_r)) draws the peak of a slice beyond the mirror direction, to where "
+                says="1 / sqrt(cos(theta_r)) draws the peak of a slice beyond the mirror direction, so that "
                 "theta_r - theta_i = alpha^2 tan(theta_r)",
                 where="known of the form: eq. 5a, derivative of its logarithm for small alpha",
                 seen=f"at theta_i = {SLICES_DEG[-1]:g} degrees it lies {beyond_deg[0]:.2f} degrees beyond "
-                f"along x and {beyond_deg[1]:.2f} along y, where the condition says {expected_deg[0]:.2f} and "
+                f"along x and {beyond_deg[1]:.2f} along y; the condition gives {expected_deg[0]:.2f} and "
                 f"{expected_deg[1]:.2f}",
                 holds=bool(np.allclose(beyond_deg, expected_deg, atol=0.01)),
                 threshold_from="a closed form: the derivative of eq. 5a, within 0.01 degrees",
@@ -160,19 +163,19 @@ def _slices() -> Figure:
 
 
 def _peak_beyond_mirror(material: Material, theta_i_deg: float) -> tuple[list[float], list[float]]:
-    """How far beyond the mirror direction slices along x and y peak [degree], and what small alpha leads to expect."""
+    """Return the angles [degree] of peaks beyond the mirror direction, along x and y, and those expected."""
     viewers_deg = np.linspace(theta_i_deg - 2.0, theta_i_deg + 5.0, 7001)
-    found, expected = [], []
+    beyond, expected = [], []
     for axis, phi in PLANES:
         peak_deg = float(viewers_deg[np.argmax(slice_of(material, theta_i_deg, phi, viewers_deg))])
-        found.append(peak_deg - theta_i_deg)
+        beyond.append(peak_deg - theta_i_deg)
         slope2 = material.parameters[f"alpha_{axis}"] ** 2
         expected.append(float(degrees(slope2 * np.tan(radians(peak_deg)))))
-    return found, expected
+    return beyond, expected
 
 
 def _asymmetry(material: Material) -> float:
-    """The largest relative change of f_r where light and viewer are exchanged."""
+    """Return the largest relative change [1] of f_r when light and viewer are exchanged."""
     theta = radians(SLICES_DEG)
     theta_i, theta_r, phi_r = np.meshgrid(theta, theta, radians(np.arange(0.0, 360.0, 15.0)), indexing="ij")
     forth, back = f_r_of(material, theta_i, 0.4, theta_r, phi_r), f_r_of(material, theta_r, phi_r, theta_i, 0.4)
@@ -180,7 +183,7 @@ def _asymmetry(material: Material) -> float:
 
 
 def _crescent() -> Figure:
-    """Fig. 7a: the highlight of a light source alone, on a sphere whose grain follows its parallels."""
+    """Draw Fig. 7a: the highlight of a light source alone, on a brushed sphere."""
     brass = presets()["rolled-brass"]
     round_brass = isotropic(brass)
     axis = np.linspace(-1.0, 1.0, 72)
@@ -196,9 +199,9 @@ def _crescent() -> Figure:
         key="ward-1992-fig-07",
         paper="ward1992",
         title="Fig. 7: the crescent of an anisotropic highlight",
-        caption=f"{described(brass)}, on a sphere with x along its meridians; a distant light "
-        f"{_LIGHT_DEG:g} degrees above the equator, a distant camera {_CAMERA_DEG:g} degrees, on one meridian. White "
-        f"is {_WHITE:g} of the peak. Beside it eq. 4 with alpha = sqrt(alpha_x alpha_y).",
+        caption=f"{parameters_text(brass)}, on a sphere with x along its meridians; a distant light "
+        f"{LIGHT_DEG:g} degrees above the equator, a distant camera {CAMERA_DEG:g} degrees, on one meridian. White "
+        f"is {_WHITE:g} of the peak. The second picture is eq. 4 with alpha = sqrt(alpha_x alpha_y).",
         panels=list(panels),
         statements=[
             Statement(
@@ -215,26 +218,17 @@ def _crescent() -> Figure:
 
 
 def _sphere(material: Material, across: Array, up: Array) -> Array:
-    """Radiance over the irradiance across the light [1/sr], at points of the image of a unit sphere; nan beside it."""
+    """Return the radiance over the irradiance [1/sr] at places in the image of a unit sphere; nan beside it."""
     outside = across**2 + up**2 >= 1.0
-    u, v = np.where(outside, 0.0, across), np.where(outside, 0.0, up)
-    camera, light = (unit_vector(HALF_PI - radians(above), 0.0) for above in (_CAMERA_DEG, _LIGHT_DEG))
-    north = np.array([0.0, 0.0, 1.0])
-    right = np.array([0.0, 1.0, 0.0])
-    normal = u[..., np.newaxis] * right + v[..., np.newaxis] * np.cross(camera, right)
-    normal = normal + np.sqrt(1.0 - u**2 - v**2)[..., np.newaxis] * camera
-    parallel = np.cross(north, normal)
-    parallel /= np.linalg.norm(parallel, axis=-1, keepdims=True)
-    frame = np.stack([np.cross(normal, parallel), parallel, normal], axis=-2)
-    wi, wr = frame @ light, frame @ camera
-    f_r = material.spec.vectors(wi, wr, **material.arguments())
-    return np.where(outside, np.nan, f_r * np.maximum(wi[..., 2], 0.0))
+    points = points_at(np.where(outside, 0.0, across), np.where(outside, 0.0, up))
+    f_r = material.spec.vectors(points.light, points.camera, **material.arguments())
+    return np.where(outside, np.nan, f_r * np.maximum(points.light[..., 2], 0.0))
 
 
 def _bend(material: Material) -> tuple[float, float]:
-    """How far the ends of the highlight lie above its middle, and how thick the middle is, in radii of the sphere.
+    """Return the height of the ends of the highlight above its middle, and the thickness of the middle [radius].
 
-    The ends are where the brightest point of a column of the image has half the peak.
+    At the ends the brightest point of a column of the image has half the peak.
     """
     across, up = np.linspace(-0.4, 0.4, 81), np.linspace(0.1, 0.9, 4001)
     radiance = _sphere(material, *np.meshgrid(across, up, indexing="ij"))

@@ -1,4 +1,4 @@
-"""Ward 1992, Fig. 3: where an imaging gonioreflectometer looks, eq. 3 against rays that a sphere reflects."""
+"""Ward 1992, Fig. 3: the directions of an imaging gonioreflectometer, eq. 3 against rays that a sphere reflects."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from brdfdb.geometry import degrees, radians, unit_vector
 
 Array = NDArray[np.float64]
 
-GOOD_DEG = 1.0  # our reading of "a good approximation": the prototype's picture has 108 by 80 pixels, about 2° each
-SMALL = 0.1  # D over R: our reading of "small in relation to R"
+GOOD_DEG = 1.0  # error of "a good approximation", our reading: the 108 by 80 pixels of the prototype have about 2°
+SMALL = 0.1  # D over R for "small in relation to R", our reading
 OFFSETS = (0.05, 0.1, 0.2)  # D over R of the statement
 
 
 def eq_3(theta_c: Array, phi_c: Array, D: float) -> Array:
-    """Return the direction from the target, unit vectors (..., 3), that eq. 3 gives for one of the camera.
+    """Return the directions from the target, unit vectors (..., 3), that eq. 3 gives for directions of the camera.
 
-    `theta_c`, `phi_c` [rad] are relative to the camera, D is half of the distance of target and camera, and R is 1.
+    `theta_c` and `phi_c` [rad] refer to the camera. D is half of the distance of target and camera, and R is 1.
     """
     sine = np.sin(phi_c) * np.sin(theta_c)
     r_c = D * sine + np.sqrt(D**2 * sine**2 + 1.0 - D**2)
@@ -30,10 +30,10 @@ def eq_3(theta_c: Array, phi_c: Array, D: float) -> Array:
 
 
 def traced(theta_c: Array, phi_c: Array, D: float) -> Array:
-    """Return the direction in which the light that the camera sees leaves the sample, unit vectors (..., 3).
+    """Return the directions, unit vectors (..., 3), in which light leaves the sample towards the camera.
 
-    The camera stands at (0, -D, 0), the target at (0, D, 0), and the middle of a sphere of radius 1 between them. A ray
-    from the camera is mirrored once, and meets the sample in or beside the middle of the target.
+    The camera is at (0, -D, 0) and the target at (0, D, 0), with the middle of a sphere of radius 1 between them. A ray
+    from the camera is mirrored once, and meets the sample at the target or close to it.
     """
     out = unit_vector(theta_c, phi_c)
     camera = np.array([0.0, -D, 0.0])
@@ -43,25 +43,27 @@ def traced(theta_c: Array, phi_c: Array, D: float) -> Array:
 
 
 def _grid() -> tuple[Array, Array]:
+    """Return theta_c and phi_c [rad] of directions of the camera up to 75 degrees."""
     return np.meshgrid(radians(np.arange(0.0, 76.0, 5.0)), radians(np.arange(-180.0, 180.0, 10.0)), indexing="ij")
 
 
 def _apart_deg(one: Array, other: Array) -> Array:
-    """Return the angle between unit vectors [degree], exact where it is small."""
+    """Return the angle [degree] between unit vectors, exact where it is small."""
     return np.asarray(degrees(2.0 * np.arcsin(np.minimum(np.linalg.norm(one - other, axis=-1) / 2.0, 1.0))))
 
 
 def _off_deg(D: float) -> Array:
+    """Return the error [degree] of eq. 3."""
     theta_c, phi_c = _grid()
     return _apart_deg(eq_3(theta_c, phi_c, D), traced(theta_c, phi_c, D))
 
 
 def fig_03() -> Figure:
-    """Return how far off eq. 3 is, over D and over the picture of the camera."""
+    """Draw the error of eq. 3 over D and over the picture of the camera."""
     spread = np.geomspace(0.005, 0.3, 15)
-    most = np.array([float(_off_deg(each).max()) for each in spread.tolist()])
-    middle = np.array([float(np.median(_off_deg(each))) for each in spread.tolist()])
-    without = np.array([float(_ignoring(each).max()) for each in spread.tolist()])
+    most = np.array([float(_off_deg(D).max()) for D in spread.tolist()])
+    middle = np.array([float(np.median(_off_deg(D))) for D in spread.tolist()])
+    without = np.array([float(_ignoring(D).max()) for D in spread.tolist()])
     axis = np.linspace(-75.0, 75.0, 31)
     x, y = np.meshgrid(axis, axis)
     theta_c, phi_c = radians(np.hypot(x, y)), np.arctan2(y, x)
@@ -72,12 +74,12 @@ def fig_03() -> Figure:
         key="ward-1992-fig-03",
         paper="ward1992",
         title="Fig. 3: from a pixel of the gonioreflectometer to the angles of reflection, eq. 3",
-        caption="Camera and target stand D beside the middle of a hemisphere of radius R; a ray from the camera is "
-        "mirrored once and followed to the sample. The paper prints neither D nor R. Directions of the camera up to "
-        "75°: it calls those near grazing a limitation (section 3.3). Right, D is a tenth of R.",
+        caption="Camera and target are D beside the middle of a hemisphere of radius R. A ray from the camera is "
+        "mirrored once and followed to the sample. The paper prints neither D nor R. Directions of the camera end at "
+        "75°, because the paper calls those near grazing a limitation (section 3.3). In the map D is a tenth of R.",
         panels=[
             Panel(
-                title="How far off eq. 3 is",
+                title="Error of eq. 3",
                 x_label="D / R",
                 y_label="angle at the sample [degree]",
                 log_x=True,
@@ -89,7 +91,7 @@ def fig_03() -> Figure:
                 ],
             ),
             Map(
-                title=f"Eq. 3 off by, D / R = {SMALL:g}",
+                title=f"Error of eq. 3, D / R = {SMALL:g}",
                 x_label="θ_c cos(φ_c) [degree]",
                 y_label="θ_c sin(φ_c) [degree]",
                 value_label="degrees",
@@ -103,33 +105,35 @@ def fig_03() -> Figure:
 
 
 def _ignoring(D: float) -> Array:
-    """Return how far off the angles of the camera would be, taken as those of the target [degree]."""
+    """Return the error [degree] of the camera's own angles, taken as those of the target."""
     theta_c, phi_c = _grid()
     return _apart_deg(unit_vector(theta_c, phi_c), traced(theta_c, phi_c, D))
 
 
 def _good() -> Statement:
-    off = [_off_deg(each) for each in OFFSETS]
-    plain = [float(_ignoring(each).max()) for each in OFFSETS]
+    """Return the statement that eq. 3 is a good approximation for small D."""
+    off = [_off_deg(D) for D in OFFSETS]
+    plain = [float(_ignoring(D).max()) for D in OFFSETS]
     return Statement(
         says='"the above equations are a good approximation [...] as long as D is small in relation to R"',
         where="section 3.2, eq. 3",
-        seen=f"For D / R of {listed(OFFSETS)} they are {listed([float(each.max()) for each in off], '.2f')}° off at "
-        f"most, and {listed([float(np.median(each)) for each in off], '.2f')}° in the median (good: {GOOD_DEG:g}° for "
-        f"{SMALL:g}); the angles of the camera itself would be {listed(plain, '.1f')}° off.",
+        seen=f"For D / R of {listed(OFFSETS)} they are {listed([float(errors.max()) for errors in off], '.2f')}° off "
+        f"at most, and {listed([float(np.median(errors)) for errors in off], '.2f')}° in the median (good: "
+        f"{GOOD_DEG:g}° for {SMALL:g}); the angles of the camera itself would be {listed(plain, '.1f')}° off.",
         threshold_from="our reading: good is within 1°, half a pixel of the reduced picture",
         holds=float(off[OFFSETS.index(SMALL)].max()) < GOOD_DEG,
     )
 
 
 def _second_order() -> Statement:
-    D = np.array([0.01, 0.02])
-    slope = float(np.diff(np.log([_off_deg(each).max() for each in D.tolist()]))[0] / np.log(2.0))
+    """Return the statement that the error of eq. 3 is of second order."""
+    spread = (0.01, 0.02)
+    slope = float(np.diff(np.log([_off_deg(D).max() for D in spread]))[0] / np.log(2.0))
     return Statement(
         says="a sphere images points near its middle onto the opposite side: the error of eq. 3 is of second order in "
         "D / R",
         where="known of the form: the middle of a sphere is its own image, without coma",
-        seen=f"From D / R of {D[0]:g} to {D[1]:g} it grows with the power {slope:.3f}.",
+        seen=f"From D / R of {spread[0]:g} to {spread[1]:g} it grows with the power {slope:.3f}.",
         threshold_from="a limit: the second power for small D / R",
         holds=abs(slope - 2.0) < 0.1,
     )

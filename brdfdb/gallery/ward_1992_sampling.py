@@ -1,4 +1,4 @@
-"""Ward 1992, Figs 7b and 7c: noise of the highlight at equal work, drawn by eq. 7, evenly, and with eq. 6."""
+"""Ward 1992, Figs 7b and 7c: noise of the highlight at equal work, for rays by eq. 7, even rays, and eq. 6."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Panel, Picture, Statement, curve_of, listed, rows
-from brdfdb.geometry import HALF_PI, radians, unit_vector
+from brdfdb.gallery._ward_sphere import Points, points_at
+from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.sampling import sample
 from brdfdb.materials import presets
@@ -17,120 +18,103 @@ from brdfdb.models import ward_vectors
 
 Array = NDArray[np.float64]
 
-CAMERA_DEG, LIGHT_DEG = 35.0, 75.0  # above the equator of the sphere, as in Fig. 7a
-HALF_ANGLE_DEG = 2.0  # of the disc of light
+HALF_ANGLE_DEG = 2.0  # half angle of the disc of light
 SOLID_ANGLE = float(np.pi * np.sin(radians(HALF_ANGLE_DEG)) ** 2)  # sr
 RAYS = 16  # "even with 16 samples per pixel"
-MANY = 2000  # rays of a point; noise is measured from them
+MANY = 2000  # rays of a point that measure the noise
 PIXELS = 64
-AMBIENT = 0.1  # radiance of the dark stripes; the light has an irradiance of 1
+AMBIENT = 0.1  # radiance of the dark stripes, for a light with an irradiance of 1
 STRIPES = 0.3  # radiance of the bright stripes
 WHITE = 0.25  # radiance drawn as white
 
 STRICT, HYBRID = "strict Monte Carlo, eq. 7 (Fig. 7b)", "hybrid, eq. 6 with eq. 7 (Fig. 7c)"
-EXCESSIVE = 0.5  # standard deviation over radiance: our reading of "excessive noise"
-CLEAN = 0.1  # standard deviation over radiance: our reading of "a clean result"
-ACCURATE = 0.05  # relative error: our reading of "without compromising accuracy"; a disc is not a point
-MUCH = 10.0  # ratio of variances: our reading of "much more efficient"
-CORRECT = 0.05  # relative error: our reading of "correctly reproduce"
-
-
-class _Points(NamedTuple):
-    """Points of the sphere: their frames (..., 3, 3), x along the meridian, and both directions in them."""
-
-    frame: Array
-    camera: Array
-    light: Array
-
-
-def _points(across: Array, up: Array) -> _Points:
-    """Return points by their place in the image of a unit sphere."""
-    camera, light = (unit_vector(HALF_PI - radians(above), 0.0) for above in (CAMERA_DEG, LIGHT_DEG))
-    right = np.array([0.0, 1.0, 0.0])
-    normal = across[..., None] * right + up[..., None] * np.cross(camera, right)
-    normal = normal + np.sqrt(1.0 - across**2 - up**2)[..., None] * camera
-    parallel = np.cross([0.0, 0.0, 1.0], normal)
-    parallel /= np.linalg.norm(parallel, axis=-1, keepdims=True)
-    frame = np.stack([np.cross(normal, parallel), parallel, normal], axis=-2)
-    return _Points(frame, frame @ camera, frame @ light)
+# Our readings of words of the paper
+EXCESSIVE = 0.5  # standard deviation over radiance for "excessive noise"
+CLEAN = 0.1  # standard deviation over radiance for "a clean result"
+ACCURATE = 0.05  # relative error for "without compromising accuracy", because a disc is not a point
+MUCH = 10.0  # ratio of variances for "much more efficient"
+CORRECT = 0.05  # relative error for "correctly reproduce"
 
 
 def _lobe() -> dict[str, Any]:
+    """Return the parameters of the lobe of rolled brass."""
     surface = presets()["rolled-brass"].parameters
     return {name: surface[name] for name in ("rho_s", "alpha_x", "alpha_y")}
 
 
-def _surroundings(points: _Points, directions: Array) -> Array:
-    """Return radiance [1/sr of an irradiance of 1] that directions of a frame look into: twelve upright stripes."""
+def _surroundings(points: Points, directions: Array) -> Array:
+    """Return the radiance [1/sr] in directions of a frame: twelve upright stripes, for an irradiance of 1."""
     world = np.einsum("...ij,...i->...j", points.frame, directions)
     return np.where(np.sin(6.0 * np.arctan2(world[..., 1], world[..., 0])) > 0.0, STRIPES, AMBIENT)
 
 
 def _random(seed: int, count: int, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return two arrays of random numbers in [0, 1), of the shape (count, *shape)."""
     rng = np.random.default_rng(seed)
     return rng.uniform(size=(count, *shape)), rng.uniform(size=(count, *shape))
 
 
 class _Rays(NamedTuple):
-    """Weighted radiance that rays bring, (rays, points), from the surroundings and the disc, and which met the disc."""
+    """Weighted radiance of rays (rays, points) from surroundings and disc, and whether a ray meets the disc."""
 
     around: Array
     disc: Array
     met: NDArray[np.bool_]
 
 
-def _followed(points: _Points, directions: Array, weight: Array) -> _Rays:
+def _followed(points: Points, directions: Array, weight: Array) -> _Rays:
+    """Return the rays that leave points in directions of their frames."""
     met = np.sum(directions * points.light, axis=-1) > np.cos(radians(HALF_ANGLE_DEG))
     around = np.where(met, 0.0, weight * _surroundings(points, directions))
     return _Rays(around, np.where(met, weight / SOLID_ANGLE, 0.0), met)
 
 
-def _by_eq_7(points: _Points, rays: int, seed: int = 7) -> _Rays:
+def _by_eq_7(points: Points, rays: int, seed: int = 7) -> _Rays:
     """Return rays drawn from the lobe of each point, eq. 7 with its weights."""
     u1, u2 = _random(seed, rays, points.camera.shape[:-1])
     drawn = sample("ward", u1, u2, points.camera, rho_d=0.0, **_lobe())
     return _followed(points, drawn.wr, drawn.weight)
 
 
-def _evenly(points: _Points, rays: int, seed: int = 7) -> _Rays:
-    """Return rays drawn evenly over the hemisphere, with f_r cos(theta) 2 pi as weights."""
+def _evenly(points: Points, rays: int, seed: int = 7) -> _Rays:
+    """Return rays drawn evenly over the hemisphere, with the weights 2 pi f_r cos(theta)."""
     u1, u2 = _random(seed, rays, points.camera.shape[:-1])
     directions = unit_vector(np.arccos(u1), 2.0 * np.pi * u2)
     f_r = ward_vectors(directions, points.camera, rho_d=0.0, **_lobe())
     return _followed(points, directions, 2.0 * np.pi * f_r * u1)
 
 
-def _closed(points: _Points) -> Array:
-    """Return L_i omega_i cos(theta_i) rho_bd of eq. 6, of the lobe alone: the deterministic term of the source."""
+def _closed(points: Points) -> Array:
+    """Return L_i omega_i cos(theta_i) rho_bd [1/sr] of eq. 6 for the lobe alone, the deterministic term."""
     f_r = ward_vectors(points.light, points.camera, rho_d=0.0, **_lobe())
     return np.asarray(f_r * np.maximum(points.light[..., 2], 0.0))
 
 
-def _diffuse(points: _Points) -> Array:
-    """Return the diffuse part of eq. 6, the same in all pictures: of the source, and of a constant ambient level."""
+def _diffuse(points: Points) -> Array:
+    """Return the diffuse part of eq. 6 [1/sr], for the source and a constant ambient level; all pictures share it."""
     rho_d = presets()["rolled-brass"].parameters["rho_d"]
     return np.asarray(rho_d / np.pi * (np.maximum(points.light[..., 2], 0.0) + np.pi * (AMBIENT + STRIPES) / 2.0))
 
 
-def _line() -> tuple[Array, _Points]:
+def _line() -> tuple[Array, Points]:
     """Return heights in the image [radius] along the meridian that faces the camera, and the points there."""
     up = np.linspace(0.15, 0.55, 41)
-    return up, _points(np.full(up.shape, 0.02), up)
+    return up, points_at(np.full(up.shape, 0.02), up)
 
 
 def _noise(samples: Array, total: Array) -> Array:
-    """Return the standard deviation of a mean of RAYS samples, over the radiance."""
+    """Return the standard deviation of a mean of RAYS samples over the radiance [1]."""
     return np.asarray(samples.std(axis=0) / np.sqrt(RAYS) / total)
 
 
 WORK = (
-    f"{RAYS} rays a pixel; seeds are fixed. Work is counted, not timed: strict Monte Carlo follows {RAYS} rays and "
-    "evaluates f_r for each, the hybrid does the same and evaluates f_r once more for the light."
+    f"{RAYS} rays a pixel, with fixed seeds. Work is counted, not timed: strict Monte Carlo follows {RAYS} rays and "
+    "evaluates f_r for each of them. The hybrid does the same and evaluates f_r once more for the light."
 )
 
 
 def pictures() -> Figure:
-    """Return the three pictures of Fig. 7."""
+    """Draw the three pictures of Fig. 7."""
     _, line = _line()
     seven = _by_eq_7(line, MANY)
     drawn, met = _pictures()
@@ -139,16 +123,16 @@ def pictures() -> Figure:
         paper="ward1992",
         title="Fig. 7: three ways to render an anisotropic highlight",
         caption="Rolled brass on a sphere, light and camera as in Fig. 7a before; the light is a disc of "
-        f"{2.0 * HALF_ANGLE_DEG:g}°, and twelve stripes stand around. (a) eq. 6 without samples; (b) rays by eq. 7 "
-        "with their weights, which find the light by chance; (c) eq. 6 with the same rays, of which those that "
-        f"meet the light do not count. The diffuse part is the same in all. {WORK}",
+        f"{2.0 * HALF_ANGLE_DEG:g}°, and twelve stripes surround the sphere. (a) Eq. 6 without samples. (b) Rays by "
+        "eq. 7 with their weights, which meet the light by chance. (c) Eq. 6 with the same rays, except those that "
+        f"meet the light. The diffuse part is the same in all. {WORK}",
         panels=[*drawn],
         statements=[_misses(seven, _total(line, seven)), _unbiased(met)],
     )
 
 
 def noise() -> Figure:
-    """Return the noise of Figs 7b and 7c, and of rays that are drawn evenly."""
+    """Draw the noise of Figs 7b and 7c, and of rays that are drawn evenly."""
     up, line = _line()
     seven, even = _by_eq_7(line, MANY), _evenly(line, MANY)
     total = _total(line, seven)
@@ -180,17 +164,17 @@ def noise() -> Figure:
     )
 
 
-def _total(line: _Points, rays: _Rays) -> Array:
-    """Return the radiance by eq. 6."""
+def _total(line: Points, rays: _Rays) -> Array:
+    """Return the radiance [1/sr] by eq. 6."""
     return np.asarray(_diffuse(line) + _closed(line) + rays.around.mean(axis=0))
 
 
 def _pictures() -> tuple[list[Picture], float]:
-    """Return the pictures (a), (b) and (c), and the share of rays of (c) that meet the light."""
+    """Return the pictures (a), (b) and (c), and the share [1] of the rays of (c) that meet the light."""
     axis = np.linspace(-1.0, 1.0, PIXELS)
     across, up = np.meshgrid(axis, axis[::-1])
     inside = across**2 + up**2 < 1.0
-    points = _points(across[inside], up[inside])
+    points = points_at(across[inside], up[inside])
     rays = _by_eq_7(points, RAYS)
     base, closed = _diffuse(points), _closed(points)
     radiances = {
@@ -207,63 +191,68 @@ def _pictures() -> tuple[list[Picture], float]:
 
 
 def _misses(rays: _Rays, total: Array) -> Statement:
+    """Return the statement on the light that a deterministic calculation misses."""
     missed = rays.around.mean(axis=0) / total
     albedo = float(rays.around.mean() / (0.5 * (AMBIENT + STRIPES)))
     return Statement(
         says='a strictly deterministic calculation "fails to pick up indirect semispecular contributions"',
         where="section 5, Fig. 7a",
-        seen=f"Beside the highlight (a) lacks {missed[0]:.0%} of the radiance, in it {missed.min():.0%}: what the "
-        f"stripes send through the lobe, {albedo:.2f} of their mean radiance.",
-        threshold_from="our reading: who fails to pick something up lacks more than half of it",
+        seen=f"Beside the highlight (a) lacks {missed[0]:.0%} of the radiance, in it {missed.min():.0%}: the light of "
+        f"the stripes in the lobe, {albedo:.2f} of their mean radiance.",
+        threshold_from="our reading: a failure to pick something up lacks more than half of it",
         holds=bool(missed[0] > 0.5),
     )
 
 
 def _excessive(noise: Array) -> Statement:
+    """Return the statement that stochastic sampling alone is noisy."""
     return Statement(
         says='relying solely on stochastic sampling shows "high variance in the form of excessive noise, even with 16 '
         'samples per pixel"',
         where="section 5, Fig. 7b",
-        seen=f"In the highlight, where the source adds half of its most or more, the standard deviation of {RAYS} "
-        f"rays is {noise.min():.0%} to {noise.max():.0%} of the radiance (excessive: {EXCESSIVE:.0%}).",
+        seen=f"In the highlight, where the source has at least half of its largest radiance, the standard deviation of "
+        f"{RAYS} rays is {noise.min():.0%} to {noise.max():.0%} of the radiance (excessive: {EXCESSIVE:.0%}).",
         threshold_from="our reading: excessive is half of the radiance",
         holds=bool(noise.min() > EXCESSIVE),
     )
 
 
 def _clean(strict: Array, hybrid: Array) -> Statement:
-    gain = (strict / hybrid) ** 2 * RAYS / (RAYS + 1.0)  # one evaluation more
+    """Return the statement that the hybrid technique has a clean result."""
+    gain = (strict / hybrid) ** 2 * RAYS / (RAYS + 1.0)  # The hybrid evaluates f_r once more
     return Statement(
         says='by combining the two techniques "we get a clean result", with the same number of samples as Fig. 7b',
         where="section 5, Fig. 7c",
         seen=f"In the highlight the standard deviation of (c) is {hybrid.max():.1%} of the radiance at most (clean: "
-        f"{CLEAN:.0%}); its variance times work is {gain.min():.1e} times smaller than that of (b) or less.",
+        f"{CLEAN:.0%}); its variance times work is smaller than that of (b) by a factor of {gain.min():.1e} or more.",
         threshold_from="our reading: clean is within a tenth of the radiance",
         holds=bool(hybrid.max() < CLEAN and gain.min() > MUCH),
     )
 
 
 def _unbiased(met: float) -> Statement:
+    """Return the statement that the hybrid technique keeps its accuracy."""
     up = np.linspace(0.15, 0.55, 201)
-    line = _points(np.full(up.shape, 0.02), up)
+    line = points_at(np.full(up.shape, 0.02), up)
     lit = np.flatnonzero(_closed(line) > 0.5 * _closed(line).max())[::3]
-    points = _Points(*(each[lit] for each in line))
+    points = Points(*(values[lit] for values in line))
     rays, closed = _by_eq_7(points, 30000, 1992).disc, float(_closed(points).sum())
-    found = float(rays.mean(axis=0).sum()) / closed
+    ratio = float(rays.mean(axis=0).sum()) / closed
     error = float(np.sqrt((rays.var(axis=0) / len(rays)).sum())) / closed
     return Statement(
         says='the hybrid technique is clean "without compromising accuracy"; bias is avoided by not counting rays that '
         "hit a source",
         where="section 5",
-        seen=f"In the highlight rays by eq. 7 find {found:.3f} ± {error:.3f} times the source's light that eq. 6 has "
-        f"(a disc of {2.0 * HALF_ANGLE_DEG:g}° taken as a point). Counted as well, they would double it; left out, "
-        f"{met:.2%} of the rays of picture (c) are wasted.",
+        seen=f"In the highlight rays by eq. 7 find {ratio:.3f} ± {error:.3f} times the light of the source by eq. 6 "
+        f"(a disc of {2.0 * HALF_ANGLE_DEG:g}° taken as a point). If they counted too, they would double it. Without "
+        f"them, {met:.2%} of the rays of picture (c) are wasted.",
         threshold_from="our reading: accuracy is kept within 5 % of the light of the source",
-        holds=abs(found - 1.0) < ACCURATE and error < 0.4 * ACCURATE,
+        holds=abs(ratio - 1.0) < ACCURATE and error < 0.4 * ACCURATE,
     )
 
 
 def _efficient(seven: Array, even: Array) -> Statement:
+    """Return the statement that eq. 7 is more efficient than even rays and than rejection."""
     gain = (even.var(axis=0) / seven.var(axis=0)).mean()
     lobe = _lobe()
     up = np.array([0.0, 0.0, 1.0])
@@ -273,15 +262,16 @@ def _efficient(seven: Array, even: Array) -> Statement:
         says='sampling by eq. 7 "is much more efficient than either distributing the samples evenly and then weighting '
         'the result, or using other techniques, such as rejection sampling"',
         where="section 5.1",
-        seen=f"Along the line of the picture the variance of evenly drawn rays is {gain:.0f} times that of eq. 7, for "
-        f"as many rays (much: {MUCH:.0f}). Rejection under the peak keeps one of {1.0 / accepted:.0f} directions "
-        "along the normal; eq. 7 keeps all but those below the horizon.",
+        seen=f"Along the line of the picture the variance of evenly drawn rays is {gain:.0f} times that of eq. 7 for "
+        f"the same number of rays (much: {MUCH:.0f}). Rejection under the peak keeps one of {1.0 / accepted:.0f} "
+        "directions along the normal; eq. 7 keeps all directions above the horizon.",
         threshold_from="our reading: much more is ten times",
         holds=bool(gain > MUCH and 1.0 / accepted > MUCH),
     )
 
 
 def _uniform_weights() -> Statement:
+    """Return the statement that uniform weights reproduce the highlight."""
     lobe = _lobe()
     thetas_deg = [0.0, 30.0, 60.0]
     viewers = unit_vector(radians(thetas_deg), 0.0)
@@ -294,8 +284,9 @@ def _uniform_weights() -> Statement:
         says='"uniformly weighted sample rays sent according to the above distribution will correctly reproduce the '
         'specified highlight"',
         where="section 5.1, eq. 7",
-        seen=f"In light from all around they bring {listed(uniform, '.2f')} times what eq. 5a reflects, for θ_r of "
-        f"{listed(thetas_deg, '.0f')}°; with weights f_r cos θ_i over their density {listed(weighted, '.3f')} times.",
+        seen=f"In uniform light they bring {listed(uniform, '.2f')} times the light that eq. 5a reflects, for θ_r of "
+        f"{listed(thetas_deg, '.0f')}°. With the weights f_r cos θ_i over their density they bring "
+        f"{listed(weighted, '.3f')} times.",
         threshold_from="our reading: correct is within 5 % of the lobe",
         holds=bool(np.abs(uniform - 1.0).max() < CORRECT),
     )

@@ -29,10 +29,11 @@ from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec
 from brdfdb.spectra import refractive_index
 
-_SOURCED = ("refractive_index", "wavelengths_nm")  # what may have a source of its own, besides parameters
+_SOURCED = ("refractive_index", "wavelengths_nm")  # fields that may have a source of their own, besides parameters
 
-# Directions from which on a call each is faster than one for all wavelengths: they are one row of the kernel then. One
-# call and a call each of copper at 8 wavelengths: 278 and 637 ns a value at 256 directions, 293 and 204 at 16384
+# Number of directions above which a call for each wavelength is faster than one call for all: each is one row of the
+# kernel then. Measured for copper at 8 wavelengths, one call and separate calls: 278 and 637 ns a value at 256
+# directions, 293 and 204 ns at 16384
 _MANY = 2000
 
 
@@ -107,7 +108,7 @@ class Material(BaseModel):
                                 len(stated),
                                 (0, most),
                             )
-                        fields[field] = {own.get(written, written): each for written, each in stated.items()}
+                        fields[field] = {own.get(written, written): value for written, value in stated.items()}
             return cls.model_validate(fields)
         except ValidationError as error:
             (field, sentence), *others = map(_field_and_sentence, error.errors())
@@ -149,7 +150,10 @@ class Material(BaseModel):
             )
         values = (*self.parameters, *_SOURCED)
         alternatives = (
-            name for each in self.assumed.values() for other in each.alternatives for name in other.parameters
+            name
+            for assumption in self.assumed.values()
+            for other in assumption.alternatives
+            for name in other.parameters
         )
         written = (*map(written_name, self.spec.parameters), *_SOURCED)
         for field, names, allowed in (
@@ -231,7 +235,7 @@ class Material(BaseModel):
         return changed
 
     def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Where a picture at some wavelengths [nm] evaluates the material: there, but for models that are not spectral.
+        """Return the wavelengths [nm] at which a picture at some wavelengths evaluates the material; None if grey.
 
         One whose parameters are stated for some wavelengths, which make no colour, is evaluated at the first of them.
         """
@@ -240,7 +244,7 @@ class Material(BaseModel):
         return wavelength_nm if self.wavelengths_nm is None else np.array(self.wavelengths_nm[:1])
 
     def arguments(self, wavelength_nm: ArrayLike | None = None) -> dict[str, Any]:
-        """Keyword arguments of the model call, angles apart.
+        """Return the keyword arguments of the model call, without the angles.
 
         Parameters
         ----------
@@ -294,12 +298,12 @@ class Material(BaseModel):
         f_r, together = vectors or self.spec.vectors, self.arguments(wavelength_nm)
         if wavelength_nm is None:
             return lambda wi, wr: f_r(wi, wr, **together)[:, np.newaxis]
-        each = _each(together)
+        separate = _each(together)
 
         def brdf(wi: Floats, wr: Floats) -> Floats:
-            if len(each) > 1 and len(wi) < _MANY:
+            if len(separate) > 1 and len(wi) < _MANY:
                 return f_r(wi[:, np.newaxis], wr[:, np.newaxis], **together)
-            return np.stack([f_r(wi, wr, **arguments) for arguments in each], axis=-1)
+            return np.stack([f_r(wi, wr, **arguments) for arguments in separate], axis=-1)
 
         return brdf
 
@@ -311,7 +315,7 @@ class Material(BaseModel):
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
     ) -> Floats:
-        """f_r of the model itself, where `brdfdb.tables.table.Table.lookup` gives that of its table.
+        """Return f_r of the model itself, as `brdfdb.tables.table.Table.lookup` gives that of its table.
 
         Parameters
         ----------
@@ -350,7 +354,7 @@ class Material(BaseModel):
         wavelength_nm: ArrayLike | None,
         names: tuple[str, ...] | None,
     ) -> Floats:
-        """A function of angles and parameters (`names` of them, or all), wavelength by wavelength on a last axis."""
+        """Evaluate a function of angles and parameters (`names` of them, or all); wavelengths are the last axis."""
         if not self.spectral:
             value = function(*angles, **self.arguments())
             if wavelength_nm is None or np.ndim(wavelength_nm) == 0:
@@ -398,7 +402,7 @@ class Material(BaseModel):
             "parameters": self.file_parameters(),
             "parameter_sources": {in_file: self.sources.get(name, self.source) for name, in_file in written.items()},
             "source": self.source,
-            "assumed": {written.get(n, n): each.model_dump(mode="json") for n, each in self.assumed.items()},
+            "assumed": {written.get(n, n): value.model_dump(mode="json") for n, value in self.assumed.items()},
             "note": self.note,
             "refractive_index": self.refractive_index or "",
             "known_excess": self.known_excess.model_dump() if self.known_excess else {},
@@ -410,7 +414,7 @@ class Material(BaseModel):
 
 
 def _each(arguments: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The arguments of a spectral model at each wavelength."""
+    """Return the arguments of a spectral model at each wavelength."""
     return [
         {name: value[w] if np.ndim(value) else value for name, value in arguments.items()}
         for w in range(arguments["wavelength_nm"].size)

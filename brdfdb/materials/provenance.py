@@ -33,7 +33,7 @@ Number = float | bool
 class KnownExcess(BaseModel):
     """A published set of constants that reflects more than it receives, with the place that says so.
 
-    `max_albedo` is the largest directional albedo that the published parameters give, Dirac part included;
+    `max_albedo` is the largest directional albedo that the published parameters give, specular part included;
     `from_theta_i_deg` [degree] is the angle of incidence above which it exceeds 1. Audits believe the built-in
     materials alone.
     """
@@ -57,8 +57,8 @@ class Alternative(BaseModel):
 class Assumption(BaseModel):
     """A value that the paper does not print: why it was chosen, and what depends on the choice.
 
-    `max_albedo` [1] is the largest directional albedo of the material as it is, Dirac part included, and is given where
-    `alternatives` are: the two together say how far the verdict on energy rests on the choice.
+    `max_albedo` [1] is the largest directional albedo of the material as it is, specular part included. It is given
+    where `alternatives` are: the two together say how far the verdict on energy rests on the choice.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -78,4 +78,4 @@ class Assumption(BaseModel):
         """Return True if an alternative moves the largest albedo across 1; None where no alternative is recorded."""
         if self.max_albedo is None:
             return None
-        return any((each.max_albedo > 1.0) != (self.max_albedo > 1.0) for each in self.alternatives)
+        return any((other.max_albedo > 1.0) != (self.max_albedo > 1.0) for other in self.alternatives)

@@ -17,7 +17,7 @@ from brdfdb.geometry import radians
 from brdfdb.parameters import Floats
 from brdfdb.scenes.gbuffer import Points, View
 from brdfdb.scenes.image import difference
-from brdfdb.scenes.offered_forms import Candidate
+from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb.scenes.renderer import Reflector, composed, radiance
 from brdfdb.scenes.scene import Scene, Tolerance
 from brdfdb.scenes.shapes import Array
@@ -42,7 +42,7 @@ class Left(NamedTuple):
 
 
 class Pick(NamedTuple):
-    """The candidate that is chosen for a material and the best of what is clearly cheaper, if any, as indices."""
+    """The form that is chosen for a material and the best of what is clearly cheaper, if any, as indices."""
 
     chosen: int
     cheaper: int | None
@@ -65,9 +65,9 @@ class Decision(NamedTuple):
     Attributes
     ----------
     pick : Pick
-        What is chosen.
+        Form that is chosen.
     left : Left
-        By itself, where candidates are compared.
+        By itself, where forms are compared.
     cheaper_left : Left or None
         How the next cheaper breaks the tolerance.
     refused : bool
@@ -88,18 +88,18 @@ class Decision(NamedTuple):
 
 
 class Seen:
-    """A scene at the points of one view: its true picture, and what candidates make of it.
+    """A scene at the points of one view: its true picture, and pictures with forms for some materials.
 
     Parameters
     ----------
     scene : Scene
-        What is seen.
+        Scene that is seen.
     view : View
         Its points.
     truths : mapping
-        By the name of each material, the candidate that the others are compared with.
+        By the name of each material, the form that the others are compared with.
     materials : mapping
-        The result of `brdfdb.scenes.renderer.reflectors`: mirror and albedo, which are the same for all candidates.
+        The result of `brdfdb.scenes.renderer.reflectors`: mirror and albedo, which are the same for all forms.
 
     Attributes
     ----------
@@ -108,15 +108,15 @@ class Seen:
     """
 
     def __init__(
-        self, scene: Scene, view: View, truths: Mapping[str, Candidate], materials: Mapping[str, Reflector]
+        self, scene: Scene, view: View, truths: Mapping[str, OfferedForm], materials: Mapping[str, Reflector]
     ) -> None:
         self.scene, self.view = scene, view
         self._materials = materials
         self._lists = self._radiances(truths)
         self.truth = composed(scene, view, self._lists, materials)
 
-    def _radiances(self, forms: Mapping[str, Candidate]) -> list[Floats]:
-        """Of each list of points: by its candidate, or else the truth."""
+    def _radiances(self, forms: Mapping[str, OfferedForm]) -> list[Floats]:
+        """Return the radiance of each list of points: by its form, or else the truth."""
         return [
             radiance(self.scene, points, self._materials[points.material], forms[points.material].brdf)
             if points.material in forms
@@ -124,8 +124,8 @@ class Seen:
             for number, points in enumerate(self.view.points)
         ]
 
-    def picture(self, forms: Mapping[str, Candidate]) -> Array:
-        """The picture (height, width, L) with candidates for some materials, the truth for all others."""
+    def picture(self, forms: Mapping[str, OfferedForm]) -> Array:
+        """Return the picture (height, width, L) with forms for some materials, the truth for all others."""
         return composed(self.scene, self.view, self._radiances(forms), self._materials)
 
     def pixels(self, material: str) -> NDArray[np.int64]:
@@ -141,11 +141,11 @@ class Seen:
     def _grazing(self) -> NDArray[np.int64]:
         """Return the pixels that show something between `GRAZING_DEG` and the horizon."""
         least = np.cos(radians(GRAZING_DEG))
-        found = [self._at(points)[(points.wr[:, 2] > 0.0) & (points.wr[:, 2] < least)] for points in self.view.points]
-        return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *found]))
+        pixels = [self._at(points)[(points.wr[:, 2] > 0.0) & (points.wr[:, 2] < least)] for points in self.view.points]
+        return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *pixels]))
 
     def differences(self, picture: Array) -> Array:
-        """How far each pixel of a picture is from the truth (height, width), as the tolerance of the scene counts.
+        """Return the difference of each pixel (height, width) from the truth, in the unit of the tolerance.
 
         Relative errors are those of spectral radiance at the worst wavelength.
         """
@@ -164,14 +164,14 @@ def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
 
 
 def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick:
-    """Pick the cheapest candidate that keeps to a tolerance; of those that cost about the same, the most accurate.
+    """Pick the cheapest form that keeps to a tolerance; of those that cost about the same, the most accurate.
 
     Parameters
     ----------
-    costs : array of shape (rounds, candidates)
-        Of each candidate in each round of timing, in one unit; one round of costs that do not scatter.
+    costs : array of shape (rounds, forms)
+        Of each form in each round of timing, in one unit; one round of costs that do not scatter.
     error : callable
-        Of the candidate with an index, 0 of the truth; asked in the order of median costs, and of nothing clearly
+        Of the form with an index, 0 of the truth; asked in the order of median costs, and of nothing clearly
         costlier than need be.
     tolerance : float
         Of the error.
@@ -180,7 +180,7 @@ def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick
     -------
     Pick
         The cost is about the same where neither is clearly cheaper (`brdfdb.forms.timing.clearly_cheaper`), as in a
-        chart; the error, where it is less than `brdfdb.forms.timing.ALIKE` times as large. Of candidates alike in both
+        chart; the error, where it is less than `brdfdb.forms.timing.ALIKE` times as large. Of forms alike in both
         it is the one given first. The next cheaper is the most accurate of those that are clearly cheaper than the
         choice, all of which break the tolerance.
     """
@@ -199,7 +199,7 @@ def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick
 
 
 def check_feasible(tolerance: Tolerance) -> None:
-    """InfeasibleError if a tolerance is finer than the truth is known."""
+    """Raise an InfeasibleError if a tolerance is finer than the truth is known."""
     value, unit = tolerance.value, tolerance.unit
     if value < FINEST[unit]:
         raise InfeasibleError(
@@ -213,18 +213,18 @@ class Look(NamedTuple):
     even: Seen
     edges: Seen | None
 
-    def errors(self, names: Iterable[str], forms: Mapping[str, Candidate]) -> dict[str, list[Array]]:
-        """Return the errors of materials with candidates for some, all at once: at even places, and at edges."""
+    def errors(self, names: Iterable[str], forms: Mapping[str, OfferedForm]) -> dict[str, list[Array]]:
+        """Return the errors of materials with forms for some, all at once: at even places, and at edges."""
         seen = [self.even] if self.edges is None else [self.even, self.edges]
-        pictures = [each.picture(forms) for each in seen]
+        pictures = [view.picture(forms) for view in seen]
         return {
-            name: [each.errors(name, picture) for each, picture in zip(seen, pictures, strict=True)] for name in names
+            name: [view.errors(name, picture) for view, picture in zip(seen, pictures, strict=True)] for name in names
         }
 
 
 def _left(errors: Sequence[Array], percentile: float) -> Left:
     """Return what is left of errors at even places, and at edges, which count where all places do."""
-    most = max(float(each.max(initial=0.0)) for each in errors)
+    most = max(float(values.max(initial=0.0)) for values in errors)
     if percentile == 100.0 or not errors[0].size:
         return Left(most, most)
     return Left(float(np.percentile(errors[0], percentile)), most)
@@ -240,24 +240,24 @@ def _sample(errors: Array, tolerance: float, confidence: float) -> Sample:
 def choose(
     planned: Look,
     check: Callable[[int], Look | None],
-    offered: Mapping[str, Sequence[Candidate]],
+    offered: Mapping[str, Sequence[OfferedForm]],
     costs: Mapping[str, Floats],
     tick: Callable[[], None] = lambda: None,
 ) -> dict[str, Decision]:
-    """Choose a candidate for each material of a scene, and check all of them together.
+    """Choose a form for each material of a scene, and check all of them together.
 
     Parameters
     ----------
     planned : Look
-        The picture, and places near edges: where candidates are compared, each against a picture that is true
+        The picture, and places near edges: where forms are compared, each against a picture that is true
         otherwise.
     check : callable
         Gives the same scene at fresh places for a round from 1 on, where all choices at once are held to the tolerance;
         None of a scene that has no other places.
     offered : mapping
-        By the name of each material, its candidates, the truth first.
+        By the name of each material, its forms, the truth first.
     costs : mapping
-        The same, what each of them costs, of shape (rounds, candidates).
+        The same, what each of them costs, of shape (rounds, forms).
     tick : callable
         Called for each material, and for each round of checks.
 
@@ -297,13 +297,15 @@ def choose(
         checked = check(number)
         looks = [planned] if checked is None else [planned, checked]
         errors = [look.errors(forms, forms) for look in looks]
-        whole = {name: Left(*np.max([_left(each[name], percentile) for each in errors], axis=0)) for name in forms}
+        whole = {
+            name: Left(*np.max([_left(of_look[name], percentile) for of_look in errors], axis=0)) for name in forms
+        }
         tick()
         if max(whole.values()).counted <= tolerance:
             break
         own = {name: max(left(look, name, one.chosen) for look in looks) for name, one in picks.items() if one.chosen}
-        for name, each in _broken(own, max(whole.values()), tolerance).items():
-            refused[name, picks[name].chosen] = each
+        for name, broken in _broken(own, max(whole.values()), tolerance).items():
+            refused[name, picks[name].chosen] = broken
             picks[name] = picked(name)
     confidence = 1.0 - (1.0 - CONFIDENCE) / (number * (number + 1))
     return {
@@ -313,7 +315,7 @@ def choose(
             None if one.cheaper is None else known(name, one.cheaper),
             (name, one.cheaper) in refused,
             whole[name],
-            *(_sample(each, tolerance, confidence) for fresh in errors[1:] for each in fresh[name]),
+            *(_sample(values, tolerance, confidence) for fresh in errors[1:] for values in fresh[name]),
         )
         for name, one in picks.items()
     }
@@ -321,5 +323,5 @@ def choose(
 
 def _broken(own: Mapping[str, Left], whole: Left, tolerance: float) -> dict[str, Left]:
     """Return the choices that break the tolerance by themselves, or else the one that leaves the most, and how far."""
-    broke = {name: each for name, each in own.items() if each.counted > tolerance}
+    broke = {name: left for name, left in own.items() if left.counted > tolerance}
     return broke or {max(own, key=lambda name: own[name]): whole}

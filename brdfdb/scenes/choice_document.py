@@ -1,4 +1,4 @@
-"""What a choice for a scene says: the types of choice.json, and reasons in words."""
+"""The document of a choice for a scene: the types of choice.json, and reasons in words."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from brdfdb.forms.catalogue import Kind
 from brdfdb.parameters import Floats
 from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Left, Sample
-from brdfdb.scenes.offered_forms import Candidate
+from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb.scenes.scene import Scene, Tolerance
 
 THIRD = 1.0 / 3.0  # of the truth: what a choice is expected to cost at most
@@ -23,7 +23,7 @@ _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
 class Price(NamedTuple):
-    """The price of a candidate: time [ns] of a pair of directions, and what is weighed in each round of timing."""
+    """The price of a form: time [ns] of a pair of directions, and what is weighed in each round of timing."""
 
     ns: float
     costs: Floats
@@ -108,8 +108,8 @@ class Choice(BaseModel):
     picture: tuple[int, int] = Field(
         description="pixels across and down: the choices keep to the tolerance at each of them, seen through its middle"
     )
-    confidence: float = Field(description="of what is said of samples, for each material and each kind of sample")
-    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is said beyond")
+    confidence: float = Field(description="of what is clause of samples, for each material and each kind of sample")
+    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is clause beyond")
     statement: str = Field(description="what is proven, and what is sampled, in a few sentences")
     materials: list[Material]
 
@@ -130,16 +130,16 @@ def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequenc
         proven = (
             f"Proven: {share:g} % of each material's pixels, of {size} seen through their middles, are within {value}."
         )
-    even = [each.even for each in materials if each.even is not None]
-    edges = [each.edges for each in materials if each.edges is not None]
+    even = [one.even for one in materials if one.even is not None]
+    edges = [one.edges for one in materials if one.edges is not None]
     if not even:
         return f"{proven} The file holds no other places."
-    places, most = sum(each.places for each in (*even, *edges)), max(each.most for each in (*even, *edges))
+    places, most = sum(one.places for one in (*even, *edges)), max(one.most for one in (*even, *edges))
     return (
         f"{proven} Sampled: all other places of the picture, for other widths and offsets of its pixels, at {places} "
         f"places that were not used to choose; the largest error at them is {most:.2g}. With {100 * CONFIDENCE:g} % "
-        f"confidence for each material, fewer than 1 in {min(each.one_in for each in even)} of its places is beyond "
-        f"{value}, and fewer than 1 in {min(each.one_in for each in edges)} of those beside its edges. "
+        f"confidence for each material, fewer than 1 in {min(one.one_in for one in even)} of its places is beyond "
+        f"{value}, and fewer than 1 in {min(one.one_in for one in edges)} of those beside its edges. "
         f"What is seen within {90.0 - GRAZING_DEG:.2g} degrees of grazing is left out."
     )
 
@@ -147,16 +147,16 @@ def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequenc
 def describe(
     scene: Scene,
     chosen: Mapping[str, Decision],
-    offered: Mapping[str, Sequence[Candidate]],
+    offered: Mapping[str, Sequence[OfferedForm]],
     prices: Mapping[str, Sequence[Price]],
     pixels: Mapping[str, int],
     revisions: Mapping[str, str],
 ) -> list[Material]:
-    """What is chosen for each material of a scene: costs to three digits, and reasons."""
+    """Return the choice for each material of a scene: costs to three digits, and reasons."""
 
     def option(name: str, index: int, left: Left) -> Option:
-        candidate, price = offered[name][index], prices[name][index]
-        form, at = candidate.form, candidate.wavelength_nm
+        one, price = offered[name][index], prices[name][index]
+        form, at = one.form, one.wavelength_nm
         return Option(
             key=form.key,
             title=form.title,
@@ -170,14 +170,14 @@ def describe(
             error=_residue(left),
         )
 
-    found = []
+    materials = []
     for name, decision in chosen.items():
         truth = option(name, 0, Left(0.0, 0.0))
         choice = option(name, decision.pick.chosen, decision.left)
         cheaper = None
         if decision.pick.cheaper is not None and decision.cheaper_left is not None:
             cheaper = option(name, decision.pick.cheaper, decision.cheaper_left)
-        found.append(
+        materials.append(
             Material(
                 material=name,
                 title=scene.materials[name].title,
@@ -193,23 +193,23 @@ def describe(
                 revision=revisions.get(name),
             )
         )
-    return found
+    return materials
 
 
 def _reason(choice: Option, cheaper: Option | None, decision: Decision, tolerance: float) -> str:
-    """Why this one, and that it costs more than a third of the truth where it does."""
-    said = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.counted:.2g}"
+    """Return the reason for a choice, and a remark if it costs more than a third of the truth."""
+    clause = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.counted:.2g}"
     if decision.pick.chosen != 0 and choice.share > THIRD:
-        said += f" at {choice.share:.2g} of the truth's cost, more than a third"
+        clause += f" at {choice.share:.2g} of the truth's cost, more than a third"
     if cheaper is None:
-        return f"{said}, and nothing is cheaper"
+        return f"{clause}, and nothing is cheaper"
     where = " at fresh places" if decision.refused else ""
     left = _above(tolerance, cheaper.error.counted)
-    return f"{said}; the best of what is cheaper, {cheaper.title}, would leave {left}{where}"
+    return f"{clause}; the best of what is cheaper, {cheaper.title}, would leave {left}{where}"
 
 
 def _above(tolerance: float, error: float) -> str:
-    """An error with as many digits as show that it is above the tolerance, two at least."""
+    """Return an error with as many digits as show that it is above the tolerance, two at least."""
     return next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
 
 

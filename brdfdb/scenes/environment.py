@@ -149,7 +149,7 @@ def _widest(source: Source, wavelength_nm: Array, wr: Array) -> Lobe:
     lobe = source.lobe(wr[:, np.newaxis, 2], at) or DIFFUSE
     width = 1 if at is None else at.size
     share, alpha_x, alpha_y = (
-        np.broadcast_to(each, (len(wr), width)) for each in (lobe.share, lobe.alpha_x, lobe.alpha_y)
+        np.broadcast_to(value, (len(wr), width)) for value in (lobe.share, lobe.alpha_x, lobe.alpha_y)
     )
     mean = share.mean(axis=1)
     share = np.where(mean > 0.0, np.clip(mean, _LEAST, _MOST), 0.0)
@@ -171,7 +171,7 @@ def _checked(name: str, picture: Array) -> Array:
 
 @functools.lru_cache(maxsize=4)
 def _read(path: Path, _written: int) -> Array:
-    """The picture of a file, kept until it is written anew: every list of points asks for it."""
+    """Return the picture of a file, kept until it is written anew: every list of points asks for it."""
     picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
     if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
         raise ParameterError("environment.file", f"{path}: must hold numbers of shape (rows, columns)")
@@ -180,12 +180,12 @@ def _read(path: Path, _written: int) -> Array:
 
 def _from_numpy(path: Path) -> NDArray[np.generic]:
     try:
-        found = np.load(path)
-        if isinstance(found, np.ndarray):
-            return found
-        with found:
-            if "radiance" in found:
-                return np.asarray(found["radiance"])
+        arrays = np.load(path)
+        if isinstance(arrays, np.ndarray):
+            return arrays
+        with arrays:
+            if "radiance" in arrays:
+                return np.asarray(arrays["radiance"])
     except (ValueError, EOFError, zipfile.BadZipFile, zlib.error):
         raise ParameterError("environment.file", f"{path}: is no .npz or .npy of numbers, or a damaged one") from None
     raise ParameterError("environment.file", f"{path}: has no array `radiance`")
@@ -196,7 +196,7 @@ def _from_exr(path: Path) -> NDArray[np.generic]:
 
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            channels = {name: np.asarray(each.pixels, dtype=np.float64) for name, each in file.channels().items()}
+            channels = {name: np.asarray(channel.pixels, dtype=np.float64) for name, channel in file.channels().items()}
     except RuntimeError:
         raise ParameterError("environment.file", f"{path}: is no OpenEXR file, or a damaged one") from None
     if "Y" in channels:

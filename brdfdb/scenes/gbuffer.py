@@ -98,7 +98,7 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
 
     Notes
     -----
-    Mirrors are surfaces whose model has a Dirac part, and show one reflection, as in section 5 of He et al. 1991
+    Mirrors are surfaces whose model has a specular part, and show one reflection, as in section 5 of He et al. 1991
     (``he1991``). The ambient radiance is not shadowed; the environment is, by objects that send nothing on themselves.
     """
     first = scene.objects[0]
@@ -109,8 +109,8 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
         pixels = np.arange(width * height).reshape(height, width).repeat(across, axis=0).repeat(across, axis=1)
         rays = scene.camera.rays(width * across, height * across)
         points, background = _traced(scene, rays, pixels.ravel(), width * height)
-        _check_outside(scene, [each for each in points if each.via is None])
-        unseen = [item.name for item in scene.objects if item.name not in {each.name for each in points}]
+        _check_outside(scene, [direct for direct in points if direct.via is None])
+        unseen = [item.name for item in scene.objects if item.name not in {met.name for met in points}]
         if unseen:
             raise ParameterError("objects", f"no ray of {width} x {height} pixels meets {', '.join(unseen)}")
         view = View(points, width, height, across**2, background)
@@ -168,7 +168,7 @@ def _seen(
     via: int | None = None,
     before: Array | float = 0.0,
 ) -> tuple[list[Points], list[_Surface], NDArray[np.int64]]:
-    """What rays meet first: points of each object that is met, the surfaces that they lie on; rays that meet none.
+    """Return points of each object that rays meet first, the surfaces that they lie on, and the rays that meet none.
 
     `before` is how far the origins are from the camera.
     """
@@ -190,19 +190,19 @@ def _seen(
 
 
 def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface) -> list[Points]:
-    """What the mirror of some points shows; in place of what lies beyond, which is then 0."""
+    """Return the points that the mirror of some points shows, and make 0 what would lie beyond."""
     facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
     origins, directions = _lifted(scene.camera, surface)[facing], _mirror(surface)[facing]
-    found, surfaces, _ = _seen(scene, origins, directions, facing, number, surface.away[facing])
-    for each, shown in zip(found, surfaces, strict=True):
-        points[number].beyond[each.at] = 0.0
-        if scene.materials[each.material].has_specular:  # what its mirror would show is not traced
-            each.beyond[np.isfinite(_trace(scene, _lifted(scene.camera, shown), _mirror(shown))[0])] = 0.0
-    return found
+    reflected, surfaces, _ = _seen(scene, origins, directions, facing, number, surface.away[facing])
+    for seen, shown in zip(reflected, surfaces, strict=True):
+        points[number].beyond[seen.at] = 0.0
+        if scene.materials[seen.material].has_specular:  # what its mirror would show is not traced
+            seen.beyond[np.isfinite(_trace(scene, _lifted(scene.camera, shown), _mirror(shown))[0])] = 0.0
+    return reflected
 
 
 def _trace(scene: Scene, origins: Array, directions: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Distance to the nearest object on each ray, and which it is."""
+    """Return the distance to the nearest object on each ray, and the number of that object."""
     shapes = [item.shape for item in scene.objects]
     distances = np.stack([shape.hit(origins, directions) for shape in shapes if not isinstance(shape, Recorded)])
     nearest = np.argmin(distances, axis=0)
@@ -210,10 +210,10 @@ def _trace(scene: Scene, origins: Array, directions: Array) -> tuple[Array, NDAr
 
 
 def _lit(scene: Scene, item: Object, surface: _Surface, wr: Array, stream: tuple[int, int]) -> tuple[Array, Array]:
-    """Directions of all samples of all light in the frame of the surface, and irradiances; 0 in shadow."""
+    """Return directions of all samples of all light in the frame of the surface, and irradiances; 0 in shadow."""
     lights = [(light.towards(), light.intensity) for light in scene.lights]
     towards = np.concatenate([np.zeros((0, 3)), *(samples for samples, _ in lights)])
-    weight = np.concatenate([np.zeros(0), *(np.full(len(samples), each / len(samples)) for samples, each in lights)])
+    weight = np.concatenate([np.zeros(0), *(np.full(len(samples), total / len(samples)) for samples, total in lights)])
     wi = unit(np.einsum("nij,ej->eni", surface.frame, towards))
     irradiance = weight[:, np.newaxis] * np.maximum(wi[..., 2], 0.0)
     _shadow(scene, surface, np.broadcast_to(towards[:, np.newaxis], wi.shape), irradiance)
@@ -256,13 +256,13 @@ def _background(scene: Scene, directions: Array, at: NDArray[np.int64], pixels: 
 
 
 def _lifted(camera: Camera, surface: _Surface) -> Array:
-    """Where rays from a surface begin: outside it, but by no more than a small part of a pixel."""
+    """Return the origins of rays from a surface: outside it, but by no more than a small part of a pixel."""
     lift = _LIFT * camera.covered(surface.away) + _ROUNDED * np.abs(surface.position).max(axis=1)
     return np.asarray(surface.position + lift[:, np.newaxis] * surface.frame[:, 2])
 
 
 def _mirror(surface: _Surface) -> Array:
-    """Where the mirror direction of each viewer points, in the scene."""
+    """Return the mirror direction of each viewer, in the scene."""
     normal = surface.frame[:, 2]
     return np.asarray(2.0 * np.sum(normal * surface.viewer, axis=1, keepdims=True) * normal - surface.viewer)
 
@@ -280,11 +280,11 @@ def _viewed(surface: _Surface) -> Array:
 
 
 def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
-    """The points of a file of directions."""
+    """Return the points of a file of directions."""
     arrays = shape.read()
     height, width = arrays["normal" if "normal" in arrays else "wr"].shape[:2]
     good = np.all(
-        [_is_unit(each) for array in arrays.values() for each in array.reshape(-1, height * width, 3)], axis=0
+        [_is_unit(light) for array in arrays.values() for light in array.reshape(-1, height * width, 3)], axis=0
     )
     at = np.flatnonzero(good)
     if not at.size:
@@ -355,19 +355,19 @@ def _height(camera: Camera, width: int, across: int) -> int:
 
 
 def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
-    """ValueError if the camera is inside an object: it sees backs alone, which are black; a plane has a back, too."""
+    """Raise a ParameterError if the camera is inside an object: it sees black backs alone; a plane has a back, too."""
     shapes = {item.name: item.shape for item in scene.objects}
-    for each in points:
-        if not isinstance(shapes[each.name], Plane) and np.median(each.wr[:, 2]) < _BEHIND:
-            raise ParameterError("camera.position", f"is inside {each.name}, which is black from there")
+    for seen in points:
+        if not isinstance(shapes[seen.name], Plane) and np.median(seen.wr[:, 2]) < _BEHIND:
+            raise ParameterError("camera.position", f"is inside {seen.name}, which is black from there")
 
 
 def _check_lights(scene: Scene, points: Sequence[Points]) -> None:
-    """ValueError if a light falls on nothing that is seen."""
+    """Raise a ParameterError if a light falls on nothing that is seen."""
     start = 0
     for number, light in enumerate(scene.lights):
         stop = start + len(light.towards())
-        if not any(np.any(each.irradiance[start:stop]) for each in points):
+        if not any(np.any(seen.irradiance[start:stop]) for seen in points):
             raise ParameterError(
                 f"lights.{number}",
                 "falls on nothing that is seen: it is below the horizon of every visible point, or "

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import WriteError
 from brdfdb.scenes.scene import Scene
 from brdfdb.spectra import colour_science, illuminant_spectrum, srgb_weights, xyz_weights
 
@@ -42,7 +43,7 @@ def difference(scene: Scene, radiance: ArrayLike, other: ArrayLike) -> Array:
     """
     colour = colour_science()
     white = colour.XYZ_to_xy(_weights(scene).sum(axis=0))
-    first, second = (colour.XYZ_to_Lab(np.maximum(xyz(scene, each), 0.0), white) for each in (radiance, other))
+    first, second = (colour.XYZ_to_Lab(np.maximum(xyz(scene, picture), 0.0), white) for picture in (radiance, other))
     return np.asarray(colour.delta_E(first, second, method="CIE 2000"))
 
 
@@ -105,7 +106,7 @@ def write_channels(
     try:
         OpenEXR.File(whole, arrays).write(str(path))
     except RuntimeError as error:
-        raise OSError(f"cannot write {path}: {error}") from error
+        raise WriteError(f"cannot write {path}: {error}") from error
 
 
 def _weights(scene: Scene) -> Array:

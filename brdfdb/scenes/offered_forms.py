@@ -1,4 +1,4 @@
-"""Candidates for a material of a scene: its forms, at all wavelengths or fewer, with the truth at limbs or without."""
+"""Forms offered for a material of a scene: at all wavelengths or fewer, with the truth at limbs or without."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ROWS = 512  # of products at a time: larger ones BLAS gives to threads, which w
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class OfferedForm:
     """A form of a material, whose f_r is that of all wavelengths of the scene, and where it is evaluated itself.
 
     `wavelength_nm` is None of a grey form; between its wavelengths f_r is interpolated on straight lines.
@@ -33,15 +33,15 @@ class Candidate:
     wavelength_nm: NDArray[np.float64] | None
 
     def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
-        """f_r [1/sr], as `render` takes it."""
+        """Return f_r [1/sr], as `render` takes it."""
         dtype = self.form.dtype
         return self.form.evaluate(wi.astype(dtype, copy=False), wr.astype(dtype, copy=False)).astype(np.float64)
 
 
-def candidates(
+def offered_forms(
     source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
-) -> list[Candidate]:
-    """Forms to choose from, the truth first: at all wavelengths, and of spectral materials at fewer.
+) -> list[OfferedForm]:
+    """Return forms to choose from, the truth first: at all wavelengths, and of spectral sources at fewer.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def candidates(
 
     Returns
     -------
-    list of Candidate
+    list of OfferedForm
         Without models that are meant to differ, and forms that differ from another in rounding alone.
 
     Raises
@@ -64,13 +64,15 @@ def candidates(
     """
     if tolerances is None and wavelength_nm is None:
         tolerances = GREY_TOLERANCES
-    found = [Candidate(form, wavelength_nm) for form in _offered(source, wavelength_nm, tolerances)]
+    offered = [OfferedForm(form, wavelength_nm) for form in _offered(source, wavelength_nm, tolerances)]
     for count in SAMPLINGS if wavelength_nm is not None else ():
         assert wavelength_nm is not None
         if count < wavelength_nm.size:
             few = wavelength_nm[np.round(np.linspace(0, wavelength_nm.size - 1, count)).astype(np.int64)]
-            found += [Candidate(_between(form, few, wavelength_nm), few) for form in _offered(source, few, tolerances)]
-    return [each for each in found if each.form.kind != "other model" and not each.form.rounded]
+            offered += [
+                OfferedForm(_between(form, few, wavelength_nm), few) for form in _offered(source, few, tolerances)
+            ]
+    return [one for one in offered if one.form.kind != "other model" and not one.form.rounded]
 
 
 def _offered(
@@ -103,7 +105,7 @@ def _with_true_limbs(form: Form, truth: Form) -> Form:
 
 
 def _between(form: Form, few: Array, wavelength_nm: Array) -> Form:
-    """A form at a few wavelengths, interpolated to all of them."""
+    """Return a form at a few wavelengths, interpolated to all of them."""
     weights = np.stack([np.interp(wavelength_nm, few, one) for one in np.eye(few.size)]).astype(form.dtype)
 
     def evaluate(wi: Floats, wr: Floats) -> Floats:

@@ -35,11 +35,11 @@ class Recorded(BaseModel):
     file: Annotated[str, Field(min_length=1)]
 
     def resolved(self, folder: Path) -> Recorded:
-        """The same with its file named relative to a folder."""
+        """Return the shape with its file named relative to a folder."""
         return self.model_copy(update={"file": str(folder / self.file)})
 
     def read(self) -> dict[str, Array]:
-        """The arrays of the file, float64, by name; ``wi`` with its axis of lights.
+        """Return the arrays of the file, float64, by name; ``wi`` with its axis of lights.
 
         Raises
         ------
@@ -68,12 +68,12 @@ class Recorded(BaseModel):
 def _from_npz(path: Path) -> dict[str, Array]:
     try:
         with np.load(path) as file:
-            found = {name: file[name] for name in ("normal", "tangent", "wr", "wi") if name in file}
+            arrays = {name: file[name] for name in ("normal", "tangent", "wr", "wi") if name in file}
     except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
         raise ParameterError(str(path), "is no .npz of numbers, or a damaged one") from None
-    if any(array.dtype.kind not in "iuf" for array in found.values()):
+    if any(array.dtype.kind not in "iuf" for array in arrays.values()):
         raise ParameterError(str(path), f"has {WANTED}: what has these names is not made of numbers")
-    return {name: array.astype(np.float64) for name, array in found.items()}
+    return {name: array.astype(np.float64) for name, array in arrays.items()}
 
 
 def _from_exr(path: Path) -> dict[str, Array]:
@@ -84,15 +84,15 @@ def _from_exr(path: Path) -> dict[str, Array]:
             channels: dict[str, NDArray[np.floating]] = {name: c.pixels for name, c in file.channels().items()}
     except RuntimeError:
         raise ParameterError(str(path), "is no OpenEXR file, or a damaged one") from None
-    found = {name: vector for name in ("normal", "tangent", "wr") if (vector := _vector(channels, name)) is not None}
+    arrays = {name: vector for name in ("normal", "tangent", "wr") if (vector := _vector(channels, name)) is not None}
     lights: list[Array] = []
     while (light := _vector(channels, f"wi{len(lights)}")) is not None:
         lights.append(light)
-    return {**found, "wi": np.stack(lights)} if lights else found
+    return {**arrays, "wi": np.stack(lights)} if lights else arrays
 
 
 def _vector(channels: Mapping[str, NDArray[np.floating]], name: str) -> Array | None:
     names = [f"{name}.{axis}" for axis in "XYZ"]
-    if not all(each in channels for each in names):
+    if not all(channel in channels for channel in names):
         return None
-    return np.stack([channels[each] for each in names], axis=-1).astype(np.float64)
+    return np.stack([channels[channel] for channel in names], axis=-1).astype(np.float64)

@@ -107,7 +107,7 @@ def reflectors(scene: Scene) -> dict[str, Reflector]:
 
 
 def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
-    """Spectral radiance of points, as multiples of the illuminant: 1 is white.
+    """Return the spectral radiance of points, as multiples of the illuminant: 1 is white.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def render(
     materials: Mapping[str, Reflector] | None = None,
     progress: Callable[[], None] | None = None,
 ) -> NDArray[np.float64]:
-    """The picture of a scene.
+    """Render the picture of a scene.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def render(
 def composed(
     scene: Scene, view: View, lists: Sequence[Floats], materials: Mapping[str, Reflector]
 ) -> NDArray[np.float64]:
-    """The picture (height, width, L) of radiances of each list of points, to which mirrors add what they show."""
+    """Return the picture (height, width, L) of radiances of each list of points; mirrors add what they show."""
     known, lists = materials, [values.copy() for values in lists]
     pixels = np.zeros((view.height * view.width, len(scene.wavelengths_nm)))
     free = np.full(len(pixels), float(view.samples))

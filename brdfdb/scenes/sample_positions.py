@@ -69,7 +69,7 @@ def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.G
         return _met(hard, _places(pixels, width, height))
 
     corners, axes = _straddling(met, width, height, rng)
-    found = [np.empty((0, 2))]
+    positions = [np.empty((0, 2))]
     left = count if len(corners) else 0
     for _ in range(_TRIES):
         if left <= 0:
@@ -91,9 +91,9 @@ def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.G
         away = 10.0 ** (-DECADES * rng.random(len(near)))
         place[np.arange(len(near)), axis] += np.where(before, -away, away)
         place = place[np.all((place >= 0.0) & (place <= size), axis=1)]
-        found.append(place[:left])
-        left -= len(found[-1])
-    return _places(np.concatenate(found), width, height)
+        positions.append(place[:left])
+        left -= len(positions[-1])
+    return _places(np.concatenate(positions), width, height)
 
 
 def _straddling(

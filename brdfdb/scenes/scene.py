@@ -164,9 +164,9 @@ class Tolerance(BaseModel):
     @property
     def value(self) -> float:
         """The largest error, in `unit`."""
-        found = self.ciede2000 if self.relative is None else self.relative
-        assert found is not None  # as `_check` saw
-        return found
+        value = self.ciede2000 if self.relative is None else self.relative
+        assert value is not None  # as `_check` saw
+        return value
 
 
 class Scene(BaseModel):
@@ -242,11 +242,11 @@ class Scene(BaseModel):
         ParameterError
             If the store of the scene cannot be read, or has no such material.
         """
-        found = _materials(self)
+        sources = _materials(self)
         for name in self.stored:
             assert self.store is not None  # as `_materials` saw
-            found[name] = _stored(self.store, name)
-        return found
+            sources[name] = _stored(self.store, name)
+        return sources
 
     @property
     def stored(self) -> list[str]:
@@ -278,12 +278,12 @@ def _materials(scene: Scene) -> dict[str, Source]:
     known: dict[str, Material] = presets()
     for name, table in scene.define.items():
         if name in known:
-            raise ParameterError(f"define.{name}", "is the name of a built-in material; give yours another")
+            raise ParameterError(f"define.{name}", "is the name of a preset; give yours another")
         try:
             known[name] = Material.from_table(name, table)
         except MaterialError as error:
             raise ParameterError(f"define.{name}", f"{error.parameter}: {error.sentence}") from None
-    found: dict[str, Source] = {}
+    sources: dict[str, Source] = {}
     for item in scene.objects:
         if item.material.startswith(STORED):
             if scene.store is None:
@@ -296,5 +296,5 @@ def _materials(scene: Scene) -> dict[str, Source]:
                 item.material,
                 tuple(known),
             )
-        found[item.material] = known[item.material]
-    return found
+        sources[item.material] = known[item.material]
+    return sources

@@ -27,7 +27,7 @@ def unit(vectors: Array) -> Array:
 
 
 def check_direction(name: str, vector: Vector) -> Vector:
-    """The vector, or a ValueError if it points nowhere."""
+    """Return a vector; ParameterError if it points nowhere."""
     if not np.linalg.norm(vector) > 1e-6:
         raise ParameterError(name, f"{list(vector)} points nowhere", list(vector))
     return vector
@@ -61,23 +61,23 @@ class Shape(BaseModel, ABC):
         return np.stack([np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x, z])
 
     def hit(self, origins: Array, directions: Array) -> Array:
-        """How far along each ray, in units of its direction, the shape is hit first: (N,), inf where it is not."""
+        """Return the distance along each ray, in units of its direction, to the first hit: (N,), inf without one."""
         own = self._own
         return self._hit((origins - np.asarray(self.position)) @ own.T, directions @ own.T)
 
     def frame(self, points: Array) -> Array:
-        """Tangent, the one across it, and normal, which points outwards, as the rows of (N, 3, 3)."""
+        """Return tangent, the one across it, and normal, which points outwards, as the rows of (N, 3, 3)."""
         own = self._own
         tangent, normal = self._tangent_and_normal((points - np.asarray(self.position)) @ own.T)
         return np.stack([tangent, np.cross(normal, tangent), normal], axis=1) @ own
 
     @abstractmethod
     def _hit(self, o: Array, d: Array) -> Array:
-        """As `hit`, in the shape's own axes."""
+        """Return distances as by `hit`, in the shape's own axes."""
 
     @abstractmethod
     def _tangent_and_normal(self, p: Array) -> tuple[Array, Array]:
-        """At points, in the shape's own axes."""
+        """Return tangent and normal at points, in the shape's own axes."""
 
 
 class Plane(Shape):
@@ -236,7 +236,7 @@ def _roots(a: Array, half_b: Array, c: Array) -> tuple[Array, Array]:
 
 
 def _nearest(*ts: Array) -> Array:
-    """The smallest of the distances in front of each ray; inf where there is none."""
+    """Return the smallest of the distances in front of each ray; inf where there is none."""
     return np.asarray(np.min([np.where(t > 0.0, t, np.inf) for t in ts], axis=0))  # nan is not
 
 
@@ -267,7 +267,7 @@ def _disc(o: Array, d: Array, radius: float, z: float) -> Array:
 
 
 def _around(p: Array) -> Array:
-    """The direction around the z axis at points (N, 3): along y where a point is on the axis."""
+    """Return the direction around the z axis at points (N, 3): along y where a point is on the axis."""
     from_axis = np.hypot(p[:, 0], p[:, 1])
     x, y = (np.divide(p[:, i], from_axis, where=from_axis > 0.0, out=np.full(len(p), 1.0 - i)) for i in (0, 1))
     return np.stack([-y, x, np.zeros(len(p))], axis=1)

@@ -1,4 +1,4 @@
-"""The zarr side of the store: which codecs, and a block as the bytes of its chunk."""
+"""Codecs of the store: a block as the bytes of a zarr chunk, and a table as the files of a zarr group."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from zarr.core.buffer import Buffer
 from zarr.storage import MemoryStore
 
 from brdfdb.errors import StoreError
+from brdfdb.store.paths import METADATA
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import VARIABLES
 
@@ -28,12 +29,12 @@ _BLOSC = Blosc(cname="zstd", clevel=1, shuffle=Blosc.SHUFFLE)
 
 
 def chunk_name(layout: Layout, number: int) -> str:
-    """The file of a block, inside the group."""
+    """Return the path of the file of a block, inside the group."""
     return "/".join([layout.variable, "c", str(number), *["0"] * (len(layout.shape) - 1)])
 
 
 def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
-    """The bytes of the file that holds a block: those that zarr writes with `COMPRESSORS`, without its event loop.
+    """Return the bytes of the file of a block: those that zarr writes with `COMPRESSORS`, without its event loop.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ def encoded(layout: Layout, number: int, values: NDArray[np.float32]) -> bytes:
 
 
 def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
-    """The block in the bytes of its file: the inverse of `encoded`.
+    """Return the block that the bytes of a file hold: the inverse of `encoded`.
 
     Raises
     ------
@@ -70,11 +71,11 @@ def decoded(layout: Layout, number: int, data: bytes) -> NDArray[np.float32]:
 
 
 def array_metadata(layout: Layout) -> bytes:
-    """The metadata of the array that holds the blocks."""
+    """Return the metadata of the array that holds the blocks."""
     rest = tuple(layout.shape[1:])
     attributes = json.dumps(VARIABLES[layout.variable])
     shape, chunks = (layout.shape[0], *rest), (layout.block_rows, *rest)
-    return _array_files(tuple(layout.dims), shape, chunks, "<f4", attributes, None)["zarr.json"]
+    return _array_files(tuple(layout.dims), shape, chunks, "<f4", attributes, None)[METADATA]
 
 
 @lru_cache(maxsize=256)
@@ -86,7 +87,7 @@ def _array_files(
     attributes: str,
     data: bytes | None,
 ) -> dict[str, bytes]:
-    """The files of an array by their path inside it, kept: tables share coordinates, and zarr takes its time."""
+    """Return the files of an array by their path inside it. Kept, since tables share coordinates and zarr is slow."""
     files: dict[str, Buffer] = {}
     array = zarr.create_array(
         MemoryStore(files),
@@ -105,12 +106,12 @@ def _array_files(
 
 
 def frame_files(layout: Layout, frame: xr.Dataset) -> dict[str, bytes]:
-    """All files of a revision but the blocks: group and array metadata, coordinates and small variables."""
-    return _group_files(frame, {f"{layout.variable}/zarr.json": array_metadata(layout)})
+    """Return all files of a revision but the blocks: metadata, coordinates and small variables."""
+    return _group_files(frame, {f"{layout.variable}/{METADATA}": array_metadata(layout)})
 
 
 def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Whole rows of the first axis, as many as make a chunk of _CHUNK_VALUES."""
+    """Return the shape of a chunk: whole rows of the first axis, about _CHUNK_VALUES values."""
     if not shape:
         return ()
     rest = int(np.prod(shape[1:]))
@@ -118,12 +119,12 @@ def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def dataset_files(dataset: xr.Dataset) -> dict[str, bytes]:
-    """All files of a revision that holds a dataset."""
+    """Return all files of a revision that holds a dataset."""
     return _group_files(dataset, {})
 
 
 def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The files of a group of plain arrays, with the metadata of all of them repeated in those of the group.
+    """Return the files of a group of plain arrays; the metadata of the group repeats those of the arrays.
 
     A plain `xarray.open_zarr` looks for them there first. `zarr.consolidate_metadata` warns while it does the same. A
     revision never changes: nothing goes stale.
@@ -140,12 +141,16 @@ def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, 
             values.tobytes(),
         )
         files |= {f"{name}/{file}": data for file, data in written.items()}
-    arrays = {name[: -len("/zarr.json")]: json.loads(files[name]) for name in sorted(files) if "/zarr.json" in name}
+    arrays = {
+        name.removesuffix(f"/{METADATA}"): json.loads(files[name])
+        for name in sorted(files)
+        if name.endswith(f"/{METADATA}")
+    }
     metadata = {
         "attributes": dataset.attrs,
         "zarr_format": 3,
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": arrays},
         "node_type": "group",
     }
-    files["zarr.json"] = json.dumps(metadata, indent=1, allow_nan=False).encode()
+    files[METADATA] = json.dumps(metadata, indent=1, allow_nan=False).encode()
     return files

@@ -22,7 +22,7 @@ from brdfdb.geometry import checked_angles, checked_vectors, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, Parameter
-from brdfdb.store.manifest import read_sealed
+from brdfdb.store.sealed_json import read_sealed
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
@@ -32,7 +32,7 @@ FORMAT = "brdfdb-family"
 FORMAT_VERSION: Literal[1] = 1
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
-_SAME = 1e-12  # of the largest value: as close to one of a member is at the member
+_SAME = 1e-12  # relative tolerance for treating a parameter as equal to a member's value
 
 
 class Sweep(BaseModel):
@@ -52,8 +52,8 @@ class Sweep(BaseModel):
     @property
     def parameters(self) -> dict[str, Parameter]:
         """The swept parameters, by the names that `axes` gives them."""
-        found = {written_name(parameter): parameter for parameter in MODELS[self.model].parameters}
-        return {written: found[written] for written in self.axes}
+        by_name = {written_name(parameter): parameter for parameter in MODELS[self.model].parameters}
+        return {written: by_name[written] for written in self.axes}
 
     @property
     def nodes(self) -> dict[str, Axis]:
@@ -79,7 +79,7 @@ class Blend(BaseModel):
     offset: float | None = Field(
         description="1/sr; what is interpolated is the logarithm of f_r plus this. null: f_r itself"
     )
-    specular_offset: float | None = Field(description="the same of the reflectance of the Dirac part")
+    specular_offset: float | None = Field(description="the same of the specular part")
     reason: str = Field(description="what this and the other ways were measured to leave")
 
 
@@ -106,13 +106,8 @@ class FamilyRecord(Sweep):
     points: int = Field(description="parameters at which the error was measured")
     worst: WorstPoint
     specular_error: float | None = Field(
-        description="largest absolute error of the reflectance of the Dirac part at the same parameters"
+        description="largest absolute error of the specular part at the same parameters"
     )
-
-
-def path_of(root: Path, name: str) -> Path:
-    """Return the path of the record of a family in the store at `root`."""
-    return root / "families" / f"{name}.json"
 
 
 def read_record(path: Path) -> FamilyRecord:
@@ -139,7 +134,7 @@ def record_from(content: Mapping[str, Any], where: str) -> FamilyRecord:
 
 
 def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], Table]:
-    """A function that gives the member of a number, as it is when first asked for, and keeps those used last.
+    """Return a function that loads a member by its number when it is first needed, and keeps those used last.
 
     It raises StoreError for a member that was built anew for another request, and for one at other wavelengths than
     another one.
@@ -160,7 +155,7 @@ def member_loader(sweep: Sweep, tables: Mapping[str, Table]) -> Callable[[int], 
 
 
 def stale(family: str, member: str) -> str:
-    """The sentence about a family whose member is not the one that its record was made of."""
+    """Return the sentence about a family whose member is not the one that its record was made of."""
     return (
         f"the family {family} is out of date: {member} is another table than it was measured with; "
         "build its recipe again"
@@ -172,7 +167,7 @@ def _same(one: Axis | None, other: Axis | None) -> bool:
 
 
 def stencil(nodes: Axis, value: float, power: int, *, cubic: bool) -> tuple[int, Floats]:
-    """Which values of a parameter count for one between them: the number of the first, and the weight of each.
+    """Return the nodes that count for a value of a parameter: the number of the first, and the weight of each.
 
     Lagrange's polynomial through 2 of them, or 4 (3 if there are no more), in a power of the parameter or its logarithm
     (power 0). At a node its weight is exactly 1, that of others 0.
@@ -187,7 +182,7 @@ def stencil(nodes: Axis, value: float, power: int, *, cubic: bool) -> tuple[int,
 
 
 def blended(values: Sequence[Floats], weights: Sequence[ArrayLike], offset: float | None) -> Floats:
-    """The weighted mean of values, or of the logarithms of values plus `offset`; nothing below 0, 0 where all are."""
+    """Return the weighted mean of values, or of the logarithms of values plus `offset`; 0 where all values are."""
     if offset is None:
         mean = sum(np.asarray(weight) * value for weight, value in zip(weights, values, strict=True))
         return np.maximum(mean, 0.0)
@@ -323,7 +318,7 @@ class Family:
     def specular_reflectance(
         self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None, **parameters: float
     ) -> Floats:
-        """Interpolate the reflectance of the Dirac part; 0 for models that have none.
+        """Interpolate the reflectance [1] of the specular part; 0 for models that have none.
 
         Parameters
         ----------
@@ -349,7 +344,7 @@ class Family:
         return blended(values, [part.weight for part in parts], self.record.interpolation.specular_offset)[()]
 
     def around(self, **parameters: float) -> list[Table]:
-        """The members that a lookup at these parameters is made of; parameters and errors as `lookup` has them."""
+        """Return the members that a lookup at these parameters is made of; parameters and errors as by `lookup`."""
         return [part.table for part in self._parts(parameters)]
 
     def _blended(self, parts: Sequence[_Part], look: Callable[[Table], Floats]) -> Floats:
@@ -365,7 +360,7 @@ class Family:
         return mean.astype(np.asarray(values[0]).dtype)[()]
 
     def _parts(self, parameters: Mapping[str, Any]) -> list[_Part]:
-        """The members around a point, those that count, with weights that add up to 1."""
+        """Return the members that count at a point, with weights that add up to 1."""
         names = list(self.axes)
         for name in parameters:
             if name not in names:

@@ -21,14 +21,15 @@ from brdfdb.store.family import (
     WorstPoint,
     blended,
     member_loader,
-    path_of,
     read_record,
     stale,
     stencil,
 )
-from brdfdb.store.manifest import sync_directory, write_sealed
+from brdfdb.store.files import sync_directory
+from brdfdb.store.lock import Lock, writing
+from brdfdb.store.paths import family_path
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import Lock, writing
+from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement
 from brdfdb.tables.layout import PLAIN
 from brdfdb.tables.places import BANDS
@@ -43,7 +44,7 @@ _DIRECTIONS = 50  # of a band of theta_i at each of them
 _DIRECTIONS_BETWEEN, _SEARCHED = 10, 40  # between wavelengths; and of one member, to find out where
 _FEWEST_DIRECTIONS = 10
 _CORNER_VALUES = 10_000_000  # that are held at a time: of more, fewer directions are drawn
-_THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # where the Dirac part is measured
+_THETA_I = radians(np.arange(0.0, 90.0, 5.0))  # where the specular part is measured
 _SPECULAR_OFFSET = 1e-6
 _POWERS: tuple[Power, ...] = (-2, -1, 0, 1, 2)
 _MOST_CORNERS = 64  # of a cubic: of more swept parameters than three, it is not tried
@@ -64,8 +65,8 @@ class _Way(NamedTuple):
     offset: float | None
     powers: tuple[Power, ...]
 
-    def said(self, sweep: Sweep) -> str:
-        """In words."""
+    def in_words(self, sweep: Sweep) -> str:
+        """Return the way in words."""
         along = {-2: "1/{}^2", -1: "1/{}", 0: "ln {}", 1: "{}", 2: "{}^2"}
         axes = ", ".join(along[power].format(name) for name, power in zip(sweep.axes, self.powers, strict=True))
         return f"{self.method} in {'f_r' if self.offset is None else 'logarithms'} along {axes}"
@@ -84,7 +85,7 @@ class _Measured(NamedTuple):
 
 
 def parameter_points(shape: tuple[int, ...], seed: int) -> list[_Point]:
-    """Where a family of so many values along each axis is measured.
+    """Return the points at which a family of so many values along each axis is measured.
 
     The same number of points in each cell, 256 in all or the next multiple; of more than 256 cells, one point in each
     of 256. They follow a sequence that fills the cells evenly, from a random start.
@@ -120,18 +121,18 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     StoreError
         If a member is not the one that the sweep asks for, or members have different wavelengths.
     """
-    found = _look(sweep, tables, seed)
-    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*found.drawn, strict=True)))
-    truth = found.truth.reshape(-1, found.truth.shape[-1])
+    measured = _look(sweep, tables, seed)
+    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
+    truth = measured.truth.reshape(-1, measured.truth.shape[-1])
     floor = error_measurement.floor_of(truth, drawn)
-    ways = _ways(sweep, found, drawn, floor)
+    ways = _ways(sweep, measured, drawn, floor)
     best = min(ways, key=lambda way: ways[way])
-    value = blended(*_weighted(sweep, found, found.corners, best), best.offset)
-    specular_offset, specular_error = _specular(sweep, found, best)
+    value = blended(*_weighted(sweep, measured, measured.corners, best), best.offset)
+    specular_offset, specular_error = _specular(sweep, measured, best)
     between = _between(sweep, tables, seed, best, floor) if floor.size > 1 else None
     p99 = [
         float(np.percentile(error_measurement.relative(v, t, floor)[d.above], 99.0, axis=0).max())
-        for v, t, d in zip(value, found.truth, found.drawn, strict=True)
+        for v, t, d in zip(value, measured.truth, measured.drawn, strict=True)
     ]
     worst = int(np.argmax(p99))
     return FamilyRecord(
@@ -142,14 +143,14 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
             offset=best.offset,
             specular_offset=specular_offset,
             reason="; ".join(
-                f"{way.said(sweep)}: p99 {left:.3g}" for way, left in sorted(ways.items(), key=lambda item: item[1])
+                f"{way.in_words(sweep)}: p99 {left:.3g}" for way, left in sorted(ways.items(), key=lambda item: item[1])
             ),
         ),
         error=error_measurement.compare(value.reshape(truth.shape), truth, drawn, seed).model_copy(
             update={"between": between}
         ),
-        points=len(found.points),
-        worst=WorstPoint(parameters=_written(sweep, found.parameters[worst]), p99=float(f"{p99[worst]:.3g}")),
+        points=len(measured.points),
+        worst=WorstPoint(parameters=_written(sweep, measured.parameters[worst]), p99=float(f"{p99[worst]:.3g}")),
         specular_error=specular_error,
     )
 
@@ -157,26 +158,25 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
 def _between(sweep: Sweep, tables: Mapping[str, Table], seed: int, way: _Way, floor: Floats) -> Between:
     """Measure the error between the wavelengths of the members, at fewer directions."""
     first = member_loader(sweep, tables)(0)
-    material, stored = _requested(first), first.wavelength_nm
+    material, stored = _material(first), first.wavelength_nm
     assert stored is not None
     pairs = error_measurement.draw(material, stored, _SEARCHED, seed)
     wi, wr = pairs.wi[pairs.above], pairs.wr[pairs.above]
     at = error_measurement.worst_wavelengths(material, stored, PLAIN, wi, wr, floor)
-    found = _look(sweep, tables, seed, at)
-    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*found.drawn, strict=True)))
-    truth = found.truth.reshape(-1, at.size)
-    value = blended(*_weighted(sweep, found, found.corners, way), way.offset).reshape(truth.shape)
+    measured = _look(sweep, tables, seed, at)
+    drawn = error_measurement.Draw(*(np.concatenate(parts) for parts in zip(*measured.drawn, strict=True)))
+    truth = measured.truth.reshape(-1, at.size)
+    value = blended(*_weighted(sweep, measured, measured.corners, way), way.offset).reshape(truth.shape)
     error = error_measurement.relative(truth, value, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
     bands = error_measurement.limits_of_bands(error[drawn.above], drawn.band[drawn.above])
     return Between(wavelength_nm=at.tolist(), bands=bands)
 
 
-def _requested(member: Table) -> Material:
-    """Return the material that a member of a family was built for; StoreError if it does not state its request."""
-    request = member.metadata.request
-    if request is None:
-        raise StoreError(f"{member.name} {member.revision} does not state its request; build it anew")
-    return Material.model_validate(request["material"])
+def _material(member: Table) -> Material:
+    """Return the material that a member of a family was tabulated from; StoreError if the table does not state it."""
+    if not isinstance(member.source, Material):
+        raise StoreError(f"{member.name} {member.revision} does not state its material; build it anew")
+    return member.source
 
 
 def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[np.float64] | None = None) -> _Measured:
@@ -187,7 +187,7 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[n
     nodes = sweep.nodes
     shape = tuple(values.size for values in nodes.values())
     member = member_loader(sweep, tables)
-    base = _requested(member(0))
+    base = _material(member(0))
     wavelength_nm = member(0).wavelength_nm if at_nm is None else at_nm
     points = parameter_points(shape, seed)
     stencils = tuple(min(_width(shape), nodes) for nodes in shape)
@@ -232,13 +232,13 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[n
 
 
 def _width(shape: tuple[int, ...]) -> int:
-    """How many values of each parameter the interpolation is made of at most."""
+    """Return the largest number of values of each parameter that an interpolation is made of."""
     return 4 if math.prod(min(4, nodes) for nodes in shape) <= _MOST_CORNERS else 2
 
 
-def _ways(sweep: Sweep, found: _Measured, drawn: error_measurement.Draw, floor: Floats) -> dict[_Way, float]:
-    """The best powers of each method, in f_r and in logarithms, with the 99th percentile of the error they leave."""
-    above = drawn.above.reshape(found.truth.shape[:2])
+def _ways(sweep: Sweep, measured: _Measured, drawn: error_measurement.Draw, floor: Floats) -> dict[_Way, float]:
+    """Return the best powers of each method, in f_r and in logarithms, with the 99th percentile of their error."""
+    above = drawn.above.reshape(measured.truth.shape[:2])
     shape = tuple(map(len, sweep.axes.values()))
     offsets: list[float | None] = [None]
     if floor.max() > 0.0:
@@ -247,8 +247,8 @@ def _ways(sweep: Sweep, found: _Measured, drawn: error_measurement.Draw, floor: 
 
     def left(way: _Way, thinned: int = 1) -> float:
         some = slice(None, None, thinned)
-        value = blended(*_weighted(sweep, found, found.corners[:, :, some], way), way.offset)
-        error = error_measurement.relative(value, found.truth[:, some], floor)[above[:, some]]
+        value = blended(*_weighted(sweep, measured, measured.corners[:, :, some], way), way.offset)
+        error = error_measurement.relative(value, measured.truth[:, some], floor)[above[:, some]]
         return float(np.percentile(error, 99.0, axis=0).max())
 
     ways: dict[_Way, float] = {}
@@ -267,13 +267,13 @@ def _ways(sweep: Sweep, found: _Measured, drawn: error_measurement.Draw, floor: 
 
 
 def _weighted(
-    sweep: Sweep, found: _Measured, corners: Floats, way: _Way
+    sweep: Sweep, measured: _Measured, corners: Floats, way: _Way
 ) -> tuple[list[Floats], list[NDArray[np.float64]]]:
-    """The values of the members around the points, corner by corner, and their weights, which broadcast to them."""
+    """Return the values of the members around the points, corner by corner, and their weights, which broadcast."""
     nodes = sweep.nodes
     shape = tuple(axis.size for axis in nodes.values())
     rows = []
-    for at in found.parameters:
+    for at in measured.parameters:
         weight = np.ones(1)
         for (name, axis), power in zip(nodes.items(), way.powers, strict=True):
             base, ones = stencil(axis, at[name], 1, cubic=_width(shape) == 4)
@@ -288,14 +288,14 @@ def _weighted(
     return [corners[:, c] for c in used], [weights[:, c][spread] for c in used]
 
 
-def _specular(sweep: Sweep, found: _Measured, way: _Way) -> tuple[float | None, float | None]:
-    """How the reflectance of the Dirac part is interpolated, offset or None, and its largest error; None without."""
-    if found.specular_corners is None or found.specular_truth is None:
+def _specular(sweep: Sweep, measured: _Measured, way: _Way) -> tuple[float | None, float | None]:
+    """Return how the specular part is interpolated, offset or None, and its largest error; None without one."""
+    if measured.specular_corners is None or measured.specular_truth is None:
         return None, None
     left: dict[float | None, float] = {}
     for offset in (None, _SPECULAR_OFFSET):
-        value = blended(*_weighted(sweep, found, found.specular_corners, way), offset)
-        left[offset] = float(np.abs(value - found.specular_truth).max())
+        value = blended(*_weighted(sweep, measured, measured.specular_corners, way), offset)
+        left[offset] = float(np.abs(value - measured.specular_truth).max())
     best = min(left, key=lambda offset: left[offset])
     return best, float(f"{left[best]:.3g}")
 
@@ -310,7 +310,7 @@ def _written(sweep: Sweep, at: Mapping[str, float]) -> dict[str, float]:
 def recorded(root: Path, sweep: Sweep) -> FamilyRecord | None:
     """Return the record of a family in the store at `root`, if it is there and of these very members; else None."""
     try:
-        record = read_record(path_of(root, sweep.name))
+        record = read_record(family_path(root, sweep.name))
     except StoreError:
         return None
     return record if all(getattr(record, name) == getattr(sweep, name) for name in Sweep.model_fields) else None
@@ -326,7 +326,7 @@ def write_family(root: str, sweep: Sweep) -> FamilyRecord:
     StoreError
         If a member is not the one that the sweep asks for, or the record cannot be written.
     """
-    store, path = Path(root), path_of(Path(root), sweep.name)
+    store, path = Path(root), family_path(Path(root), sweep.name)
     with Lock(store, sweep.name) as lock:
         if (record := recorded(store, sweep)) is not None:
             return record
@@ -347,7 +347,7 @@ def verify_family(root: Path, name: str) -> int:
     StoreError
         Naming what is wrong first.
     """
-    store, path = Store(root), path_of(root, name)
+    store, path = Store(root), family_path(root, name)
     record = read_record(path)
     if not len(record.members) == len(record.request_sha256) == math.prod(map(len, record.axes.values())):
         raise StoreError(f"the family {name} is damaged: its axes do not make {len(record.members)} members")

@@ -1,21 +1,40 @@
-"""Publication of a source from Python: tabulated to a tolerance in this process, measured, and put into a store."""
+"""Publication: a table becomes the current revision of its material."""
 
 from __future__ import annotations
 
 import os
-from typing import NamedTuple
+import shutil
+from collections.abc import Mapping
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from brdfdb.errors import (
+    ParameterError,
+    StoreError,
+)
 from brdfdb.materials import Source
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.decoding import read_metadata
+from brdfdb.store.files import Entry, sync_directory, write_file
+from brdfdb.store.lock import Lock, writing
+from brdfdb.store.manifest import Manifest, Summary, check_manifest, read_manifest, whole_revisions
+from brdfdb.store.marker import make_store
+from brdfdb.store.paths import NAME, manifest_path, material_path, staged_path
+from brdfdb.store.pointer import known_manifests, newest, point_to
+from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement
 from brdfdb.tables.grids import check_wavelengths
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.tabulation import tabulate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Published(NamedTuple):
@@ -81,3 +100,106 @@ def publish_layout(root: str | os.PathLike[str], name: str, layout: Layout) -> P
     values = dataset[layout.variable].to_numpy()
     error = error_measurement.measure(layout, lambda rows: values[rows])
     return Published(*publish_dataset(root, name, dataset.assign_attrs(error=error.model_dump(mode="json"))), error)
+
+
+def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset) -> tuple[str, int]:
+    """Publish a table that is in memory, whoever computed it, as the next revision of a material.
+
+    Parameters
+    ----------
+    root : path
+        Directory of the store; made if it does not exist.
+    name : str
+        Of the material.
+    dataset : Dataset
+        As `tabulate.tabulate` makes it.
+
+    Returns
+    -------
+    revision, bytes
+        Such as ``r000003``, and how much it takes.
+
+    Raises
+    ------
+    StoreError
+        If the store cannot be written.
+    ValueError
+        If the name is none of a material: it would never be found again.
+    """
+    from brdfdb.store.codec import dataset_files
+
+    if not NAME.fullmatch(name):
+        raise ParameterError("name", f"{name!r} is not made of lower-case letters, digits and single hyphens", name)
+    store = Path(root)
+    make_store(store)
+    files = dataset_files(dataset)
+    with Lock(store, name):
+        staging = staged_path(store, name) / "dataset"
+        with writing(store, name):
+            shutil.rmtree(staging, ignore_errors=True)
+            try:
+                staging.mkdir()
+                written = {file: write_file(staging / "table" / file, data, staging) for file, data in files.items()}
+                return publish_staged(store, name, staging, written)
+            finally:
+                shutil.rmtree(staging, ignore_errors=True)
+
+
+def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) -> tuple[str, int]:
+    """Make a staged table the current revision of its material; the lock must be held. Returns revision and bytes.
+
+    Until the pointer is swapped, as the last step, readers see the revision before. After a crash in between, the
+    revision lies whole in its place and the next build of the request makes it current.
+
+    Parameters
+    ----------
+    files : mapping
+        Every file of the group, by its path inside: what else lies there is removed.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written.
+    """
+    material = material_path(root, name)
+    table = staging / "table"
+    with writing(root, name):
+        for path in table.rglob("*"):
+            if path.is_file() and path.relative_to(table).as_posix() not in files:
+                path.unlink()
+        metadata = read_metadata(table)
+        stored = sum(entry["size"] for entry in files.values())
+        summary: Summary = {
+            "title": metadata.title or "",
+            "model": metadata.model or "",
+            "model_version": metadata.model_version or 0,
+            "request_sha256": metadata.request_sha256 or "",
+            "error_p99": None if metadata.error is None else metadata.error.overall.p99,
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "bytes": stored,
+        }
+        for directory, _, _ in os.walk(table, topdown=False):
+            sync_directory(Path(directory))
+        material.mkdir(exist_ok=True)
+        sync_directory(material.parent)
+        revision = f"r{newest(material) + 1:06d}"
+        manifest: Manifest = {"material": name, "revision": revision, "summary": summary, "files": dict(files)}
+        write_sealed(manifest_path(material / revision), manifest, staging)
+        table.rename(material / revision)
+        sync_directory(material)
+        point_to(material, revision)
+        shutil.rmtree(staging, ignore_errors=True)
+    return revision, stored
+
+
+def adoptable(root: Path, name: str, request_sha256: str) -> str | None:
+    """Return the newest revision of a material that answers a request and is undamaged; None without any."""
+    material = material_path(root, name)
+    known = known_manifests(material)
+    for group in reversed(whole_revisions(material)):
+        with suppress(StoreError):
+            manifest, digest = read_manifest(group, known.get(group.name))
+            if manifest["summary"]["request_sha256"] == request_sha256:
+                check_manifest(group, digest, contents=True)
+                return group.name
+    return None

@@ -15,84 +15,49 @@ rewrite a shared root file, and stale metadata hides groups.
 from __future__ import annotations
 
 import itertools
-import json
 import os
 import threading
 import weakref
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from brdfdb.errors import StoreError, UnknownFamilyError, UnknownMaterialError, UnknownRevisionError
-from brdfdb.store.manifest import (
-    NAME,
-    Head,
-    Manifest,
-    Snapshot,
-    check_manifest,
-    head_from,
-    number_of,
-    read_json,
-    read_manifest,
-    read_sealed,
-    read_snapshot,
-    regular_bytes,
-    unsealed,
-    whole_revisions,
+from brdfdb.errors import (
+    StoreError,
+    UnknownFamilyError,
+    UnknownMaterialError,
+    UnknownRevisionError,
 )
+from brdfdb.store.decoding import decode, read_metadata
+from brdfdb.store.files import regular_bytes
+from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
+from brdfdb.store.marker import check_marker
+from brdfdb.store.paths import (
+    HEAD,
+    NAME,
+    families_path,
+    family_path,
+    material_path,
+    materials_path,
+    number_of,
+    pointer_path,
+    revision_path,
+    staged_path,
+)
+from brdfdb.store.pointer import Head, check_summary, head_from
+from brdfdb.store.sealed_json import read_sealed
+from brdfdb.store.snapshot_record import Snapshot, read_snapshot
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.store.family import Family
-    from brdfdb.store.zarr_store import Whole
     from brdfdb.tables.metadata import TableMetadata
     from brdfdb.tables.table import Table
 
-__all__ = [
-    "FORMAT",
-    "FORMAT_VERSION",
-    "DamagedMarkerError",
-    "Store",
-    "WrongSummaryError",
-]
-
-FORMAT = "brdfdb"
-FORMAT_VERSION = 2  # 1 had no digests in the first lines
 
 CACHE_BYTES = 256 * 2**20  # of decoded tables that a Store keeps
-
-
-class DamagedMarkerError(StoreError):
-    """A brdfdb.json that cannot be believed: `brdfdb build` writes it anew where there are tables beside it."""
-
-
-class WrongSummaryError(StoreError):
-    """A pointer that says of its revision other than the manifest."""
-
-
-def _check_marker(root: Path) -> None:
-    """Raise StoreError unless there is a store at `root` that this program reads."""
-    marker = root / "brdfdb.json"
-    try:
-        data = marker.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        raise StoreError(f"no store at {root}: brdfdb.json is missing there; `brdfdb build` makes one") from None
-    except OSError as error:
-        raise StoreError(f"cannot read {marker}: {error.strerror}") from error
-    try:
-        found = unsealed(data, str(root), marker.name)
-    except StoreError as damaged:
-        if data != json.dumps({"format": FORMAT, "version": 1}, indent=1).encode():  # as version 1 wrote it
-            raise DamagedMarkerError(f"{damaged}; `brdfdb build` writes it anew") from None
-        found = {"format": FORMAT, "version": 1}
-    if (found.get("format"), found.get("version")) != (FORMAT, FORMAT_VERSION):
-        raise StoreError(
-            f"{marker} says format {found.get('format')} version {found.get('version')}, this program reads {FORMAT} "
-            f"version {FORMAT_VERSION}; `brdfdb build --store DIR` builds its recipe in another directory"
-        )
 
 
 class Store(Mapping[str, "Table"]):
@@ -120,7 +85,7 @@ class Store(Mapping[str, "Table"]):
         self, root: str | os.PathLike[str], cache_bytes: int = CACHE_BYTES, *, snapshot: str | None = None
     ) -> None:
         self.root = Path(root).absolute()
-        _check_marker(self.root)
+        check_marker(self.root)
         self.snapshot: Snapshot | None = None if snapshot is None else read_snapshot(self.root, snapshot)
         self._cache_bytes = cache_bytes
         self._decoded: OrderedDict[tuple[str, str], Table] = OrderedDict()
@@ -132,7 +97,7 @@ class Store(Mapping[str, "Table"]):
     def __iter__(self) -> Iterator[str]:
         if self.snapshot is not None:
             return iter(sorted(self.snapshot["materials"]))
-        directory = f"{self.root}/materials"
+        directory = materials_path(self.root)
         try:
             names = sorted(os.listdir(directory))
         except OSError as error:
@@ -150,16 +115,16 @@ class Store(Mapping[str, "Table"]):
     def _has(self, name: str) -> bool:
         """Return whether there is a material of a name, be it one whose pointer was lost."""
         return NAME.fullmatch(name) is not None and (
-            os.path.isfile(f"{self.root}/materials/{name}/HEAD.json") or self._lost(name)
+            pointer_path(material_path(self.root, name)).is_file() or self._lost(name)
         )
 
     def _lost(self, name: str) -> bool:
         """Return whether a material has revisions, and no pointer that a first publication is about to write."""
-        material, staged = self.root / "materials" / name, self.root / ".staging" / name
+        material, staged = material_path(self.root, name), staged_path(self.root, name)
         revisions = [group.name for group in whole_revisions(material)]
         if not revisions or (revisions == ["r000001"] and any(path.is_dir() for path in staged.glob("*"))):
             return False
-        return not (material / "HEAD.json").is_file()  # asked last: it may have been written meanwhile
+        return not pointer_path(material).is_file()  # the last check: it may have been written meanwhile
 
     def __getitem__(self, name: str) -> Table:
         while True:
@@ -172,7 +137,7 @@ class Store(Mapping[str, "Table"]):
                 # a newer revision was published, and the one we were reading removed: read the newer one
 
     def table(self, name: str, revision: str) -> Table:
-        """The decoded table of a revision, current or not.
+        """Return the decoded table of a revision, current or not.
 
         Raises
         ------
@@ -197,11 +162,11 @@ class Store(Mapping[str, "Table"]):
     def revisions(self, name: str) -> list[str]:
         """Return the revisions of a material that are whole, oldest first; of a snapshot the one it names."""
         current = self.path(name)
-        found = whole_revisions(current.parent) if self.snapshot is None else [current]
-        return [group.name for group in found]
+        groups = whole_revisions(current.parent) if self.snapshot is None else [current]
+        return [group.name for group in groups]
 
     def held(self, name: str) -> Table | None:
-        """The current table of a material if it is decoded already: an answer without waiting; None else.
+        """Return the current table of a material if it is decoded already, without waiting; None else.
 
         Raises
         ------
@@ -221,23 +186,23 @@ class Store(Mapping[str, "Table"]):
             if (held := self._used(key)) is not None:
                 return held
             files = check_manifest(group, digest, contents=False)["files"]
-            table = _decode(name, group, Whole(group, files), digest)
+            table = decode(name, group, Whole(group, files), digest)
             with self._lock:
                 self._decoded[key] = table
-                size = sum(each.nbytes for each in self._decoded.values())
+                size = sum(decoded.nbytes for decoded in self._decoded.values())
                 while size > self._cache_bytes and len(self._decoded) > 1:
                     size -= self._decoded.popitem(last=False)[1].nbytes
             return table
 
     def _used(self, key: tuple[str, str]) -> Table | None:
-        """A decoded table, which is now the one used last."""
+        """Return a decoded table, and count it as the one used last; None if it is not decoded."""
         with self._lock:
             if key in self._decoded:
                 self._decoded.move_to_end(key)
             return self._decoded.get(key)
 
     def head(self, name: str) -> str:
-        """The current revision of a material, such as ``r000003``, read anew each time.
+        """Return the current revision of a material, such as ``r000003``, read anew each time.
 
         Raises
         ------
@@ -247,7 +212,7 @@ class Store(Mapping[str, "Table"]):
         return self.path(name).name
 
     def path(self, name: str) -> Path:
-        """Directory of the current revision: a zarr group that xarray opens."""
+        """Return the directory of the current revision: a zarr group that xarray opens."""
         return self.location(name)[0]
 
     def summary(self, name: str) -> Head:
@@ -273,12 +238,12 @@ class Store(Mapping[str, "Table"]):
         if self.snapshot is not None:
             return sorted(self.snapshot["families"])
         try:
-            found = sorted(os.listdir(f"{self.root}/families"))
+            files = sorted(os.listdir(families_path(self.root)))
         except FileNotFoundError:
             return []
         except OSError as error:
-            raise StoreError(f"cannot read {self.root}/families: {error.strerror}") from error
-        names = (name.removesuffix(".json") for name in found if name.endswith(".json"))
+            raise StoreError(f"cannot read {families_path(self.root)}: {error.strerror}") from error
+        names = (name.removesuffix(".json") for name in files if name.endswith(".json"))
         return [name for name in names if NAME.fullmatch(name)]
 
     def family(self, name: str) -> Family:
@@ -301,7 +266,7 @@ class Store(Mapping[str, "Table"]):
             raise UnknownFamilyError(name, self.families())
         if self.snapshot is not None:
             return self.snapshot["families"][name]
-        return read_sealed(self.root / "families" / f"{name}.json", f"the family {name}")
+        return read_sealed(family_path(self.root, name), f"the family {name}")
 
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset: see `brdfdb.tables.xarray_view.opened`.
@@ -339,14 +304,14 @@ class Store(Mapping[str, "Table"]):
         if pointer is not None:
             return pointer
         if self.snapshot is None and NAME.fullmatch(name) and self._lost(name):
-            raise StoreError(f"{name} is damaged: HEAD.json is missing")
+            raise StoreError(f"{name} is damaged: {HEAD} is missing")
         raise UnknownMaterialError(name, list(self))
 
     def _pinned(self, name: str, snapshot: Snapshot) -> _Pointer | None:
         """Return what the snapshot says of a material, as a pointer; None of one that it does not name."""
         known, pin = self._pointers.get(name), snapshot["materials"].get(name)
         if known is None and pin is not None:
-            group = self.root / "materials" / name / pin["revision"]
+            group = revision_path(self.root, name, pin["revision"])
             manifest, digest = read_manifest(group, pin["manifest_sha256"])
             head: Head = {
                 **manifest["summary"],
@@ -365,17 +330,18 @@ class Store(Mapping[str, "Table"]):
         known = self._pointers.get(name)
         if known is None and not NAME.fullmatch(name):
             return None
-        path = f"{self.root}/materials/{name}/HEAD.json"
+        material = material_path(self.root, name) if known is None else known.material
+        path = pointer_path(material)
         try:
             at = os.stat(path)
             seen = at.st_ino, at.st_mtime_ns, at.st_size  # a swap gives the file a new inode
             if known is None or known.seen != seen:
-                head = head_from(Path(path), regular_bytes(path))
-                known = self._pointers[name] = _Pointer(seen, self.root / "materials" / name, head)
+                head = head_from(path, regular_bytes(path))
+                known = self._pointers[name] = _Pointer(seen, material, head)
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            raise StoreError(f"{name} is damaged: HEAD.json cannot be read: {error.strerror}") from error
+            raise StoreError(f"{name} is damaged: {HEAD} cannot be read: {error.strerror}") from error
         return known
 
     def location(self, name: str) -> tuple[Path, str]:
@@ -386,22 +352,6 @@ class Store(Mapping[str, "Table"]):
         """Return what `location` gives, and what else the pointer says, from one look at it."""
         pointer = self._pointer(name)
         return *pointer.location, pointer.head
-
-
-def read_metadata(group: Path) -> TableMetadata:
-    """Return the metadata in the directory of a revision, whose files were checked against its manifest."""
-    from brdfdb.tables.metadata import TableMetadata
-
-    return TableMetadata.read(read_json(group / "zarr.json").get("attributes", {}))
-
-
-def check_summary(head: Head, manifest: Manifest) -> None:
-    """Raise WrongSummaryError unless a pointer says of its revision what the manifest does."""
-    for key, value in manifest["summary"].items():
-        if head.get(key) != value:
-            raise WrongSummaryError(
-                f"{head['material']} is damaged: HEAD.json says {key} {head.get(key)!r}, not {value!r}"
-            )
 
 
 class _Pointer(NamedTuple):
@@ -419,6 +369,8 @@ class _Pointer(NamedTuple):
 
 
 _OPEN: weakref.WeakValueDictionary[int, Store] = weakref.WeakValueDictionary()
+
+
 _NUMBERS = itertools.count()
 
 
@@ -434,28 +386,3 @@ def _after_fork() -> None:
 
 
 os.register_at_fork(after_in_child=_after_fork)
-
-
-def _decode(name: str, path: Path, files: Whole, digest: str) -> Table:
-    import numpy as np
-    import zarr
-
-    from brdfdb.tables.table import table_from
-
-    try:
-        group = zarr.open_group(files, mode="r")
-        found = dict(group.arrays())
-        arrays = {key: np.asarray(array[...]) for key, array in found.items()}
-    except StoreError:
-        raise
-    except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
-        raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
-    try:
-        table = table_from(name, path.name, arrays, dict(group.attrs))
-        variable = "brdf" if "brdf" in found else "parts"
-        dims, axes = found[variable].metadata.dimension_names or (), table.grid.names  # type: ignore[union-attr]
-        if dims[: len(axes)] != axes:
-            raise ValueError(f"{variable}: its dimensions {dims} must begin with {axes}")
-        return replace(table, digest=digest)
-    except ValueError as error:  # written by another program
-        raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error

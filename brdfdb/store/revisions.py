@@ -11,17 +11,22 @@ from pathlib import Path
 from typing import Any, Literal
 
 from brdfdb.errors import BusyError, ParameterError, StoreError, UnknownMaterialError
-from brdfdb.store.manifest import (
-    Summary,
-    check_manifest,
+from brdfdb.store.lock import Lock, writing
+from brdfdb.store.manifest import Summary, check_manifest, read_manifest, whole_revisions
+from brdfdb.store.paths import (
+    marker_path,
+    material_path,
+    materials_path,
     number_of,
-    read_manifest,
-    read_snapshot,
-    snapshot_names,
-    whole_revisions,
+    pointer_path,
+    revision_of,
+    revision_path,
+    staging_path,
 )
+from brdfdb.store.pointer import known_manifests, point_to
+from brdfdb.store.publication import adoptable
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import Lock, adoptable, known_manifests, point_to, writing
+from brdfdb.store.snapshot_record import read_snapshot, snapshot_names
 from brdfdb.tables.layout import digest
 
 SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turns; no material has such a name
@@ -60,16 +65,16 @@ def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
         why = "new"
     except StoreError as error:
         why = str(error)
-    found = adoptable(root, name, wanted)
-    return Standing("missing", "", why) if found is None else Standing("adoptable", found, why)
+    sound = adoptable(root, name, wanted)
+    return Standing("missing", "", why) if sound is None else Standing("adoptable", sound, why)
 
 
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    """In a phrase, how a request differs from that of the current table."""
+    """Return a phrase on how a request differs from that of the current table."""
     if not old:
         return "the current table does not say what was asked for"
     new = json.loads(json.dumps(new))
-    said: list[str] = []
+    changes: list[str] = []
     for key in sorted({*old, *new}):
         before, after = old.get(key), new.get(key)
         if before == after:
@@ -77,12 +82,12 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
         words = key.replace("_", " ")
         if isinstance(before, dict) and isinstance(after, dict) and key == "material":
             parts = [part for part in sorted({*before, *after}) if before.get(part) != after.get(part)]
-            said.append(f"{', '.join(part.replace('_', ' ') for part in parts)} changed")
+            changes.append(f"{', '.join(part.replace('_', ' ') for part in parts)} changed")
         elif isinstance(before, int | str) and isinstance(after, int | str):
-            said.append(f"{words} {before} -> {after}")
+            changes.append(f"{words} {before} -> {after}")
         else:
-            said.append(f"{words} changed")
-    return ", ".join(said)
+            changes.append(f"{words} changed")
+    return ", ".join(changes)
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,7 @@ class Revision:
 
 
 def history(root: Path, name: str) -> list[Revision]:
-    """The revisions of a material that are whole, oldest first.
+    """Return the revisions of a material that are whole, oldest first.
 
     Raises
     ------
@@ -126,7 +131,7 @@ def rollback(root: Path, name: str, revision: str) -> str:
     StoreError
         If the material has no such revision, or it is damaged.
     """
-    store, material = Store(root), root / "materials" / name
+    store, material = Store(root), material_path(root, name)
     if name not in store:
         raise UnknownMaterialError(name, list(store))
     with Lock(root, name):
@@ -198,11 +203,11 @@ def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
 
 def pinned(root: Path) -> dict[Path, str]:
     """Return the revisions that snapshots name, each with the name of one; StoreError if a snapshot is damaged."""
-    found = {}
+    groups = {}
     for name in snapshot_names(root):
         for material, pin in read_snapshot(root, name)["materials"].items():
-            found[root / "materials" / material / pin["revision"]] = name
-    return found
+            groups[revision_path(root, material, pin["revision"])] = name
+    return groups
 
 
 def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> None:
@@ -210,15 +215,15 @@ def _collect(store: Store, keep: int, damaged: bool, collected: Collected) -> No
         stay = pinned(store.root)
     except StoreError as error:
         raise StoreError(f"nothing is collected, since {error}; remove it with `brdfdb snapshot --remove`") from error
-    for path in store.root.glob(".brdfdb.json.*"):
+    for path in store.root.glob(f".{marker_path(store.root).name}.*"):
         _remove(store.root, path, collected)
-    staged, materials = store.root / ".staging", store.root / "materials"
+    staged, materials = staging_path(store.root), materials_path(store.root)
     names = {path.name for directory in (staged, materials) for path in directory.iterdir() if path.is_dir()}
     for name in sorted(names - {SNAPSHOTS}):
         try:
             with Lock(store.root, name, wait=False) as lock:
                 material = materials / name
-                if whole_revisions(material) and not (material / "HEAD.json").is_file():
+                if whole_revisions(material) and not pointer_path(material).is_file():
                     continue  # killed before the first pointer, or it was lost: the next build makes one
                 for path in lock.path.parent.iterdir():
                     if path != lock.path:
@@ -256,7 +261,7 @@ def _collect_material(
         for path in strangers(group, known.get(group.name)):
             _remove(store.root, path, collected)
     for path in sorted(material.iterdir(), reverse=True):  # a manifest before its directory: that is then an orphan
-        group = path.with_name(path.name.removesuffix(".MANIFEST.json"))
+        group = revision_of(path)
         if (number_of(group.name) and group not in kept) or path.name.startswith("."):
             _remove(store.root, path, collected)
     if not any(material.iterdir()):
@@ -273,7 +278,7 @@ def strangers(group: Path, digest: str | None) -> list[Path]:
 
 
 def _remove(root: Path, path: Path, collected: Collected) -> None:
-    files = [path] if path.is_file() else [found for found in path.rglob("*") if found.is_file()]
+    files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
     freed = sum(file.stat().st_size for file in files)
     if path.is_dir():
         shutil.rmtree(path)

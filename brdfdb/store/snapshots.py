@@ -13,21 +13,13 @@ from pathlib import Path
 
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store.family import stale
-from brdfdb.store.manifest import (
-    NAME,
-    SNAPSHOT_FORMAT,
-    SNAPSHOT_VERSION,
-    Pin,
-    Snapshot,
-    read_snapshot,
-    seal_of,
-    snapshot_path,
-    sync_directory,
-    write_sealed,
-)
+from brdfdb.store.files import sync_directory
+from brdfdb.store.lock import Lock, writing
+from brdfdb.store.paths import NAME, snapshot_path
 from brdfdb.store.reader import Store
 from brdfdb.store.revisions import SNAPSHOTS
-from brdfdb.store.staging import Lock, writing
+from brdfdb.store.sealed_json import seal_of, write_sealed
+from brdfdb.store.snapshot_record import SNAPSHOT_FORMAT, SNAPSHOT_VERSION, Pin, Snapshot, read_snapshot
 
 
 def create(root: Path, name: str, advance: Callable[[], None] = lambda: None) -> str:

@@ -9,20 +9,15 @@ from typing import Any
 import numpy as np
 
 from brdfdb.errors import StoreError, UnknownMaterialError
+from brdfdb.store.decoding import read_metadata
 from brdfdb.store.family_records import verify_family
-from brdfdb.store.manifest import (
-    Entry,
-    Head,
-    check_manifest,
-    manifest_of,
-    read_manifest,
-    read_snapshot,
-    snapshot_names,
-    snapshot_path,
-    whole_revisions,
-)
-from brdfdb.store.reader import Store, WrongSummaryError, check_summary, read_metadata
+from brdfdb.store.files import Entry
+from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
+from brdfdb.store.paths import manifest_path, material_path, revision_path, snapshot_path
+from brdfdb.store.pointer import Head, WrongSummaryError, check_summary
+from brdfdb.store.reader import Store
 from brdfdb.store.revisions import pinned, strangers
+from brdfdb.store.snapshot_record import read_snapshot, snapshot_names
 
 _BUILD = "`brdfdb build` with its recipe repairs it"
 _BUILD_ANEW = "`brdfdb build` with its recipe makes it anew, then `brdfdb gc --damaged` removes this revision"
@@ -67,17 +62,19 @@ def material(root: Path, name: str) -> tuple[int, list[Finding]]:
         try:
             group, digest, head = store.current(name)
         except StoreError as error:
-            return 0, [Finding(name, str(error), _pointer_repair(store.root / "materials" / name))]
+            return 0, [Finding(name, str(error), _pointer_repair(material_path(store.root, name)))]
         try:
-            size, found = _current(name, group, digest, head), _remarks(name, group)
+            size, findings = _current(name, group, digest, head), _remarks(name, group)
         except StoreError as error:
             if _moved(store, name, group, digest):
                 continue
             if isinstance(error, WrongSummaryError):
                 return 0, [Finding(name, str(error), _pointer_repair(group.parent))]
-            repair = f"`rm {manifest_of(group)}`, then {_BUILD}" if isinstance(error, WrongTableError) else _BUILD_ANEW
-            size, found = 0, [Finding(name, str(error), repair)]
-        return size, found + _strange(name, group, digest) + _others(store, group, head)
+            repair = (
+                f"`rm {manifest_path(group)}`, then {_BUILD}" if isinstance(error, WrongTableError) else _BUILD_ANEW
+            )
+            size, findings = 0, [Finding(name, str(error), repair)]
+        return size, findings + _strange(name, group, digest) + _others(store, group, head)
 
 
 def _remarks(name: str, group: Path) -> list[Finding]:
@@ -106,18 +103,18 @@ def _pointer_repair(material: Path) -> str:
 
 def _strange(name: str, group: Path, digest: str | None) -> list[Finding]:
     try:
-        found = strangers(group, digest)
+        paths = strangers(group, digest)
     except OSError:  # removed while it was looked through
         return []
     return [
         Finding(name, f"{name} {group.name}: {path.relative_to(group)} does not belong there", "`brdfdb gc` removes it")
-        for path in found
+        for path in paths
     ]
 
 
 def _others(store: Store, current: Path, head: Head) -> list[Finding]:
     """Check the revisions that are not current."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     name = current.parent.name
     for group in whole_revisions(current.parent):
         digest = head["manifests"].get(group.name)
@@ -126,16 +123,16 @@ def _others(store: Store, current: Path, head: Head) -> list[Finding]:
         try:
             check_manifest(group, digest, contents=True)
         except StoreError as error:
-            if manifest_of(group).is_file():  # else it was collected meanwhile
-                found.append(Finding(name, f"{error} (not the current revision)", _other_repair(store.root, group)))
+            if manifest_path(group).is_file():  # else it was collected meanwhile
+                findings.append(Finding(name, f"{error} (not the current revision)", _other_repair(store.root, group)))
             continue
-        found += _strange(name, group, digest)
+        findings += _strange(name, group, digest)
     for revision in head["manifests"]:
         group = current.with_name(revision)
-        if not group.is_dir() and manifest_of(group).is_file():  # a collection removes the manifest first
+        if not group.is_dir() and manifest_path(group).is_file():  # a collection removes the manifest first
             sentence = f"{name} {revision} is damaged: its directory is missing (not the current revision)"
-            found.append(Finding(name, sentence, _other_repair(store.root, group)))
-    return found
+            findings.append(Finding(name, sentence, _other_repair(store.root, group)))
+    return findings
 
 
 def _other_repair(root: Path, group: Path) -> str:
@@ -158,7 +155,7 @@ def family(root: Path, name: str) -> tuple[int, list[Finding]]:
 
 def snapshots(root: Path) -> list[Finding]:
     """Check every snapshot, and the manifests of the revisions that it names; `material` checks their contents."""
-    found = []
+    findings = []
     for name in snapshot_names(root):
         remove = f"`brdfdb snapshot --remove {name}`"
         try:
@@ -166,15 +163,15 @@ def snapshots(root: Path) -> list[Finding]:
         except StoreError as error:
             if snapshot_path(root, name).is_file():  # else it was removed meanwhile
                 again = f"copy it from where it is whole, or {remove} and name the revisions anew"
-                found.append(Finding(name, str(error), again))
+                findings.append(Finding(name, str(error), again))
             continue
         for material, pin in pins.items():
             try:
-                read_manifest(root / "materials" / material / pin["revision"], pin["manifest_sha256"])
+                read_manifest(revision_path(root, material, pin["revision"]), pin["manifest_sha256"])
             except StoreError as error:
                 sentence = f"the snapshot {name} is damaged: {error}"
-                found.append(Finding(name, sentence, f"copy the revision from where it is whole, or {remove}"))
-    return found
+                findings.append(Finding(name, sentence, f"copy the revision from where it is whole, or {remove}"))
+    return findings
 
 
 def _current(name: str, group: Path, digest: str, head: Head) -> int:

@@ -13,7 +13,7 @@ from xarray.backends import BackendEntrypoint
 import brdfdb
 from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store.http_client import remote_dataset
-from brdfdb.store.manifest import number_of
+from brdfdb.store.paths import METADATA, marker_path, number_of, store_of
 from brdfdb.store.reader import Store
 from brdfdb.tables.xarray_view import opened
 
@@ -76,19 +76,19 @@ class BrdfdbBackend(BackendEntrypoint):
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         """Return True for the directory of a store; revisions are zarr groups, which others read, too."""
-        return isinstance(filename_or_obj, str | os.PathLike) and Path(filename_or_obj, "brdfdb.json").is_file()
+        return isinstance(filename_or_obj, str | os.PathLike) and marker_path(Path(filename_or_obj)).is_file()
 
 
 def _local(path: Path, revision: str | None, snapshot: str | None) -> xr.Dataset:
     """Open the directory of a material or of a revision."""
-    if (path / "brdfdb.json").is_file():
+    if marker_path(path).is_file():
         names = ", ".join(list(Store(path))[:5]) or "none"
         raise ParameterError("material", f"{path} is a store; name one of its materials, such as {names}")
-    if path.parent.name == "materials":
-        return Store(path.parent.parent, snapshot=snapshot).dataset(path.name, revision)
-    if path.parent.parent.name == "materials" and (path.parent.parent.parent / "brdfdb.json").is_file():
-        return Store(path.parent.parent.parent, snapshot=snapshot).dataset(path.parent.name, path.name)
-    if not (path / "zarr.json").is_file():
+    if (root := store_of(path / "r000001")) is not None:
+        return Store(root, snapshot=snapshot).dataset(path.name, revision)
+    if (root := store_of(path)) is not None:
+        return Store(root, snapshot=snapshot).dataset(path.parent.name, path.name)
+    if not (path / METADATA).is_file():
         raise StoreError(f"no table at {path}: name a revision, a material of a store, or a store with `material`")
     try:
         return opened(path)

@@ -11,7 +11,8 @@ from zarr.core.buffer import Buffer, BufferPrototype
 from zarr.storage import LocalStore
 
 from brdfdb.errors import StoreError
-from brdfdb.store.manifest import Entry, manifest_of
+from brdfdb.store.files import Entry
+from brdfdb.store.paths import manifest_path
 
 
 class Whole(LocalStore):
@@ -41,7 +42,7 @@ class Whole(LocalStore):
         if (entry := self._files.get(key)) is None:
             return value
         if value is None:
-            if not manifest_of(self.root).is_file():
+            if not manifest_path(self.root).is_file():
                 raise StoreError(f"{where} was removed while it was read; open the material anew")
             raise StoreError(f"{where} is damaged: {key} is missing")
         if byte_range is None and hashlib.sha256(value.to_bytes()).hexdigest() != entry["sha256"]:

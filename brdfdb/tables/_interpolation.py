@@ -1,4 +1,4 @@
-"""Interpolation on rectilinear grids: where a point lies on each axis, and the nodes that count there, with weights."""
+"""Interpolation on rectilinear grids: the cell of a point on each axis, and the nodes that count, with weights."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from brdfdb._numba import kernel
 
 Array = NDArray[np.float64]
 
+_AT_END = 4  # first column of `Axes.slopes` for the end of a cell; those for its beginning come first
 _MOST_BUCKETS = 1 << 15  # of an axis: nodes closer together than a part in this share a bucket
 
 
@@ -25,9 +26,9 @@ class Axes(NamedTuple):
     nodes, inverse : float64 (nodes,)
         Nodes, and the inverse of the step to the next one.
     uniform : bool (axes,)
-        Whether the steps of an axis are equal: its cells are found without a search.
+        True if the steps of an axis are equal: its cells need no search.
     crowded : bool (axes,)
-        Whether a bucket of an axis may hold more than one node.
+        True if a bucket of an axis may hold more than one node.
     scale : float64 (axes,)
         Cells or buckets for one unit along the axis.
     bucket, bucket_first : int64
@@ -35,7 +36,7 @@ class Axes(NamedTuple):
     width : int64 (axes,)
         Nodes that count in a cell: 2, or 4 of a cubic.
     stencil : int64 (nodes, 4)
-        Which nodes those are.
+        The numbers of those nodes.
     slopes : float64 (nodes, 8)
         The slopes at both ends of a cell, times its length, as weights of those nodes.
     """
@@ -55,14 +56,14 @@ class Axes(NamedTuple):
 
 
 def prepared(axes: Sequence[Array], ends: Sequence[tuple[str, str]], *, cubic: bool) -> Axes:
-    """Axes ready for kernels.
+    """Prepare axes for kernels.
 
     Parameters
     ----------
     axes : sequence of float64 arrays
         Nodes, strictly increasing, two or more on each axis.
     ends : sequence of (str, str)
-        What is known of the function beyond the first and the last node: "even" where it is mirrored there,
+        The continuation of the function beyond the first and the last node: "even" where it is mirrored there,
         "periodic" where the last node is the first again, "open" where nothing is.
     cubic : bool
         Catmull-Rom cubics on the axes that have three nodes or more, else linear.
@@ -106,7 +107,7 @@ def weights_of_nodes(
     Returns
     -------
     index : int64 array (points, 4)
-        Which nodes count.
+        The nodes that count.
     weight : float64 array (points, 4)
         Their weights. They add up to 1. On a node the weight of that node is exactly 1, and the others are 0.
     """
@@ -123,14 +124,14 @@ def weights_of_nodes(
     stencil, slopes = _cubic_cells(nodes, ends)
     rise = t * t * (3.0 - 2.0 * t)
     for k in range(4):
-        weight[:, k] = t * (1 - t) ** 2 * slopes[cell, k] + t * t * (t - 1) * slopes[cell, k + 4]
+        weight[:, k] = t * (1 - t) ** 2 * slopes[cell, k] + t * t * (t - 1) * slopes[cell, k + _AT_END]
     weight[:, 1] += 1.0 - rise
     weight[:, 2] += rise
     return stencil[cell], weight
 
 
 def _buckets(nodes: Array) -> tuple[NDArray[np.int64], float, bool]:
-    """Equal pieces of an axis, none longer than its shortest cell: the cell in which each begins, pieces a unit."""
+    """Return equal pieces of an axis, none longer than its shortest cell: the cell at each begin, and pieces a unit."""
     steps = np.diff(nodes)
     extent = nodes[-1] - nodes[0]
     if np.ptp(steps) <= 1e-9 * steps[0]:
@@ -141,7 +142,7 @@ def _buckets(nodes: Array) -> tuple[NDArray[np.int64], float, bool]:
 
 
 def _cubic_cells(nodes: Array, ends: tuple[str, str]) -> tuple[NDArray[np.int64], Array]:
-    """The four nodes that count in each cell of an axis, and the slopes at its two ends as weights of them.
+    """Return the four nodes that count in each cell of an axis, and the slopes at its two ends as weights of them.
 
     Catmull-Rom for unequal steps: Hermite's cubic whose slope at a node is that of the parabola through it and its two
     neighbours. The cell after the last node is never looked up.
@@ -168,7 +169,7 @@ def _cubic_cells(nodes: Array, ends: tuple[str, str]) -> tuple[NDArray[np.int64]
 
 
 def _beyond(nodes: Array, end: str, low: bool) -> tuple[int, float]:
-    """Which node stands one beyond an end of an axis, and where; nan where nothing is known."""
+    """Return the number and place of the node one beyond an end of an axis; the place is nan if nothing is known."""
     last = nodes.size - 1
     if end == "even":
         return (1, 2.0 * nodes[0] - nodes[1]) if low else (last - 1, 2.0 * nodes[last] - nodes[last - 1])
@@ -179,7 +180,7 @@ def _beyond(nodes: Array, end: str, low: bool) -> tuple[int, float]:
 
 
 def _slopes(a: Any, b: Any, c: Any, at: Any) -> Array:
-    """The slopes at one of three nodes of the parabolas through them, as weights of their values: shape (..., 3)."""
+    """Return the slopes of parabolas through three nodes at one of them, as weights of their values: shape (..., 3)."""
     return np.stack(
         [
             (2.0 * at - b - c) / ((a - b) * (a - c)),
@@ -192,7 +193,7 @@ def _slopes(a: Any, b: Any, c: Any, at: Any) -> Array:
 
 @kernel
 def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64], share: Array) -> None:
-    """Cell and share of it, in [0, 1], of `count` points of one axis; beyond its ends, the end."""
+    """Write the cell of each point on one axis, and the share of it in [0, 1]; a point beyond an end is moved to it."""
     first = np.uint64(axes.first[axis])
     buckets = np.uint64(axes.bucket_first[axis])
     last = axes.counts[axis] - 2
@@ -233,7 +234,7 @@ def locate(axes: Axes, axis: int, x: Array, count: int, cell: NDArray[np.int64],
 
 @kernel
 def _weigh(axes: Axes, axis: int, c: int, t: float, stride: int, at: NDArray[np.uint64], w: Array) -> None:
-    """Offsets and weights of the nodes that count for a point, into row `axis` of `at` and `w`."""
+    """Write offsets and weights of the nodes that count for a point into row `axis` of `at` and `w`."""
     if axes.width[axis] == 2:
         at[axis, 0], at[axis, 1] = np.uint64(c * stride), np.uint64((c + 1) * stride)
         w[axis, 0], w[axis, 1] = 1.0 - t, t
@@ -244,7 +245,7 @@ def _weigh(axes: Axes, axis: int, c: int, t: float, stride: int, at: NDArray[np.
     m_0, m_1 = t * (1.0 - t) * (1.0 - t), t2 * (t - 1.0)
     for node in range(4):
         at[axis, node] = np.uint64(axes.stencil[k, node] * stride)
-        w[axis, node] = m_0 * axes.slopes[k, node] + m_1 * axes.slopes[k, node + 4]
+        w[axis, node] = m_0 * axes.slopes[k, node] + m_1 * axes.slopes[k, node + _AT_END]
     w[axis, 1] += 1.0 - h_1
     w[axis, 2] += h_1
 
@@ -253,7 +254,7 @@ def _weigh(axes: Axes, axis: int, c: int, t: float, stride: int, at: NDArray[np.
 def trilinear(
     axes: Axes, cell: NDArray[np.int64], share: Array, count: int, table: NDArray[np.float32], out: Array
 ) -> None:
-    """Linear interpolation on three axes of a table with one value a node, of the points that `locate` found."""
+    """Interpolate linearly on three axes of a table with one value a node, at the points of `locate`."""
     n_1, n_2 = axes.counts[1], axes.counts[2]
     one, row, layer = np.uint64(1), np.uint64(n_2), np.uint64(n_1 * n_2)
     for j in range(count):
@@ -274,7 +275,7 @@ def trilinear(
 def tricubic(
     axes: Axes, cell: NDArray[np.int64], share: Array, count: int, table: NDArray[np.float32], out: Array
 ) -> None:
-    """Cubic interpolation on three axes of a table with one value a node, of the points that `locate` found."""
+    """Interpolate with cubics on three axes of a table with one value a node, at the points of `locate`."""
     at, w = np.empty((3, 4), np.uint64), np.empty((3, 4))
     for j in range(count):
         stride = 1
@@ -305,7 +306,7 @@ def weighted(
     channels: int,
     out: Array,
 ) -> None:
-    """Interpolation on three or four axes of a table with `channels` values a node, of the points that `locate` found.
+    """Interpolate on three or four axes of a table with `channels` values a node, at the points of `locate`.
 
     `out` holds the channels of one point after those of another.
     """

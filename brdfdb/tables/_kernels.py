@@ -1,6 +1,6 @@
-"""The inside of lookups: from directions to points on a grid, through the interpolation, to values of f_r.
+"""Kernels of lookups: from directions to points on a grid, through the interpolation, to values of f_r.
 
-All work in blocks of directions, step by step, so that each step is a short loop.
+Each kernel works on a block of directions, one short loop after another, so that loops vectorise.
 """
 
 from __future__ import annotations
@@ -16,29 +16,27 @@ from brdfdb.tables._interpolation import Axes, locate, tricubic, trilinear, weig
 
 Array = NDArray[np.float64]
 
-PI = np.pi
-TURN = 2.0 * np.pi
-HALF_PI = np.pi / 2.0
+PI, TURN, HALF_PI = np.pi, 2.0 * np.pi, np.pi / 2.0
 PHI_MAX = 1e15
 
 
 class Rule(NamedTuple):
-    """How numbers on a grid become f_r.
+    """The way from numbers on a grid to f_r.
 
     Attributes
     ----------
     half_difference : bool
-        Whether the axes are those of half and difference vectors.
+        True for the axes of half and difference vectors.
     copies : int
-        How many times the azimuth of an anisotropic grid goes into a full turn: 1, 2 or 4.
+        Number of times that the azimuth of an anisotropic grid goes into a full turn: 1, 2 or 4.
     logarithm : bool
-        Whether the numbers are logarithms, ...
+        True if the numbers are logarithms.
     offset : float
-        ... of values to which this was added.
+        Added to values before the logarithm was taken.
     power : float
-        What was tabulated is f_r times (cos theta_i cos theta_r) to this power.
+        Power of cos theta_i cos theta_r that f_r was multiplied by.
     overshoots : bool
-        Whether what is interpolated may fall below 0 where no node is: it is 0 there.
+        True if interpolated values may fall below 0 between nodes; they are set to 0.
     """
 
     half_difference: bool
@@ -51,7 +49,7 @@ class Rule(NamedTuple):
 
 @kernel
 def angle(y: float, x: float) -> float:
-    """atan2(y, x) of a point in the first quadrant, the axes included; 0 at the origin."""
+    """Return atan2(y, x) [rad] of a point in the first quadrant, the axes included; 0 at the origin."""
     length = np.sqrt(x * x + y * y)
     a = arcsin(min(x, y) / (length if length > 0.0 else 1.0))
     return float(HALF_PI - a if y > x else a)
@@ -59,7 +57,7 @@ def angle(y: float, x: float) -> float:
 
 @kernel
 def _full_turn(y: float, x: float) -> float:
-    """atan2(y, x) in [0, 2 pi)."""
+    """Return atan2(y, x) [rad] in [0, 2 pi)."""
     a = angle(abs(y), abs(x))
     a = PI - a if x < 0.0 else a
     return TURN - a if y < 0.0 and a > 0.0 else a
@@ -67,13 +65,13 @@ def _full_turn(y: float, x: float) -> float:
 
 @kernel
 def _folded(phi: float, period: float) -> float:
-    """An azimuth in [0, period]."""
+    """Return an azimuth folded into [0, period]."""
     return float(phi - np.floor(phi * (1.0 / period)) * period)
 
 
 @kernel
 def _turned(phi: float, other: float, copies: int) -> tuple[float, float]:
-    """Two azimuths after the symmetries of the surface brought the first into its part of the turn.
+    """Return two azimuths, the first folded into its part of the turn by the symmetries of the surface.
 
     Half a turn of the surface moves both by pi, the mirror changes the sign of both.
     """
@@ -87,7 +85,7 @@ def _turned(phi: float, other: float, copies: int) -> tuple[float, float]:
 
 @kernel
 def _halved(phi_h: float, phi_d: float, copies: int) -> tuple[float, float]:
-    """The azimuths of half and difference vector after the symmetries of the surface and reciprocity.
+    """Return the azimuths of half and difference vector after the symmetries of the surface and reciprocity.
 
     Half a turn of the surface moves phi_h alone, the mirror changes the sign of both.
     """
@@ -102,21 +100,23 @@ def _halved(phi_h: float, phi_d: float, copies: int) -> tuple[float, float]:
 def points_of_angles(
     rule: Rule, theta_i: Array, phi_i: Array, theta_r: Array, phi_r: Array, count: int, x: Array, mu: Array
 ) -> None:
-    """Points on a grid of light and viewer, and mu = cos theta_i cos theta_r, which is needed of some rules only."""
+    """Write points on a grid of light and viewer, and mu = cos theta_i cos theta_r if the rule has a power."""
     if x.shape[0] == 3:
+        light, viewer, delta_phi = x[0], x[1], x[2]
         for j in range(count):
             d = np.float64(phi_r[j]) - np.float64(phi_i[j])
             d -= np.floor(d * (1.0 / TURN) + 0.5) * TURN
-            x[0, j] = theta_i[j]
-            x[1, j] = theta_r[j]
-            x[2, j] = abs(d)
+            light[j] = theta_i[j]
+            viewer[j] = theta_r[j]
+            delta_phi[j] = abs(d)
     else:
+        light, light_phi, viewer, viewer_phi = x[0], x[1], x[2], x[3]
         for j in range(count):
             phi, other = _turned(np.float64(phi_i[j]), np.float64(phi_r[j]), rule.copies)
-            x[0, j] = theta_i[j]
-            x[1, j] = phi
-            x[2, j] = theta_r[j]
-            x[3, j] = _folded(other, TURN)
+            light[j] = theta_i[j]
+            light_phi[j] = phi
+            viewer[j] = theta_r[j]
+            viewer_phi[j] = _folded(other, TURN)
     if rule.power != 0.0:
         for j in range(count):
             mu[j] = cosine(cos(np.float64(theta_i[j]))) * cosine(cos(np.float64(theta_r[j])))
@@ -124,26 +124,30 @@ def points_of_angles(
 
 @loop
 def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu: Array, scratch: Array) -> None:
-    """Points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r.
+    """Write points on either kind of grid, of unit vectors in flat arrays, and mu = cos theta_i cos theta_r.
 
     `scratch` holds four rows. One loop for the products and one for each angle: all in one would not vectorise.
     """
     if rule.half_difference:
-        _half_difference(ui, ur, count, x[0], x[x.shape[0] - 2], x[x.shape[0] - 1], scratch)
+        theta_h, theta_d, phi_d = x[0], x[x.shape[0] - 2], x[x.shape[0] - 1]
+        _half_difference(ui, ur, count, theta_h, theta_d, phi_d, scratch)
         if x.shape[0] == 4:
+            along, across, x_h, y_h = scratch[0], scratch[1], scratch[2], scratch[3]
+            phi_h = x[1]
             for j in range(count):
-                phi_h = _full_turn(scratch[3, j], scratch[2, j])
-                x[1, j], x[3, j] = _halved(phi_h, _full_turn(scratch[1, j], scratch[0, j]), rule.copies)
+                turn = _full_turn(y_h[j], x_h[j])
+                phi_h[j], phi_d[j] = _halved(turn, _full_turn(across[j], along[j]), rule.copies)
     elif x.shape[0] == 3:
         _light_and_viewer(ui, ur, count, x[0], x[1], x[2], scratch)
     else:
+        light, light_phi, viewer, viewer_phi = x[0], x[1], x[2], x[3]
         for j in range(count):
             phi_i, phi_r = _full_turn(ui[3 * j + 1], ui[3 * j]), _full_turn(ur[3 * j + 1], ur[3 * j])
             phi, other = _turned(phi_i, phi_r, rule.copies)
-            x[0, j] = _polar(ui[3 * j], ui[3 * j + 1], ui[3 * j + 2])
-            x[1, j] = phi
-            x[2, j] = _polar(ur[3 * j], ur[3 * j + 1], ur[3 * j + 2])
-            x[3, j] = _folded(other, TURN)
+            light[j] = _polar(ui[3 * j], ui[3 * j + 1], ui[3 * j + 2])
+            light_phi[j] = phi
+            viewer[j] = _polar(ur[3 * j], ur[3 * j + 1], ur[3 * j + 2])
+            viewer_phi[j] = _folded(other, TURN)
     for j in range(count):
         mu[j] = cosine(np.float64(ui[3 * j + 2])) * cosine(np.float64(ur[3 * j + 2]))
 
@@ -157,7 +161,7 @@ def _polar(x: float, y: float, z: float) -> float:
 def _half_difference(
     ui: Array, ur: Array, count: int, theta_h: Array, theta_d: Array, phi_d: Array, scratch: Array
 ) -> None:
-    """theta_h, theta_d, and phi_d in the first quadrant.
+    """Write theta_h, theta_d, and phi_d in the first quadrant.
 
     `scratch` gets the difference vector along theta_h and along phi_h, both times one positive number, and the
     horizontal half vector; where that is nothing, the frame is that of phi_h = 0.
@@ -191,7 +195,7 @@ def _half_difference(
 def _light_and_viewer(
     ui: Array, ur: Array, count: int, theta_i: Array, theta_r: Array, delta_phi: Array, scratch: Array
 ) -> None:
-    """theta_i, theta_r and delta_phi."""
+    """Write theta_i, theta_r and delta_phi."""
     dot, cross = scratch[0], scratch[1]
     for j in range(count):
         x_i, y_i = np.float64(ui[3 * j]), np.float64(ui[3 * j + 1])
@@ -209,7 +213,7 @@ def _light_and_viewer(
 
 @loop
 def interpolated(axes: Axes, table: NDArray[np.float32], channels: int, x: Array, count: int, numbers: Array) -> None:
-    """What a table holds at points on its grid: `channels` numbers a point, point after point."""
+    """Interpolate the numbers of a table at points on its grid: `channels` numbers a point, point after point."""
     cell, share = np.empty((x.shape[0], BLOCK), np.int64), np.empty((x.shape[0], BLOCK))
     for axis in range(x.shape[0]):
         locate(axes, axis, x[axis], count, cell[axis], share[axis])
@@ -294,7 +298,7 @@ def finished(
 
 @loop
 def vectors_of_angles(theta: Array, phi: Array, count: int, w: Array) -> None:
-    """Unit vectors, three numbers each, of directions by angles [rad]; below the horizon, at the horizon.
+    """Write unit vectors, three numbers each, of directions by angles [rad]; those below the horizon lie on it.
 
     The float32 nearest pi/2 lies above pi/2, and is the horizon.
     """
@@ -330,7 +334,7 @@ def by_angles(
     horizon: float,
     out: Array,
 ) -> bool:
-    """f_r of directions by angles [rad] on either kind of grid; False where an angle is not what it may be."""
+    """Write f_r [1/sr] of directions by angles [rad]. Return False if any angle is out of range."""
     x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
     wi, wr = np.empty(3 * BLOCK), np.empty(3 * BLOCK)
     numbers = np.empty(BLOCK * channels)
@@ -338,8 +342,8 @@ def by_angles(
     good = True
     for start in range(0, theta_i.size, BLOCK):
         count = min(BLOCK, theta_i.size - start)
-        here = slice(start, start + count)  # an index that starts at 0 is known not to be negative: loops vectorise
-        t_i, p_i, t_r, p_r = theta_i[here], phi_i[here], theta_r[here], phi_r[here]
+        block = slice(start, start + count)  # an index that starts at 0 is known not to be negative: loops vectorise
+        t_i, p_i, t_r, p_r = theta_i[block], phi_i[block], theta_r[block], phi_r[block]
         f_r = out[start * wavelengths : (start + count) * wavelengths]
         if rule.half_difference:
             vectors_of_angles(t_i, p_i, count, wi)
@@ -364,7 +368,7 @@ def by_angles(
 
 @kernel
 def _outside(direction: float, below: bool, point: int, wavelengths: int, out: Array) -> None:
-    """nan where a direction is nan, 0 below the horizon."""
+    """Write nan if a direction is nan, 0 if it is below the horizon."""
     if below or direction != direction:
         for m in range(wavelengths):
             out[point * wavelengths + m] = np.nan if direction != direction else 0.0
@@ -384,7 +388,7 @@ def by_vectors(
     wr: Array,
     out: Array,
 ) -> None:
-    """f_r of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
+    """Write f_r [1/sr] of directions by unit vectors, flat arrays of three numbers each, on either kind of grid."""
     x, mu, scratch = np.empty((axes.counts.size, BLOCK)), np.empty(BLOCK), np.empty((4, BLOCK))
     numbers = np.empty(BLOCK * channels)
     points, wavelengths = wi.size // 3, nodes.shape[0]
@@ -415,9 +419,9 @@ def specular(
     horizon: float,
     out: Array,
 ) -> bool:
-    """Write the Dirac part [1], linear between its nodes `theta_nodes` [rad]; `out` stays as it is if there are none.
+    """Write the specular part [1], linear between its nodes `theta_nodes` [rad]; else as `by_angles`.
 
-    Wavelengths, directions below the horizon and the result are as by `by_angles`.
+    `out` stays as it is if there are no nodes.
     """
     wavelengths = nodes.shape[0]
     last = theta_nodes.size - 1

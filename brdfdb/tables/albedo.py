@@ -23,7 +23,7 @@ _PHI_I_STEP_DEG = 30.0
 
 
 class TableAlbedo(NamedTuple):
-    """The directional albedo of a table, without the Dirac part.
+    """The directional albedo of a table, without the specular part.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
 
 
 def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
-    """The share that is reflected of light that is the same from everywhere.
+    """Return the share [1] that is reflected of light that is the same from everywhere.
 
     Parameters
     ----------
@@ -161,12 +161,12 @@ def source_albedo(
 
 
 def linear_in_angles(table: Table) -> bool:
-    """Whether the table is f_r over light and viewer, linear in each angle between its nodes."""
+    """Return True if the table is f_r over light and viewer, linear in each angle between its nodes."""
     return table.values_are_brdf and not table.grid.half_difference and not table.interpolation.cubic
 
 
 def wavelengths_of(table: Table) -> int:
-    """How many wavelengths a table has; 1 if it is grey."""
+    """Return the number of wavelengths of a table; 1 if it is grey."""
     return 1 if table.wavelength_nm is None else table.wavelength_nm.size
 
 
@@ -215,7 +215,7 @@ def _trapezoid_weights(nodes: Axis) -> Axis:
 
 
 def _theta_weights(nodes: Axis) -> Axis:
-    """Integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat held constant up to pi/2.
+    """Return the integrals of hat_j(theta) cos(theta) sin(theta) over [0, pi/2], the last hat held constant up to pi/2.
 
     With F = sin^2 / 2 and its integral G = theta / 4 - sin(2 theta) / 8, the rising half over [a, b] gives
     F(b) - (G(b) - G(a)) / (b - a).

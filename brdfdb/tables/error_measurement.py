@@ -23,9 +23,10 @@ from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.stated_error import Between, Error, Overall, Places
 from brdfdb.tables.table import Table, points
 
-FLOOR = 1e-3  # of the Lambertian BRDF with the albedo of the material
-WIDTHS = (1.0, 2.0)  # of the lobes that directions are drawn in, of the material's own
-DIRECTIONS = 4000  # of each band; of more than _FEW wavelengths, each with errors of its own, fewer
+FLOOR = 1e-3  # share of the Lambertian BRDF with the albedo of the source
+WIDTHS = (1.0, 2.0)  # widths of the lobes to draw directions from, relative to that of the source
+# Directions in each band of theta_i. Tables of more than _FEW wavelengths use fewer: each wavelength is measured
+DIRECTIONS = 4000
 _FEW, _FEWER_DIRECTIONS = 4, 3000
 SEED = 1991
 # Directions of a sample in a place, and of a band between wavelengths, of those of a band at the wavelengths
@@ -51,7 +52,7 @@ class Draw(NamedTuple):
 
     @property
     def above(self) -> NDArray[np.bool_]:
-        """Which viewers are above the horizon."""
+        """Mask of the viewers above the horizon."""
         return np.asarray(self.weight > 0.0)
 
 
@@ -98,25 +99,25 @@ def model_values(source: Source, wavelength_nm: NDArray[np.float64] | None, wi: 
 
 
 def floor_of(truth: Floats, drawn: Draw) -> Floats:
-    """The floor [1/sr] of relative errors at each wavelength: `FLOOR` of the Lambertian BRDF of the same albedo."""
+    """Return the floor [1/sr] of relative errors at each wavelength: `FLOOR` of a Lambertian BRDF as bright."""
     return np.asarray(FLOOR / np.pi * np.mean(drawn.weight[:, np.newaxis] * truth, axis=0))
 
 
-def relative(found: Floats, truth: Floats, floor: Floats) -> Floats:
-    """abs(found - truth) / max(truth, floor); 0 where nothing is and nothing was found."""
+def relative(values: Floats, truth: Floats, floor: Floats) -> Floats:
+    """Return the relative error [1], abs(values - truth) / max(truth, floor); 0 where both are 0."""
     scale = np.maximum(truth, floor)
-    error = np.abs(found - truth)
+    error = np.abs(values - truth)
     return np.divide(error, scale, out=np.where(error > 0.0, np.inf, 0.0), where=scale > 0.0)
 
 
-def mean_error(found: Floats, truth: Floats, weight: Floats) -> Floats:
-    """Weighted mean of abs(found - truth) over that of truth, for each row of weights and each wavelength; or 0."""
-    wrong, whole = weight @ np.abs(found - truth), weight @ truth
+def mean_error(values: Floats, truth: Floats, weight: Floats) -> Floats:
+    """Return the weighted mean of abs(values - truth) over that of truth, for each row of weights and wavelength."""
+    wrong, whole = weight @ np.abs(values - truth), weight @ truth
     return np.divide(wrong, whole, out=np.zeros_like(wrong), where=whole > 0.0)
 
 
 def classes(drawn: Draw) -> dict[str, NDArray[np.bool_]]:
-    """Which viewers of a draw look forward or back, within 45 degrees of azimuth, and which pairs graze, beyond 75."""
+    """Return which viewers of a draw look forward or back, within 45 degrees of azimuth, and which pairs graze."""
     wi, wr = drawn.wi, drawn.wr
     along = np.sum(wi[:, :2] * wr[:, :2], axis=1)
     across = np.hypot(*wi[:, :2].T) * np.hypot(*wr[:, :2].T)
@@ -155,13 +156,13 @@ def measure(
     pairs = places.draw(math.ceil(count * _IN_PLACES), seed)
     wi, wr = np.concatenate([drawn.wi, pairs.wi]), np.concatenate([drawn.wr, pairs.wr])
     truth = model_values(layout.source, layout.wavelength_nm, wi, wr)
-    found = _looked_up(layout, read, wi, wr, layout.wavelength_nm)
+    values = _looked_up(layout, read, wi, wr, layout.wavelength_nm)
     own = len(drawn.wi)
-    error = compare(found[:own], truth[:own], drawn, seed)
+    error = compare(values[:own], truth[:own], drawn, seed)
     floor = floor_of(truth[:own], drawn)
     return error.model_copy(
         update={
-            "places": _in_places(relative(truth[own:], found[own:], floor), pairs),
+            "places": _in_places(relative(truth[own:], values[own:], floor), pairs),
             "between": None if floor.size < 2 else _between(layout, read, drawn, pairs, floor, count),
         }
     )
@@ -184,8 +185,8 @@ def _between(
     some = _first(drawn.band, math.ceil(count * _BETWEEN)) & drawn.above
     fewer = pairs.some(_first(pairs.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
     wi, wr = np.concatenate([drawn.wi[some], fewer.wi]), np.concatenate([drawn.wr[some], fewer.wr])
-    found, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.source, at, wi, wr)
-    error = relative(truth, found, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
+    values, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.source, at, wi, wr)
+    error = relative(truth, values, np.maximum(floor[1:], floor[:-1]))  # to what a lookup knows
     own = np.count_nonzero(some)
     return Between(
         wavelength_nm=at.tolist(),
@@ -220,7 +221,7 @@ def worst_wavelengths(
 
 def limits_of_bands(error: Floats, band: NDArray[np.int64]) -> list[list[float]]:
     """Return the limit of errors (N, columns) in each band of theta_i."""
-    return [_short(_limit(error[band == each])) for each in range(places.BANDS)]
+    return [_short(_limit(error[band == row])) for row in range(places.BANDS)]
 
 
 def _first(sample: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
@@ -232,9 +233,9 @@ def _in_places(error: Floats, pairs: places.Pairs) -> Places:
     """Return limits of errors (N, columns) at pairs drawn in places: the largest of the samples of each place."""
     rows: dict[int, Floats] = {}
     for sample in range(pairs.sample[-1] + 1):
-        here = pairs.sample == sample
-        row = int(pairs.row[here][0])
-        rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[here]))
+        members = pairs.sample == sample
+        row = int(pairs.row[members][0])
+        rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[members]))
 
     limits = {row: _short(limit) for row, limit in rows.items()}
     return Places(
@@ -267,16 +268,16 @@ def _rank(count: int) -> int:
         rank += 1
 
 
-def compare(found: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:
-    """The error of values of f_r, shape (N, L), against the truth at the directions of a draw."""
+def compare(values: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:
+    """Return the error of values of f_r, shape (N, L), against the truth at the directions of a draw."""
     floor = floor_of(truth, drawn)
     count = BANDS_DEG.size - 1
     # rows of weights: each band of theta_i, then all of them
     weights = np.concatenate(
         [np.where(drawn.band == np.arange(count)[:, np.newaxis], drawn.weight, 0.0), [drawn.weight]]
     )
-    l1 = mean_error(found, truth, weights)
-    error = np.ascontiguousarray(relative(found, truth, floor).T)
+    l1 = mean_error(values, truth, weights)
+    error = np.ascontiguousarray(relative(values, truth, floor).T)
     chosen = [drawn.above & (drawn.band == band) for band in range(count)] + [drawn.above]
     percentiles = [np.percentile(error[:, rows], [50.0, 95.0, 99.0, 100.0], axis=1) for rows in chosen]
     # [statistic][band][wavelength]
@@ -305,20 +306,20 @@ def _looked_up(
     """Return values (N, L) of a table at directions, read in windows of rows with one more on either side."""
     rows = layout.shape[0]
     step = max(2, min(rows, _WINDOW // (layout.size // rows)))
-    found = np.zeros((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
+    values = np.zeros((len(wi), 1 if wavelength_nm is None else wavelength_nm.size))
     if step >= rows:
-        return Table.of(layout, read(slice(0, rows))).lookup_vectors(wi, wr, wavelength_nm).reshape(found.shape)
+        return Table.of(layout, read(slice(0, rows))).lookup_vectors(wi, wr, wavelength_nm).reshape(values.shape)
     grid = layout.grid
     x = points(grid, wi, wr)
     row = np.clip(np.searchsorted(radians(next(iter(grid.axes.values()))), x[0], side="right") - 1, 0, rows - 2)
     for start in range(0, rows - 1, step):
-        here = (row >= start) & (row < start + step)
+        inside = (row >= start) & (row < start + step)
         window = slice(max(start - 1, 0), min(start + step + 2, rows))
         table = Table.of(layout, read(window), Grid.part(grid, window))
-        found[here] = table.lookup_vectors(wi[here], wr[here], wavelength_nm).reshape(-1, found.shape[1])
-    return found
+        values[inside] = table.lookup_vectors(wi[inside], wr[inside], wavelength_nm).reshape(-1, values.shape[1])
+    return values
 
 
 def _short(values: Floats) -> list[float]:
-    """Numbers to three digits."""
+    """Return numbers to three digits."""
     return [float(f"{value:.3g}") for value in values.tolist()]

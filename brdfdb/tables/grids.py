@@ -84,12 +84,12 @@ class Grid:
 
     @property
     def anisotropic(self) -> bool:
-        """Whether the grid resolves how the surface is turned about its normal."""
+        """True if the grid resolves the turn of the surface about its normal."""
         return len(self.axes) == 4
 
     @property
     def half_difference(self) -> bool:
-        """Whether the axes are those of half and difference vectors."""
+        """True if the axes are those of half and difference vectors."""
         return "theta_h" in self.axes
 
     @property
@@ -99,18 +99,18 @@ class Grid:
 
     @property
     def copies(self) -> int:
-        """How many times the azimuth of an anisotropic grid, phi_i or phi_h, goes into a full turn: 1, 2 or 4."""
+        """Number of times the azimuth of an anisotropic grid, phi_i or phi_h, goes into a full turn: 1, 2 or 4."""
         turned = self.axes.get("phi_i", self.axes.get("phi_h"))
         return 1 if turned is None else round(360.0 / turned[-1])
 
     @property
     def reciprocal(self) -> bool:
-        """Whether a table is its own transpose: theta_i, theta_r, delta_phi with the same nodes for both thetas."""
+        """True if a table is its own transpose: theta_i, theta_r, delta_phi with the same nodes for both thetas."""
         return self.names == ISOTROPIC_AXES and np.array_equal(self.axes["theta_i"], self.axes["theta_r"])
 
     @property
     def symmetries(self) -> list[str]:
-        """What a table on the grid leaves out or repeats, in words."""
+        """The symmetries that a table on the grid makes use of, in words."""
         known = [] if self.anisotropic else ["brdf(delta_phi) = brdf(-delta_phi)"]
         known += [_HALF_TURN] if self.copies > 1 else []
         known += [_MIRROR] if self.copies == 4 else []
@@ -142,13 +142,13 @@ class Grid:
 
     @property
     def reaches_horizon(self) -> bool:
-        """Whether a theta axis of light or viewer has a node at exactly 90 degrees."""
+        """True if a theta axis of light or viewer has a node at exactly 90 degrees."""
         return any(nodes[-1] == 90.0 for name, nodes in self.axes.items() if name in ("theta_i", "theta_r"))
 
 
 def directions(names: tuple[str, ...], nodes: Sequence[Axis]) -> tuple[NDArray[np.float64], ...]:
-    """theta_i, phi_i, theta_r, phi_r [rad] of nodes [degree] on the axes that are named: see `Grid.directions`."""
-    on_axes = np.ix_(*(radians(each) for each in nodes))
+    """Return theta_i, phi_i, theta_r, phi_r [rad] of nodes [degree] on named axes: see `Grid.directions`."""
+    on_axes = np.ix_(*(radians(axis) for axis in nodes))
     if names == ISOTROPIC_AXES:
         return on_axes[0], np.zeros(()), on_axes[1], on_axes[2]
     if names == ANISOTROPIC_AXES:
@@ -159,7 +159,7 @@ def directions(names: tuple[str, ...], nodes: Sequence[Axis]) -> tuple[NDArray[n
 
 
 def axes_among(names: Iterable[Any]) -> tuple[str, ...]:
-    """The axes of a grid among the names of arrays or dimensions.
+    """Return the axes of a grid among the names of arrays or dimensions.
 
     An anisotropic grid of half and difference vectors has the axes of an isotropic one, too.
 
@@ -178,7 +178,7 @@ def axes_among(names: Iterable[Any]) -> tuple[str, ...]:
 
 
 def _checked(names: tuple[str, ...], name: str, nodes: Any) -> Axis:
-    """The nodes of an axis [degree] as float64, or a ValueError saying what is wrong with them."""
+    """Return the nodes of an axis [degree] as float64; ParameterError for nodes that are not allowed."""
     axis = np.array(nodes, dtype=np.float64)
     if axis.ndim != 1 or axis.size < 2:
         raise ParameterError(

@@ -28,19 +28,19 @@ _BLOCK_VALUES = 1 << 20  # values of a block, 4 MB
 
 @dataclass(frozen=True)
 class Interpolation:
-    """How the numbers of a table become f_r between its nodes.
+    """The way from the numbers of a table to f_r between its nodes.
 
     Attributes
     ----------
     method : str
         "linear", or "cubic": Catmull-Rom, each cell the Hermite cubic with the slopes of parabolas through three nodes.
     logarithm : bool
-        Whether logarithms are tabulated and interpolated.
+        True if logarithms are tabulated and interpolated.
     offset : float [1/sr]
-        What is added before logarithms are taken: values much smaller take no nodes.
+        Number that is added before logarithms are taken: much smaller values take no nodes.
     power : float
-        What is tabulated is f_r times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a
-        model has at the horizon.
+        f_r is tabulated times (cos theta_i cos theta_r) to this power, in {0, 1/2, 1}: without the pole that a source
+        may have at the horizon.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # where attributes of tables are read
@@ -60,21 +60,21 @@ class Interpolation:
 
     @property
     def cubic(self) -> bool:
-        """Whether four nodes of an axis count, not two."""
+        """True if four nodes of an axis count, not two."""
         return self.method == "cubic"
 
     @property
     def plain(self) -> bool:
-        """Whether it is f_r itself that is tabulated."""
+        """True if f_r itself is tabulated."""
         return not self.logarithm and self.power == 0.0
 
     def numbers(self, f_r: Floats, mu: Floats) -> Floats:
-        """What is tabulated of f_r [1/sr], shape (..., L), where mu = cos theta_i cos theta_r, shape (...)."""
+        """Return the numbers to tabulate for f_r [1/sr], shape (..., L); mu = cos theta_i cos theta_r, shape (...)."""
         values = f_r if self.power == 0.0 else f_r * (mu**self.power)[..., np.newaxis]
         return np.log(values + self.offset) if self.logarithm else values
 
     def f_r(self, numbers: Floats, mu: Floats) -> Floats:
-        """f_r [1/sr] from what is tabulated: the inverse of `numbers`, nothing below 0."""
+        """Return f_r [1/sr] from tabulated numbers: the inverse of `numbers`, nothing below 0."""
         values = np.maximum(np.exp(numbers) - self.offset, 0.0) if self.logarithm else numbers
         return values if self.power == 0.0 else values / (mu**self.power)[..., np.newaxis]
 
@@ -98,13 +98,13 @@ class Layout:
     wavelength_nm : array of shape (L,) [nm], optional
         For spectral sources, and only for them.
     interpolation : Interpolation
-        How the numbers of the table become f_r between its nodes; by default they are f_r, and linear.
+        The way from the numbers of the table to f_r; by default they are f_r, and linear.
     spectra : array of shape (parts, L), optional
-        Of logarithms: orthonormal rows that make up the spectrum of every node, which then is stored in parts.
+        Basis of a factored spectrum of logarithms: orthonormal rows. Nodes then store coefficients.
     bits : int
-        Bits of the mantissa that are kept, in [1, 23].
+        Bits of the mantissa to keep, in [1, 23].
     reason : str
-        Why the table is laid out so.
+        Reason for the layout, in words.
 
     Raises
     ------
@@ -140,7 +140,7 @@ class Layout:
 
     @property
     def plain(self) -> bool:
-        """Whether the stored numbers are f_r itself."""
+        """True if the stored numbers are f_r itself."""
         return self.interpolation.plain and self.spectra is None
 
     @functools.cached_property
@@ -182,7 +182,7 @@ class Layout:
 
     @property
     def block_rows(self) -> int:
-        """Rows of the first axis that make a block, the piece that a worker computes and a chunk of the store."""
+        """Number of rows of the first axis in a block: the piece that a worker computes, and a chunk of the store."""
         return max(1, min(self.shape[0], _BLOCK_VALUES // math.prod(self.shape[1:])))
 
     @property
@@ -235,5 +235,5 @@ class Layout:
 
 
 def digest(document: Mapping[str, Any]) -> str:
-    """sha256 of a document, whatever the order of its keys."""
+    """Return the sha256 of a document, whatever the order of its keys."""
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()

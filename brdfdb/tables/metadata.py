@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, PrivateAttr, ValidationError
 
+from brdfdb.errors import ParameterError
 from brdfdb.materials.provenance import Assumption, KnownExcess
 from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.stated_error import Error
@@ -94,7 +95,7 @@ class TableMetadata(BaseModel):
         try:
             return cls.model_validate(known)
         except ValidationError as error:
-            strange = {str(each["loc"][0]): each["msg"] for each in error.errors(include_url=False)}
+            strange = {str(item["loc"][0]): item["msg"] for item in error.errors(include_url=False)}
         metadata = cls.model_validate({key: value for key, value in known.items() if key not in strange})
         metadata._strange.update(strange)
         return metadata
@@ -122,15 +123,15 @@ class TableMetadata(BaseModel):
     def known_interpolation(self) -> Interpolation:
         """Return the interpolation; ValueError if it is one that this program does not know."""
         if "interpolation" in self.strange:
-            raise ValueError(f"interpolation: {self.strange['interpolation']}")
+            raise ParameterError("interpolation", self.strange["interpolation"])
         return self.interpolation
 
     @property
     def gaps(self) -> str:
         """A phrase that names the attributes that are missing or not what they must be; empty for a whole record."""
-        said = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
-        said += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
-        return ", and ".join(said)
+        phrases = [f"does not state its {', '.join(map(_words, self.missing))}"] if self.missing else []
+        phrases += [f"states its {_words(key)} wrongly ({why})" for key, why in self.strange.items()]
+        return ", and ".join(phrases)
 
 
 def _words(key: str) -> str:

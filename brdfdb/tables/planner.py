@@ -45,7 +45,7 @@ _LINES = 100
 _POINTS = 145  # of a line
 _COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112, 137)  # nodes of an axis
 _MOST_NODES = 400  # of an axis
-_BEYOND = 4.0  # times as many nodes as lines tell take numbers that vary where a grid goes beyond the horizon
+_BEYOND = 4.0  # safety factor on the node count where the grid extends below the horizon
 _HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
 _SMOOTHED = 9  # points of a line that the density of nodes is averaged over
 _EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
@@ -68,7 +68,7 @@ _LINE = {
 
 
 class _Need:
-    """What an axis needs: where its nodes go, and the error that so many of them leave on lines along it."""
+    """The need of an axis: the density of its nodes, and the error that so many of them leave on lines along it."""
 
     def __init__(self, layout: Layout, axis: int, numbers: Floats, weight: Floats) -> None:
         order = 4 if layout.interpolation.cubic else 2
@@ -87,7 +87,7 @@ class _Need:
         self.counts = [n for n in _COUNTS if _spread(self.density, n) is not None]
 
     def left(self, count: int) -> float:
-        """The error that a number of nodes leaves."""
+        """Return the error that a number of nodes leaves."""
         if count not in self.known:
             at = _spread(self.density, count)
             assert at is not None
@@ -95,7 +95,7 @@ class _Need:
         return self.known[count]
 
     def count(self, error: float) -> float:
-        """The smallest number of nodes that leaves no more than an error; infinite if no sensible one does.
+        """Return the smallest number of nodes that leaves no more than an error; infinite if no sensible one does.
 
         More nodes than lines have points are guessed, from the order of the interpolation.
         """
@@ -106,8 +106,8 @@ class _Need:
         return guessed if guessed <= _MOST_NODES else math.inf
 
 
-# Likely number of values, kind of table, needs of its axes: none where the number is only a bound
-_Candidate = tuple[float, Layout, dict[str, _Need]]
+# Likely number of values, layout at a coarse grid, needs of its axes: none where the number is only a bound
+_TableKind = tuple[float, Layout, dict[str, _Need]]
 
 
 class _Task(NamedTuple):
@@ -121,7 +121,7 @@ class _Task(NamedTuple):
 
 
 def check_tolerance(tolerance: float) -> None:
-    """ValueError if no table is planned for a tolerance."""
+    """Raise a ParameterError if no table is planned for a tolerance."""
     if not 1e-4 <= tolerance <= 0.5:
         raise ParameterError("tolerance", f"{tolerance:g} is outside [0.0001, 0.5]", tolerance, (1e-4, 0.5))
 
@@ -160,15 +160,15 @@ def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: f
     check_tolerance(tolerance)
     task = _task(source, wavelength_nm, tolerance)
     if not task.truth.any():
-        return Layout(source, coarsest(source), wavelength_nm, reason="f_r is 0: all light is in the Dirac part")
-    candidates = tried = list(_candidates(task))
+        return Layout(source, coarsest(source), wavelength_nm, reason="f_r is 0: all light is in the specular part")
+    table_kinds = tried = list(_table_kinds(task))
     for stricter in _STRICTER:
         layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
         if layout is not None:
-            tried = [candidate for candidate in candidates if _kind(candidate[1]) == _kind(layout)]
+            tried = [kind for kind in table_kinds if _kind(kind[1]) == _kind(layout)]
         finished = None if layout is None else _finished(layout, wavelength_nm, tolerance)
         if finished is not None:
-            return replace(finished, reason=_reason(finished, tolerance, candidates))
+            return replace(finished, reason=_reason(finished, tolerance, table_kinds))
     raise ParameterError(
         "tolerance",
         f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for more error",
@@ -176,16 +176,16 @@ def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: f
     )
 
 
-def _order(candidate: _Candidate) -> tuple[float, int]:
-    """The fewest values first, and of as many, the simplest."""
-    size, layout, _ = candidate
+def _order(kind: _TableKind) -> tuple[float, int]:
+    """Return a sorting key: the fewest values first, then the simplest."""
+    size, layout, _ = kind
     how = layout.interpolation
     return size, how.cubic + how.logarithm + (how.power != 0.0)
 
 
-def _smallest(task: _Task, candidates: list[_Candidate]) -> Layout | None:
-    """The smallest table of some kinds that keeps to the tolerance of the task."""
-    ranked = [candidate for candidate in sorted(candidates, key=_order) if candidate[2]]
+def _smallest(task: _Task, table_kinds: list[_TableKind]) -> Layout | None:
+    """Return the smallest table of some kinds that keeps to the tolerance of the task."""
+    ranked = [kind for kind in sorted(table_kinds, key=_order) if kind[2]]
     for most in (0.5 * _HOPELESS * ranked[0][0], math.inf):  # nodes: a kind that takes many more than it seemed is left
         best: Layout | None = None
         tried: Counter[tuple[str, ...]] = Counter()
@@ -199,20 +199,20 @@ def _smallest(task: _Task, candidates: list[_Candidate]) -> Layout | None:
     return None
 
 
-def _reason(layout: Layout, tolerance: float, candidates: list[_Candidate]) -> str:
-    """Why a table is laid out so, in words: what it takes, and what the other grid and the simplest table would."""
+def _reason(layout: Layout, tolerance: float, table_kinds: list[_TableKind]) -> str:
+    """Return the reason for a layout: its number of nodes, and those of the other grid and of the simplest table."""
     chosen, nodes = _kind(layout), math.prod(layout.grid.shape)
-    said = [f"for a tolerance of {tolerance:g}, {chosen} takes {nodes} nodes"]
-    ranked = sorted(candidates, key=_order)
+    clauses = [f"for a tolerance of {tolerance:g}, {chosen} takes {nodes} nodes"]
+    ranked = sorted(table_kinds, key=_order)
     simplest = [c for c in ranked if c[1].interpolation.plain and not c[1].interpolation.cubic]
     others = [c for c in ranked if c[1].grid.names != layout.grid.names][:1] + simplest[:1]
     for size, other, needs in others:
         if _kind(other) != chosen:
             bound = "about" if needs else "more than"
-            said.append(f"{_kind(other)} was expected to take {bound} {min(size, MOST_VALUES):.2g}")
+            clauses.append(f"{_kind(other)} was expected to take {bound} {min(size, MOST_VALUES):.2g}")
     if layout.spectra is not None:
-        said.append(f"{layout.spectra.shape[1]} wavelengths are made of {len(layout.spectra)} parts")
-    return "; ".join(said)
+        clauses.append(f"{layout.spectra.shape[1]} wavelengths are made of {len(layout.spectra)} parts")
+    return "; ".join(clauses)
 
 
 def _kind(layout: Layout) -> str:
@@ -231,7 +231,7 @@ def _task(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: 
 
 
 def offset_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> float:
-    """What is added to f_r [1/sr] before logarithms are taken: half the floor of its relative error."""
+    """Return the offset [1/sr] of f_r before logarithms are taken: half the floor of its relative error."""
     return _offset(_task(source, wavelength_nm, 0.01))
 
 
@@ -242,9 +242,14 @@ def _offset(task: _Task) -> float:
 def coarsest(source: Source) -> Grid:
     """Return the smallest grid that suits a source."""
     names = ANISOTROPIC_AXES if source.anisotropic else ISOTROPIC_AXES
+    return _grid(source, names, pole=source.grazing_pole)
+
+
+def _grid(source: Source, names: tuple[str, ...], *, pole: bool) -> Grid:
+    """Return the grid with the two ends of each axis alone; with a pole, light and viewer end before it."""
     ends = {name: _end(source, name) for name in names}
-    if source.grazing_pole:
-        ends |= {"theta_i": POLE_END_DEG, "theta_r": POLE_END_DEG}
+    if pole:
+        ends |= {name: POLE_END_DEG for name in ("theta_i", "theta_r") if name in names}
     return Grid({name: [0.0, end] for name, end in ends.items()})
 
 
@@ -257,8 +262,8 @@ def _end(source: Source, name: str) -> float:
     return _LINE[name][0]
 
 
-def _candidates(task: _Task) -> Iterator[_Candidate]:
-    """Kinds of tables, each with the number of values that it is likely to take; simple ones first."""
+def _table_kinds(task: _Task) -> Iterator[_TableKind]:
+    """Yield kinds of tables, each with the number of values that it is likely to take; simple ones first."""
     source = task.source
     offset = _offset(task)
     kinds: list[tuple[str, ...]]
@@ -271,16 +276,9 @@ def _candidates(task: _Task) -> Iterator[_Candidate]:
         for power in (0.5, 1.0, 0.0) if source.grazing_pole else (0.0,):
             # what goes on beyond the horizon may fall below 0, which a logarithm does not
             for logarithm in (True,) if "theta_h" in names else (True, False):
-                ends = {name: _end(source, name) for name in names}
-                if source.grazing_pole and power == 0.0:
-                    ends |= {name: POLE_END_DEG for name in ("theta_i", "theta_r") if name in names}
-                grid = Grid({name: [0.0, end] for name, end in ends.items()})
-                layout = Layout(
-                    source,
-                    grid,
-                    task.wavelength_nm,
-                    interpolation=Interpolation("linear", logarithm, offset if logarithm else 0.0, power),
-                )
+                grid = _grid(source, names, pole=source.grazing_pole and power == 0.0)
+                how = Interpolation("linear", logarithm, offset if logarithm else 0.0, power)
+                layout = Layout(source, grid, task.wavelength_nm, how)
                 lines: dict[str, tuple[Floats, Floats]] = {}
                 for method in ("cubic", "linear"):
                     chosen = replace(layout, interpolation=replace(layout.interpolation, method=method))
@@ -304,7 +302,7 @@ def _candidates(task: _Task) -> Iterator[_Candidate]:
 
 
 def _points(name: str, end: float, s: Floats) -> Axis:
-    """Where on an axis [degree] a line has its point s, in [0, 1]."""
+    """Return the place on an axis [degree] of the point s of a line, in [0, 1]."""
     power = _LINE[name][1]
     return np.asarray(end * (s**power if power > 0.0 else 1.0 - (1.0 - s) ** -power), dtype=np.float64)
 
@@ -318,7 +316,7 @@ def _lines(task: _Task, layout: Layout, axis: int) -> tuple[Floats, Floats]:
     wi, wr = task.drawn.wi[chosen], task.drawn.wr[chosen]
     x = points(grid, wi, wr)
     name = grid.names[axis]
-    coordinates = [np.repeat(each[:, np.newaxis], _POINTS, axis=1) for each in x]
+    coordinates = [np.repeat(column[:, np.newaxis], _POINTS, axis=1) for column in x]
     coordinates[axis][:] = radians(_points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, _POINTS)))
     if grid.half_difference:
         theta_h, *others = coordinates
@@ -345,20 +343,20 @@ def _lines(task: _Task, layout: Layout, axis: int) -> tuple[Floats, Floats]:
 
 
 def _spread(density: Floats, count: int) -> NDArray[np.int64] | None:
-    """The points of a line that are nodes of an axis with so many; None if two would be the same."""
+    """Return the points of a line that are nodes of an axis with so many; None if two would be the same."""
     at = np.round(_quantiles(density, count) * (density.size - 1)).astype(np.int64)
     return at if np.all(np.diff(at) > 0) else None
 
 
 def _quantiles(density: Floats, count: int) -> Floats:
-    """Places s in [0, 1] between which the density of nodes has equal integrals."""
+    """Return places s in [0, 1] between which the density of nodes has equal integrals."""
     steps = 0.5 * (density[1:] + density[:-1])
     total = np.concatenate([[0.0], np.cumsum(steps)])
     return np.interp(np.linspace(0.0, total[-1], count), total, np.linspace(0.0, 1.0, density.size))
 
 
 def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weights: Floats) -> float:
-    """99th percentile of the error on lines that are interpolated between some of their points."""
+    """Return the 99th percentile of the error on lines that are interpolated between some of their points."""
     grid = layout.grid
     name = grid.names[axis]
     x = _points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, rows.shape[1]))
@@ -371,7 +369,7 @@ def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weight
 
 
 def _with_axes(layout: Layout, needs: dict[str, _Need], error: float) -> Layout | None:
-    """The layout with the axes that leave an error each; None if no known number of nodes does."""
+    """Return the layout whose axes leave the same error each; None if no known number of nodes does."""
     axes = {}
     for name, need in needs.items():
         count = need.count(error)
@@ -384,19 +382,20 @@ def _with_axes(layout: Layout, needs: dict[str, _Need], error: float) -> Layout 
 
 
 def _error(layout: Layout, values: NDArray[np.float32], drawn: error_measurement.Draw, truth: Floats) -> float:
-    """99th percentile of the relative error at the worst wavelength, or what else is to keep to the tolerance.
+    """Return the largest of the errors that are held to the tolerance.
 
-    That is the l1 error, as a few values that are off by orders of magnitude, next to a pole, escape any percentile,
-    and the 99th percentile of each band of theta_i over `_OF_A_BAND`: grazing light is a ninth of the directions.
+    They are the 99th percentile of the relative error at the worst wavelength, the l1 error, as a few values that are
+    off by orders of magnitude next to a pole escape any percentile, and the 99th percentile of each band of theta_i
+    over `_OF_A_BAND`: grazing light is a ninth of the directions.
     """
-    found = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
-    error = error_measurement.relative(found, truth, error_measurement.floor_of(truth, drawn))
-    wrong = drawn.weight @ np.abs(found - truth)
+    looked_up = Table.of(layout, values).lookup_vectors(drawn.wi, drawn.wr).reshape(truth.shape)
+    error = error_measurement.relative(looked_up, truth, error_measurement.floor_of(truth, drawn))
+    wrong = drawn.weight @ np.abs(looked_up - truth)
     l1 = np.divide(wrong, drawn.weight @ truth, out=np.zeros_like(wrong), where=wrong > 0.0)
     worst = max(np.percentile(error[drawn.above], 99, axis=0).max(), l1.max())
     for band in np.unique(drawn.band):
-        here = error[drawn.above & (drawn.band == band)]
-        worst = max(worst, np.percentile(here, 99, axis=0).max() / _OF_A_BAND)
+        in_band = error[drawn.above & (drawn.band == band)]
+        worst = max(worst, np.percentile(in_band, 99, axis=0).max() / _OF_A_BAND)
     return float(worst)
 
 
@@ -405,7 +404,7 @@ def _values(layout: Layout) -> NDArray[np.float32]:
 
 
 def _refined(task: _Task, layout: Layout, needs: dict[str, _Need], most: float) -> Layout | None:
-    """The coarsest axes that keep to the tolerance, of those tried; None if none of less than `most` values does."""
+    """Return the coarsest axes of those tried that keep to the tolerance with fewer than `most` values; or None."""
     goal, error, best = _MARGIN * task.tolerance, task.tolerance, None
     known: dict[tuple[int, ...], float] = {}
     for _ in range(_ROUNDS):
@@ -424,10 +423,7 @@ def _refined(task: _Task, layout: Layout, needs: dict[str, _Need], most: float) 
 
 
 def _finished(layout: Layout, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout | None:
-    """The layout at all wavelengths, its spectrum in as few parts and its numbers in as few bits as the error allows.
-
-    None if not even all parts and bits keep to the tolerance.
-    """
+    """Return the layout at all wavelengths, with as few coefficients and bits as the error allows; None if none do."""
     drawn = error_measurement.draw(layout.source, wavelength_nm, _FINAL_DRAWS, _SEED + 1)
     truth = error_measurement.model_values(layout.source, wavelength_nm, drawn.wi, drawn.wr)
     goal = _MARGIN * tolerance

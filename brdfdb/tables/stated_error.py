@@ -1,4 +1,4 @@
-"""What a table states of its error against its model."""
+"""The error that a table states against its source."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Between(BaseModel):
 
 
 class Error(BaseModel):
-    """The error of a table, abs(table - model) / max(model, floor), for each band of theta_i and each wavelength."""
+    """The error of a table, abs(table - source) / max(source, floor), for each band of theta_i and each wavelength."""
 
     model_config = _STRICT
 

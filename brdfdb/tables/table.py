@@ -32,25 +32,25 @@ class Table(BaseTable):
     Attributes
     ----------
     name, revision : str
-        Which material, and which of its revisions.
+        Name of the material, and its revision.
     attrs : dict
-        What the store says of it: title, model, parameters, sources and more.
+        The attributes as stored; `metadata` is the typed record of them.
     grid : Grid
         The angular axes, in the order of the dimensions.
     wavelength_nm : array (L,) [nm] or None
         Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
     values : float32 array
-        Numbers over the angular axes and, last, the wavelengths, or the parts of a factored spectrum.
+        Numbers over the angular axes and, last, the wavelengths, or the coefficients of a factored spectrum.
     specular : float32 array (theta_i[, L]) [1] or None
-        Reflectance of the Dirac part, None if the model has none.
+        Reflectance of the specular part; None if the source has none.
     specular_theta_deg : array [degree] or None
-        Where; by default the nodes of the axis theta_i.
+        Its nodes; by default those of the axis theta_i.
     interpolation : Interpolation
-        How the numbers become f_r between the nodes; by default they are f_r and linear.
-    spectra : array (parts, L) or None
-        How the parts of a factored spectrum make up the wavelengths.
+        The way from the numbers to f_r between nodes; by default they are f_r, interpolated linearly.
+    spectra : array (coefficients, L) or None
+        The basis of a factored spectrum.
     uniform : array (L,) or (1,) [1/sr]
-        The part of f_r that is the same in all directions, which is not in `values`.
+        The uniform part of f_r, which is not in `values`.
     digest : str
         sha256 of the manifest of the revision; empty of a table that was not read from a store.
     n, k : array (L,) [1] or None
@@ -75,7 +75,7 @@ class Table(BaseTable):
 
     @classmethod
     def of(cls, layout: Layout, values: NDArray[np.float32], grid: Grid | None = None) -> Table:
-        """The table of a layout, or of a part of its grid, before it is stored: without the Dirac part."""
+        """Make the table of a layout, or of a part of its grid, before it is stored: without the specular part."""
         return cls(
             name=layout.source.name,
             revision="",
@@ -110,7 +110,7 @@ class Table(BaseTable):
 
     @property
     def nbytes(self) -> int:
-        """Of the arrays that lookups read."""
+        """Size [byte] of the arrays that lookups read."""
         arrays = (self.values, self.specular, self.spectra, self.uniform)
         return sum(array.nbytes for array in arrays if array is not None)
 
@@ -160,7 +160,7 @@ class Table(BaseTable):
 
     @functools.cached_property
     def _kernel(self) -> _Ready:
-        """What kernels need to know of the table."""
+        """The table as kernels read it."""
         grid, how = self.grid, self.interpolation
         # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
         overshoots = how.logarithm or how.cubic or grid.half_difference
@@ -189,7 +189,7 @@ class Table(BaseTable):
 
     @functools.cached_property
     def _specular_rows(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-        """Nodes [rad] of the Dirac part, and its values there, a row a node; none of either where there is none."""
+        """Nodes [rad] of the specular part, and its values there, a row a node; empty arrays where there is none."""
         if self.specular is None:
             return np.empty(0), np.empty((0, 0), np.float32)
         at_deg = self.specular_theta_deg
@@ -210,9 +210,9 @@ def rebuilt(
     theta_i: Floats,
     theta_r: Floats,
 ) -> Floats:
-    """f_r [1/sr] at nodes, shape (..., L), from what is stored there, shape (..., parts or L); 0 below the horizon.
+    """Return f_r [1/sr] at nodes, shape (..., L), from the numbers there, shape (..., coefficients or L).
 
-    theta_i and theta_r [rad] broadcast to the shape of the nodes; uniform and spectra are those of a `Table`.
+    theta_i and theta_r [rad] broadcast to the shape of the nodes. It is 0 below the horizon.
     """
     wavelengths = numbers if spectra is None else numbers.astype(np.float64) @ spectra
     mu = np.maximum(np.cos(theta_i), COS_HORIZON) * np.maximum(np.cos(theta_r), COS_HORIZON)
@@ -221,7 +221,7 @@ def rebuilt(
 
 
 def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """One number after the other, and never writable: kernels are compiled anew for arrays that are, 10 s a time."""
+    """Return a flat array that is never writable: kernels are compiled anew for arrays that are, 10 s each time."""
     whole = array if array.shape == shape else np.broadcast_to(array, shape)
     flat = np.ascontiguousarray(whole, dtype=dtype).reshape(-1)
     flat.flags.writeable = False
@@ -229,7 +229,7 @@ def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDAr
 
 
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
-    """Where directions lie on a grid: coordinates [rad], of shape (axes, N), of unit vectors of shape (N, 3)."""
+    """Return the coordinates [rad] on a grid, of shape (axes, N), of unit vectors of shape (N, 3)."""
     x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
     rule = _kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False)
     flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
@@ -238,20 +238,22 @@ def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
 
 
 def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], attrs: Mapping[str, Any]) -> Table:
-    """The table that the arrays and attributes of a stored group describe; ValueError where they do not fit."""
+    """Return the table that the arrays and attributes of a stored group describe; ValueError if they do not fit."""
     interpolation = TableMetadata.read(attrs).known_interpolation()
     variable = "brdf" if "brdf" in arrays else "parts"
     if variable not in arrays:
-        raise ValueError(f"brdf: neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
+        raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
     grid = Grid({axis: arrays[axis] for axis in axes_among(arrays)})
     specular, uniform = arrays.get("specular_reflectance"), arrays.get("uniform")
     wavelength_nm, spectra = arrays.get("wavelength"), arrays.get("spectra")
     spectrum = () if wavelength_nm is None else check_wavelengths(wavelength_nm).shape
     channels = spectrum if spectra is None else spectra.shape[:1]
     if arrays[variable].shape != (*grid.shape, *channels):  # kernels do not look
-        raise ValueError(f"{variable}: shape {arrays[variable].shape} is not {(*grid.shape, *channels)}, of its axes")
+        raise ParameterError(variable, f"shape {arrays[variable].shape} is not {(*grid.shape, *channels)}, of its axes")
     if spectra is not None and spectra.shape != (*channels, *spectrum):
-        raise ValueError(f"spectra: shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths")
+        raise ParameterError(
+            "spectra", f"shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths"
+        )
     return Table(
         name=name,
         revision=revision,

@@ -28,11 +28,11 @@ class Located(NamedTuple):
     Attributes
     ----------
     nodes : int64 array (M, 4)
-        The wavelengths of the table that count.
+        Numbers of the wavelengths of the table that count.
     weight : float64 array (M, 4)
         Their weights, as by `weights_of_nodes`.
     column : int64 array (M,)
-        Where a stated error stands for each: see `Error.limits`.
+        The column of `Error.limits` for each.
     tail : tuple of int
         The shape that the wavelengths add to that of the directions.
     """
@@ -54,10 +54,10 @@ class Stated(NamedTuple):
     Attributes
     ----------
     brdf : array [1/sr]
-        As by `Table.lookup`.
+        Values as by `Table.lookup`.
     error : array [1/sr]
         In the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
-        model. Between wavelengths, and in the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
+        source. Between wavelengths, and in the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
     """
 
     brdf: Floats
@@ -187,7 +187,7 @@ class BaseTable(ABC):
     def stated_by(
         self, error: Error, directions: Directions, brdf: Floats, wavelength_nm: ArrayLike | None = None
     ) -> Floats:
-        """Return what an error at the wavelengths of the table says [1/sr] of values, in their shape.
+        """Return the error [1/sr] that is stated for values, in their shape.
 
         Raises
         ------
@@ -217,7 +217,7 @@ class BaseTable(ABC):
         return {}
 
     def _wavelengths(self, wavelength_nm: ArrayLike | None) -> Located:
-        """Return where wavelengths [nm] lie on the axis of the table; ValueError if one is not allowed."""
+        """Locate wavelengths [nm] on the axis of the table; ParameterError if one is not allowed."""
         if wavelength_nm is None:
             return self._all_wavelengths
         if not isinstance(wavelength_nm, float):
@@ -259,7 +259,7 @@ class BaseTable(ABC):
 
 
 def _on_axis(stored: NDArray[np.float64], wanted: NDArray[np.float64], tail: tuple[int, ...]) -> Located:
-    """Return where wavelengths [nm] lie among those of a table."""
+    """Locate wavelengths [nm] among those of a table."""
     below = np.searchsorted(stored, wanted, side="right") - 1
     column = np.where(stored[below] == wanted, below, stored.size + below)
     return Located(*weights_of_nodes(stored, wanted), column, tail)

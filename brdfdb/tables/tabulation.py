@@ -19,19 +19,19 @@ from brdfdb.tables.metadata import TableMetadata
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
 _CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
-# Where the Dirac part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
+# Where the specular part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
 
 
 def tabulate(layout: Layout) -> xr.Dataset:
-    """Tabulate the BRDF of a material: all blocks of a layout, in memory.
+    """Tabulate the BRDF of a source: all blocks of a layout, in memory.
 
     Returns
     -------
     Dataset
         ``brdf`` [1/sr], or ``parts``, from which it is rebuilt as the attribute ``reconstruction`` says: float32, over
-        the axes of the grid and, last, ``wavelength`` or ``part``; for models with a Dirac part
+        the axes of the grid and, last, ``wavelength`` or ``part``; for models with a specular part
         ``specular_reflectance`` [1] over theta_i, or specular_theta_i, and wavelength; for spectral materials ``n`` and
         ``k`` as used.
         Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
@@ -41,27 +41,27 @@ def tabulate(layout: Layout) -> xr.Dataset:
 
 
 def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
-    """The values of some rows of the first axis of a table: float32, in the shape of the table's other axes."""
+    """Return the values of some rows of the first axis of a table: float32, over its other axes, too."""
     values = np.empty((rows.stop - rows.start, *layout.shape[1:]), dtype=np.float32)
     step = max(1, _SLAB // int(np.prod(layout.grid.shape[1:])))
     for start in range(rows.start, rows.stop, step):
-        here = slice(start, min(start + step, rows.stop))
-        at = slice(here.start - rows.start, here.stop - rows.start)
+        some = slice(start, min(start + step, rows.stop))
+        at = slice(some.start - rows.start, some.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
             for number, wavelength in enumerate(_wavelengths(layout)):
                 index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
-                values[index] = _evaluated(layout, here, wavelength)
+                values[index] = _evaluated(layout, some, wavelength)
         else:
-            numbers = node_numbers(layout, here)
+            numbers = node_numbers(layout, some)
             if layout.spectra is not None:
                 # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
                 numbers = np.einsum("...w,pw->...p", numbers, layout.spectra)
-            values[at] = numbers.reshape(here.stop - here.start, *layout.shape[1:])
+            values[at] = numbers.reshape(some.stop - some.start, *layout.shape[1:])
     return rounded(values, layout.bits)
 
 
 def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
-    """float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
+    """Return float32 values rounded to so many bits of their mantissa: off by 2**-(bits + 1) of them at most."""
     drop = 23 - bits
     if drop == 0:
         return values
@@ -86,11 +86,11 @@ def _evaluated(layout: Layout, rows: slice, wavelength_nm: float | None) -> Floa
     if not layout.grid.reciprocal:
         return evaluate(*layout.grid.directions(rows))
     theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
-    here, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
-    values = np.empty((here.size, theta.size, delta_phi.size))
-    values[:, rows.start :] = evaluate(*_spread(here, right, delta_phi))
-    swapped = evaluate(*_spread(left, here, delta_phi))
-    smaller = left < here[:, np.newaxis]
+    some, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
+    values = np.empty((some.size, theta.size, delta_phi.size))
+    values[:, rows.start :] = evaluate(*_spread(some, right, delta_phi))
+    swapped = evaluate(*_spread(left, some, delta_phi))
+    smaller = left < some[:, np.newaxis]
     np.copyto(values[:, : rows.stop], np.swapaxes(swapped, 0, 1), where=smaller[..., np.newaxis])
     return values
 
@@ -101,12 +101,12 @@ def _spread(theta_i: Axis, theta_r: Axis, delta_phi: Axis) -> tuple[Axis, ...]:
 
 
 def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
-    """What a table holds or would hold at any directions: shape (..., L), before a spectrum is taken in parts.
+    """Return the numbers of a table at any directions, shape (..., L), before a spectrum is factored.
 
     Parameters
     ----------
     layout : Layout
-        Which numbers.
+        Layout of the table.
     wi, wr : arrays of shape (..., 3)
         Unit vectors, at the horizon or above.
     """
@@ -168,7 +168,7 @@ def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats
 
 
 def frame(layout: Layout) -> xr.Dataset:
-    """All of a table but its values: coordinates, Dirac part, how to rebuild f_r, refractive indices, attributes."""
+    """Return a table without its values: coordinates, specular part, basis, refractive indices and attributes."""
     source, grid, wavelength_nm = layout.source, layout.grid, layout.wavelength_nm
     spectral = () if wavelength_nm is None else ("wavelength",)
     coordinates: dict[str, Any] = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
@@ -195,13 +195,13 @@ def frame(layout: Layout) -> xr.Dataset:
         variables["specular_reflectance"] = (
             (name, *spectral),
             source.specular_reflectance(radians(theta_i_deg), wavelength_nm),
-            {"units": "1", "long_name": "reflectance of the Dirac part, in the exact mirror direction"},
+            {"units": "1", "long_name": "reflectance of the specular part, in the exact mirror direction"},
         )
     return xr.Dataset(variables, coordinates, metadata_of(layout).attributes())
 
 
 def specular_nodes(layout: Layout) -> Axis:
-    """Return the angles of incidence [degree] at which the Dirac part of a table is stored."""
+    """Return the angles of incidence [degree] at which the specular part of a table is stored."""
     given = "theta_i" in layout.grid.axes and not layout.reason
     return layout.grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
 
@@ -211,7 +211,7 @@ def _coordinate(name: str, nodes: Axis) -> tuple[str, Axis, dict[str, str]]:
 
 
 def _reconstruction(layout: Layout) -> str:
-    """How to rebuild f_r from the arrays of a table, in one line."""
+    """Return the formula for f_r from the arrays of a table, in one line."""
     spectrum = "" if layout.wavelength_nm is None else "; over wavelengths cubic"
     if layout.plain:
         return f"brdf is f_r; between nodes {layout.interpolation.method}{spectrum}"
@@ -248,7 +248,7 @@ def metadata_of(layout: Layout) -> TableMetadata:
 
 _LONG_NAMES = {
     "theta_i": "polar angle of the light",
-    "specular_theta_i": "polar angle of the light, of the Dirac part",
+    "specular_theta_i": "polar angle of the light, of the specular part",
     "theta_r": "polar angle of the viewer",
     "phi_i": "azimuth of the light",
     "phi_r": "azimuth of the viewer",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from brdfdb.errors import ParameterError
 from brdfdb.tables.grids import axes_among, directions
 from brdfdb.tables.metadata import TableMetadata
 from brdfdb.tables.table import rebuilt
@@ -70,13 +71,15 @@ def with_brdf(dataset: xr.Dataset) -> xr.Dataset:
     if "brdf" in dataset:
         return dataset
     if "parts" not in dataset:
-        raise ValueError(f"brdf: neither it nor parts is among the arrays {', '.join(map(str, dataset)) or 'none'}")
+        raise ParameterError(
+            "brdf", f"neither it nor parts is among the arrays {', '.join(map(str, dataset)) or 'none'}"
+        )
     brdf = _Rebuilt(dataset)
     return dataset.assign(brdf=xr.Variable(brdf.dims, indexing.LazilyIndexedArray(brdf), VARIABLES["brdf"]))
 
 
 class _Rebuilt(BackendArray):
-    """What xarray indexes: f_r of the nodes and wavelengths that are asked for."""
+    """The array that xarray indexes: f_r [1/sr] at the nodes and wavelengths of a request."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._parts = dataset["parts"]

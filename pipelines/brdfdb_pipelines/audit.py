@@ -131,7 +131,7 @@ def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except BrokenProcessPool as error:
-            raise ChildProcessError("the workers are gone, killed or out of memory") from error
+            raise workers.WorkersError("the workers are gone, killed or out of memory") from error
         finally:
             for future in futures:
                 future.cancel()

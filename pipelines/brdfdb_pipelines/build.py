@@ -1,4 +1,4 @@
-"""The build job: the tables of a recipe, block by block on workers; what is there already is not computed again."""
+"""The builder: it tabulates a recipe block by block on workers, and computes nothing that the store already has."""
 
 from __future__ import annotations
 
@@ -13,48 +13,42 @@ from typing import Any
 from brdfdb.errors import BusyError, ParameterError, StoreError
 from brdfdb.store.family import FamilyRecord, Sweep
 from brdfdb.store.family_records import recorded, write_family
-from brdfdb.store.manifest import Entry, read_manifest
-from brdfdb.store.staging import (
-    Block,
-    Lock,
-    discard,
-    make_store,
-    point_to,
-    prepare,
-    publish,
-    remove_begun,
-    write_block,
-    write_frame,
-    writing,
-)
+from brdfdb.store.files import Entry
+from brdfdb.store.lock import Lock, writing
+from brdfdb.store.manifest import read_manifest
+from brdfdb.store.marker import make_store
+from brdfdb.store.paths import material_path, revision_path
+from brdfdb.store.pointer import point_to
+from brdfdb.store.publication import publish_staged
+from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
 from brdfdb_pipelines import build_resources, workers
 from brdfdb_pipelines.build_progress import Event, Tally
 from brdfdb_pipelines.build_survey import Survey, head_of, survey
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
-_LOOK_S = 2.0  # between looks at workers that say nothing
-_POLL_S = 0.1  # between looks at a lock that another build holds
+_LOOK_S = 2.0  # interval [s] at which silent workers are checked
+_POLL_S = 0.1  # interval [s] at which a lock of another build is tried again
 
 
 @dataclass(frozen=True)
 class Built:
-    """What became of one job.
+    """The result of one job.
 
     Attributes
     ----------
     job : Job
-        What was asked for.
+        The request.
     state : str
-        "published", "adopted" (a revision that was there is current again) or "unchanged".
+        "published", "adopted" (an existing revision is current again) or "unchanged".
     revision : str
-        The current one.
+        The current revision.
     stored_bytes : int
-        Of that revision.
+        Size of that revision [byte].
     why : str
-        Why it was not left alone, in a phrase; empty for "unchanged".
+        Phrase on why the table was not left unchanged; empty for "unchanged".
     shape : tuple of int
-        Of the table; empty unless it was computed.
+        Shape of the table; empty unless it was computed.
     """
 
     job: Job
@@ -67,7 +61,7 @@ class Built:
 
 @dataclass(eq=False)
 class _Table:
-    """A table in progress."""
+    """The progress of one table."""
 
     job: Job
     survey: Survey
@@ -75,7 +69,7 @@ class _Table:
     staging: Path = Path()
     blocks: deque[int] = field(default_factory=deque)  # not submitted yet
     files: dict[str, Entry] = field(default_factory=dict)
-    told: bool = False  # that another build holds the lock
+    waiting_reported: bool = False  # the event that another build holds the lock was sent
 
     @property
     def name(self) -> str:
@@ -90,20 +84,20 @@ def build(
     *,
     memory: int | None = None,
 ) -> list[Built]:
-    """Build what is missing of the tables of a recipe, and measure its families.
+    """Build the missing tables of a recipe and measure its families.
 
     Parameters
     ----------
     recipe : Recipe
-        What to build.
+        The recipe.
     root : Path
         Directory of the store; made if it does not exist.
     at : Workers or Executor
-        Where tasks run: threads, processes or machines that see `root` under the same path.
+        Executor of the tasks: threads, processes or machines that see `root` under the same path.
     report : callable
-        Called with every event, as the README lists them.
+        Function that takes every event; the README lists them.
     memory : int, optional
-        Bytes that all tasks together may take.
+        Memory of all tasks together [byte].
 
     Returns
     -------
@@ -115,11 +109,11 @@ def build(
     RecipeError
         Before anything is written, if the recipe cannot be built.
     ParameterError
-        If a single task does not fit into `memory`, or the tables do not fit on the disk. A store that was made for
-        them is removed again.
+        If a single task exceeds `memory`, or the tables do not fit on the disk. A store that was made for them is
+        removed again.
     StoreError
-        If the store cannot be written. What was published stays, and so does every block that is whole: the next build
-        of the same recipe goes on from there. Any other error of a table lets the others be built first.
+        If the store cannot be written. Published tables and complete blocks stay: the next build of the same
+        recipe resumes from them. Any other error of a table is raised after the other tables are built.
     """
     jobs = recipe.jobs()
     sweeps = recipe.sweeps(jobs)
@@ -158,10 +152,10 @@ class _Builder:
         self.built: dict[str, Built] = {}
         self.error: Exception | None = None
         self.tally = Tally(0)
-        self.idle = False  # whether it was said that there are no workers
+        self.idle = False  # the event that there are no workers was sent
 
     def run(self) -> list[Built]:
-        """Survey, tabulate, publish; in the order of the recipe what became of each job."""
+        """Survey, tabulate and publish; return the result of each job in the order of the recipe."""
         start = time.perf_counter()
         self.report({"event": "start", "tables": len(self.jobs), "store": str(self.root)})
         try:
@@ -190,7 +184,7 @@ class _Builder:
 
     @property
     def _room(self) -> bool:
-        most = 2 * max(1, self.at.slots())  # a worker that is done finds the next task waiting
+        most = 2 * max(1, self.at.slots())  # so that a worker that finishes has a next task
         if self.memory is not None:
             most = min(most, self.memory // self.task_bytes)
         return len(self.running) < max(1, most)
@@ -204,7 +198,7 @@ class _Builder:
             self.running.pop(future)(future)
 
     def _leave(self) -> None:
-        """Begin nothing more, let what runs come to its end, and give the locks back; what is staged stays."""
+        """Cancel pending tasks, wait for running ones, and release the locks; staged blocks stay."""
         for future in self.running:
             future.cancel()
         wait(self.running)
@@ -224,8 +218,8 @@ class _Builder:
                 job = jobs.popleft()
 
                 def then(future: Future[Survey], job: Job = job) -> None:
-                    if (found := self._result(job.material.name, future)) is not None:
-                        self._surveyed(job, found)
+                    if (result := self._result(job.material.name, future)) is not None:
+                        self._surveyed(job, result)
 
                 self._submit(then, survey, str(self.root), job)
             self._wait()
@@ -239,21 +233,21 @@ class _Builder:
         self.report({"event": "planned", "tables": len(missing), "values": self.tally.total})
 
     def _claim(self, what: str, need: int) -> None:
-        """Count the memory [byte] of a task among those that run side by side; refuse one that alone takes too much."""
+        """Raise the memory [byte] per task to that of this one; ParameterError if it alone exceeds what is allowed."""
         self.task_bytes = max(self.task_bytes, need)
         build_resources.check_memory(what, need, self.memory)
 
-    def _surveyed(self, job: Job, found: Survey) -> None:
+    def _surveyed(self, job: Job, result: Survey) -> None:
         name = job.material.name
-        self.report({"event": "surveyed", "material": name, "state": found.standing.state, "why": found.standing.why})
-        if found.standing.state == "current":
-            self._is_current(job, found.standing.revision)
+        self.report({"event": "surveyed", "material": name, "state": result.standing.state, "why": result.standing.why})
+        if result.standing.state == "current":
+            self._is_current(job, result.standing.revision)
         else:
-            self.waiting.append(_Table(job, found, Lock(self.root, name, wait=False)))
+            self.waiting.append(_Table(job, result, Lock(self.root, name, wait=False)))
 
     def _is_current(self, job: Job, revision: str) -> None:
         name = job.material.name
-        stored = read_manifest(self.root / "materials" / name / revision, None)[0]["summary"]["bytes"]
+        stored = read_manifest(revision_path(self.root, name, revision), None)[0]["summary"]["bytes"]
         self.built[name] = Built(job, "unchanged", revision, stored)
         self.report({"event": "unchanged", "material": name, "revision": revision})
 
@@ -266,10 +260,10 @@ class _Builder:
             if self.running:
                 self._wait()
             elif self.waiting:
-                time.sleep(_POLL_S)  # all that is left is in the hands of other builds
+                time.sleep(_POLL_S)  # all remaining tables are being built by others
 
     def _next(self) -> bool:
-        """Submit a task; False if there is none to submit now."""
+        """Submit a task; return False if there is none to submit now."""
         if self.ready:
             table = self.ready.popleft()
             self._submit(
@@ -296,33 +290,33 @@ class _Builder:
         self._submit(then, write_block, str(table.staging), table.survey.layout, number)
 
     def _begin(self, table: _Table) -> bool:
-        """Take the lock of a material, and see what is still to do; whether there are blocks to compute."""
+        """Lock a material and survey it again; return True if there are blocks to compute."""
         job, name = table.job, table.name
         try:
             table.lock.__enter__()
         except BusyError:
-            if not table.told:
+            if not table.waiting_reported:
                 self.report({"event": "waiting", "material": name})
-                table.told = True
+                table.waiting_reported = True
             self.waiting.append(table)
             return False
         self.open.append(table)
         if head_of(self.root, name) != table.survey.head:  # another build published meanwhile
             table.survey = survey(str(self.root), job)
-        found = table.survey.standing
-        if found.state == "missing":
+        standing = table.survey.standing
+        if standing.state == "missing":
             table.staging = prepare(self.root, name, job.request, table.survey.layout)
             table.blocks.extend(range(len(table.survey.block_values)))
             return True
-        if found.state == "adoptable":
+        if standing.state == "adoptable":
             with writing(self.root, name):
-                point_to(self.root / "materials" / name, found.revision)
-            discard(self.root, name, job.request)  # where the build was killed that made this revision
-            stored = read_manifest(self.root / "materials" / name / found.revision, None)[0]["summary"]["bytes"]
-            self.built[name] = Built(job, "adopted", found.revision, stored, found.why)
-            self.report({"event": "adopted", "material": name, "revision": found.revision, "why": found.why})
+                point_to(material_path(self.root, name), standing.revision)
+            discard(self.root, name, job.request)  # the build that made this revision may have been killed
+            stored = read_manifest(revision_path(self.root, name, standing.revision), None)[0]["summary"]["bytes"]
+            self.built[name] = Built(job, "adopted", standing.revision, stored, standing.why)
+            self.report({"event": "adopted", "material": name, "revision": standing.revision, "why": standing.why})
         else:
-            self._is_current(job, found.revision)
+            self._is_current(job, standing.revision)
         self._close(table)
         return False
 
@@ -354,7 +348,7 @@ class _Builder:
     def _framed(self, table: _Table, future: Future[dict[str, Entry]]) -> None:
         files = self._result(table.name, future)
         if files is not None:
-            revision, stored = publish(self.root, table.name, table.staging, {**table.files, **files})
+            revision, stored = publish_staged(self.root, table.name, table.staging, {**table.files, **files})
             why = table.survey.standing.why
             self.built[table.name] = Built(table.job, "published", revision, stored, why, table.survey.shape)
             self.report(
@@ -365,7 +359,7 @@ class _Builder:
     # Families
 
     def _measure_families(self) -> None:
-        """Record the families whose members are all current, where no record says so yet."""
+        """Measure and record the families whose members are all current, unless their record is."""
         sweeps = deque(sweep for sweep in self.sweeps if all(name in self.built for name in sweep.members))
         while sweeps or self.running:
             while sweeps and self._room:
@@ -375,8 +369,8 @@ class _Builder:
                     continue
 
                 def then(future: Future[FamilyRecord], name: str = sweep.name) -> None:
-                    if (found := self._result(name, future)) is not None:
-                        self._family(found, "published")
+                    if (measured := self._result(name, future)) is not None:
+                        self._family(measured, "published")
 
                 self.report({"event": "family", "family": sweep.name, "state": "measuring"})
                 self._submit(then, write_family, str(self.root), sweep)
@@ -395,11 +389,11 @@ class _Builder:
         )
 
     def _result(self, name: str, future: Future[Any]) -> Any:
-        """What a task returned; None if it failed, which takes no table with it but its own."""
+        """Return the result of a task; None if it failed, which fails its own table only."""
         error: BaseException | None
         try:
             error = future.exception()
-        except CancelledError as cancelled:  # not by us: the cluster lost it
+        except CancelledError as cancelled:  # by the cluster, which lost the task
             error = cancelled
         if error is None:
             return future.result()

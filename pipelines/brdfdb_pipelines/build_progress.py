@@ -1,4 +1,4 @@
-"""How a build tells where it is: bars for people on stderr, a JSON object a line for programs on stdout."""
+"""Progress of a build: bars on stderr for people, a JSON object a line on stdout for programs."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Event = dict[str, Any]
 
 
 class Tally:
-    """Counts values, and tells how fast they come and how long the rest will take."""
+    """The number of values computed so far, their rate, and the time left."""
 
     def __init__(self, total: int) -> None:
         self.total, self.done, self._computed = total, 0, 0
         self._start = time.perf_counter()
 
     def add(self, values: int, *, kept: bool) -> Event:
-        """Count values, of which those that an earlier build kept say nothing about the speed."""
+        """Add values and return the fields of an event; values kept from an earlier build do not count for the rate."""
         self.done += values
         self._computed += 0 if kept else values
         rate = self._computed / max(time.perf_counter() - self._start, 1e-9)
@@ -36,7 +36,7 @@ class Tally:
 
 
 class Lines:
-    """Prints every event as it is; a context manager like `Bars`."""
+    """Printer of events as JSON; a context manager like `Bars`."""
 
     def __enter__(self) -> Lines:
         return self
@@ -52,7 +52,7 @@ class Lines:
 
 
 class Bars:
-    """A bar for the whole build, and one for each table in progress that has several blocks."""
+    """Progress bars: one for the build, and one for each table in progress that has several blocks."""
 
     def __init__(self) -> None:
         self._progress = terminal.progress(counted=False, text="{task.fields[rate]}")

@@ -1,4 +1,4 @@
-"""Memory and disk that the tasks of a build take, estimated before they begin."""
+"""Memory and disk space of a build, estimated before it starts."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from brdfdb.errors import ParameterError
 from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import terminal
 
-_TASK = 20_000_000  # bytes of any task: the interpreter's own, and directions that errors are measured at
-# Bytes of a planner's candidates, in all and for each wavelength: copper at 41 wavelengths peaks at 119 MB for a
-# tolerance of 0.01, at 377 MB for 0.001; grey foam at 49 MB for 0.0001
+_TASK = 20_000_000  # memory of any task [byte]: the interpreter, and the directions of the error measurement
+# Memory of the planner's layouts [byte], in all and per wavelength. Measured peaks: copper at 41 wavelengths 119 MB for
+# a tolerance of 0.01 and 377 MB for 0.001; grey foam 49 MB for 0.0001
 _PLAN, _PLAN_WAVELENGTH = 10_000_000, 3_000_000
 _FINE, _FINE_TIMES = 0.005, 4
-_SLAB = 1 << 17  # directions that `tabulate.block` evaluates at once, or one row of the grid if that is more
-# Bytes of intermediates for each direction of a slab, measured: 22 to 36 over light and viewer, 237 over half vectors
+_SLAB = 1 << 17  # directions that a block evaluates at once, or one row of the grid if that is more
+# Memory of intermediates per direction of a slab [byte]; measured: 22 to 36 over light and viewer, 237 over half
+# vectors
 _PLAIN, _HALF = 40, 250
-_SPECTRUM = 45  # bytes for each wavelength of a direction where all wavelengths are held at once, measured: 35 to 44
-_VALUE = 16  # bytes for each value of a block: float32, the copy of the codec, the encoded bytes and theirs
-# Bytes that measuring the error takes: five rows of the table and their copies, 60 to 80 for each value of a row,
-# and for each wavelength the values at the directions that are drawn
+_SPECTRUM = 45  # memory per wavelength and direction [byte] where all wavelengths are held at once; measured: 35 to 44
+_VALUE = 16  # memory per value of a block [byte]: float32, the copy of the codec, the encoded bytes and their copy
+# Memory of the error measurement [byte]: five rows of the table and their copies, 60 to 80 per value of a row, and
+# per wavelength the values at the drawn directions
 _ROW, _DRAW = 80, 1_500_000
 
 
 def plan_bytes(wavelengths: int, tolerance: float) -> int:
-    """Return the memory [byte] that the planner takes for a material at so many wavelengths."""
+    """Return the memory [byte] that the planner takes for a material at a number of wavelengths."""
     return (_PLAN + _PLAN_WAVELENGTH * wavelengths) * (1 if tolerance >= _FINE else _FINE_TIMES)
 
 
@@ -55,7 +56,7 @@ def machine_memory() -> int:
 
 
 def check_memory(what: str, need: int, memory: int | None) -> None:
-    """ValueError if a task needs more memory [byte] than is allowed; None allows any."""
+    """Raise ParameterError if a task needs more memory [byte] than is allowed; None allows any."""
     if memory is not None and need > memory:
         raise ParameterError(
             "memory", f"{what} takes about {terminal.size(need)}, more than the {terminal.size(memory)} allowed", memory
@@ -63,7 +64,7 @@ def check_memory(what: str, need: int, memory: int | None) -> None:
 
 
 def check_disk(need: int, directory: Path) -> None:
-    """ValueError if the file system of a directory, which need not be there, has less than `need` [byte] free."""
+    """Raise ParameterError if the file system of a directory has less than `need` [byte] free; it need not exist."""
     there = next(path for path in (directory, *directory.absolute().parents) if path.exists())
     free = shutil.disk_usage(there).free
     if need > free:
@@ -73,7 +74,7 @@ def check_disk(need: int, directory: Path) -> None:
 
 
 def stored_bytes(directories: Sequence[Path]) -> int:
-    """Return the size [byte] of all files below some directories, which need not be there."""
+    """Return the size [byte] of all files below some directories, which need not exist."""
     return sum(
         os.lstat(os.path.join(folder, file)).st_size
         for directory in directories

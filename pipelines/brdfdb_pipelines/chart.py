@@ -1,4 +1,4 @@
-"""Charting speed against accuracy: measures materials and families, writes and prints what is worth having."""
+"""The chart job: it measures speed against accuracy of the forms of materials and families, and draws them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class _Subject(NamedTuple):
 
 
 class _Family(NamedTuple):
-    """A family that is charted: its members at their wavelengths, and what the store has of it."""
+    """A family to chart: its members at their wavelengths, and the family of the store."""
 
     sweep: Sweep
     materials: list[Material]
@@ -54,35 +54,35 @@ def run(
     recipe_path: Path | None = None,
     tolerances: Sequence[float] | None = None,
 ) -> Charts:
-    """Chart materials and families, and write of each ``NAME.json``, ``NAME.svg`` and ``NAME.png``.
+    """Chart materials and families; write ``NAME.json``, ``NAME.svg`` and ``NAME.png`` for each.
 
     Parameters
     ----------
     names : sequence of str
-        Materials or families of the recipe, which by default has every built-in material, or else of the store.
+        Materials or families of the recipe (by default every preset) or of the store.
     out : Path
-        Directory to write to; made if it is not there.
+        Directory to write to; made if it does not exist.
     store : Path, optional
-        Its tables are charted beside the planned ones, and its families' lookups; it need not exist.
+        Store whose tables and families are charted as well; it need not exist.
     recipe_path : Path, optional
         A recipe that defines materials or families, and the wavelengths of spectral ones.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.forms.catalogue`.
+        Tolerances of planned tables: see `brdfdb.forms.catalogue`.
 
     Returns
     -------
     Charts
-        All of them; each is written by itself, beside its pictures: other runs replace what they chart anew, no more.
+        All charts. Each is written to a file of its own, so that another run replaces only what it charts again.
 
     Raises
     ------
-    ValueError
-        If a name is neither of the recipe nor of the store, or a tolerance is none.
+    ParameterError
+        If a name is neither in the recipe nor in the store, or a tolerance is out of range.
     """
     for tolerance in tolerances or ():
         check_tolerance(tolerance)
     subjects = _subjects(names, store, recipe_path)
-    found: list[Chart] = []
+    material_charts: list[Chart] = []
     families: list[FamilyChart] = []
     with terminal.progress(counted=False) as bar:
         for subject in subjects:
@@ -94,33 +94,39 @@ def run(
                 continue
             task = bar.add_task(subject.source.name, total=STEPS)
             tick = functools.partial(bar.advance, task)
-            found.append(chart(subject.source, subject.wavelength_nm, tolerances, also=subject.stored, tick=tick))
+            material_charts.append(
+                chart(subject.source, subject.wavelength_nm, tolerances, also=subject.stored, tick=tick)
+            )
     charts = Charts(
-        brdfdb=version("brdfdb"), when=datetime.now(UTC), machine=terminal.machine(), charts=found, families=families
+        brdfdb=version("brdfdb"),
+        when=datetime.now(UTC),
+        machine=terminal.machine(),
+        charts=material_charts,
+        families=families,
     )
     out.mkdir(parents=True, exist_ok=True)
-    for one in found:
+    for one in material_charts:
         _write(out / one.material, charts.model_copy(update={"charts": [one], "families": []}), one)
         _print(one)
     for whole in families:
         _write(out / whole.family, charts.model_copy(update={"charts": [], "families": [whole]}), whole)
         _print_family(whole)
-    written = [*(one.material for one in found), *(whole.family for whole in families)]
+    written = [*(one.material for one in material_charts), *(whole.family for whole in families)]
     print(f"{out}: .json, .svg and .png of {', '.join(written)}")
     return charts
 
 
 def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
-    """A chart as data and as pictures; the names of materials have no dots."""
+    """Write a chart as data and as pictures; names of materials have no dots."""
     stem.with_suffix(".json").write_text(document.model_dump_json(indent=1) + "\n", encoding="utf-8")
     stem.with_suffix(".svg").write_text(tradeoff_plot.svg(drawn), encoding="utf-8")
     stem.with_suffix(".png").write_bytes(tradeoff_plot.png(drawn))
 
 
 def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None) -> list[_Subject | _Family]:
-    asked = recipe_file.load(recipe_path)
-    listed = asked.jobs()
-    jobs, sweeps = {job.material.name: job for job in listed}, {sweep.name: sweep for sweep in asked.sweeps(listed)}
+    recipe = recipe_file.load(recipe_path)
+    listed = recipe.jobs()
+    jobs, sweeps = {job.material.name: job for job in listed}, {sweep.name: sweep for sweep in recipe.sweeps(listed)}
     store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None
     subjects: list[_Subject | _Family] = []
     for name in dict.fromkeys(names):
@@ -165,7 +171,7 @@ def _fits(stored: NDArray[np.float64] | None, wanted: NDArray[np.float64] | None
 
 
 def _print(one: Chart) -> None:
-    """All points as a table, and the front in a sentence."""
+    """Print all points as a table, and the front in a sentence."""
     rows = [
         (
             "*" if point.key in one.fronts.batch else "",
@@ -201,7 +207,7 @@ def _said(point: Point) -> str:
 
 
 def _print_family(whole: FamilyChart) -> None:
-    """The mean error of every form along each parameter, and what is worth having where in a sentence each."""
+    """Print the mean error of every form along each parameter, and where each form of the front is worth having."""
     for axis, values in whole.axes.items():
         rows = []
         for curve in whole.curves:
@@ -232,7 +238,7 @@ def _print_family(whole: FamilyChart) -> None:
 
 
 def _where(whole: FamilyChart, members: Sequence[int]) -> str:
-    """The part of a family that some members lie in."""
+    """Return the part of a family that some members lie in, in words."""
     points = list(itertools.product(*whole.axes.values()))
     spans = []
     for number, axis in enumerate(whole.axes):

@@ -1,8 +1,7 @@
-"""The tables of a choice: measured as those of a build are, and published in a store."""
+"""Publication of the tables of a choice, with their errors measured as in a build."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,10 +18,10 @@ from brdfdb_pipelines import terminal
 
 
 class Built(NamedTuple):
-    """The revision of a store that is the table of a choice, and in a sentence what became of the one before."""
+    """The revision that holds the table of a choice, and a sentence on the revision before it."""
 
     revision: str
-    said: str
+    sentence: str
 
 
 def build(root: Path, layouts: Mapping[str, Layout]) -> dict[str, Built]:
@@ -31,9 +30,9 @@ def build(root: Path, layouts: Mapping[str, Layout]) -> dict[str, Built]:
     Parameters
     ----------
     root : Path
-        Directory of the store, which is there.
+        Directory of an existing store.
     layouts : mapping
-        By the name under which a table is published. One that is current there already is left as it is.
+        Layouts by the name under which their table is published. A table that is current already stays.
 
     Raises
     ------
@@ -61,7 +60,7 @@ def _build(root: Path, name: str, layout: Layout) -> Built:
 
 
 def _before(store: Store, name: str) -> str:
-    """What a new revision does to the current one."""
+    """Return a phrase on what a new revision does to the current one."""
     if name not in store:
         return "is new in the store"
     try:
@@ -72,24 +71,24 @@ def _before(store: Store, name: str) -> str:
 
 
 def _is_there(store: Store, name: str, layout: Layout) -> bool:
-    """Whether the current table has this layout, whatever the reason, states its error, and is undamaged."""
+    """Return True if the current table has this layout, for any reason, states its error, and is undamaged."""
     if name not in store:
         return False
     wanted = frame(layout)
     try:
         store.verify(name)
-        stored = store.dataset(name)
+        stored, metadata = store.dataset(name), store.metadata(name)
     except StoreError:
         return False
-    told = json.loads(json.dumps(wanted.attrs)) | {"reason": stored.attrs.get("reason")}
+    known = metadata.attributes()
     return (
-        "error" in stored.attrs
-        and told.items() <= stored.attrs.items()
+        metadata.error is not None
+        and all(known.get(key) == value for key, value in wanted.attrs.items() if key != "reason")
         and all(key in stored and np.array_equal(stored[key], value) for key, value in wanted.variables.items())
     )
 
 
 def with_reason(layout: Layout, title: str, wanted: str) -> Layout:
-    """A layout that says what it was chosen for, beside why it was laid out so."""
+    """Return a layout whose reason names the scene that it was chosen for."""
     planned = f"; {layout.reason}" if layout.reason else ""
     return replace(layout, reason=f"{title}, chosen for {wanted}{planned}")

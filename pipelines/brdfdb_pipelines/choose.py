@@ -1,4 +1,4 @@
-"""Choosing for a scene: times the forms of its materials, writes choice.json, pictures and tables, prints reasons."""
+"""The choose job: it times the forms of the materials of a scene, and writes choice.json, pictures and tables."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from brdfdb.scenes import image, sample_positions
 from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Look, Seen, check_feasible, choose
 from brdfdb.scenes.choice_document import Choice, Price, Weigh, describe, statement, within
 from brdfdb.scenes.gbuffer import View, gather, gather_at
-from brdfdb.scenes.offered_forms import Candidate, candidates
+from brdfdb.scenes.offered_forms import OfferedForm, offered_forms
 from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.renderer import Reflector, reflectors
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
-from brdfdb.store.staging import make_store, remove_begun
+from brdfdb.store.marker import make_store
+from brdfdb.store.staging import remove_begun
 from brdfdb_pipelines import terminal
 from brdfdb_pipelines.choice_publication import Built, build, with_reason
 from brdfdb_pipelines.scene_file import SceneError, load
 
-TIMED = 20_000  # pairs of directions of a material, drawn from those that the scene uses
+TIMED = 20_000  # pairs of directions of a material on which forms are timed, drawn from those of the scene
 SEED = 1992
-ROUNDS = 7  # of timing
-FINER = 2  # times as wide as the picture: choices are checked at one place in each pixel of that
-EDGES = 4000  # places beside edges where candidates are compared, and as many other ones where choices are checked
+ROUNDS = 7  # rounds of timing
+FINER = 2  # choices are checked at one place in each pixel of a picture so many times as wide
+EDGES = 4000  # places beside edges where forms are compared, and as many others where choices are checked
 
 
 def run(
@@ -50,31 +51,31 @@ def run(
     out : Path
         Directory to write to; made if it is not there.
     width : int
-        Pixels across the picture where candidates are compared. The whole is checked at fresh places: `FINER` squared
-        times as many, and `EDGES` beside edges. A recorded scene has the size of its file, and no other places.
+        Pixels across the picture where forms are compared. The choice as a whole is checked at fresh places: `FINER`
+        squared times as many, and `EDGES` beside edges. A recorded scene has the size of its file, and no other places.
     weigh : str
-        What is to be small: "time", "bytes", or "both", which is their product.
+        Cost to minimise: "time", "bytes", or "both", which is their product.
     store : Path, optional
-        Where chosen tables are published, under the names of their materials, each with its error; made if it is not
-        there.
+        Store where chosen tables are published, under the names of their materials, each with its error; made if it
+        does not exist.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.scenes.choice.candidates`.
+        Of planned tables: see `brdfdb.scenes.offered_forms`.
 
     Returns
     -------
     Choice
-        What was written.
+        The document that was written.
 
     Raises
     ------
     SceneError
-        If the scene is none or cannot be looked at, or its tolerance is infeasible.
+        If there is no such scene, it cannot be rendered, or its tolerance is infeasible.
     StoreError
-        If the store cannot be written, or is something else: before any work.
+        If the store cannot be written or is no store: before any work.
     """
     scene, made = load(name), False
     try:
-        check_feasible(scene.tolerance)  # before minutes of work, as the store
+        check_feasible(scene.tolerance)  # before minutes of work, like the store
         made = store is not None and make_store(store)
         return _run(scene, name, out, width, weigh, store, tolerances)
     except ParameterError as error:
@@ -100,7 +101,7 @@ def _run(
         task = bar.add_task("tabulating, timing", total=2 * len(materials))
         offered, prices = {}, {}
         for key, reflector in materials.items():
-            offered[key] = candidates(reflector.source, reflector.wavelength_nm, tolerances)
+            offered[key] = offered_forms(reflector.source, reflector.wavelength_nm, tolerances)
             bar.advance(task)
             prices[key] = _prices(offered[key], *_pairs(view, key), weigh)
             bar.advance(task)
@@ -111,7 +112,7 @@ def _run(
             bar.update(task, total=len(materials) + number)
             return check(number)
 
-        costs = {key: np.stack([price.costs for price in each], axis=1) for key, each in prices.items()}
+        costs = {key: np.stack([one.costs for one in of_forms], axis=1) for key, of_forms in prices.items()}
         chosen = choose(planned, checked, offered, costs, tick=lambda: bar.advance(task))
     forms = {key: offered[key][decision.pick.chosen].form for key, decision in chosen.items()}
     wanted = f"{Path(name).stem}, {within(scene.tolerance)}"
@@ -127,7 +128,7 @@ def _run(
         offered,
         prices,
         {key: planned.even.pixels(key).size for key in offered},
-        {key: each.revision for key, each in built.items()},
+        {key: one.revision for key, one in built.items()},
     )
     choice = Choice(
         brdfdb=version("brdfdb"),
@@ -153,9 +154,9 @@ def _run(
 
 
 def _looks(
-    scene: Scene, view: View, offered: Mapping[str, Sequence[Candidate]], materials: Mapping[str, Reflector]
+    scene: Scene, view: View, offered: Mapping[str, Sequence[OfferedForm]], materials: Mapping[str, Reflector]
 ) -> tuple[Look, Callable[[int], Look | None]]:
-    """Return the scene where candidates are compared, and what gives it at fresh places for each round of checks."""
+    """Return the scene where forms are compared, and a function from the number of a check to fresh places."""
     truths = {key: forms[0] for key, forms in offered.items()}
     picture = Seen(scene, view, truths, materials)
     if isinstance(scene.objects[0].shape, Recorded):
@@ -176,36 +177,36 @@ def _looks(
 
 
 def _pairs(view: View, material: str) -> tuple[Array, Array]:
-    """Pairs of directions that the scene evaluates a material at, mixed; at least one."""
+    """Return pairs of directions (n, 3) at which the scene evaluates a material, shuffled; at least one."""
     pairs = [
         (points.wi[light, point], points.wr[point])
         for points in view.points
         if points.material == material
         for light, point in [np.nonzero(points.irradiance * (points.wr[:, 2] > 0.0))]
     ]
-    wi, wr = (np.concatenate(each) for each in zip(*pairs, strict=True))
-    if not len(wi):  # in shadow
+    wi, wr = (np.concatenate(directions) for directions in zip(*pairs, strict=True))
+    if not len(wi):  # the material is in shadow
         wi = wr = np.array([[0.0, 0.0, 1.0]])
     mixed = np.random.default_rng(SEED).permutation(len(wi))[:TIMED]
     return wi[mixed], wr[mixed]
 
 
-def _prices(forms: Sequence[Candidate], wi: Array, wr: Array, weigh: Weigh) -> list[Price]:
-    """Return what forms cost; the wavelengths of all are those of the scene."""
-    times = timing.times([each.form for each in forms], wi, wr, most=TIMED, rounds=ROUNDS)
+def _prices(forms: Sequence[OfferedForm], wi: Array, wr: Array, weigh: Weigh) -> list[Price]:
+    """Return the costs of forms at the wavelengths of the scene."""
+    times = timing.times([offered.form for offered in forms], wi, wr, most=TIMED, rounds=ROUNDS)
     prices = []
-    for candidate, time in zip(forms, times, strict=True):
-        form = candidate.form
+    for offered, time in zip(forms, times, strict=True):
+        form = offered.form
         ns = time.quartiles_ns[1] * form.evaluate(wi[:1].astype(form.dtype), wr[:1].astype(form.dtype)).size
-        # of the truth in the same round: what slows the machine down slows both down
+        # relative to the exact form in the same round: a busy machine slows both down
         shares = time.seconds / times[0].seconds
         costs = {"time": shares, "bytes": np.full(ROUNDS, float(form.bytes)), "both": shares * form.bytes}
         prices.append(Price(ns, costs[weigh]))
     return prices
 
 
-def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], chosen: Mapping[str, Decision]) -> None:
-    """The comparison as a picture; truth and choice as spectral EXR."""
+def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[OfferedForm]], chosen: Mapping[str, Decision]) -> None:
+    """Write the comparison as a picture, and the exact and the chosen one as spectral EXR."""
     from brdfdb_pipelines import choice_picture
 
     picks = {key: decision.pick for key, decision in chosen.items()}
@@ -219,7 +220,7 @@ def _draw(stem: Path, seen: Seen, offered: Mapping[str, Sequence[Candidate]], ch
 
 
 def _print(choice: Choice, built: Mapping[str, Built]) -> None:
-    """The choices as a table, reasons, and what became of the tables of a store."""
+    """Print the choices as a table, their reasons, and the tables that were published."""
     numbers = ("alone", "whole", "largest", "ns", "bytes", "share of the truth")
     rows = [
         (
@@ -239,5 +240,5 @@ def _print(choice: Choice, built: Mapping[str, Built]) -> None:
     for one in choice.materials:
         print(f"  {one.material}: {one.choice.title} {one.reason}")
         if one.material in built:
-            print(f"    {built[one.material].said}")
+            print(f"    {built[one.material].sentence}")
     print(choice.statement)

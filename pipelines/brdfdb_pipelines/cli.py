@@ -25,6 +25,7 @@ _MACHINE = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO),
     *(errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE),
 }
+_MODELS = "files of models"  # begins the names under which parsers keep --models
 _EPILOG = f"""\
 exit codes:
   0    done
@@ -36,7 +37,24 @@ exit codes:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that answers a misspelt command or choice with the closest one."""
+    """A parser with the options of every command, which answers a misspelt command or choice with the closest one."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        group = self.add_argument_group("options of every command")
+        # A default of a command, or a name that it shares, would replace what stands before the command
+        group.add_argument(
+            "--debug", action="store_true", default=argparse.SUPPRESS, help="print the traceback of an error, too"
+        )
+        group.add_argument(
+            "--models",
+            action="append",
+            dest=f"{_MODELS} of {self.prog}",
+            default=argparse.SUPPRESS,
+            metavar="FILE",
+            help="a Python file with models of yours, for this command and the processes that it starts; may be "
+            "repeated (default: $BRDFDB_MODELS)",
+        )
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is None or value in action.choices:
@@ -65,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     options = _parser().parse_args(arguments, argparse.Namespace(arguments=arguments))
     try:
-        _add_models([*getattr(options, "models", ()), *getattr(options, "models_of_command", ())])
+        _add_models(options)
         code: int = options.run(options)
         sys.stdout.flush()  # a reader that left shows here, not at exit
         return code
@@ -95,34 +113,18 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
-    _add_globals(parser, "models")
     subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
     for name, command in commands().items():
         first_sentence = command.HELP.partition(". ")[0].rstrip(".")
         subparser = subparsers.add_parser(name, help=f"{first_sentence}.", description=command.HELP)
         command.add_arguments(subparser)
-        _add_globals(subparser, "models_of_command")
         subparser.set_defaults(run=command.run)
     return parser
 
 
-def _add_globals(parser: argparse.ArgumentParser, models: str) -> None:
-    # without a default, and a list of its own: those of a command would replace what stands before the command
-    parser.add_argument(
-        "--debug", action="store_true", default=argparse.SUPPRESS, help="print the traceback of an error, too"
-    )
-    parser.add_argument(
-        "--models",
-        action="append",
-        dest=models,
-        default=argparse.SUPPRESS,
-        metavar="FILE",
-        help="a Python file with models of yours, for this command and the processes that it starts; may be repeated "
-        "(default: $BRDFDB_MODELS)",
-    )
-
-
-def _add_models(files: Sequence[str]) -> None:
+def _add_models(options: argparse.Namespace) -> None:
+    """Add the models of the files that stand before or after the command."""
+    files = [file for name, files in vars(options).items() if name.startswith(_MODELS) for file in files]
     if files:
         from brdfdb.models import MODELS
 

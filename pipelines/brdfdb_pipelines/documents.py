@@ -1,4 +1,4 @@
-"""Documents that are generated from the code and kept in the repository for review: JSON Schemas, the README's table.
+"""Generated documents that are kept in the repository for review: JSON Schemas and the README's model table.
 
 ``python -m brdfdb_pipelines.documents`` in the root of the repository writes them anew; the tests compare. Nothing
 reads them at run time.
@@ -37,7 +37,7 @@ TABLE_BEGIN, TABLE_END = "<!-- generated: models -->", "<!-- end -->"
 
 
 def schema(name: str) -> str:
-    """The text of ``schemas/<name>.schema.json``."""
+    """Return the text of ``schemas/<name>.schema.json``."""
     dialect = "https://json-schema.org/draft/2020-12/schema"
     document: dict[str, Any] = {"$schema": dialect, **SCHEMAS[name].model_json_schema()}
     if name == "family":  # the file that the store keeps begins with its digest
@@ -48,7 +48,7 @@ def schema(name: str) -> str:
 
 
 def model_table() -> str:
-    """The README's table of models and their parameters."""
+    """Return the README's table of models and their parameters."""
     lines = ["| function | model | equations | parameters |", "|---|---|---|---|"]
     for spec in MODELS.values():
         parameters = ", ".join(f"`{p.name}` {p.interval}" for p in spec.parameters)
@@ -59,7 +59,7 @@ def model_table() -> str:
 
 
 def readme(text: str) -> str:
-    """A README with its model table brought up to date."""
+    """Return a README with its model table brought up to date."""
     before, rest = text.split(TABLE_BEGIN)
     _, after = rest.split(TABLE_END)
     return f"{before}{TABLE_BEGIN}\n{model_table()}\n{TABLE_END}{after}"

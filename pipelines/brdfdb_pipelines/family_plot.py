@@ -1,4 +1,4 @@
-"""Pictures of families: errors of forms along each parameter, their costs, and a table of all."""
+"""Pictures of families: errors of forms along each parameter, their costs, and a table of all forms."""
 
 from __future__ import annotations
 
@@ -41,35 +41,39 @@ from brdfdb_pipelines.plot_panels import (
 )
 
 _FAMILY_COLUMNS = (18.0, 250.0, 330.0, 410.0, 490.0, 580.0, 670.0, 760.0, 850.0, 988.0)
-CLOSE = 0.01  # mean error of what the truth need not be evaluated for
-_MEAN, _NAMES, _TAIL = 216.0, 172.0, 150.0  # widths: panel of means, names beside it, panel of the 99th percentile
-_FAMILY_ABOVE, _FAMILY_ROW = 76.0, 310.0  # below the title, room for a diagnostic; from one parameter to the next
-_HIGHEST = 10.0  # of errors drawn: ten times the light that there is
+CLOSE = 0.01  # mean error below which a form replaces the exact one
+_MEAN, _NAMES, _TAIL = (
+    216.0,
+    172.0,
+    150.0,
+)  # widths [point]: means, names, 99th percentiles
+_FAMILY_ABOVE, _FAMILY_ROW = 76.0, 310.0  # heights [point]: for a diagnostic; of a parameter
+_HIGHEST = 10.0  # largest error that is drawn: ten times the reflected light
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)))
-_APART = 26.0  # of ticks that are numbers of their own
+_APART = 26.0  # distance of labelled ticks [point]
 
 
 def along(whole: FamilyChart, axis: str) -> list[list[int]]:
-    """The members at each value of one parameter of a family."""
+    """Return the indices of the members at each value of one parameter of a family."""
     shape = [len(values) for values in whole.axes.values()]
     numbers = np.arange(len(whole.members)).reshape(shape)
     return np.moveaxis(numbers, list(whole.axes).index(axis), 0).reshape(len(whole.axes[axis]), -1).tolist()
 
 
 def middle(errors: Iterable[float | None]) -> float | None:
-    """The median of those that are there."""
+    """Return the median of the errors that are not None; None if there are none."""
     there = [error for error in errors if error is not None]
     return float(np.median(there)) if there else None
 
 
 def drawn(whole: FamilyChart) -> Canvas:
-    """For each parameter two panels, error along it; cost against error; all forms as a table."""
+    """Draw two panels of errors for each parameter, a panel of cost against error, and a table of all forms."""
     bottom = _FAMILY_ABOVE + PLOT + (len(whole.axes) - 1) * _FAMILY_ROW
     count_of = len(whole.curves) + (whole.between is not None)
     height = bottom + BELOW + ROW * (count_of + 2)
     several = "; lines are medians, bands all members of a value" if len(whole.axes) > 1 else ""
-    said = f"{whole.family}, {whole.model}, {wavelengths(whole)}, {len(whole.members)} members{several}."
-    canvas = titled(height, whole.title, f"{said} Large: worth having there. Times are those of one member.")
+    subtitle = f"{whole.family}, {whole.model}, {wavelengths(whole)}, {len(whole.members)} members{several}."
+    canvas = titled(height, whole.title, f"{subtitle} Large: worth having there. Times are those of one member.")
 
     def box(left: float, top: float, width: float) -> tuple[float, float, float, float]:
         return left / WIDTH, 1.0 - (top + PLOT) / height, width / WIDTH, PLOT / height
@@ -105,7 +109,7 @@ def drawn(whole: FamilyChart) -> Canvas:
 def _sweep(
     axes: Axes, whole: FamilyChart, axis: str, errors: Callable[[Curve], list[float | None]], between: float | None
 ) -> None:
-    """Errors along one parameter; what is worth having at most of the members of a value is drawn large."""
+    """Draw errors along one parameter; forms worth having at most members of a value are drawn large."""
     x = whole.axes[axis]
     error_axis(axes, _HIGHEST)
     if x[0] > 0.0 and x[-1] > 8.0 * x[0]:
@@ -157,7 +161,7 @@ def _diagnostic(axes: Axes, x: list[float], diagnostic: Diagnostic) -> None:
 
 
 def _named(axes: Axes, whole: FamilyChart, axis: str) -> None:
-    """Number and name of each curve beside its right end, bold if it is worth having anywhere."""
+    """Draw number and name of each curve beside its right end, bold if it is worth having anywhere."""
     ends = []
     for number, curve in enumerate(whole.curves, 1):
         values = [middle([curve.l1[index] for index in some]) for some in along(whole, axis)]
@@ -172,11 +176,11 @@ def _named(axes: Axes, whole: FamilyChart, axis: str) -> None:
     ends.sort(key=lambda end: end[0])
     low, high = (math.log10(y) for y in axes.get_ylim())
     wanted = [PLOT * (math.log10(min(y, _HIGHEST)) - low) / (high - low) for y, *_ in ends]
-    for (y, x, text, bold, kind), here in zip(ends, apart(wanted, LINE, PLOT), strict=True):
+    for (y, x, text, bold, kind), height in zip(ends, apart(wanted, LINE, PLOT), strict=True):
         axes.annotate(
             text,
             (x, min(y, _HIGHEST)),
-            (_MEAN + 10.0, here),
+            (_MEAN + 10.0, height),
             textcoords=OffsetFrom(axes, (0.0, 0.0)),
             va="center",
             fontsize=7.0,
@@ -188,8 +192,8 @@ def _named(axes: Axes, whole: FamilyChart, axis: str) -> None:
 
 
 def apart(wanted: Sequence[float], least: float, most: float) -> list[float]:
-    """Increasing heights, moved as little as makes them `least` apart and keeps them between 0 and `most`."""
-    blocks: list[tuple[float, int]] = []  # of names that touch: where the first would be, and how many
+    """Return increasing heights, moved as little as possible to be `least` apart and between 0 and `most`."""
+    blocks: list[tuple[float, int]] = []  # names that touch: position of the first, and their number
     for index, height in enumerate(wanted):
         start, number = height - least * index, 1
         while blocks and blocks[-1][0] > start:
@@ -202,7 +206,7 @@ def apart(wanted: Sequence[float], least: float, most: float) -> list[float]:
 
 
 def _costs(axes: Axes, whole: FamilyChart) -> None:
-    """Error over cost: a bar from the least to the largest mean error of the members, a mark at the median."""
+    """Draw error over cost: a bar from the least to the largest mean error of the members, a mark at the median."""
     labels = []
     forms: list[tuple[Form, list[float | None]]] = [(curve, curve.l1) for curve in whole.curves]
     if whole.between is not None:

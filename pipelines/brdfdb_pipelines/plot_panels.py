@@ -1,4 +1,4 @@
-"""Common parts of the pictures of charts: looks of forms, axes of errors and costs, labels, legends, tables."""
+"""Common parts of charts: marks of forms, axes of errors and costs, labels, legends, tables."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from brdfdb_pipelines import figure_svg, terminal
 
 WIDTH, PLOT, ABOVE, BELOW, ROW = 1000.0, 270.0, 64.0, 58.0, 12.0  # points
 LEFT, GAP, RIGHT = 66.0, 14.0, 12.0
-SMALLEST = 1e-6  # errors below are drawn here: the truth, and what differs from it by rounding
+SMALLEST = 1e-6  # smaller errors are drawn at this one: the exact form, and forms that differ from it by rounding
 _LETTER, LINE = 4.1, 9.0  # width and height of a letter of a label, on average
 LEADER: dict[str, Any] = {"arrowstyle": "-", "color": figure_svg.MUTED, "linewidth": 0.5}
 _NEAR = 10.0  # distance [points] of a text from its point beyond which a line joins them
@@ -41,10 +41,10 @@ LOOKS: dict[Kind, Look] = {
 }
 
 
-def titled(height: float, title: str, said: str) -> Canvas:
+def titled(height: float, title: str, subtitle: str) -> Canvas:
     canvas = Canvas(figsize=(WIDTH / 72.0, height / 72.0), facecolor="white")
     canvas.text(8.0 / WIDTH, 1.0 - 8.0 / height, title, va="top", fontsize=12, fontweight="bold")
-    canvas.text(8.0 / WIDTH, 1.0 - 25.0 / height, said, va="top")
+    canvas.text(8.0 / WIDTH, 1.0 - 25.0 / height, subtitle, va="top")
     return canvas
 
 
@@ -79,7 +79,7 @@ def cost_axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
 
 
 class Label(NamedTuple):
-    """Text beside a point: in full where there is room, else its least form."""
+    """Text beside a point: the full text where there is room, else the shortest."""
 
     least: str
     full: str
@@ -92,26 +92,26 @@ class Label(NamedTuple):
 
 
 def labelled(axes: Axes, labels: Sequence[Label]) -> None:
-    """Texts beside points, each where it hides neither a point nor another text; those given first come first."""
+    """Draw texts beside points, each where it hides neither a point nor another text; earlier ones have priority."""
     scale = 72.0 / mpl.rcParams["figure.dpi"]
     at = [axes.transData.transform((label.x, label.y)) * scale for label in labels]
     frame = axes.get_window_extent().extents * scale
     taken = [(x - 3.0, y - 3.0, x + 3.0, y + 3.0) for x, y in at]
     chosen = []
-    for label, here in zip(labels, at, strict=True):
+    for label, point in zip(labels, at, strict=True):
         width = label.width(label.least)
-        best = min(offsets(width), key=lambda offset: hidden(box(here, offset, width), taken, frame))
-        taken.append(box(here, best, width))
+        best = min(offsets(width), key=lambda offset: hidden(box(point, offset, width), taken, frame))
+        taken.append(box(point, best, width))
         chosen.append(best)
-    for index, (label, here, best) in enumerate(zip(labels, at, chosen, strict=True)):
+    for index, (label, point, best) in enumerate(zip(labels, at, chosen, strict=True)):
         text, own, width = label.least, len(at) + index, label.width(label.full)
         others = [*taken[:own], *taken[own + 1 :]]
         near = [offset for offset in offsets(width) if abs(offset[1]) <= _NEAR]
-        free = [offset for offset in near if hidden(box(here, offset, width), others, frame) == 0.0]
+        free = [offset for offset in near if hidden(box(point, offset, width), others, frame) == 0.0]
         if free:
-            text, best, taken[own] = label.full, free[0], box(here, free[0], width)
+            text, best, taken[own] = label.full, free[0], box(point, free[0], width)
         width = label.width(text)
-        side = min(max(-best[0] / width, 0.0), 1.0)  # of the text, what is next to its point: left, middle or right
+        side = min(max(-best[0] / width, 0.0), 1.0)  # side of the text that is next to its point: left, middle or right
         axes.annotate(
             text,
             (label.x, label.y),
@@ -133,21 +133,21 @@ Box = tuple[float, float, float, float]
 
 def offsets(width: float) -> list[tuple[float, float]]:
     """Return positions for the left end of a text, in points from its point: the nearest first."""
-    found = []
+    positions = []
     for far in (0.0, 8.0, 16.0, 26.0):
-        found += [(6.0, far), (6.0, -far), (-6.0 - width, far), (-6.0 - width, -far)]
-        found += [(-width / 2.0, 9.0 + far), (-width / 2.0, -9.0 - far)]
-    return found
+        positions += [(6.0, far), (6.0, -far), (-6.0 - width, far), (-6.0 - width, -far)]
+        positions += [(-width / 2.0, 9.0 + far), (-width / 2.0, -9.0 - far)]
+    return positions
 
 
-def box(here: Any, offset: tuple[float, float], width: float) -> Box:
+def box(point: Any, offset: tuple[float, float], width: float) -> Box:
     """Return the box that a text covers if its left end is at an offset from its point."""
-    x, y = here[0] + offset[0], here[1] + offset[1]
+    x, y = point[0] + offset[0], point[1] + offset[1]
     return x, y - LINE / 2.0, x + width, y + LINE / 2.0
 
 
 def hidden(box: Box, taken: list[Box], frame: Any) -> float:
-    """The area of what a text would hide; what leaves the frame counts most."""
+    """Return the area [point^2] that a text would hide; area outside the frame counts most."""
     area = sum(
         max(0.0, min(box[2], other[2]) - max(box[0], other[0]))
         * max(0.0, min(box[3], other[3]) - max(box[1], other[1]))
@@ -189,7 +189,7 @@ def table_of(
     top: float,
     height: float,
 ) -> None:
-    """A row for each form, numbered, those that are worth having in bold."""
+    """Draw a numbered row for each form, those of the front in bold."""
     row_of(canvas, columns, 0, ("", "", *heads), top, height, color=figure_svg.MUTED)
     for number, (form, cells, bold) in enumerate(rows, 1):
         style = {"fontweight": "bold" if bold else "normal", "color": LOOKS[form.kind].colour}
@@ -199,7 +199,7 @@ def table_of(
 def row_of(
     canvas: Canvas, columns: Sequence[float], number: int, cells: Iterable[str], top: float, height: float, **how: Any
 ) -> None:
-    """Cells of a row: a number, a title from the left, and the others up to the ends of their columns."""
+    """Draw the cells of a row: a number, a title set left, and the others set right in their columns."""
     for column, (end, cell) in enumerate(zip(columns, cells, strict=True)):
         align = "left" if column == 1 else "right"
         x = columns[0] + 4.0 if column == 1 else end
@@ -213,7 +213,7 @@ def height_of(error: float) -> float:
 
 
 def percent(value: float) -> str:
-    """An error as a human reads it."""
+    """Return an error in percent as text."""
     if value <= SMALLEST:
         return "0" if value == 0.0 else "≤ 0.0001 %"
     return f"{100.0 * value:.2g} %" if value < 0.995 else f"{100.0 * value:.0f} %"

@@ -57,7 +57,7 @@ class Range(BaseModel):
     step: float = Field(gt=0.0)
 
     def nodes(self, name: str) -> Axis:
-        """The numbers; RecipeError if the step does not lead from start to stop."""
+        """Return the numbers; RecipeError if the step does not lead from start to stop."""
         count = (self.stop - self.start) / self.step
         if count >= _MOST_NODES:
             raise RecipeError(name, f"steps of {self.step:g} make more than the {_MOST_NODES} nodes an axis may have")
@@ -125,7 +125,7 @@ class AnisotropicHalfDifferenceGrid(BaseModel):
 
 
 def _meant(grid: Any) -> str:
-    """Which kind of grid a table of a recipe is meant to be."""
+    """Return the kind of grid that a table of a recipe is meant to be."""
     half = isinstance(grid, BaseModel | dict) and "theta_h_deg" in (grid if isinstance(grid, dict) else dict(grid))
     return "half" if half else "plain"
 
@@ -161,7 +161,7 @@ class Job:
     family: Mapping[str, Any] | None = None
 
     def layout(self) -> Layout:
-        """What the table is going to be; to a tolerance, this takes the planner a second or more."""
+        """Return the layout of the table; to a tolerance, this takes the planner a second or more."""
         if self.grid is not None:
             method, logarithm = self.interpolation.removeprefix("log-"), self.interpolation.startswith("log-")
             offset = offset_of(self.material, self.wavelength_nm) if logarithm else 0.0
@@ -180,7 +180,7 @@ class Job:
 
     @property
     def request(self) -> dict[str, Any]:
-        """All that decides the table, ready for JSON: the same request makes the same table."""
+        """Everything that decides the table, ready for JSON: the same request makes the same table."""
         member = {} if self.family is None else {"family": dict(self.family)}
         return {
             **member,
@@ -218,7 +218,7 @@ class Recipe(BaseModel):
     )
 
     def jobs(self) -> list[Job]:
-        """Every table that the recipe asks for.
+        """Return a job for each table that the recipe asks for.
 
         Raises
         ------
@@ -263,13 +263,13 @@ class Recipe(BaseModel):
             raise RecipeError(f"grids.{name}.{error.parameter}_deg", error.sentence) from None
 
     def sweeps(self, jobs: Sequence[Job]) -> list[Sweep]:
-        """The families all of whose members are among the jobs."""
-        found = []
+        """Return the families whose members are all among the jobs."""
+        sweeps = []
         for name, table in self.sweep.items():
             axes = _swept(name, table)
             members = sorted((j for j in jobs if j.family and j.family["name"] == name), key=lambda j: j.material.name)
             if len(members) == math.prod(map(len, axes.values())):
-                found.append(
+                sweeps.append(
                     Sweep(
                         name=name,
                         title=table["title"],
@@ -279,14 +279,14 @@ class Recipe(BaseModel):
                         request_sha256=[digest(job.request) for job in members],
                     )
                 )
-        return found
+        return sweeps
 
     def _selected(self) -> list[tuple[Material, dict[str, Any] | None]]:
-        """The materials, and of which family each is a member."""
+        """Return the selected materials, each with the family that it is a member of, or None."""
         known: dict[str, tuple[Material, dict[str, Any] | None]] = {n: (m, None) for n, m in presets().items()}
         for name, table in self.define.items():
             if name in known:
-                raise RecipeError(f"define.{name}", "is the name of a built-in material; give yours another")
+                raise RecipeError(f"define.{name}", "is the name of a preset; give yours another")
             try:
                 known[name] = Material.from_table(name, table), None
             except MaterialError as error:
@@ -320,7 +320,7 @@ class Recipe(BaseModel):
 
 
 def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
-    """The parameters of a sweep that are lists, in the order of the model, each with its values."""
+    """Return the values of the swept parameters, which are lists, in the order of the model."""
     parameters, model = table.get("parameters"), table.get("model")
     where = f"sweep.{name}.parameters"
     lists = {x: v for x, v in parameters.items() if isinstance(v, list)} if isinstance(parameters, dict) else {}
@@ -334,8 +334,8 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
         try:
             parts = _VALUES.validate_python(lists[x])
         except ValidationError as error:
-            field, said = _first(error)
-            raise RecipeError(f"{where}.{x}{field and f'.{field}'}", said) from None
+            field, message = _first(error)
+            raise RecipeError(f"{where}.{x}{field and f'.{field}'}", message) from None
         values = [float(f"{value:.12g}") for value in _nodes(f"{where}.{x}", parts)]  # 0.3, not 0.1 + 0.1 + 0.1
         if len(values) < 2:
             raise RecipeError(f"{where}.{x}", "needs a list of at least two values")
@@ -346,7 +346,7 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
 
 
 def _members(name: str, table: Mapping[str, Any]) -> list[tuple[Material, dict[str, Any]]]:
-    """The materials of a sweep, the last of its lists running fastest, each with what it is in its family."""
+    """Return the materials of a sweep, the last parameter varying fastest, each with its place in the family."""
     axes = _swept(name, table)
     width = max(3, len(str(math.prod(map(len, axes.values())))))
     members = []
@@ -395,10 +395,10 @@ def load(path: Path | None = None) -> Recipe:
 
 
 def _first(error: ValidationError) -> tuple[str, str]:
-    """The first field that pydantic finds fault with, and what it says."""
+    """Return the first field that pydantic refuses, and its message."""
     # pydantic lists each branch of number | range: a table was meant as a range, whatever else is wrong with it,
     # and the names of the branches are not names of the recipe
-    found = error.errors(include_url=False)
-    first = next(item for item in found if not ("float" in item["loc"][-1:] and isinstance(item["input"], dict)))
+    errors = error.errors(include_url=False)
+    first = next(item for item in errors if not ("float" in item["loc"][-1:] and isinstance(item["input"], dict)))
     field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
     return field, "unknown key" if first["type"] == "extra_forbidden" else first["msg"]

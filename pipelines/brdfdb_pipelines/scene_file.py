@@ -1,4 +1,4 @@
-"""Scene files: TOML by path, or by name one of those that come with the program; one sentence for what is wrong."""
+"""Scene files: TOML by path, or by the name of a scene that comes with the program."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ class SceneError(ParameterError):
 
 
 def shipped() -> list[str]:
-    """The names of the scenes that come with the program."""
+    """Return the names of the scenes that come with the program."""
     return sorted(file.name.removesuffix(".toml") for file in _SHIPPED.iterdir() if file.name.endswith(".toml"))
 
 
 def load(name: str) -> Scene:
-    """Read a scene: a path that ends in .toml, or the name of a scene that comes with the program.
+    """Return a scene from a path that ends in .toml, or the name of a scene that comes with the program.
 
-    Files that the scene names lie beside it.
+    File names in a scene are relative to its directory.
 
     Raises
     ------
     SceneError
-        If there is none, it is not TOML, or is not a scene.
+        If there is no such scene, or the file is not TOML or not a scene.
     """
     if not name.endswith(".toml") and name not in shipped():
         sentence = f"is no scene{closest(name, shipped())}; give a path that ends in .toml or one of "
@@ -67,30 +67,30 @@ def load(name: str) -> Scene:
 
 
 def _field_and_sentence(error: ValidationError) -> tuple[str, str]:
-    """Return the first field that pydantic finds fault with, and why; a mistyped key before what is then missing."""
+    """Return the first field that pydantic refuses, and why; an unknown key before a missing one."""
     errors = error.errors(include_url=False)
-    first = next((each for each in errors if each["type"] == "extra_forbidden"), errors[0])
+    first = next((item for item in errors if item["type"] == "extra_forbidden"), errors[0])
     # after the key of a shape comes its kind, which is no key
     loc = [str(part) for before, part in zip((None, *first["loc"]), first["loc"], strict=False) if before != "shape"]
     match first["type"]:
         case "value_error":
             cause = first["ctx"]["error"]
             if not isinstance(cause, ParameterError):
-                said = str(cause)
+                sentence = str(cause)
             else:
                 if loc and cause.parameter.startswith(loc[-1]):
                     loc.pop()
                 loc.append(cause.parameter)
-                said = cause.sentence
+                sentence = cause.sentence
         case "extra_forbidden":
-            missing = [str(each["loc"][-1]) for each in errors if each["type"] == "missing"]
-            said = f"unknown key{closest(loc[-1], missing)}"
+            missing = [str(item["loc"][-1]) for item in errors if item["type"] == "missing"]
+            sentence = f"unknown key{closest(loc[-1], missing)}"
         case "union_tag_invalid":
             loc.append("kind")
-            said = f"{first['ctx']['tag']!r} is not one of {first['ctx']['expected_tags'].replace(chr(39), '')}"
+            sentence = f"{first['ctx']['tag']!r} is not one of {first['ctx']['expected_tags'].replace(chr(39), '')}"
         case "union_tag_not_found":
             loc.append("kind")
-            said = "Field required"
+            sentence = "Field required"
         case _:
-            said = first["msg"]
-    return ".".join(loc), said
+            sentence = first["msg"]
+    return ".".join(loc), sentence

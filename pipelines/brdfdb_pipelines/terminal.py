@@ -1,4 +1,4 @@
-"""What the command line shows: progress bars on stderr, tables on stdout, numbers and the machine in words."""
+"""Output of the command line: progress bars on stderr, tables on stdout, numbers and the machine in words."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-_MANY = 200  # rows, of which rich makes a page in a tenth of a second
+_MANY = 200  # rows that rich lays out in a tenth of a second; longer tables are printed plainly
 
 
 def plain(text: str) -> str:
@@ -24,9 +24,10 @@ def plain(text: str) -> str:
 
 
 def progress(counted: bool = True, text: str = "", transient: bool = False) -> Progress:
-    """A progress bar; `counted` shows how many of how many, for tasks that count things; `text` what else to show.
+    """Return a progress bar on stderr.
 
-    A `transient` one leaves nothing behind, and is not for files: for what may end with a sentence of its own.
+    `counted` adds the number of steps, `text` another column. A `transient` bar leaves nothing behind and is not
+    written to files: for tasks that may end with a sentence of their own.
     """
     console = Console(stderr=True)
     count = [MofNCompleteColumn()] if counted else []
@@ -47,9 +48,9 @@ def progress(counted: bool = True, text: str = "", transient: bool = False) -> P
 def print_table(
     title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: Sequence[str] = ()
 ) -> None:
-    """Print rows under column headings; the columns in `numbers` are set to the right.
+    """Print rows under column headings; the columns in `numbers` are set right.
 
-    When the output is not a terminal, lines are as long as they need to be: nothing is cut for a program to read.
+    When the output is not a terminal, lines are as long as needed, so that programs read everything.
     """
     title, rows = plain(title), [[plain(cell) for cell in row] for row in rows]
     if len(rows) > _MANY:
@@ -69,7 +70,7 @@ def print_table(
 
 
 def _print_plainly(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[str]) -> None:
-    """Print a long table in a fraction of the time, without looks."""
+    """Print a long table without styles, in a fraction of the time."""
     widths = [max(map(cell_len, cells)) for cells in zip(columns, *rows, strict=True)]
     lines = [title]
     for row in (columns, *rows):
@@ -82,7 +83,7 @@ def _print_plainly(title: str, columns: Sequence[str], rows: Sequence[Sequence[s
 
 
 def size(count: float) -> str:
-    """A number of bytes as a human reads it."""
+    """Return a number of bytes as text with a unit."""
     for unit in ("B", "kB", "MB"):
         if count < 999.5:
             return f"{count:.3g} {unit}"
@@ -91,7 +92,7 @@ def size(count: float) -> str:
 
 
 def error(p99: float | None) -> str:
-    """A relative error that a table states, as a human reads it."""
+    """Return a stated relative error as text in percent."""
     if p99 is None:
         return "not measured"
     if p99 < 1e-5:
@@ -100,7 +101,7 @@ def error(p99: float | None) -> str:
 
 
 def count(value: float) -> str:
-    """A number to three digits, thousands with a k."""
+    """Return a number as text of three digits, thousands with a k."""
     for unit in ("", "k", "M"):
         if value < 999.5:
             return f"{value:.3g}{unit}"
@@ -109,5 +110,5 @@ def count(value: float) -> str:
 
 
 def machine() -> str:
-    """What times were taken on."""
+    """Return the machine that times were measured on, in words."""
     return f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"

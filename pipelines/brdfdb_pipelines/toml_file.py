@@ -1,4 +1,4 @@
-"""TOML files of a user, read within bounds: no file makes the program hang or fill the memory."""
+"""TOML files of a user, read within bounds, so that no file makes the program hang or fill the memory."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import Any
 
 from brdfdb.errors import BrdfdbError
 
-MOST_BYTES = 4_000_000  # of a file: tomllib reads about a megabyte a second
-MOST_KEY_PARTS = 64  # of a dotted key: tomllib takes memory that grows with their square
-_MOST_BITS = 8192  # of an integer: far above what any field takes
+MOST_BYTES = 4_000_000  # size of a file [byte]: tomllib reads about a megabyte a second
+MOST_KEY_PARTS = 64  # parts of a dotted key; the memory of tomllib grows with their square
+_MOST_BITS = 14_000  # bits of an integer: Python prints no more than 4300 digits
 
 _PART = r"""(?:"[^"\n]*"|'[^'\n]*'|[\w-]++)"""
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_KEY_PARTS}}}")

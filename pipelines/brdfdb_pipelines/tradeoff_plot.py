@@ -50,7 +50,7 @@ _BLANK: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type":
 
 
 def svg(chart: Chart | FamilyChart) -> str:
-    """The picture as a document of its own."""
+    """Return a chart as an SVG document."""
     with mpl.rc_context(_STYLE):
         text = io.StringIO()
         _canvas(chart).savefig(text, format="svg", metadata=_BLANK)
@@ -61,7 +61,7 @@ def svg(chart: Chart | FamilyChart) -> str:
 
 
 def png(chart: Chart | FamilyChart) -> bytes:
-    """The picture in pixels."""
+    """Return a chart as PNG."""
     with mpl.rc_context(_STYLE):
         data = io.BytesIO()
         _canvas(chart).savefig(data, format="png", dpi=_DPI, metadata={"Software": None})
@@ -76,11 +76,11 @@ def _drawn(chart: Chart) -> Canvas:
     table = ABOVE + PLOT + BELOW
     samplers = table + ROW * (len(chart.points) + 3)
     height = samplers + ROW * (len(chart.samplers) + 3) + _BARS + 44.0
-    said = "Lines go up from the mean error to the 99th percentile, thick over its 95 % confidence interval."
+    subtitle = "Lines go up from the mean error to the 99th percentile, thick over its 95 % confidence interval."
     times = "Bars are quartiles of the time."
     if len(chart.ladder) > 1:
         times += " Dashed: the ladder, the truth by ever coarser quadrature."
-    canvas = titled(height, chart.title, f"{chart.material}, {chart.model}, {wavelengths(chart)}. {said}\n{times}")
+    canvas = titled(height, chart.title, f"{chart.material}, {chart.model}, {wavelengths(chart)}. {subtitle}\n{times}")
     room = WIDTH - LEFT - RIGHT - 4.0 * GAP
     left = LEFT
 
@@ -124,7 +124,7 @@ def _drawn(chart: Chart) -> Canvas:
 
 
 def tail(point: Point) -> str:
-    """The 99th percentile of the error and its confidence interval, all in percent."""
+    """Return the 99th percentile of the error and its confidence interval [%] as text."""
     if point.p99 <= SMALLEST:
         return percent(point.p99)
     low, high = (percent(end).removesuffix(" %") for end in (point.p99_low, point.p99_high or math.inf))
@@ -132,13 +132,13 @@ def tail(point: Point) -> str:
 
 
 def quartiles(cost: Cost) -> str:
-    """The time of a form [ns], and its quartiles."""
+    """Return the time of a form [ns] and its quartiles as text."""
     ns, low, high = map(terminal.count, (cost.ns, cost.low, cost.high))
     return f"{ns} ({low}-{high})"
 
 
 def against(point: Point) -> str:
-    """How many times as fast a form is as the cheapest rung of the truth that is as accurate, and which that is."""
+    """Return the speed of a form relative to the cheapest rung of the exact form that is as accurate, and that rung."""
     return "" if point.saving is None else f"{terminal.count(float(f'{point.saving.times:.2g}'))} ({point.rung})"
 
 
@@ -204,8 +204,8 @@ def _panel(
     cost_axes(axes, [c[0] for c in costs.values()] + [c[2] for c in costs.values()], [p.p99 for p in chart.points])
     steps: list[tuple[float, float]] = []
     for key in front:  # down in error, then across: there is nothing clearly cheaper below
-        here = costs[key][1], height_of(points[key].l1)
-        steps += [(steps[-1][0], here[1]), here] if steps else [here]
+        corner = costs[key][1], height_of(points[key].l1)
+        steps += [(steps[-1][0], corner[1]), corner] if steps else [corner]
     if steps:
         axes.plot(*zip(*steps, strict=True), color=figure_svg.OURS, linewidth=5.0, alpha=0.16, zorder=1, clip_on=False)
     if len(chart.ladder) > 1:

@@ -16,8 +16,8 @@ import numpy as np
 import uvicorn
 
 from brdfdb.materials import Material
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.error_measurement import measure
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout

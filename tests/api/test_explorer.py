@@ -35,7 +35,16 @@ def get(path: str, **headers: str) -> httpx.Response:
 
 
 def test_what_is_served_is_what_there_is() -> None:
-    assert sorted(pages.MEDIA) == NAMES
+    assert sorted(pages.MEDIA) == sorted([*NAMES, "views.js"])
+
+
+def test_the_page_finds_the_views_by_the_names_of_their_modules() -> None:
+    found = [name for name in NAMES if name.startswith("view_")]
+    assert len(found) >= 6
+    script = get("/explorer/views.js").text
+    assert re.findall(r'from "\./(.*?)"', script) == found
+    others = [(FOLDER / name).read_text(encoding="utf-8") for name in NAMES if name not in found]
+    assert not any("view_" in text for text in others)  # nothing else names a module of a view
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -59,7 +68,7 @@ def test_a_file_of_the_explorer_says_in_its_first_lines_what_lives_there(name: s
 def test_nothing_is_fetched_from_elsewhere(name: str) -> None:
     text = (FOLDER / name).read_text(encoding="utf-8").replace(SVG, "")
     assert OUTSIDE.findall(text) == []
-    assert set(re.findall(r'from "\./(.*?)"', text)) <= set(NAMES)
+    assert set(re.findall(r'from "\./(.*?)"', text)) <= {*NAMES, "views.js"}
 
 
 def test_the_page_is_at_the_root_and_names_the_version_of_plotly() -> None:

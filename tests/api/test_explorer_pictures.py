@@ -269,7 +269,7 @@ def test_a_mirror_is_spoken_of_where_there_is_one(chromium: Chromium, address: s
     for name, mirror in (("foam", False), ("scene-copper-sphere", True)):
         chromium.open(f"{address}#material={name}&view=sphere")
         shown(chromium, "view=sphere")
-        assert ("Dirac" in chromium.evaluate("caption.textContent")) is mirror
+        assert ("specular" in chromium.evaluate("caption.textContent")) is mirror
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import publish_dataset
 from brdfdb_api.http.app import create_app
 from brdfdb_api.serving.settings import Settings
 from brdfdb_api.serving.shelf import Shelf

@@ -2,133 +2,51 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit, audit, report
+from brdfdb.audit import audit
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.reciprocity import Reciprocity
-from brdfdb.audit.sampling import Sampling
-from brdfdb.audit.smoothness import Smoothness
 from brdfdb.audit.table_energy import table_energy_of
 from brdfdb.audit.table_error import TableError
 from brdfdb.audit.values import Values
-from brdfdb.geometry import degrees
-from brdfdb.materials import Material, presets, written_name
-from brdfdb.materials.provenance import KnownExcess
 from brdfdb.models import MODELS
-from brdfdb.parameters import ModelSpec
 from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
-from brdfdb.tables.tabulation import tabulate
-from tests.models.draws import middle
+from tests.audit.a_table import (
+    ANISOTROPIC,
+    ISOTROPIC,
+    PARAMETERS,
+    THETA,
+    UNEQUAL,
+    WAVELENGTHS,
+    lambert,
+    material,
+    node,
+    tabulated,
+    verdicts,
+    written,
+)
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
-
-SCHEMA = json.loads((Path(__file__).parents[2] / "schemas" / "audit.schema.json").read_text(encoding="utf-8"))
 
 # rho / pi rounded to float32, summed in float64; half an ulp is 6e-8
 FLOAT32 = 1e-7
 # Two sums of the same numbers in another order; measured 4e-15
 QUADRATURE_TOLERANCE = 1e-13
 
-THETA = [0.0, 10.0, 30.0, 60.0, 80.0, 89.5]
-ISOTROPIC = Grid({"theta_i": THETA, "theta_r": THETA, "delta_phi": [0, 20, 90, 150, 180]})
-UNEQUAL = Grid({"theta_i": [0, 30, 70], "theta_r": [0, 15, 30, 45, 85], "delta_phi": [0, 20, 180]})
-ANISOTROPIC = Grid(
-    {"theta_i": THETA[::2], "phi_i": [0, 100, 200, 360], "theta_r": THETA[::2], "phi_r": [0, 100, 200, 360]}
-)
-WAVELENGTHS = np.array([450.0, 500.0, 700.0])
-
-
-def in_file(spec: ModelSpec) -> dict[str, float]:
-    """Return parameters in the middle of their ranges, as files write them."""
-    values = middle(spec)
-    return {
-        written_name(p): float(degrees(values[p.name])) if p.unit == "rad" else values[p.name] for p in spec.parameters
-    }
-
-
-# What a table of each model takes: a model without a line here is tested in its middle
-PARAMETERS: dict[str, dict[str, Any]] = {name: in_file(spec) for name, spec in MODELS.items()} | {
-    "lambert": {"rho": 0.6},
-    "minnaert": {"k": 0.6, "rho": 0.5},
-    "oren_nayar": {"rho": 0.6, "sigma_deg": 30},
-    "oren_nayar_qualitative": {"rho": 0.6, "sigma_deg": 30},
-    "oren_nayar_unidirectional": {"rho": 0.6, "theta_a_deg": 30, "phi_a_deg": 20},
-    "oren_nayar_single_slope": {"rho": 0.6, "theta_a_deg": 30},
-    "oren_nayar_gaussian": {"rho": 0.6, "sigma_deg": 30},
-    "oren_nayar_body_surface": {"rho": 0.6, "sigma_deg": 30, "k_s": 0.02},
-    "oren_nayar_fujii": {"rho": 0.6, "sigma": 0.5},
-    "oren_nayar_energy_preserving": {"rho": 0.6, "roughness": 0.5},
-    "torrance_sparrow": {"sigma_deg": 10},
-    "ward": {"rho_d": 0.2, "rho_s": 0.2, "alpha_x": 0.4, "alpha_y": 0.3},
-    "ward_half_vector": {"rho_d": 0.2, "rho_s": 0.2, "alpha_x": 0.4, "alpha_y": 0.3},
-    "ward_duer": {"rho_d": 0.2, "rho_s": 0.2, "alpha_x": 0.4, "alpha_y": 0.3},
-    "ward_bounded": {"rho_d": 0.2, "rho_s": 0.2, "alpha_x": 0.4, "alpha_y": 0.3},
-    "he_torrance": {"sigma_0_um": 0.3, "tau_um": 3.0, "a": 0.1},
-}
-
 
 @pytest.fixture(autouse=True)
 def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     """Samplers are audited at length in test_audit_model.py."""
     monkeypatch.setattr("brdfdb.audit.sampling.SAMPLES", 2000)
-
-
-def material(model: str, parameters: dict[str, Any], **more: Any) -> Material:
-    spectral = {"refractive_index": "main/Cu/Johnson"} if MODELS[model].spectral else {}
-    table = {"title": "Made up", "model": model, "source": "no paper", "parameters": parameters, **spectral, **more}
-    return Material.from_table("made-up", table)
-
-
-def tabulated(made_up: Material, grid: Grid, wavelengths: NDArray[np.float64] | None = None) -> Table:
-    dataset = tabulate(Layout(made_up, grid, wavelengths))
-    specular = dataset["specular_reflectance"].values.astype(np.float32) if "specular_reflectance" in dataset else None
-    brdf = dataset["brdf"].values
-    return Table(made_up.name, "r000001", dataset.attrs, grid, wavelengths, brdf, specular)
-
-
-def lambert(rho: float, grid: Grid = ISOTROPIC, **more: Any) -> Table:
-    return tabulated(material("lambert", {"rho": rho}, **more), grid)
-
-
-def verdicts(found: MaterialAudit) -> dict[str, str]:
-    """Every finding that is not a pass."""
-    every = {
-        "energy": found.of(Energy).table.verdict,
-        "reciprocity": found.of(Reciprocity).verdict,
-        "positivity": found.of(Values).positivity,
-        "finiteness": found.of(Values).finiteness,
-        "smoothness": found.of(Smoothness).verdict,
-        "table_error": found.of(TableError).verdict,
-        "sampling": found.of(Sampling).verdict,
-    }
-    return {name: verdict for name, verdict in every.items() if verdict != "passes"}
-
-
-ABOUT: dict[str, Any] = {"store": "a store", "when": datetime(2026, 11, 21, tzinfo=UTC)}
-
-
-def written(audits: list[MaterialAudit]) -> dict[str, Any]:
-    """The report as a file holds it, valid by the schema in the repository."""
-    document = json.loads(report(audits, **ABOUT).model_dump_json())
-    jsonschema.validate(document, SCHEMA)
-    assert isinstance(document, dict)
-    return document
 
 
 # What passes
@@ -212,14 +130,6 @@ def test_every_model_is_reciprocal_positive_and_finite_and_so_are_its_tables(mod
 
 
 # What must not pass
-
-
-def node(table: Table, value: float) -> Table:
-    """A copy with one value changed, away from every edge, where light and viewer are not at the same angle."""
-    brdf = table.brdf.copy()
-    index = (1, 1, 2, 2) if table.anisotropic else (1, 2, 1)
-    brdf[index] = value
-    return replace(table, values=brdf)
 
 
 TABLES = pytest.mark.parametrize(
@@ -384,155 +294,3 @@ def test_a_model_that_is_not_reciprocal_is_caught(monkeypatch: pytest.MonkeyPatc
     assert found.of(Reciprocity).model_random.max == pytest.approx(5e-11, rel=0.1)
     assert found.of(Reciprocity).table_nodes is not None
     assert found.of(Reciprocity).table_nodes.max == 0.0
-
-
-# What is known
-
-
-def known(max_albedo: float, from_theta_i_deg: float) -> KnownExcess:
-    return KnownExcess(max_albedo=max_albedo, from_theta_i_deg=from_theta_i_deg, citation="Somebody 1991, p. 3")
-
-
-@pytest.mark.parametrize(
-    ("excess", "verdict", "reason"),
-    [
-        (
-            known(1.06, 60.0),
-            "known published excess",
-            "reflects 1.05 of what arrives at 80 degrees: Somebody 1991, p. 3",
-        ),
-        (
-            known(1.06, 10.0),
-            "known published excess",
-            "reflects 1.05 of what arrives at 80 degrees: Somebody 1991, p. 3",
-        ),
-        (known(1.04, 60.0), "violates", "reflects 1.05 of what arrives at 80 degrees"),
-        (known(1.06, 60.1), "violates", "reflects 1.05 of what arrives at 80 degrees"),
-        (None, "violates", "reflects 1.05 of what arrives at 80 degrees"),
-    ],
-)
-def test_an_excess_is_known_up_to_its_albedo_and_from_its_angle_on(
-    excess: KnownExcess | None, verdict: str, reason: str
-) -> None:
-    table = lambert(0.5)
-    mirror = np.array([0.1, 0.1, 0.1, 0.51, 0.55, 0.5], dtype=np.float32)
-    found = table_energy_of(replace(table, specular=mirror), excess)
-    assert (found.verdict, found.reason) == (verdict, reason)
-    assert found.max_at_theta_i_deg == 80.0
-    # 0.6 at 30 degrees, 1.01 at 60, and linear between them
-    assert found.exceeds_1_from_theta_i_deg == pytest.approx(30.0 + 30.0 * 0.4 / 0.41, abs=0.002)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_no_excess_is_known_to_be_infinite(value: float) -> None:
-    table = node(lambert(0.5), value)
-    assert table_energy_of(table, known(1e300, 0.0)).verdict == "violates"
-
-
-@pytest.mark.parametrize("accept", [False, True])
-def test_an_excess_is_accepted_of_the_model_not_of_a_table_that_exceeds_1_where_it_does_not(accept: bool) -> None:
-    table = tabulated(material("oren_nayar", {"rho": 0.98, "sigma_deg": 40}), fine(2.0))
-    bright = table.brdf * np.float32(1.02 / np.max(directional_albedo(table).albedo))
-    found = audit(replace(table, values=bright), accept_excess=accept)
-    assert found.of(Energy).model.exceeds_1_from_theta_i_deg is None
-    assert (found.of(Energy).table.max_albedo, found.of(Energy).table.verdict) == (
-        pytest.approx(1.02, rel=1e-6),
-        "violates",
-    )
-
-
-def fine(step: float) -> Grid:
-    theta = np.append(np.arange(0.0, 89.0, step), [89.0, 89.5])
-    return Grid({"theta_i": theta, "theta_r": theta, "delta_phi": np.arange(0.0, 181.0, step)})
-
-
-def test_the_published_magnesium_oxide_is_a_known_excess() -> None:
-    found = audit(tabulated(presets()["magnesium-oxide-ceramic"], fine(1.0), np.array([500.0])))
-    assert verdicts(found) == {"energy": "known published excess"}
-    assert found.verdict == "known published excess"
-    assert " of what arrives at 83 degrees: He et al. 1991, section 3.2.3" in found.of(Energy).table.reason
-    # ERRATA: 0.977 at 30 degrees, 1.016 at 60, 1.11 at 85, above 1 from about 54 on
-    at = {
-        theta: row[0]
-        for theta, row in zip(found.of(Energy).table.theta_i_deg, found.of(Energy).table.albedo, strict=True)
-    }
-    assert at[30.0] == pytest.approx(0.977, abs=0.002)
-    assert at[60.0] == pytest.approx(1.016, abs=0.002)
-    assert at[85.0] == pytest.approx(1.11, abs=0.015)
-    assert found.of(Energy).table.exceeds_1_from_theta_i_deg == pytest.approx(54.0, abs=1.0)
-
-
-# Directional albedo at 89 degrees with rho = 1, interreflection included: ERRATA of eqs 27 and 28
-@pytest.mark.parametrize(("sigma_deg", "albedo"), [(10, 1.031), (20, 1.042), (30, 1.012)])
-def test_oren_nayar_with_rho_1_violates_unless_it_is_accepted(sigma_deg: float, albedo: float) -> None:
-    table = tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": sigma_deg}), fine(2.0))
-    found = audit(table)
-    assert (found.verdict, verdicts(found)) == ("violates", {"energy": "violates"})
-    assert "; this model does so by itself for such parameters: up to 1.0" in found.of(Energy).model.reason
-    assert "(Oren and Nayar 1994, eqs 27, 28 and 30: " in found.of(Energy).model.reason
-    accepted = audit(table, accept_excess=True)
-    assert (accepted.verdict, accepted.of(Energy).verdict) == ("accepted excess", "accepted excess")
-    assert "this model does so by itself" in accepted.of(Energy).reason
-    assert found.of(Energy).table.albedo[-2] == [pytest.approx(albedo, abs=0.002)]
-
-
-def test_what_a_recipe_says_of_an_excess_is_repeated_and_excuses_nothing() -> None:
-    ward = {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": 1.0, "alpha_y": 0.001}
-    claim = {"max_albedo": 2.0, "from_theta_i_deg": 0.0, "citation": "I say so"}
-    table = tabulated(material("ward_half_vector", ward, known_excess=claim), ANISOTROPIC)
-    found = audit(table)
-    assert (found.verdict, found.of(Energy).verdict) == ("violates", "violates")
-    assert found.of(Energy).reason.endswith("; its recipe excuses it, which counts for nothing: I say so")
-
-
-def test_what_is_accepted_excuses_nothing_but_the_energy_of_the_model() -> None:
-    table = node(tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": 20}), fine(5.0)), -1.0)
-    found = audit(table, accept_excess=True)
-    assert (found.verdict, found.of(Energy).model.verdict, found.of(Values).positivity) == (
-        *("violates", "accepted excess"),
-        "violates",
-    )
-
-
-def test_oren_nayar_with_rho_1_conserves_energy_on_a_rough_surface() -> None:
-    found = audit(tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": 40}), fine(2.0)))
-    assert found.verdict == "passes"
-
-
-# The report
-
-
-def test_the_report_names_the_violations_and_nothing_else() -> None:
-    good, bad = lambert(0.5), node(lambert(0.5), -1.0)
-    excused = tabulated(presets()["blue-plastic"], ISOTROPIC, np.array([460.0]))
-    named = {"good": good, "bad": bad, "excused": excused}
-    audits = [audit(replace(table, name=name)) for name, table in named.items()]
-    document = written(audits)
-    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 5, ["bad"])
-    assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]
-    assert AuditReport.model_validate(document) == report(audits, **ABOUT)
-
-
-def test_an_empty_report_is_a_report() -> None:
-    about = {"store": "a store", "brdfdb": version("brdfdb"), "when": "2026-11-21T00:00:00Z"}
-    empty: dict[str, list[Any]] = {"materials": [], "atlas": [], "gallery": [], "damaged": [], "violations": []}
-    document = written([])
-    assert [each["key"] for each in document.pop("explanations")] == list(FINDINGS)
-    assert document == {"format": "brdfdb-audit", "version": 5, **about, **empty}
-
-
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda document: document.pop("violations"),
-        lambda document: document.update(comment="fine"),
-        lambda document: document["materials"][0].update(verdict="fine"),
-        lambda document: document["materials"][0]["findings"]["energy"]["table"].update(max_albedo="1.0"),
-        lambda document: document["materials"][0]["findings"]["values"].pop("count"),
-    ],
-)
-def test_the_schema_refuses_what_is_no_report(spoil: Callable[[dict[str, Any]], Any]) -> None:
-    document = written([audit(lambert(0.5))])
-    spoil(document)
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(document, SCHEMA)

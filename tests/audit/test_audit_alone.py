@@ -21,7 +21,7 @@ from brdfdb.parameters import Floats
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
-from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, lambert, tabulated, written
+from tests.audit.a_table import ANISOTROPIC, ISOTROPIC, lambert, tabulated, written
 from tests.benchmarks.sound_materials import built
 
 WHY = "; the table does not say what its source is, or this program does not have its model"

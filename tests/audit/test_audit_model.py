@@ -26,7 +26,7 @@ from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
 from brdfdb.tables import error_measurement
 from brdfdb.tables.table import Table
-from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
+from tests.audit.a_table import ANISOTROPIC, ISOTROPIC, PARAMETERS, WAVELENGTHS, lambert, material, tabulated
 
 Array = NDArray[np.float64]
 

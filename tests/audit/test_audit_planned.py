@@ -18,7 +18,7 @@ from brdfdb.materials.provenance import KnownExcess
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
-from tests.audit.test_audit import ISOTROPIC, known, material, verdicts, written
+from tests.audit.a_table import ISOTROPIC, known, material, verdicts, written
 from tests.tables.test_albedo import KINDS, planned, table_of
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")

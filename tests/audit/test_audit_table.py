@@ -14,7 +14,7 @@ from brdfdb.audit.smoothness import TABLE_TOLERANCE, Jump, Smoothness, smoothnes
 from brdfdb.audit.table_error import LEAST, TableError, table_error_of
 from brdfdb.tables import error_measurement
 from brdfdb.tables.table import Table
-from tests.audit.test_audit import ANISOTROPIC, ISOTROPIC, UNEQUAL, lambert
+from tests.audit.a_table import ANISOTROPIC, ISOTROPIC, UNEQUAL, lambert
 from tests.audit.test_audit_planned import scaled
 from tests.tables.test_albedo import KINDS, planned, table_of
 

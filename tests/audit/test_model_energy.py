@@ -21,7 +21,7 @@ from brdfdb.integrals.uniform_bound import largest_uniform
 from brdfdb.materials import Material, presets
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.models import MODELS
-from tests.audit.test_audit import PARAMETERS, known, lambert, material
+from tests.audit.a_table import PARAMETERS, known, lambert, material
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
 

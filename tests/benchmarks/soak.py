@@ -27,8 +27,8 @@ from rich.table import Table
 from service import as_npy, points, served
 
 from brdfdb.materials import Material
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.revisions import collect
-from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate

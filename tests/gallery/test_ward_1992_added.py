@@ -9,6 +9,7 @@ import pytest
 
 from brdfdb.figure import Figure, Panel, Picture
 from brdfdb.gallery import ward_1992_box, ward_1992_gonioreflectometer, ward_1992_sampling
+from brdfdb.gallery._ward_sphere import Points
 from brdfdb.reference import ward_1992 as reference
 
 FIGURES = {**ward_1992_gonioreflectometer.FIGURES, **ward_1992_sampling.FIGURES, **ward_1992_box.FIGURES}
@@ -139,7 +140,7 @@ def test_pictures_b_and_c_differ_by_the_highlight_alone() -> None:
 
 def test_evenly_drawn_rays_and_those_of_eq_7_have_one_mean() -> None:
     _, line = ward_1992_sampling._line()
-    points = ward_1992_sampling._Points(*(each[::20] for each in line))
+    points = Points(*(values[::20] for values in line))
     seven = ward_1992_sampling._by_eq_7(points, 20000).around
     even = ward_1992_sampling._evenly(points, 200000).around
     error = np.sqrt(seven.var(axis=0) / len(seven) + even.var(axis=0) / len(even))

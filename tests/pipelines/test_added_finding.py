@@ -12,7 +12,7 @@ import pytest
 from brdfdb.audit import FINDINGS, AuditReport
 from brdfdb.audit.finding import Cell, Finding, Sentence, Subject, Verdict
 from brdfdb.materials import Material
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate

@@ -6,6 +6,7 @@ import errno
 import json
 import re
 import shutil
+import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -19,14 +20,16 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import StoreError
-from brdfdb.store import manifest
+from brdfdb.store import files
+from brdfdb.store.lock import Lock
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import Lock
 from brdfdb.tables import layout as layouts
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
+from brdfdb.tables.xarray_view import plain_attributes
 from brdfdb_pipelines import build_resources, cli
 from brdfdb_pipelines.build import Built, build
+from brdfdb_pipelines.exit_codes import BUG
 from brdfdb_pipelines.recipe_file import Job, Recipe, RecipeError, load
 from brdfdb_pipelines.workers import Workers
 
@@ -108,8 +111,10 @@ def test_tables_are_those_of_tabulate_with_the_request_beside_them(recipe: Path,
         expected = tabulation.tabulate(job.layout())
         request = json.loads(json.dumps(job.request))
         with store.dataset(job.material.name) as found:
-            of_build = {"request": request, "request_sha256": digest(request), "error": found.attrs["error"]}
-            xr.testing.assert_identical(found.load(), expected.assign_attrs(of_build))
+            error = store[job.material.name].attrs["error"]
+            of_build = {"request": request, "request_sha256": digest(request), "error": error}
+            expected.attrs = plain_attributes(expected.attrs | of_build)
+            xr.testing.assert_identical(found.load(), expected)
         assert store.summary(job.material.name)["request_sha256"] == digest(request)
 
 
@@ -324,11 +329,14 @@ def test_a_build_that_is_broken_off_says_so_and_the_old_revision_is_served(
 
 
 def test_a_bug_in_the_program_keeps_its_traceback(
-    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     failing(monkeypatch, "foam", ZeroDivisionError("a bug"))
-    with pytest.raises(ZeroDivisionError, match="a bug"):
-        cli.main(["build", str(recipe), "--store", str(tmp_path), "--jobs", "1"])
+    assert cli.main(["build", str(recipe), "--store", str(tmp_path / "store"), "--jobs", "1"]) == BUG
+    (file,) = tmp_path.glob("brdfdb-*.txt")
+    assert capsys.readouterr().err.endswith(f"its traceback is in {file} (ZeroDivisionError: a bug)\n")
+    assert file.read_text(encoding="utf-8").endswith("\nZeroDivisionError: a bug\n")
 
 
 def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
@@ -336,7 +344,7 @@ def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
 ) -> None:
     root, written = tmp_path / "store", 0
     monkeypatch.setattr(layouts, "_BLOCK_VALUES", 50)
-    write = manifest.write_file
+    write = files.write_file
 
     def fill(path: Path, data: bytes, temporary: Path) -> Any:
         nonlocal written
@@ -346,7 +354,7 @@ def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
         return write(path, data, temporary)
 
     with monkeypatch.context() as patch:
-        for user in ("brdfdb.store.staging.write_file", "brdfdb.store.manifest.write_file"):
+        for user in ("brdfdb.store.staging.write_file", "brdfdb.store.sealed_json.write_file"):
             patch.setattr(user, fill)
         assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "1"]) == 2
     out, err = capsys.readouterr()

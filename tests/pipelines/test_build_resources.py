@@ -12,7 +12,7 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import presets
-from brdfdb.store import staging
+from brdfdb.store import marker, staging
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb_pipelines import build_resources, cli
@@ -40,7 +40,7 @@ def layout(name: str, half: bool, how: Interpolation, nodes: int, rows: int) -> 
     ],
 )
 def test_a_task_takes_at_most_the_memory_that_is_expected_and_not_a_tenth_of_it(table: Layout, tmp_path: Path) -> None:
-    staging.make_store(tmp_path / "store")
+    marker.make_store(tmp_path / "store")
     text = json.dumps(table.document())
     directory = str(staging.prepare(tmp_path / "store", table.source.name, {"asked": "by a test"}, text))
     for number in range(len(table.blocks)):  # the first time kernels are compiled

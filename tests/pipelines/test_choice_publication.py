@@ -12,7 +12,7 @@ import brdfdb
 from brdfdb.audit.pairs import pairs_of
 from brdfdb.audit.table_error import table_error_of
 from brdfdb.materials import presets
-from brdfdb.store.staging import make_store
+from brdfdb.store.marker import make_store
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan

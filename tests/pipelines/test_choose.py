@@ -15,7 +15,7 @@ from matplotlib.image import imread
 import brdfdb
 from brdfdb.models import oren_nayar_gaussian_vectors
 from brdfdb.scenes.choice_document import Choice, Price
-from brdfdb.scenes.offered_forms import Candidate
+from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb_pipelines import choose, cli, terminal
 from brdfdb_pipelines.documents import schema
 
@@ -52,7 +52,7 @@ COSTS = {
 }
 
 
-def made_up_prices(forms: Sequence[Candidate], *_: object) -> list[Price]:
+def made_up_prices(forms: Sequence[OfferedForm], *_: object) -> list[Price]:
     """Price forms by their kinds; what asks the truth at limbs costs twice as much."""
     costs = [COSTS[each.form.kind] * (2.0 if "limbs" in each.form.key else 1.0) for each in forms]
     return [Price(cost, np.array([cost])) for cost in costs]

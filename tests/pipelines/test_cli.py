@@ -138,7 +138,7 @@ def test_list_presets_needs_no_store_and_cuts_nothing(tmp_path: Path, capsys: Ca
     assert run("list", "--presets", "--store", tmp_path / "none") == 0
     out, _ = capsys.readouterr()
     lines = out.splitlines()
-    assert lines[0].strip() == "59 built-in materials"
+    assert lines[0].strip() == "59 presets"
     assert [line.split()[0] for line in lines[2:]] == list(presets())
     assert all(material.source in out for material in presets().values())
 

@@ -14,7 +14,7 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.materials import Material
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate

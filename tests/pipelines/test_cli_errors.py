@@ -91,6 +91,16 @@ def test_a_module_of_no_extra_is_a_bug(tmp_path: Path, monkeypatch: pytest.Monke
     assert "brdfdb.nowhere" in capsys.readouterr().err
 
 
+def test_options_of_every_command_stand_anywhere(tmp_path: Path, capsys: Captured) -> None:
+    for arguments in (
+        ("--debug", "export", "exr", "foam"),
+        ("export", "--debug", "exr", "foam"),
+        ("export", "exr", "foam", "--debug"),
+    ):
+        assert run(*arguments, "--store", tmp_path) == REFUSED
+        assert capsys.readouterr().err.startswith("Traceback")
+
+
 @pytest.mark.parametrize("place", [("--debug", "chart", "foam"), ("chart", "foam", "--debug")])
 def test_debug_prints_the_traceback_before_the_sentence(
     place: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, capsys: Captured

@@ -12,7 +12,7 @@ import pytest
 
 import brdfdb
 from brdfdb.materials import presets
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate

@@ -13,7 +13,7 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.audit import sampling
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb_pipelines import cli
 
 DEFINED = """\

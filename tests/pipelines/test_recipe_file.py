@@ -98,7 +98,7 @@ BAD = [
     changed('title = "My own"\n', "", "define.mine: title: Field required", GOOD + DEFINED),
     changed('model = "ward"\n', "", "define.mine: model: Field required", GOOD + DEFINED),
     changed("alpha_y = 0.3\n", "", "define.mine: alpha_y: missing", GOOD + DEFINED),
-    changed("define.mine", "define.foam", "define.foam: is the name of a built-in material", GOOD + DEFINED),
+    changed("define.mine", "define.foam", "define.foam: is the name of a preset", GOOD + DEFINED),
     # another type
     changed('title = "one"', "title = 5", "title: "),
     changed('["foam"]', '"foam"', "materials: "),

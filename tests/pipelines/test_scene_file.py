@@ -82,7 +82,7 @@ def test_the_scenes_of_the_papers_are_there() -> None:
         ('kind = "sphere", ', "", "objects.0.shape.kind: Field required"),
         ('material = "mine"', 'material = "foan"', "objects.ball.material: 'foan' is unknown; closest: foam"),
         ("rho = 0.5", "rho = 5", "define.mine: rho: 5 is outside [0, 1]"),
-        ("[define.mine]", "[define.foam]", "define.foam: is the name of a built-in material; give yours another"),
+        ("[define.mine]", "[define.foam]", "define.foam: is the name of a preset; give yours another"),
         ('title = "one"', 'illuminant = "D66"', "illuminant: 'D66' is unknown; closest: D65"),
         (
             'title = "one"',

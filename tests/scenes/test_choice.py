@@ -12,7 +12,7 @@ from brdfdb.scenes import sample_positions
 from brdfdb.scenes.choice import CONFIDENCE, Decision, InfeasibleError, Left, Look, Pick, Seen, choose, pick
 from brdfdb.scenes.choice_document import Price, describe
 from brdfdb.scenes.gbuffer import View, gather, gather_at
-from brdfdb.scenes.offered_forms import LIMB_DEG, Candidate, candidates
+from brdfdb.scenes.offered_forms import LIMB_DEG, OfferedForm, offered_forms
 from brdfdb.scenes.renderer import reflectors, render
 from brdfdb.scenes.scene import Scene, Tolerance
 from brdfdb_pipelines.scene_file import load, shipped
@@ -32,7 +32,7 @@ COSTS = {
 }
 
 
-def made_up_costs(offered: dict[str, list[Candidate]]) -> dict[str, Floats]:
+def made_up_costs(offered: dict[str, list[OfferedForm]]) -> dict[str, Floats]:
     return {
         name: np.array(
             [[COSTS[each.form.kind] * (1 if each.wavelength_nm is None else each.wavelength_nm.size) for each in forms]]
@@ -90,14 +90,14 @@ def look(seen: Seen) -> Look:
     return Look(seen, None)
 
 
-def most(seen: Seen, name: str, form: Candidate) -> float:
+def most(seen: Seen, name: str, form: OfferedForm) -> float:
     return float(seen.errors(name, seen.picture({name: form})).max())
 
 
-def offered_and_seen(scene: Scene, *widths: int) -> tuple[dict[str, list[Candidate]], list[Seen]]:
+def offered_and_seen(scene: Scene, *widths: int) -> tuple[dict[str, list[OfferedForm]], list[Seen]]:
     """Candidates without tables, and the scene at some widths."""
     materials = reflectors(scene)
-    offered = {name: candidates(each.material, each.wavelength_nm, ()) for name, each in materials.items()}
+    offered = {name: offered_forms(each.source, each.wavelength_nm, ()) for name, each in materials.items()}
     truths = {name: forms[0] for name, forms in offered.items()}
     return offered, [Seen(scene, gather(scene, width), truths, materials) for width in widths]
 
@@ -168,12 +168,12 @@ def test_what_is_cheaper_in_half_of_the_rounds_is_the_noise_of_a_clock() -> None
 
 
 @pytest.fixture(scope="module")
-def rough() -> list[Candidate]:
+def rough() -> list[OfferedForm]:
     """A sphere's candidates with tables planned for 1 %."""
-    return candidates(presets()["rendered-sphere-40deg"], None, [0.01])
+    return offered_forms(presets()["rendered-sphere-40deg"], None, [0.01])
 
 
-def test_every_table_is_offered_with_the_truth_at_limbs(rough: list[Candidate]) -> None:
+def test_every_table_is_offered_with_the_truth_at_limbs(rough: list[OfferedForm]) -> None:
     forms = {each.form.key: each for each in rough}
     tables = [key for key, each in forms.items() if each.form.kind == "table" and "limbs" not in key]
     assert tables
@@ -188,7 +188,7 @@ def test_every_table_is_offered_with_the_truth_at_limbs(rough: list[Candidate]) 
         np.testing.assert_array_equal(values[~limb], forms[key].brdf(wi[~limb], wr[~limb]))
 
 
-def test_limbs_that_no_pixel_of_the_picture_shows_refuse_a_table(rough: list[Candidate]) -> None:
+def test_limbs_that_no_pixel_of_the_picture_shows_refuse_a_table(rough: list[OfferedForm]) -> None:
     name = "rendered-sphere-40deg"
     scene = scene_of({"ciede2000": 1.0}, name)
     materials = reflectors(scene)

@@ -14,9 +14,10 @@ from brdfdb import models
 from brdfdb.errors import StoreError
 from brdfdb.forms.catalogue import of_family, of_table
 from brdfdb.materials import Material
-from brdfdb.store.family import Family, FamilyRecord, Sweep, blended, path_of, read_record, stencil
+from brdfdb.store.family import Family, FamilyRecord, Sweep, blended, read_record, stencil
 from brdfdb.store.family_records import POINTS, measure, parameter_points
-from brdfdb.store.manifest import sealed
+from brdfdb.store.paths import family_path
+from brdfdb.store.sealed_json import sealed
 from brdfdb.tables import error_measurement
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
@@ -331,7 +332,7 @@ def test_members_at_other_wavelengths_are_refused(families: Families) -> None:
 
 def test_a_record_comes_back_and_a_damaged_one_is_named(tmp_path: Path, families: Families) -> None:
     record = families["copper"][0].record
-    path = path_of(tmp_path, "copper")
+    path = family_path(tmp_path, "copper")
     path.parent.mkdir()
     content = json.loads(json.dumps(record.model_dump(mode="json")))
     path.write_bytes(sealed(content))

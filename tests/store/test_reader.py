@@ -21,9 +21,10 @@ from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.materials import Material
 from brdfdb.store import codec
 from brdfdb.store import reader as module
-from brdfdb.store.manifest import Head, sealed, unsealed
+from brdfdb.store.pointer import Head
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.sealed_json import sealed, unsealed
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate

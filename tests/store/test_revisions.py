@@ -15,9 +15,10 @@ import brdfdb
 from brdfdb.errors import StoreError, UnknownMaterialError
 from brdfdb.materials import Material
 from brdfdb.store import revisions
-from brdfdb.store.manifest import manifest_of
+from brdfdb.store.lock import Lock
+from brdfdb.store.paths import manifest_path
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.revisions import collect, difference, history, rollback, standing
-from brdfdb.store.staging import Lock, publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.tabulation import tabulate
@@ -140,7 +141,7 @@ def test_collection_after_a_rollback_keeps_the_current_revision_and_numbers_are_
 def test_collection_takes_what_crashes_left_behind_and_nothing_of_a_build_at_work(root: Path) -> None:
     material = root / "materials" / "white"
     shutil.copytree(material / "r000004", material / "r000005")  # no manifest
-    shutil.copyfile(manifest_of(material / "r000004"), manifest_of(material / "r000006"))  # no directory
+    shutil.copyfile(manifest_path(material / "r000004"), manifest_path(material / "r000006"))  # no directory
     (material / ".HEAD.json.0123").write_text("{")
     (root / ".brdfdb.json.0123").write_text("{")
     for name in ("white", "black"):

@@ -20,9 +20,9 @@ from brdfdb.materials import Material
 from brdfdb.store import snapshots, verification
 from brdfdb.store.family import Sweep
 from brdfdb.store.family_records import write_family
-from brdfdb.store.manifest import snapshot_path
+from brdfdb.store.paths import snapshot_path
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.revisions import collect
-from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.tabulation import tabulate

@@ -16,10 +16,12 @@ import xarray as xr
 import brdfdb
 from brdfdb.errors import StoreError
 from brdfdb.materials import Material
-from brdfdb.store import codec, snapshots, staging, verification
-from brdfdb.store.manifest import manifest_of, sealed, unsealed
+from brdfdb.store import codec, publication, snapshots, verification
+from brdfdb.store.marker import make_store
+from brdfdb.store.paths import manifest_path
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.revisions import collect, history, rollback, standing
-from brdfdb.store.staging import make_store, publish_dataset
+from brdfdb.store.sealed_json import sealed, unsealed
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.tabulation import tabulate
@@ -106,12 +108,12 @@ def test_a_pointer_that_a_first_publication_is_about_to_write_is_not_missed(tmp_
 
 
 def test_an_altered_older_manifest_is_not_believed(root: Path) -> None:
-    older = manifest_of(root / "materials" / "white" / "r000001")
+    older = manifest_path(root / "materials" / "white" / "r000001")
     files = unsealed(older.read_bytes(), "", "")["files"]
     chunk = older.with_name("r000001") / "brdf" / "c" / "0" / "0" / "0"
     other = (older.with_name("r000002") / "brdf" / "c" / "0" / "0" / "0").read_bytes()
     chunk.write_bytes(other)
-    newer = unsealed(manifest_of(root / "materials" / "white" / "r000002").read_bytes(), "", "")["files"]
+    newer = unsealed(manifest_path(root / "materials" / "white" / "r000002").read_bytes(), "", "")["files"]
     changed(older, files={**files, "brdf/c/0/0/0": newer["brdf/c/0/0/0"]})
     said = r"^white r000001 is damaged: r000001\.MANIFEST\.json is not the one whose digest was recorded$"
     for ask in (
@@ -121,7 +123,7 @@ def test_an_altered_older_manifest_is_not_believed(root: Path) -> None:
     ):
         with pytest.raises(StoreError, match=said):
             ask()
-    assert staging.adoptable(root, "white", digest({"rho": 0.25})) is None
+    assert publication.adoptable(root, "white", digest({"rho": 0.25})) is None
     (found,) = findings(root)
     assert found.startswith(
         "white r000001 is damaged: r000001.MANIFEST.json is not the one whose digest was recorded ("
@@ -197,7 +199,7 @@ def test_a_revision_that_is_superseded_and_collected_while_it_is_verified_is_no_
 def test_verify_knows_what_a_table_is(root: Path, change: Callable[[xr.Dataset], xr.Dataset], said: str) -> None:
     publish_dataset(root, "white", change(lambert(0.5)))
     (found,) = findings(root)
-    manifest = manifest_of(root / "materials" / "white" / "r000004")
+    manifest = manifest_path(root / "materials" / "white" / "r000004")
     assert found == f"white r000004 {said}; `rm {manifest}`, then `brdfdb build` with its recipe repairs it"
 
 
@@ -215,7 +217,7 @@ def test_verify_remarks_on_what_a_table_does_not_state(root: Path) -> None:
 
 def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(codec, "_CHUNK_VALUES", 9)
-    whole = staging.write_file
+    whole = publication.write_file
 
     def spoil(path: Path, data: bytes, temporary: Path) -> object:
         if path.match("brdf/c/2/0/0"):  # written wrong, so that manifest and file agree
@@ -223,7 +225,7 @@ def test_verify_decodes_every_chunk(root: Path, monkeypatch: pytest.MonkeyPatch)
         return whole(path, data, temporary)
 
     with monkeypatch.context() as patch:
-        patch.setattr(staging, "write_file", spoil)
+        patch.setattr(publication, "write_file", spoil)
         publish_dataset(root, "white", lambert(0.5))
     brdfdb.open(root).verify("white")
     (found,) = findings(root)
@@ -234,7 +236,7 @@ def test_a_revision_of_another_material_is_not_adopted(root: Path) -> None:
     publish_dataset(root, "black", lambert(0.125))
     white, black = root / "materials" / "white", root / "materials" / "black"
     shutil.copytree(black / "r000001", white / "r000009")
-    shutil.copyfile(manifest_of(black / "r000001"), manifest_of(white / "r000009"))
+    shutil.copyfile(manifest_path(black / "r000001"), manifest_path(white / "r000009"))
     (white / "HEAD.json").unlink()
     (found,) = findings(root)
     assert "`brdfdb rollback white r000003`" in found
@@ -253,7 +255,7 @@ def test_a_revision_without_its_directory_is_named_and_stays_while_a_snapshot_na
     (found,) = findings(root)
     assert found.startswith("white r000001 is damaged: its directory is missing (not the current revision); copy it")
     collect(root, 1)
-    assert manifest_of(root / "materials" / "white" / "r000001").is_file()
+    assert manifest_path(root / "materials" / "white" / "r000001").is_file()
     snapshots.remove(root, "paper")
     collect(root, 1)
     assert findings(root) == []

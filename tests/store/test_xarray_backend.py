@@ -14,8 +14,8 @@ import xarray as xr
 import brdfdb
 from brdfdb.errors import ParameterError, StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.materials import presets
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.snapshots import create
-from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.tabulation import tabulate

@@ -12,7 +12,7 @@ from brdfdb.geometry import unit_vector
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
-from tests.audit.test_audit import ISOTROPIC, material
+from tests.audit.a_table import ISOTROPIC, material
 from tests.tables.test_albedo import KINDS, planned, table_of
 
 # Azimuths are folded, which rounds them: measured 1.8e-13, of f_r far below the offset of its logarithm

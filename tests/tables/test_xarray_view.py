@@ -10,8 +10,8 @@ import zarr
 import brdfdb
 from brdfdb.geometry import directions_from_half_difference
 from brdfdb.materials import presets
+from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
-from brdfdb.store.staging import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.tabulation import tabulate

@@ -1,19 +1,16 @@
 // Sliders, switches and the choice of a view: they show the state, and tell what a hand changes of it.
 
 import { element } from "./dom.js";
-import { ILLUMINANTS, MODEL, VIEWS } from "./state.js";
+import { ILLUMINANTS, MODEL } from "./state.js";
 import { anisotropic, makesColour, nearest } from "./series.js";
+import { VIEWS } from "./views.js";
 
 const form = document.getElementById("controls");
 const views = document.getElementById("views");
 const fields = form.elements;
-const TITLES = {
-  cut: "Cut", hemisphere: "Hemisphere", "half-difference": "Half–difference", spectrum: "Spectrum", albedo: "Albedo",
-  sphere: "Sphere",
-};
 
-for (const view of VIEWS) {
-  views.append(element("label", {}, element("input", { type: "radio", name: "view", value: view }), TITLES[view]));
+for (const { name, title } of Object.values(VIEWS)) {
+  views.append(element("label", {}, element("input", { type: "radio", name: "view", value: name }), title));
 }
 
 fields.illuminant.append(...ILLUMINANTS.map((name) => new Option(name)));
@@ -51,27 +48,28 @@ export function show(state, series) {
     fields[name].value = state[name];
     said(name, `${state[name]}°`);
   }
-  for (const each of form.querySelectorAll("[data-view]")) each.hidden = each.dataset.view !== state.view;
-  fields.theta_i.disabled = ["albedo", "half-difference"].includes(state.view);
-  fields.phi_i.disabled = state.view === "albedo" || !(state.view === "sphere" || anisotropic(series));
+  const { idle = [], also = [], turned = false } = VIEWS[state.view];
+  for (const name of ["theta_r", "turn"]) fields[name].closest("label").hidden = !also.includes(name);
+  fields.theta_i.disabled = idle.includes("theta_i");
+  fields.phi_i.disabled = idle.includes("phi_i") || !(turned || anisotropic(series));
   fields.log.checked = state.scale === "log";
-  fields.log.disabled = ["albedo", "sphere"].includes(state.view);
+  fields.log.disabled = idle.includes("log");
   fields.compare.value = state.compare;
 
   const spectral = series.find(({ info }) => info.wavelength_nm)?.info;
   const range = spectral?.wavelength_nm ?? [550];
   fields.nm.min = range[0];
   fields.nm.max = range.at(-1);
-  const one = range.length === 1 || state.view === "spectrum";
+  const one = range.length === 1 || idle.includes("nm");
   const coloured = spectral !== undefined && makesColour(spectral);
   fields.nm.disabled = one || (coloured && state.nm === null);
   if (spectral && state.nm !== null) fields.nm.value = nearest(spectral, state.nm);
   said("nm", !spectral ? "grey: the same at all" : fields.nm.disabled && !one ? "all" : `${nearest(spectral, state.nm)} nm`);
-  if (state.view === "spectrum") said("nm", "all");
+  if (idle.includes("nm")) said("nm", "all");
   fields.colour.checked = coloured && state.nm === null;
-  fields.colour.disabled = !coloured || state.view === "spectrum";
+  fields.colour.disabled = !coloured || idle.includes("colour");
   fields.illuminant.value = state.illuminant;
-  fields.illuminant.closest("label").hidden = !fields.colour.checked || ["spectrum", "albedo"].includes(state.view);
+  fields.illuminant.closest("label").hidden = !fields.colour.checked || idle.includes("illuminant");
 }
 
 function said(name, text) {

@@ -27,9 +27,10 @@ function python(href) {
   if (!kind) return `import json\nfrom urllib.request import urlopen\n\nanswer = json.load(urlopen("${href}"))`;
   const query = Object.fromEntries(searchParams);
   const [before, directions] = DIRECTIONS[query.view ?? kind](query);
-  const options = (query.wavelength_nm ? `, wavelength_nm=${query.wavelength_nm}` : "") + (query.error ? ", with_error=True" : "");
+  const wavelength = query.wavelength_nm ? `, wavelength_nm=${query.wavelength_nm}` : "";
+  const method = query.error ? "lookup_with_error" : "lookup";
   return `import numpy as np\nimport brdfdb\n${before}table = brdfdb.open("${base}")["${decodeURIComponent(name)}"]\n` +
-    `answer = table.lookup(${directions}${options})  # 1/sr${query.output ? ", at all wavelengths" : ""}`;
+    `answer = table.${method}(${directions}${wavelength})  # 1/sr${query.output ? ", at all wavelengths" : ""}`;
 }
 
 /** Make the buttons work; `link` gives that of the view, `request` what it asks for, `say` tells people. */

@@ -3,29 +3,19 @@
 import { AGAIN_MS, Problem, json } from "./api.js";
 import * as controls from "./controls.js";
 import * as copy from "./copy.js";
-import { cut } from "./cut.js";
 import { element } from "./dom.js";
 import * as facts from "./facts.js";
-import { figure } from "./figures.js";
-import { hemisphere, turns } from "./hemisphere.js";
 import * as list from "./list.js";
-import { againstAudit, request, seriesOf } from "./series.js";
-import { lit, spheres } from "./sphere.js";
+import { seriesOf } from "./series.js";
 import { fromHash, toHash } from "./state.js";
+import { VIEWS } from "./views.js";
 
 const [title, message, caption, picture] = ["title", "message", "caption", "picture"].map((id) => document.getElementById(id));
-const PLACES = { cut: "cut", hemisphere: "hemisphere", sphere: "spheres" }; // where a view is drawn, one shown at a time
-const placeOf = ({ view }) => PLACES[view] ?? "plot";
-const DRAWN = { // of the buttons, those that save and restore: more would lie over titles and legends
-  displaylogo: false, responsive: true, showSendToCloud: false, modeBarButtonsToRemove: [
-    "lasso2d", "select2d", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "autoScale2d",
-  ],
-};
-const NARROW = 560; // pixels in which two pictures do not stand side by side
+const placeOf = ({ place, name }) => place ?? name; // where a view is drawn, one shown at a time
 const SLOW_MS = 200; // after which people are told that a picture is on its way
 const LINK_MS = 200; // browsers slow pages down that write their address at every move of a slider
 
-let state = fromHash(location.hash);
+let state = fromHash(location.hash, VIEWS);
 let series = []; // what is shown; emptied when it has to be found anew
 let stop = new AbortController();
 let asked = 0; // when the picture was asked for; the first one when the page was
@@ -100,7 +90,10 @@ async function work() {
 async function draw(now, signal) {
   if (series.length) facts.band(series[0].info, now);
   else await know(now, signal);
-  const words = await (now.view in PLACES ? drawOwn : drawPlot)(now, signal);
+  const view = VIEWS[now.view];
+  const [answers] = await Promise.all([answersTo(now, signal), view.ready?.()]);
+  signal.throwIfAborted();
+  const words = await view.draw(shown(placeOf(view)), series, answers, now);
   signal.throwIfAborted();
   caption.textContent = words;
 }
@@ -147,27 +140,14 @@ async function alone(now, signal, sentence) {
   return found;
 }
 
-async function drawOwn(now, signal) {
-  const answers = await answersTo(now, signal);
-  return { cut, hemisphere, sphere: spheres }[now.view](shown(placeOf(now)), series, answers, now);
-}
+/** The address of what a view shows of one series. */
+const request = (each, now) => VIEWS[now.view].request(each, now, series);
 
-async function drawPlot(now, signal) {
-  const [answers, Plotly] = await Promise.all([answersTo(now, signal), loaded()]);
-  signal.throwIfAborted();
-  const plot = shown(placeOf(now));
-  const width = plot.clientWidth, stacked = width < NARROW && answers.length > 1 && now.view === "half-difference";
-  plot.classList.toggle("stacked", stacked);
-  const { data, layout, caption: words } = figure(now.view, series, answers, now, { width, stacked });
-  await Plotly.react(plot, data, layout, DRAWN);
-  return words;
-}
-
-/** What the service answers for a view; the albedo of a model that nobody audited it does not know. */
+/** What the service answers for a view, of the series that it knows there. */
 async function answersTo(now, signal, lastTry = false) {
-  const known = now.view !== "albedo" ? series : series.filter((each) => each.source === "table" || againstAudit(each, now));
-  const answers = await Promise.all(known.map((each) =>
-    (now.view === "sphere" ? lit(each, now, signal) : json(request(each, now, series), signal))));
+  const { known: knows = () => true, answer = (each) => json(request(each, now), signal) } = VIEWS[now.view];
+  const known = series.filter((each) => knows(each, now));
+  const answers = await Promise.all(known.map((each) => answer(each, now, signal)));
   signal.throwIfAborted();
   if (lastTry || !answers.some((answer, i) => outdates(answer, known[i].info))) return answers;
   await know(now, signal);
@@ -178,36 +158,26 @@ async function answersTo(now, signal, lastTry = false) {
 const outdates = ({ revision, current, finding }, info) => (finding ?
   revision !== info.audit.revision || current !== info.audit.current : revision !== info.revision);
 
-let library; // plotly.js, once it is asked for
-
-/** plotly.js, which takes a second to run: what is known already is shown before. */
-function loaded() {
-  library ??= new Promise((go) => requestAnimationFrame(() => setTimeout(go))).then(() => new Promise((resolve, reject) => {
-    const script = element("script", { src: document.getElementById("plotly").href });
-    script.addEventListener("load", () => resolve(globalThis.Plotly));
-    script.addEventListener("error", () => reject(new Problem("plotly.js did not arrive: load this page again")));
-    document.head.append(script);
-  }));
-  return library;
-}
-
 /** Tell people: what failed, or in another colour what worked. */
 function say(sentence, tone = "bad") {
   message.className = tone;
   message.textContent = sentence;
 }
 
-/** What a copied request asks for: of a sphere, which is thousands of directions, its middle. */
-const copiedOf = (now) => (now.view === "sphere" ? { ...now, theta_r: 0 } : now);
-
+for (const view of Object.values(VIEWS)) {
+  if (document.getElementById(placeOf(view))) continue;
+  const place = element("div", { id: placeOf(view), role: "img", hidden: true });
+  place.setAttribute("aria-labelledby", "caption");
+  caption.before(place);
+  view.begin?.(place);
+}
 controls.listen(choose);
-turns(document.getElementById("hemisphere"));
 copy.listen(
   () => new URL(toHash(state), location.href),
-  () => (series.length ? request(series[0], copiedOf(state), series) : "v1/materials"), say);
+  () => (series.length ? request(series[0], state) : "v1/materials"), say);
 addEventListener("hashchange", () => { // a link, or the way back
   clearTimeout(linked);
-  const held = fromHash(location.hash);
+  const held = fromHash(location.hash, VIEWS);
   change({ ...held, material: held.material || state.material });
 });
 let width = picture.clientWidth;
@@ -217,7 +187,7 @@ new ResizeObserver(() => {
   if (series.length) redraw();
 }).observe(picture);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => series.length && redraw());
-shown(placeOf(state)); // an empty frame
+shown(placeOf(VIEWS[state.view])); // an empty frame
 if (state.material) redraw(0);
 list.load((material) => choose({ material, compare: state.compare === material ? "" : state.compare }), (materials) => {
   controls.offer(materials);

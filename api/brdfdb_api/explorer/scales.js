@@ -56,9 +56,9 @@ export function unseenWords({ info }, { nm }) {
   return ` It is grey for what no eye sees: ${at} nm is ${at > 780 ? "infrared" : "ultraviolet"}.`;
 }
 
-/** A sentence on Dirac parts. */
+/** A sentence on specular parts. */
 export function mirrorWords(series, answers) {
   const parts = answers.map((answer) => answer.specular_reflectance && number(answer)(answer.specular_reflectance));
   const said = series.flatMap(({ label }, i) => (parts[i] ? [series.length > 1 ? `${short(parts[i])} (${label})` : short(parts[i])] : []));
-  return said.length ? ` Not drawn is the mirror image, a Dirac part: ${said.join(", ")} of the light.` : "";
+  return said.length ? ` Not drawn is the mirror image, a specular part: ${said.join(", ")} of the light.` : "";
 }

@@ -44,21 +44,13 @@ export function quantityWords({ info }, { nm, illuminant }) {
 /** Whether albedos are those of the audit: it alone knows that of a model, unless the table was audited without one. */
 export const againstAudit = ({ info }, { compare }) => compare === MODEL && Boolean(info.audit?.model);
 
-/** The address of what a view shows of one series. */
-export function request(each, state, series) {
-  const { view, theta_i } = state;
-  const phi_i = anisotropic(series) ? state.phi_i : undefined;
-  if (view === "albedo") return address(each.name, againstAudit(each, state) ? "audit" : "albedo");
-  if (view === "spectrum" || view === "sphere") {
-    const of = view === "sphere" ? quantity(each, state, "linear-srgb") :
-      each.source === "model" ? { from: "model" } : each.info.error ? { error: true } : {};
-    const phi_r = ((phi_i ?? 0) + state.turn) % 360;
-    return address(each.name, "lookup", { theta_i, phi_i, theta_r: state.theta_r, phi_r, ...of });
-  }
-  return address(each.name, "lobe", {
-    view, theta_i: view === "half-difference" ? undefined : theta_i, phi_i, ...quantity(each, state),
-  });
-}
+/** The azimuth of the light, where any of the series turns with it. */
+export const azimuth = ({ phi_i }, series) => (anisotropic(series) ? phi_i : undefined);
+
+/** The address of f_r over the viewers of one light, of a view that the service knows. */
+export const lobe = (each, state, series) => address(each.name, "lobe", {
+  view: state.view, theta_i: state.theta_i, phi_i: azimuth(state, series), ...quantity(each, state),
+});
 
 /** A function that makes a number of what an answer holds at a point. */
 export const number = (document) => (document.output === "xyz" ? (value) => value[1] : (value) => value);

@@ -1,7 +1,5 @@
 // What is looked at: a material, directions, a wavelength, a view; as a link, and back from one.
 
-export const VIEWS = ["cut", "hemisphere", "half-difference", "spectrum", "albedo", "sphere"];
-
 // compare: nothing, the model of the material itself, or the name of another one
 export const MODEL = ":model";
 
@@ -13,17 +11,17 @@ const DEFAULTS = {
   material: "", view: "cut", theta_i: 45, phi_i: 0, theta_r: 45, turn: 180, nm: null, scale: "log", compare: "",
   illuminant: "D65",
 };
-const CHOICES = { view: VIEWS, scale: ["log", "linear"], illuminant: ILLUMINANTS };
+const CHOICES = { scale: ["log", "linear"], illuminant: ILLUMINANTS };
 const RANGES = { theta_i: [0, 89.5], phi_i: [0, 360], theta_r: [0, 89.5], turn: [0, 360], nm: [1, 1e6] };
 
-/** The state that a link holds; what it does not hold, or holds wrongly, is as at the start. */
-export function fromHash(hash) {
-  const state = { ...DEFAULTS };
+/** The state that a link holds, of some views; what it does not hold, or holds wrongly, is as at the start. */
+export function fromHash(hash, views) {
+  const state = { ...DEFAULTS }, choices = { ...CHOICES, view: Object.keys(views) };
   for (const [key, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
     if (key in RANGES) {
       const value = Number(text), [low, high] = RANGES[key];
       if (text !== "" && value >= low && value <= high) state[key] = value;
-    } else if (key in CHOICES ? CHOICES[key].includes(text) : key in DEFAULTS) {
+    } else if (key in choices ? choices[key].includes(text) : key in DEFAULTS) {
       state[key] = text;
     }
   }

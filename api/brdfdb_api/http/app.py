@@ -35,7 +35,7 @@ phi_r - phi_i = 0 looks back towards the light, 180 is the side of the mirror di
 application/problem+json document with one sentence."""
 
 
-# Only JSON is compressed: numbers as bytes hardly shrink, files are compressed already
+# Media types that are not compressed: binary numbers hardly shrink, and files are compressed already
 UNCOMPRESSED = (*("application/x-npy", "application/octet-stream", "application/zip"), "image/*", "text/*")
 
 
@@ -49,7 +49,7 @@ class Application(FastAPI):
         await self.outermost(scope, receive, send)
 
     async def routed(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """What lies behind the edge."""
+        """Run the router, which lies behind the edge."""
         await super().__call__(scope, receive, send)
 
     def openapi(self) -> dict[str, Any]:
@@ -85,7 +85,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
         description=DESCRIPTION,
         generate_unique_id_function=lambda route: route.name,
         lifespan=_warmed,
-        redirect_slashes=False,  # what is not an address is 404
+        redirect_slashes=False,  # an unknown address is 404
     )
     app.state.settings = settings or Settings.from_environment()
     app.state.shelf = Shelf(app.state.settings, store)
@@ -112,14 +112,14 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
 
 @contextlib.asynccontextmanager
 async def _warmed(app: FastAPI) -> AsyncIterator[None]:
-    """While the application runs: a thread that decodes what lists show first."""
+    """Run a thread that finds the colours of the first page of a list, until the application ends."""
     threading.Thread(target=app.state.shelf.warm, daemon=True).start()
     yield
     app.state.shelf.close()
 
 
 def openapi_json() -> bytes:
-    """The OpenAPI document as it stands in ``api/openapi.json``."""
+    """Return the OpenAPI document as it stands in ``api/openapi.json``."""
     return orjson.dumps(create_app(Settings()).openapi(), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
 
 

@@ -11,7 +11,9 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from brdfdb.errors import StoreError
-from brdfdb.store.manifest import check_manifest, manifest_of, sha256_of
+from brdfdb.store.files import sha256_of
+from brdfdb.store.manifest import check_manifest
+from brdfdb.store.paths import manifest_path
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.openapi_notes import answers
 from brdfdb_api.http.responses import cache_headers, not_modified
@@ -33,7 +35,7 @@ files = APIRouter()
     responses=answers(None, 304, 404, 422, 503, media={ZIP: "a zarr v3 group, for zarr.storage.ZipStore"}),
 )
 def download(request: Request, name: str, revision: str | None = None) -> Response:
-    """A revision as one zip file, not compressed again: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
+    """Return a revision as one uncompressed zip file: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
     group, digest = _located(request, name, revision)
     headers = cache_headers(f"{name}-{group.name}-{digest[:16]}", "zip", immutable=revision is not None)
     headers["Content-Disposition"] = f'attachment; filename="{name}-{group.name}.zarr.zip"'
@@ -50,7 +52,7 @@ def download(request: Request, name: str, revision: str | None = None) -> Respon
     responses=answers(None, 304, 404, 422, 503, media={BYTES: "a file of the zarr group"}),
 )
 def stored_file(request: Request, name: str, revision: str, file: str) -> Response:
-    """A file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these."""
+    """Return a file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these."""
     group, digest = _located(request, name, revision)
     listed = check_manifest(group, digest, contents=False)["files"]
     if file not in listed:
@@ -59,7 +61,7 @@ def stored_file(request: Request, name: str, revision: str, file: str) -> Respon
     headers = cache_headers(f"{name}-{revision}-{listed[file]['sha256'][:16]}", kind, immutable=True)
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
-    if sha256_of(group / file) != listed[file]["sha256"]:  # it would be kept for good
+    if sha256_of(group / file) != listed[file]["sha256"]:  # a cache would keep it forever
         raise StoreError(f"{name} {revision} is damaged: the content of {file} changed")
     media = "application/json" if file.endswith(".json") else BYTES
     return FileResponse(group / file, media_type=media, headers=headers)
@@ -72,13 +74,13 @@ def _located(request: Request, name: str, revision: str | None) -> tuple[Path, s
     """
     shelf = shelf_of(request)
     group, digest = shelf.store.located(name, revision or shelf.head(name))
-    if not manifest_of(group).is_file():
+    if not manifest_path(group).is_file():
         raise StoreError(f"{name} {group.name} is damaged: its manifest is missing")
     return group, digest
 
 
 class _Pieces:
-    """A file that cannot be sought, which hands out what was written to it."""
+    """A write-only stream without seek that hands out the bytes written to it."""
 
     def __init__(self) -> None:
         self.waiting: list[bytes] = []
@@ -97,7 +99,7 @@ class _Pieces:
 
 
 def _zipped(group: Path, listed: list[str]) -> Iterator[bytes]:
-    """A zip of some files of a directory, piece by piece: memory does not grow with the table."""
+    """Yield a zip of some files of a directory in pieces, so that memory does not grow with the table."""
     pieces = _Pieces()
     with zipfile.ZipFile(pieces, "w", zipfile.ZIP_STORED) as archive:  # type: ignore[call-overload]
         for name in listed:

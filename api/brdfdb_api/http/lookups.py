@@ -1,4 +1,4 @@
-"""Lookups: the points asked for, read from a query, JSON or .npy in degrees and checked; and the values, evaluated."""
+"""Lookups: the points of a request, read from a query, JSON or .npy in degrees and checked, and their values."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ Output = Literal["spectrum", "xyz", "linear-srgb"]
 Format = Literal["json", "npy"]
 Angles = tuple[Any, Any, Any, Any]  # theta_i, phi_i, theta_r, phi_r [rad]
 
-_TURN = 360.0  # degrees; fmod is exact, and radians have no digits left at 1e15
-_AT_ONCE = 25_000  # points whose spectra are in memory while colours are made of them
-_MOST_AXES = 32  # that numpy broadcasts
-_HEADER_BYTES = 4096  # of a .npy file: dtype and shape take a hundred
+_TURN = 360.0  # degrees; fmod is exact, while radians have no digits left at 1e15
+_AT_ONCE = 25_000  # points whose spectra are in memory at once while colours are computed
+_MOST_AXES = 32  # axes that numpy broadcasts
+_HEADER_BYTES = 4096  # limit on the header of a .npy file, which usually takes a hundred
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a lookup is to be answered.
+    """The options of a lookup.
 
     Attributes
     ----------
@@ -99,12 +99,12 @@ class Points:
 
     @property
     def count(self) -> int:
-        """How many points there are."""
+        """Return the number of points."""
         return math.prod(self.shape)
 
     @classmethod
     def from_query(cls, query: Mapping[str, str], wavelengths: list[str]) -> Self:
-        """One point, of numbers in a query; errors as by `from_fields`."""
+        """Return one point from the numbers of a query; errors as of `from_fields`."""
         angles = []
         for name in ANGLES:
             text = query.get(name)
@@ -130,7 +130,7 @@ class Points:
         try:
             fields = orjson.loads(body)
         except orjson.JSONDecodeError:
-            # The NaN and Infinity that some clients write are not JSON: read them all the same, to name the parameter.
+            # NaN and Infinity, which some clients write, are not JSON. They are read here to name the parameter.
             try:
                 fields = json.loads(body)
             except (ValueError, RecursionError):
@@ -188,17 +188,17 @@ class Points:
         return cls((angles[0], angles[1], angles[2], angles[3]), degrees.shape[:-1], wavelength_nm)
 
     def wavelengths(self, table: Table) -> float | NDArray[np.float64] | None:
-        """The wavelengths [nm] of the values: what was asked for, else those of the table; None if it is grey."""
+        """Return the wavelengths [nm] of the values: those of the request, else of the table; None if it is grey."""
         return table.wavelength_nm if self.wavelength_nm is None else self.wavelength_nm
 
     def values(self, table: Table) -> int:
-        """How many numbers are looked up: points times wavelengths."""
+        """Return the number of values to look up: points times wavelengths."""
         wavelengths = self.wavelengths(table)
         return self.count * (wavelengths.size if isinstance(wavelengths, np.ndarray) else 1)
 
 
 class Values(NamedTuple):
-    """What a lookup found: f_r, its error or None, the Dirac part or None; colours on the last axis if asked for."""
+    """The result of a lookup: f_r [1/sr], its error or None, the specular part or None; colours on the last axis."""
 
     brdf: Any
     error: Any
@@ -206,9 +206,9 @@ class Values(NamedTuple):
 
 
 def evaluate(points: Points, options: Options, table: Table, *, specular: bool = True) -> Values:
-    """Look points up, and if `specular` the Dirac part at their theta_i.
+    """Look up points, and if `specular` the specular part at their theta_i.
 
-    A RequestError (422) where the table does not reach, or makes no colour.
+    Raises RequestError (422) outside the range of the table, or where it makes no colour.
     """
     try:
         source: Table | Material = table
@@ -217,10 +217,10 @@ def evaluate(points: Points, options: Options, table: Table, *, specular: bool =
             from brdfdb.materials import Material
 
             at = points.wavelengths(table)
-            table.specular_reflectance(0.0, at)  # no further than the table reaches
+            table.specular_reflectance(0.0, at)  # refuses wavelengths outside the table
             if not isinstance(table.source, Material):
-                said = f"the table of {table.name} keeps no model; ask for from=table"
-                raise RequestError(422, f"from: {said}", "from")
+                sentence = f"the table of {table.name} keeps no model; ask for from=table"
+                raise RequestError(422, f"from: {sentence}", "from")
             source = table.source
 
         def spectra(angles: Angles) -> tuple[Any, Any]:
@@ -245,7 +245,7 @@ def _coloured(
     specular: Table | Material | None,
     spectra: Callable[[Angles], tuple[Any, Any]],
 ) -> Values:
-    """Colours of spectra, some points at a time: 41 numbers of each of a million would be 300 MB."""
+    """Return colours of spectra, in batches of points: 41 values of each of a million points would be 300 MB."""
     from brdfdb_api.serving.colours import coloured, weights
 
     assert options.output != "spectrum"
@@ -259,8 +259,8 @@ def _coloured(
     for start in range(0, points.count, _AT_ONCE):
         rows = slice(start, start + _AT_ONCE)
         t_i, p_i, t_r, p_r = (angle[rows] for angle in flat)
-        found, stated = spectra((t_i, p_i, t_r, p_r))
-        brdf[rows] = coloured(found, of, grey=grey)
+        spectrum, stated = spectra((t_i, p_i, t_r, p_r))
+        brdf[rows] = coloured(spectrum, of, grey=grey)
         if error is not None:
             error[rows] = coloured(stated, np.abs(of), grey=grey)
     shape = (*points.shape, 3)
@@ -278,7 +278,7 @@ def _refusal(error: ParameterError) -> RequestError | None:
 
 
 def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list[str]]:
-    """A query string: single values by name, and those of wavelength_nm, which may be repeated.
+    """Return the single values of a query string by name, and those of wavelength_nm, which may be repeated.
 
     Raises
     ------
@@ -305,14 +305,14 @@ def parsed(query: bytes, allowed: tuple[str, ...]) -> tuple[dict[str, str], list
 
 
 def unknown(name: str, allowed: tuple[str, ...]) -> RequestError:
-    """The refusal (422) of a parameter that is not one of `allowed`: a misspelt one is never ignored."""
+    """Return the refusal (422) of a parameter that is not one of `allowed`: a misspelt one is never ignored."""
     shown = shortened(name)
-    said = "belongs in the query" if allowed == FIELDS and name in OPTIONS else "unknown parameter"
-    return RequestError(422, f"{shown}: {said}; allowed are {', '.join(allowed) or 'none'}", shown)
+    reason = "belongs in the query" if allowed == FIELDS and name in OPTIONS else "unknown parameter"
+    return RequestError(422, f"{shown}: {reason}; allowed are {', '.join(allowed) or 'none'}", shown)
 
 
 def shortened(text: str) -> str:
-    """What a client wrote, to be repeated to it: 40 characters at most, none of which is special."""
+    """Return a text of the client for a sentence: at most 40 characters, control characters escaped."""
     return text.encode("ascii", "backslashreplace").decode()[:40]
 
 
@@ -324,7 +324,7 @@ def _one_of(query: Mapping[str, str], name: str, allowed: tuple[str, ...], defau
 
 
 def _number(name: str, text: str) -> float:
-    """A finite number, as a query writes it."""
+    """Return a finite number from a query."""
     try:
         value = float(text) if "_" not in text else math.nan
     except ValueError:
@@ -336,7 +336,7 @@ def _number(name: str, text: str) -> float:
 
 
 def _in_radians(name: str, degrees: NDArray[Any]) -> NDArray[Any]:
-    """Angles [rad], checked: polar angles are within [0, 180] degrees."""
+    """Return angles [rad] from degrees; polar angles must be within [0, 180] degrees."""
     if name.startswith("theta"):
         bad = ~((degrees >= 0.0) & (degrees <= 180.0))
         if np.any(bad):
@@ -347,13 +347,13 @@ def _in_radians(name: str, degrees: NDArray[Any]) -> NDArray[Any]:
 
 
 def _npy(body: bytes) -> NDArray[Any]:
-    """The float32 or float64 array of a .npy file; its header is believed only where the body is as long as it says."""
+    """Return the float32 or float64 array of a .npy file; the length of the body must agree with its header."""
     stream = io.BytesIO(body)
     try:
         version = np.lib.format.read_magic(stream)
         read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
         shape, by_columns, dtype = read(stream, max_header_size=_HEADER_BYTES)
-    except Exception:  # a header is Python text: what reading it raises is of many kinds
+    except Exception:  # the header is Python text, and reading it raises errors of many kinds
         raise RequestError(422, "the body is not a .npy file") from None
     if dtype not in (np.dtype("<f4"), np.dtype("<f8")):
         raise RequestError(422, f"the body: {shortened(str(dtype))} is not float32 or float64, little endian")
@@ -364,7 +364,7 @@ def _npy(body: bytes) -> NDArray[Any]:
 
 
 def _numbers(name: str, value: Any) -> NDArray[np.float64]:
-    """A JSON number or nested lists of them as a float64 array: not empty, all finite."""
+    """Return a JSON number or nested lists of numbers as a float64 array: not empty, all finite."""
     try:
         types = _types(value)
         array = np.array(value, np.float64) if types <= {int, float} else None  # numpy alone would read true as 1
@@ -384,7 +384,7 @@ def _numbers(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def _types(value: Any) -> set[type]:
-    """The types of the leaves of nested lists."""
+    """Return the types of the leaves of nested lists."""
     if type(value) is not list:
         return {type(value)}
     types = set(map(type, value))

@@ -22,11 +22,11 @@ from brdfdb_api.serving.settings import LogLevel
 LOOKUP = re.compile(r"/v1/materials/([^/]+)(?:/revisions/([^/]+))?/lookup")
 LOOKUP_ROUTE = "/v1/materials/{name}/lookup"
 
-GONE = 499  # nobody is there to be answered: as nginx counts it
-BODIES = 8  # of the largest size that may be in memory together
+GONE = 499  # status of a request whose client went away, as nginx counts it
+BODIES = 8  # bodies of the largest size that may be in memory together
 _REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
-# made once a process, as the registry is
+# made once per process, like the registry
 REQUESTS = Counter("brdfdb_requests", "Requests answered", ["route", "status"])
 SECONDS = Histogram(
     "brdfdb_request_seconds",
@@ -36,9 +36,9 @@ SECONDS = Histogram(
 )
 POINTS = Counter("brdfdb_points", "Pairs of directions looked up", ["source"])
 
-LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # the lowest status
-LINE = 4096  # bytes: beyond, pipes mix what several workers write
-SHOWN = 100  # characters of a path, and of a query, in a line that would be longer
+LOGGED_FROM: dict[LogLevel, int] = {"info": 0, "warning": 400, "error": 500}  # lowest status that is logged
+LINE = 4096  # length of a line [byte] beyond which pipes mix the lines of several workers
+SHOWN = 100  # characters of a path, and of a query, in a shortened line
 KEPT = {"failed": slice(SHOWN), "traceback": slice(-1000, None)}
 _STDERR = 2
 
@@ -79,8 +79,8 @@ class Edge:
             await self.app(scope, receive, send)
             return
         start = time.perf_counter()
-        exchange, asked = _Exchange(self, scope, receive, send), scope
-        if scope["method"] == "HEAD":  # answered as GET, without the body
+        exchange, original_scope = _Exchange(self, scope, receive, send), scope
+        if scope["method"] == "HEAD":  # answered like GET, without the body
             scope = {**scope, "method": "GET"}
         route = ""
         try:
@@ -94,32 +94,32 @@ class Edge:
             refusal = self.failed(error)
             if refusal.status_code == 500 and not exchange.gone:
                 failed = f"{type(error).__name__}: {error}"
-                _log(asked, exchange.id, failed=_ascii(failed), traceback=_ascii(traceback.format_exc()))
+                _log(original_scope, exchange.id, failed=_ascii(failed), traceback=_ascii(traceback.format_exc()))
             if exchange.status == 0:
                 await refusal(scope, receive, exchange.send)
-            elif not exchange.ended:  # too late for another answer
+            elif not exchange.ended:  # the answer has started: no other is possible
                 exchange.status = 500
                 raise
         finally:
             self.waiting -= exchange.size
             seconds = time.perf_counter() - start
-            status = exchange.status or GONE  # nobody waits for a request that is cancelled
+            status = exchange.status or GONE  # no client waits for a cancelled request
             requests, observed = _counters(route or getattr(scope.get("route"), "path", "other"), status)
             requests.inc()
             observed.observe(seconds)
             if status >= self.logged_from:
-                _log(asked, exchange.id, status=status, ms=round(1e3 * seconds, 3))
+                _log(original_scope, exchange.id, status=status, ms=round(1e3 * seconds, 3))
 
 
 class _Exchange:
-    """A request and its answer as they pass: the body counted, with those of all others, and the answer with an id."""
+    """A request and its answer: counts the bytes of the body, also over all requests, and gives the answer an id."""
 
     def __init__(self, edge: Edge, scope: Scope, receive: Receive, send: Send) -> None:
         self.edge, self._receive, self._send = edge, receive, send
         self.id = _request_id(scope)
         self.head = scope["method"] == "HEAD"
         self.size = 0  # bytes of the body so far
-        self.status = 0  # of the answer, once it has begun
+        self.status = 0  # status of the answer, once it has started
         self.ended = self.gone = False
 
     async def receive(self) -> Message:
@@ -162,12 +162,12 @@ def _points(source: str) -> Counter:
 
 @functools.lru_cache(maxsize=4096)
 def _counters(route: str, status: int) -> tuple[Counter, Histogram]:
-    """What counts a route and a status: labels take as long to look up as a point."""
+    """Return the counters of a route and a status, cached: finding labels takes as long as a lookup."""
     return REQUESTS.labels(route, status), SECONDS.labels(route)
 
 
 def metrics() -> bytes:
-    """What was counted, of all workers, as Prometheus reads it."""
+    """Return the counts of all workers in the format of Prometheus."""
     if "PROMETHEUS_MULTIPROC_DIR" not in os.environ:
         return generate_latest(REGISTRY)
     from prometheus_client.multiprocess import MultiProcessCollector
@@ -178,7 +178,7 @@ def metrics() -> bytes:
 
 
 def _request_id(scope: Scope) -> bytes:
-    """The id that a client gives a request, else a new one."""
+    """Return the id that a client gives a request, else a new one."""
     for name, value in scope["headers"]:
         if name == b"x-request-id" and _REQUEST_ID.fullmatch(value):
             return bytes(value)
@@ -186,7 +186,7 @@ def _request_id(scope: Scope) -> bytes:
 
 
 def _log(scope: Scope, request_id: bytes, **more: object) -> None:
-    """A line of JSON to standard error, whole in one write: `logging` takes as long as a lookup."""
+    """Write a line of JSON to standard error in one call: `logging` takes as long as a lookup."""
     client = scope.get("client")
     record = {
         "time": round(time.time(), 3),
@@ -198,14 +198,14 @@ def _log(scope: Scope, request_id: bytes, **more: object) -> None:
         **more,
     }
     line = orjson.dumps(record, option=orjson.OPT_APPEND_NEWLINE)
-    if len(line) > LINE:  # a character is six at most
+    if len(line) > LINE:  # an escaped character takes six at most
         shown = {"path": record["path"][:SHOWN], "query": record["query"][:SHOWN]}
         shown |= {key: str(more[key])[part] for key, part in KEPT.items() if key in more}
         line = orjson.dumps(record | shown, option=orjson.OPT_APPEND_NEWLINE)
-    with contextlib.suppress(OSError):  # nobody reads it any more
+    with contextlib.suppress(OSError):  # the reader has gone
         os.write(_STDERR, line)
 
 
 def _ascii(text: str) -> str:
-    """What orjson can write, lone surrogates too, and terminals show as it is."""
+    """Return ASCII text, which orjson writes and terminals show: other characters, lone surrogates too, are escaped."""
     return text.encode("ascii", "backslashreplace").decode()

@@ -110,7 +110,7 @@ EXPORT_OPTIONS = [
 
 
 def answers(model: type | None, *statuses: int, media: dict[str, str] | None = None) -> dict[int | str, dict[str, Any]]:
-    """What OpenAPI says of the answers of an address: `model` at 200 or other media, and `statuses`."""
+    """Return the OpenAPI description of the answers of an address: `model` at 200 or other media, and `statuses`."""
     others: dict[int, dict[str, Any]] = {
         304: {"description": "The ETag in If-None-Match still holds"},
         404: {"description": "No such material or revision; the closest names are listed", "model": Problem},

@@ -7,6 +7,7 @@ import gzip
 import hashlib
 import importlib.metadata
 from importlib.resources import files
+from pathlib import PurePath
 
 from fastapi import APIRouter
 from starlette.requests import Request
@@ -16,19 +17,13 @@ from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.responses import not_modified
 
 SCRIPT = "text/javascript; charset=utf-8"
-MEDIA = {
-    "index.html": "text/html; charset=utf-8",
-    "explorer.css": "text/css; charset=utf-8",
-    **dict.fromkeys(
-        (
-            *("main.js", "state.js", "series.js", "api.js", "list.js", "controls.js"),
-            *("facts.js", "figures.js", "hemisphere.js", "sphere.js", "copy.js", "dom.js", "cut.js", "scales.js"),
-        ),
-        SCRIPT,
-    ),
-}
+_TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": SCRIPT}
+_VIEWS = "views.js"
+FOLDER = files("brdfdb_api").joinpath("explorer")
+# Media types of all files of the explorer: those of the folder, and the list of its views
+MEDIA = {file.name: _TYPES[PurePath(file.name).suffix] for file in FOLDER.iterdir()} | {_VIEWS: SCRIPT}
 
-# plotly writes style attributes, and reads its pictures back from data: and blob: addresses
+# plotly writes style attributes, and reads its pictures from data: and blob: addresses
 POLICY = "; ".join(
     (
         *("default-src 'none'", "script-src 'self'", "style-src 'self' 'unsafe-inline'"),
@@ -43,13 +38,13 @@ pages = APIRouter(include_in_schema=False)
 
 @pages.get("/")
 def index(request: Request) -> Response:
-    """The explorer."""
+    """Return the page of the explorer."""
     return explorer_file(request, "index.html")
 
 
 @pages.get("/explorer/plotly.js")
 def plotly(request: Request) -> Response:
-    """The library that draws; its address in the page holds its version, so that it is fetched once."""
+    """Return plotly.js; its address holds the version, so that a browser fetches it once."""
     packed = "gzip" in request.headers.get("accept-encoding", "")
     content, tag = _plotly(packed=packed)
     headers = {
@@ -66,7 +61,7 @@ def plotly(request: Request) -> Response:
 
 @pages.get("/explorer/{file}")
 def explorer_file(request: Request, file: str) -> Response:
-    """A file of the explorer, of those that there are."""
+    """Return a file of the explorer."""
     if file not in MEDIA:
         raise RequestError(404, "the explorer has no such file")
     content, tag = _file(file)
@@ -78,10 +73,20 @@ def explorer_file(request: Request, file: str) -> Response:
 
 @functools.cache
 def _file(name: str) -> tuple[bytes, str]:
-    """A file of the explorer and its digest."""
-    content = files("brdfdb_api").joinpath("explorer", name).read_bytes()
+    """Return a file of the explorer and its digest."""
+    content = _views() if name == _VIEWS else FOLDER.joinpath(name).read_bytes()
     content = content.replace(b"PLOTLY_VERSION", importlib.metadata.version("plotly").encode())
     return content, hashlib.sha256(content).hexdigest()[:16]
+
+
+def _views() -> bytes:
+    """Return a script that exports VIEWS: the views of all modules ``view_*.js`` by name, in their order."""
+    modules = sorted(name for name in MEDIA if name.startswith("view_"))
+    lines = [f'import view{number} from "./{name}";' for number, name in enumerate(modules)]
+    views = ", ".join(f"view{number}" for number in range(len(modules)))
+    lines.append("const by = (a, b) => a.order - b.order;")
+    lines.append(f"export const VIEWS = Object.fromEntries([{views}].sort(by).map((view) => [view.name, view]));")
+    return ("\n".join(lines) + "\n").encode()
 
 
 @functools.cache

@@ -7,10 +7,10 @@ from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-HEAD_BYTES = 64 * 2**10  # httptools reads no longer addresses
-# An offer of HTTP/2, which Java's client makes: may be ignored, but the parser reads no body after it
+HEAD_BYTES = 64 * 2**10  # limit on a head [byte]; httptools reads no longer addresses
+# Java's client offers HTTP/2. The offer may be ignored, but the parser reads no body after it
 UPGRADE = re.compile(rb"\r\nupgrade: h2c(?=\r|$)", re.IGNORECASE)
-LAST_S = 0.5  # from the word to stop to the last byte of a request that is answered still
+LAST_S = 0.5  # time after the signal to stop in which a request may still arrive completely [s]
 
 
 class BoundedProtocol(HttpToolsProtocol):
@@ -30,7 +30,7 @@ class BoundedProtocol(HttpToolsProtocol):
             head, end, rest = data.partition(b"\r\n\r\n")
             data = UPGRADE.sub(b"", head) + end + rest
         self._pending += len(data)
-        super().data_received(data)  # callbacks below set it to 0
+        super().data_received(data)  # the callbacks below set it to 0
         if self._pending > HEAD_BYTES and not self.transport.is_closing():
             self.logger.warning("Address and headers are longer than %d bytes.", HEAD_BYTES)
             self.send_400_response(f"Address and headers are longer than {HEAD_BYTES} bytes.")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 NPY = "application/x-npy"
 JSON = "application/json"
-REVISION = "Brdfdb-Revision"  # header: which revision the numbers of a lookup are of
+REVISION = "Brdfdb-Revision"  # header that names the revision of the values of a lookup
 
 
 class Problem(BaseModel):
@@ -32,13 +32,13 @@ class Problem(BaseModel):
 
 
 class Alive(BaseModel):
-    """The process answers."""
+    """State of the process."""
 
     status: str
 
 
 class Health(Alive):
-    """The store can be read."""
+    """State of the store."""
 
     materials: int = Field(description="number of materials in the store")
 
@@ -99,7 +99,7 @@ class Material(BaseModel):
     anisotropic: bool
     wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")
     axes_deg: dict[str, list[float]] = Field(description="the grid of the table [degrees]")
-    specular: bool = Field(description="whether there is a Dirac part: specular_reflectance is not 0 everywhere")
+    specular: bool = Field(description="whether there is a specular part: specular_reflectance is not 0 everywhere")
     error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
         description="the measured error of the table against its model, by bands of theta_i; null: not measured"
     )
@@ -133,7 +133,7 @@ class Lookup(BaseModel):
         description="in the shape of brdf, 99 of 100 values are within that of the model; null: not asked for"
     )
     specular_reflectance: float | list[Any] = Field(
-        description="Dirac part, a reflectance without unit that is not in brdf: shape of theta_i, then as brdf"
+        description="specular part, a reflectance without unit that is not in brdf: shape of theta_i, then as brdf"
     )
 
 
@@ -144,8 +144,8 @@ class Albedo(BaseModel):
     revision: str
     wavelength_nm: list[float] | None = Field(description="null: grey")
     theta_i: list[float] = Field(description="degrees")
-    albedo: list[list[float]] = Field(description="[theta_i][wavelength], without the Dirac part")
-    specular_reflectance: list[list[float]] = Field(description="[theta_i][wavelength], the Dirac part")
+    albedo: list[list[float]] = Field(description="[theta_i][wavelength], without the specular part")
+    specular_reflectance: list[list[float]] = Field(description="[theta_i][wavelength], the specular part")
     hemispherical: list[float] = Field(description="[wavelength], of light that is the same from everywhere, both")
     error: float = Field(description="of albedo, the largest estimate of the integration")
 
@@ -172,7 +172,7 @@ class Lobe(BaseModel):
 
 
 class Audit(BaseModel):
-    """What the audit found of a material."""
+    """The findings of the audit on a material."""
 
     material: str
     revision: str = Field(description="that was audited")
@@ -184,33 +184,33 @@ class Audit(BaseModel):
 
 
 def json_bytes(document: dict[str, Any]) -> bytes:
-    """JSON; numpy arrays may stand anywhere in `document` except as 0-d arrays."""
+    """Return a document as JSON; it may contain numpy arrays, except 0-d ones."""
     return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def json_response(document: dict[str, Any], headers: dict[str, str] | None = None) -> Response:
-    """A JSON answer, of what `json_bytes` takes."""
+    """Return a JSON answer with a document that `json_bytes` takes."""
     return Response(json_bytes(document), media_type=JSON, headers=headers)
 
 
 def npy_bytes(array: NDArray[Any]) -> bytes:
-    """An array as a .npy file."""
+    """Return an array as a .npy file."""
     buffer = io.BytesIO()
     np.save(buffer, array, allow_pickle=False)
     return buffer.getvalue()
 
 
 class Encoded(dict[str, str]):
-    """Headers that many answers have in common, encoded once: it takes as long as the lookup of a point."""
+    """Headers that many answers share, encoded once: encoding takes as long as the lookup of a point."""
 
     @functools.cached_property
     def raw(self) -> list[tuple[bytes, bytes]]:
-        """As they are sent."""
+        """Encoded headers, as they are sent."""
         return [(name.lower().encode("latin-1"), value.encode("latin-1")) for name, value in self.items()]
 
 
 class EncodedResponse(Response):
-    """An answer with such headers, which name its media type, too."""
+    """An answer with encoded headers, which also name its media type."""
 
     def __init__(self, content: bytes, headers: Encoded) -> None:
         self.status_code, self.background, self.body = 200, None, content
@@ -219,32 +219,32 @@ class EncodedResponse(Response):
 
 @functools.lru_cache(maxsize=1024)
 def lookup_headers(tag: str | None, revision: str, kind: str, *, immutable: bool = False) -> Encoded:
-    """Of the answer to a lookup: by its tag, or None of what is not to be kept; which revision the numbers are of."""
+    """Return the headers of the answer to a lookup: its tag (None: not to be cached) and the revision of its values."""
     cached = {"Cache-Control": "no-store"} if tag is None else cache_headers(tag, kind, immutable=immutable)
     return Encoded({**cached, REVISION: revision, "Content-Type": NPY if kind == "npy" else JSON})
 
 
 def plain(array: Any) -> Any:
-    """What orjson can write: a number for a 0-d array, contiguous memory for any other."""
+    """Return what orjson can write: a number for a 0-d array, contiguous memory for any other."""
     if isinstance(array, np.ndarray):
         return np.ascontiguousarray(array) if array.ndim else array.item()
     return array
 
 
 def tag_of(table: Table) -> str:
-    """What an ETag says of a table: name, revision, and its content, as numbers begin anew with a new store."""
+    """Return the ETag of a table: name, revision, and digest, because revisions are numbered anew in a new store."""
     return f"{table.name}-{table.revision}-{table.digest[:16]}"
 
 
 def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> dict[str, str]:
-    """ETag and Cache-Control; of an address that names a revision, for good. JSON may be compressed: a weak tag."""
+    """Return ETag and Cache-Control: forever for an address with a revision. JSON may be compressed: a weak tag."""
     etag = f'W/"{tag}"' if kind == "json" else f'"{tag}-{kind}"'
     kept = "public, max-age=31536000, immutable" if immutable else "no-cache"
     return {"ETag": etag, "Cache-Control": kept, "Vary": "Accept"}
 
 
 def not_modified(held: str | None, headers: dict[str, str]) -> Response | None:
-    """The 304 of a client that already holds the answer with these headers, None for any other."""
+    """Return the 304 for a client that already holds the answer with these headers, None for any other."""
     if held is None:
         return None
     tags = {tag.strip().removeprefix("W/") for tag in held.split(",")}

@@ -47,22 +47,22 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-INLINE_VALUES = 1000  # looking up more numbers happens in a thread, so that the event loop serves others meanwhile
-INLINE_BYTES = 96 * 2**10  # the same for reading a body; 1000 points are at most about this long
-# Larger bodies, or answers of more values, are worked on so many at a time
+INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop can serve others
+INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
+# Number of larger bodies, or larger answers, that are processed at a time
 LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 8
-JSON_BYTES = 8 * 2**20  # of a JSON body: numbers in lists take twenty times as much memory as text
-LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points, and values, of one answer, as multiples of max_points
-SPECTRA_OF_COLOURS = 10  # times as many values where colours are made of them: they are not kept
-PAGE, MOST = 100, 1000  # materials on a page
-_ALLOWED = (*FIELDS, *OPTIONS)  # in the query of a lookup
+JSON_BYTES = 8 * 2**20  # limit on a JSON body [byte]: numbers in lists take twenty times the memory of the text
+LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points and values of one answer, as multiples of max_points
+SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
+PAGE, MOST = 100, 1000  # materials on a page: default and largest number
+_ALLOWED = (*FIELDS, *OPTIONS)  # parameters in the query of a lookup
 SEARCHED = ("name", "title", "model", "model_title", "paper", "source")
 
 router = APIRouter()
 
 
 def query_names(*allowed: str) -> Any:
-    """A dependency that refuses query parameters that are not `allowed`, and any but wavelength_nm given twice."""
+    """Return a dependency that refuses parameters that are not `allowed`, and all but wavelength_nm given twice."""
 
     async def check(request: Request) -> None:
         parsed(request.scope["query_string"], allowed)
@@ -71,20 +71,20 @@ def query_names(*allowed: str) -> Any:
 
 
 def shelf_of(request: Request) -> Shelf:
-    """What the application serves."""
+    """Return the shelf of the application."""
     shelf: Shelf = request.app.state.shelf
     return shelf
 
 
 @router.get("/healthz", tags=["service"], dependencies=[query_names()], responses=answers(Alive, 422))
 async def healthz() -> Response:
-    """Whether the process answers at all."""
+    """Report that the process answers."""
     return json_response({"status": "ok"})
 
 
 @router.get("/readyz", tags=["service"], dependencies=[query_names()], responses=answers(Health, 422, 503))
 def readyz(request: Request) -> Response:
-    """Whether kernels are loaded and the store can be read, and how many materials it holds."""
+    """Report that kernels are loaded and the store can be read, and the number of its materials."""
     if shelf_of(request).warming:
         raise RequestError(503, "kernels are being loaded; the first time they are compiled, which takes half a minute")
     return json_response({"status": "ok", "materials": len(shelf_of(request).names())})
@@ -123,8 +123,8 @@ def catalogue(
     shelf.colour(line["name"] for line in lines if line.get("colour") is None and "damaged" not in line)
     following = None
     if page and names[-1] > page[-1]:
-        asked = {"model": model, "paper": paper, "q": q, "limit": limit, "cursor": page[-1]}
-        following = f"/v1/materials?{urlencode({key: value for key, value in asked.items() if value})}"
+        query = {"model": model, "paper": paper, "q": q, "limit": limit, "cursor": page[-1]}
+        following = f"/v1/materials?{urlencode({key: value for key, value in query.items() if value})}"
     answer = json_response({"materials": lines, "total": len(names), "next": following})
     headers = cache_headers(f"materials-{hashlib.sha256(answer.body).hexdigest()[:16]}")
     if held := not_modified(request.headers.get("if-none-match"), headers):
@@ -134,7 +134,7 @@ def catalogue(
 
 
 def _let_through(line: dict[str, Any], model: str, paper: str, words: list[str]) -> bool:
-    """Whether a line of the catalogue is asked for."""
+    """Return True if the filters let a line of the catalogue through."""
     text = " ".join(str(line.get(key, "")) for key in SEARCHED).casefold()
     papers = f"{line.get('paper', '')} {line.get('source', '')}".casefold()
     return model in ("", line.get("model", "")) and paper in papers and all(word in text for word in words)
@@ -162,16 +162,16 @@ def both(
 
 @both("", tags=["materials"], dependencies=[query_names()], responses=answers(Material, 304, 404, 422, 503))
 def material(request: Request, name: str, revision: str | None = None) -> Response:
-    """Where the table of a material comes from, where it is sampled (axes in degrees), and how far to believe it."""
+    """Return the origin of the table of a material, its grid (axes in degrees), and its error."""
     shelf = shelf_of(request)
     table = shelf.table(name, revision)
     verdict, revisions = shelf.verdict(name), shelf.store.revisions(name)
-    # what changes beside the table
+    # facts that change while the table does not
     beside = f"{'' if verdict is None else verdict.when} {revisions}"
     headers = cache_headers(f"{tag_of(table)}-{hashlib.sha256(beside.encode()).hexdigest()[:8]}")
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
-    here = f"/v1/materials/{name}" + ("" if revision is None else f"/revisions/{revision}")
+    address = f"/v1/materials/{name}" + ("" if revision is None else f"/revisions/{revision}")
     metadata = table.metadata
     document = {
         "name": table.name,
@@ -190,9 +190,9 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "attributes": {key: value for key, value in table.attrs.items() if key not in ("error", "request")},
         "revisions": revisions,
         "links": {
-            "self": here,
-            **{key: f"{here}/{key}" for key in ("lookup", "albedo", "lobe", "audit", "download.zarr")},
-            **{f"export/{file_format}": f"{here}/export/{file_format}" for file_format in EXPORTERS},
+            "self": address,
+            **{key: f"{address}/{key}" for key in ("lookup", "albedo", "lobe", "audit", "download.zarr")},
+            **{f"export/{file_format}": f"{address}/export/{file_format}" for file_format in EXPORTERS},
             "store": f"/v1/store/materials/{name}/{table.revision}",
             "revision": f"/v1/materials/{name}/revisions/{table.revision}",
             "materials": "/v1/materials",
@@ -202,12 +202,12 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
 
 
 def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
-    """The parameters as files write them: value, unit, meaning, source."""
+    """Return the parameters as recipes write them: value, unit, meaning, source."""
     from brdfdb.materials import written_name
     from brdfdb.models import MODELS
 
     spec = MODELS.get(metadata.model or "")
-    meanings = {} if spec is None else {written_name(each): each for each in spec.parameters}
+    meanings = {} if spec is None else {written_name(parameter): parameter for parameter in spec.parameters}
     return [
         {
             "name": name,
@@ -240,7 +240,7 @@ def _verdicts(finding: dict[str, Any], when: str, revision: str) -> dict[str, An
     openapi_extra={"parameters": [*POINT, WAVELENGTHS, *openapi_notes.OPTIONS, ERROR]},
 )
 async def lookup_point(request: Request, name: str, revision: str | None = None) -> Response:
-    """The BRDF of one pair of directions (angles in degrees).
+    """Return the BRDF at one pair of directions (angles in degrees).
 
     The wavelengths are an axis, unless wavelength_nm is one number or the material is grey. Below the horizon (theta
     above 90 degrees) the BRDF is 0.
@@ -269,14 +269,14 @@ def _headers(scope: Scope) -> tuple[str, str]:
     accept = held = b""
     for key, value in scope["headers"]:
         if key == b"accept":
-            accept += value  # of several lines
+            accept += value  # the header may come in several lines
         elif key == b"if-none-match":
             held = value
     return accept.decode("latin-1"), held.decode("latin-1")
 
 
 async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
-    """A table at once if it is decoded, else from a thread."""
+    """Return a table at once if it is decoded, else from a thread."""
     table = shelf.held(name)
     if table is not None and revision in (None, table.revision):
         return table
@@ -291,7 +291,7 @@ async def _table(shelf: Shelf, name: str, revision: str | None) -> Table:
     openapi_extra={"requestBody": BODY, "parameters": [WAVELENGTHS, *openapi_notes.OPTIONS, ERROR]},
 )
 async def lookup_points(request: Request, name: str, revision: str | None = None) -> Response:
-    """The BRDF of many pairs of directions (angles in degrees): an array of the shape that the angles broadcast to.
+    """Return the BRDF at many pairs of directions (angles in degrees), in the shape that the angles broadcast to.
 
     The wavelengths are a last axis, unless wavelength_nm is one number or the material is grey. Below the horizon
     (theta above 90 degrees) the BRDF is 0. wavelength_nm in the query is for .npy bodies; JSON holds its own.
@@ -322,7 +322,7 @@ async def lookup_points(request: Request, name: str, revision: str | None = None
         async with large if len(body) > LARGE_BYTES else contextlib.nullcontext():
             return await run_in_threadpool(answer, body)
     points, values = points_of(body)
-    # a row and a column of angles are a short body
+    # a row and a column of angles take few bytes and make many points
     async with large if values > LARGE_VALUES else contextlib.nullcontext():
         return await run(write_answer, points, options, table, kind, headers, in_thread=slow(values, options))
 
@@ -333,12 +333,12 @@ async def run(function: Callable[..., T], *args: Any, in_thread: bool) -> T:
 
 
 def slow(values: int, options: Options) -> bool:
-    """Whether looking up so many values would keep others waiting."""
+    """Return True if a lookup of this many values would keep other requests waiting."""
     return values > INLINE_VALUES or options.source == "model" or options.output != "spectrum"
 
 
 def checked_size(max_points: int, points: Points, options: Options, table: Table, kind: str) -> int:
-    """How many numbers are looked up; a RequestError (413) where they are too many for one answer."""
+    """Return the number of values to look up; RequestError (413) if they are too many for one answer."""
     most_points, most_values = LIMITS[kind]
     most_points, most_values = most_points * max_points, most_values * max_points
     if points.count > most_points:
@@ -357,9 +357,9 @@ def checked_size(max_points: int, points: Points, options: Options, table: Table
 def write_answer(points: Points, options: Options, table: Table, kind: str, headers: Encoded) -> Response:
     """Look the points up and write them as `kind`."""
     middleware.points_counted(options.source, points.count)
-    found = evaluate(points, options, table, specular=kind == "json")
+    values = evaluate(points, options, table, specular=kind == "json")
     if kind == "npy":
-        content = npy_bytes(found.brdf if found.error is None else np.stack([found.brdf, found.error]))
+        content = npy_bytes(values.brdf if values.error is None else np.stack([values.brdf, values.error]))
         return EncodedResponse(content, headers)
     document = {
         "material": table.name,
@@ -369,8 +369,8 @@ def write_answer(points: Points, options: Options, table: Table, kind: str, head
         "output": options.output,
         "illuminant": None if options.output == "spectrum" else options.illuminant,
         "wavelength_nm": points.wavelengths(table),
-        "brdf": plain(found.brdf),
-        "error": None if found.error is None else plain(found.error),
-        "specular_reflectance": plain(found.specular_reflectance),
+        "brdf": plain(values.brdf),
+        "error": None if values.error is None else plain(values.error),
+        "specular_reflectance": plain(values.specular_reflectance),
     }
     return EncodedResponse(json_bytes(document), headers)

@@ -1,4 +1,4 @@
-"""What a page or a report shows of a material: albedos, lobes, files of other formats, and what the audit found."""
+"""Views of a material for pages and reports: albedos, lobes, files of other formats, and the findings of the audit."""
 
 from __future__ import annotations
 
@@ -43,13 +43,14 @@ View = Literal["cut", "hemisphere", "half-difference"]
 _CUT = np.arange(-90.0, 91.0)  # theta_r [degree], negative back towards the light
 _OVER = np.linspace(0.0, 90.0, 31)  # theta_r of a hemisphere [degree]
 _AROUND = np.linspace(0.0, 360.0, 61)  # delta_phi
-_NEAR = np.array([-12.0, -8.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0])  # of the mirror
-_HALF = np.arange(90) + 0.5  # theta_h and theta_d
-_POINTS = _HALF.size**2  # of the largest view
+# Angles from the mirror direction [degree]
+_NEAR = np.array([-12.0, -8.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0])
+_HALF = np.arange(90) + 0.5  # theta_h and theta_d [degree]
+_POINTS = _HALF.size**2  # points of the largest view
 
 _LOBE = ("view", "theta_i", "phi_i", "wavelength_nm", "from", "output", "illuminant", "format")
 
-_ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()  # as long as the table is kept
+_ALBEDOS: WeakKeyDictionary[Table, bytes] = WeakKeyDictionary()  # kept as long as the table
 
 views = APIRouter()
 
@@ -65,7 +66,7 @@ Azimuth = Annotated[float, Query(ge=-720.0, le=720.0, description="azimuth of th
     responses=answers(Albedo, 304, 404, 422, 503),
 )
 def albedo(request: Request, name: str, revision: str | None = None) -> Response:
-    """Directional and hemispherical albedo of the table: what it reflects of light from one direction, or from all."""
+    """Return the directional and the hemispherical albedo [1] of the table."""
     table = shelf_of(request).table(name, revision)
     headers = cache_headers(tag_of(table), immutable=revision is not None)
     if held := not_modified(request.headers.get("if-none-match"), headers):
@@ -77,23 +78,23 @@ def albedo(request: Request, name: str, revision: str | None = None) -> Response
 
 
 def _albedo(table: Table) -> bytes:
-    """The document: a third of a second of integration."""
+    """Return the document; the integration takes a third of a second."""
     from brdfdb.tables.albedo import directional_albedo, hemispherical_albedo
 
-    found = directional_albedo(table)
-    diffuse = found.mean
-    specular = np.asarray(table.specular_reflectance(radians(found.theta_i_deg))).reshape(diffuse.shape[0], -1)
+    albedo = directional_albedo(table)
+    diffuse = albedo.mean
+    specular = np.asarray(table.specular_reflectance(radians(albedo.theta_i_deg))).reshape(diffuse.shape[0], -1)
     specular = np.broadcast_to(specular, diffuse.shape)
     return json_bytes(
         {
             "material": table.name,
             "revision": table.revision,
             "wavelength_nm": table.wavelength_nm,
-            "theta_i": np.ascontiguousarray(found.theta_i_deg),
+            "theta_i": np.ascontiguousarray(albedo.theta_i_deg),
             "albedo": np.ascontiguousarray(diffuse),
             "specular_reflectance": np.ascontiguousarray(specular),
-            "hemispherical": hemispherical_albedo(found.theta_i_deg, diffuse + specular),
-            "error": float(found.error.max()),
+            "hemispherical": hemispherical_albedo(albedo.theta_i_deg, diffuse + specular),
+            "error": float(albedo.error.max()),
         }
     )
 
@@ -113,9 +114,9 @@ def lobe(
     phi_i: Azimuth = 0.0,
     revision: str | None = None,
 ) -> Response:
-    """f_r for one light, in the plane of incidence or over all viewers, to be drawn; or over theta_h and theta_d.
+    """Return f_r [1/sr] for one light, in the plane of incidence or over all viewers; or over theta_h and theta_d.
 
-    Viewers are closer together around the mirror direction. phi_h is phi_i in half-difference, and phi_d 90 degrees.
+    Viewers are closer together around the mirror direction. In half-difference, phi_h is phi_i and phi_d is 90 degrees.
     """
     query, wavelengths = parsed(request.scope["query_string"], _LOBE)
     options = Options.from_query(query)
@@ -127,11 +128,11 @@ def lobe(
     axes, angles = _directions(view, theta_i, phi_i)
     at = Points.from_query({"theta_i": "0", "theta_r": "0"}, wavelengths).wavelength_nm
     points = Points(angles, np.broadcast_shapes(*(np.shape(angle) for angle in angles)), at)
-    # points are as many as a view has; of the client are the wavelengths
+    # The view fixes the points; the client chooses only the wavelengths.
     checked_size(max(request.app.state.settings.max_points, _POINTS), points, options, table, kind)
-    found = evaluate(points, options, table)
+    values = evaluate(points, options, table)
     if kind == "npy":
-        return Response(npy_bytes(found.brdf), media_type=NPY, headers=headers)
+        return Response(npy_bytes(values.brdf), media_type=NPY, headers=headers)
     document = {
         "material": table.name,
         "revision": table.revision,
@@ -144,14 +145,14 @@ def lobe(
         "unit": "1/sr",
         "wavelength_nm": points.wavelengths(table),
         "axes_deg": axes,
-        "brdf": plain(found.brdf),
-        "specular_reflectance": None if view == "half-difference" else plain(found.specular_reflectance),
+        "brdf": plain(values.brdf),
+        "specular_reflectance": None if view == "half-difference" else plain(values.specular_reflectance),
     }
     return json_response(document, headers)
 
 
 def _directions(view: View, theta_i: float, phi_i: float) -> tuple[dict[str, NDArray[Any]], Any]:
-    """The axes of a view [degrees], and the angles of its points [rad]."""
+    """Return the axes of a view [degree] and the angles of its points [rad]."""
     if view == "half-difference":
         from brdfdb.geometry import directions_from_half_difference
 
@@ -187,7 +188,7 @@ def export(
     file_format: Annotated[str, Path(json_schema_extra={"enum": [*EXPORTERS]})],
     revision: str | None = None,
 ) -> Response:
-    """The table, or a slice of it, as a file of another format, as `brdfdb export` writes it."""
+    """Return the table, or a slice of it, as a file of another format, as `brdfdb export` writes it."""
     if file_format not in EXPORTERS:
         raise RequestError(404, f"{file_format!r} is no format; there are {', '.join(EXPORTERS)}")
     exporter = EXPORTERS[file_format]
@@ -212,12 +213,12 @@ def export(
     "/audit", router=views, tags=["views"], dependencies=[query_names()], responses=answers(Audit, 304, 404, 422, 503)
 )
 def audit(request: Request, name: str, revision: str | None = None) -> Response:
-    """What the last `brdfdb audit` of the store found of a material: energy, reciprocity, error and more."""
+    """Return the findings of the last `brdfdb audit` on a material: energy, reciprocity, error and more."""
     shelf = shelf_of(request)
     verdict, current = shelf.verdict(name), shelf.head(name)
     if verdict is None or revision not in (None, verdict.finding["revision"]):
         if revision not in (None, current):
-            shelf.table(name, revision)  # there is no such revision
+            shelf.table(name, revision)  # raises if there is no such revision
         raise RequestError(404, f"{name}: no audit of it is here; `brdfdb audit` makes one")
     headers = cache_headers(f"{name}-{current}-{verdict.when}")
     if held := not_modified(request.headers.get("if-none-match"), headers):

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 Colour = Literal["xyz", "linear-srgb"]
 
-_WAVELENGTHS = 1000  # of a colour that is asked for: its weights take the square of their number
-_LIGHT_DEG = 45.0  # of the swatch
-_SAMPLES = 256  # of what it leaves
+_WAVELENGTHS = 1000  # largest number of wavelengths of a colour: the cost of its weights grows with the square
+_LIGHT_DEG = 45.0  # theta_i of the swatch
+_SAMPLES = 256  # viewers of the swatch
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
@@ -47,8 +47,8 @@ def weights(colour: Colour, wavelength_nm: NDArray[np.float64] | None, illuminan
         )
     # a grey material is a flat spectrum: any wavelengths sum to the same
     at = (380.0, 780.0) if wavelength_nm is None else tuple(wavelength_nm.tolist())
-    found = (xyz_weights if colour == "xyz" else srgb_weights)(at, illuminant)
-    return found.sum(axis=0, keepdims=True) if wavelength_nm is None else found
+    weights_at = (xyz_weights if colour == "xyz" else srgb_weights)(at, illuminant)
+    return weights_at.sum(axis=0, keepdims=True) if wavelength_nm is None else weights_at
 
 
 def coloured(values: Floats, of: NDArray[np.float64], *, grey: bool) -> Floats:
@@ -58,9 +58,9 @@ def coloured(values: Floats, of: NDArray[np.float64], *, grey: bool) -> Floats:
 
 
 def swatch(table: Table) -> str:
-    """The colour of a table under D65 as ``#rrggbb``: of what it leaves of a light at 45 degrees, Dirac part included.
+    """Return the colour of a table under D65 as ``#rrggbb``: albedo for light at 45 degrees, specular part included.
 
-    Grey where its wavelengths make no colour. To look at: the albedo is a mean over few directions.
+    Grey where its wavelengths make no colour. For display only: the albedo is a mean over few directions.
     """
     from brdfdb.integrals.sampling import DIFFUSE, directions, mixture_density
 

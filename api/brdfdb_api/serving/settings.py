@@ -50,7 +50,7 @@ class Settings:
 
     @property
     def audit_file(self) -> Path:
-        """Where the report of an audit is looked for."""
+        """Path of the audit report."""
         return self.store / "audit.json" if self.audit is None else self.audit
 
     @classmethod

@@ -14,22 +14,23 @@ from weakref import WeakKeyDictionary
 import orjson
 
 from brdfdb.errors import StoreError, UnknownMaterialError
+from brdfdb.store.decoding import read_metadata
 from brdfdb.store.manifest import check_manifest
-from brdfdb.store.reader import Store, read_metadata
+from brdfdb.store.reader import Store
 from brdfdb_api.serving.colours import swatch
 from brdfdb_api.serving.settings import Settings
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-COLOURED_BYTES = 16 * 2**20  # a larger table is not decoded only to show its colour in a list
+COLOURED_BYTES = 16 * 2**20  # size [byte] of a table above which it is not decoded for its colour in a list
 
-IDLE_S = 1.0  # that the thread which finds colours waits for more
+IDLE_S = 1.0  # time after which the idle thread for colours ends [s]
 WARMED = 100  # materials whose colours are found when a server starts
 
 
 class Verdict(NamedTuple):
-    """What the audit says of a material: the finding, when, and whether it is about the current revision."""
+    """The audit of a material: the findings, their date, and whether they are about the current revision."""
 
     finding: dict[str, Any]
     when: str
@@ -49,7 +50,7 @@ class Shelf:
 
     def __init__(self, settings: Settings, store: Store | None = None) -> None:
         self._settings = settings
-        self._root = settings.store.absolute()  # as it is now, not when the store is opened
+        self._root = settings.store.absolute()  # resolved now: the working directory may change
         self._store = store
         self._seen: set[str] = set()
         self._summaries: dict[str, tuple[str, dict[str, Any]]] = {}
@@ -60,24 +61,24 @@ class Shelf:
         self._painter: threading.Thread | None = None
         self._swatches: WeakKeyDictionary[Table, str | None] = WeakKeyDictionary()
         self._closed = False
-        self.warming = False  # kernels are being loaded, which takes half a minute where they are compiled
+        self.warming = False  # kernels are being loaded, or compiled for half a minute
 
     @property
     def store(self) -> Store:
-        """The store; StoreError where there is none."""
+        """Open store; StoreError if there is none."""
         if self._store is None:
             self._store = Store(self._root, self._settings.cache_bytes, snapshot=self._settings.snapshot)
         return self._store
 
     def held(self, name: str) -> Table | None:
-        """The current table of a material if it is decoded already, without a wait; None else, and `table` says why."""
+        """Return the current table of a material if it is decoded already, else None: `table` raises the reason."""
         try:
             return self.store.held(name)
         except StoreError:
             return None
 
     def table(self, name: str, revision: str | None = None) -> Table:
-        """The table of a material, of its current revision or another.
+        """Return the table of a material, of its current revision or another.
 
         Raises
         ------
@@ -87,21 +88,21 @@ class Shelf:
             If it cannot be read, or was there and is gone; the sentence names the material.
         """
         try:
-            found = self.store[name] if revision is None else self.store.table(name, revision)
+            table = self.store[name] if revision is None else self.store.table(name, revision)
         except (UnknownMaterialError, StoreError) as error:
             raise self._named(name, error) from error
         self._seen.add(name)
-        return found
+        return table
 
     def head(self, name: str) -> str:
-        """The current revision of a material; errors as by `table`."""
+        """Return the current revision of a material; errors as of `table`."""
         try:
             return self.store.head(name)
         except (UnknownMaterialError, StoreError) as error:
             raise self._named(name, error) from error
 
     def _named(self, name: str, error: Exception) -> Exception:
-        """An error of a material that was served before is one of the store, and names it."""
+        """Return the error of a material: StoreError with its name if it was served before."""
         if isinstance(error, UnknownMaterialError) and name not in self._seen:
             return error
         if isinstance(error, UnknownMaterialError):
@@ -109,13 +110,13 @@ class Shelf:
         return error if name in str(error) else StoreError(f"{name} cannot be read: {error}")
 
     def names(self) -> list[str]:
-        """The names of all materials, sorted."""
+        """Return the sorted names of all materials."""
         names = list(self.store)
         self._seen.update(names)
         return names
 
     def summary(self, name: str) -> dict[str, Any]:
-        """What lists show of a material; of a damaged one its name and a sentence."""
+        """Return the line of a material in lists; for a damaged one its name and a sentence."""
         try:
             group, digest, head = self.store.current(name)
             known = self._summaries.get(name)
@@ -124,11 +125,11 @@ class Shelf:
         except (UnknownMaterialError, StoreError) as error:
             return {"name": name, "damaged": str(error), "href": f"/v1/materials/{name}"}
         verdict = self.verdict(name)
-        found, colour = self._colours.get(name, ("", None))
+        cached, colour = self._colours.get(name, ("", None))
         return {
             **known[1],
             "verdict": verdict.finding["verdict"] if verdict and verdict.current else None,
-            "colour": colour if found == digest else None,
+            "colour": colour if cached == digest else None,
         }
 
     def colour(self, names: Iterable[str]) -> None:
@@ -155,7 +156,7 @@ class Shelf:
             self._closed = True
             painter = self._painter
         if painter is not None:
-            self._waiting.put("")  # it may wait for a name
+            self._waiting.put("")  # it may be waiting for a name
             painter.join()
 
     def paint(self, name: str) -> None:
@@ -170,7 +171,7 @@ class Shelf:
             self._colours[name] = table.digest, self.swatch(table)
 
     def swatch(self, table: Table) -> str | None:
-        """The colour of a table, found once; None of a model that this program does not know."""
+        """Return the colour of a table, cached; None for an unknown model."""
         if table not in self._swatches:
             try:
                 self._swatches[table] = swatch(table)
@@ -191,12 +192,12 @@ class Shelf:
             self.warming = False
 
     def verdict(self, name: str) -> Verdict | None:
-        """What the last audit says of a material; None where there is none, or its report cannot be read."""
+        """Return the last audit of a material; None if there is none, or its report cannot be read."""
         report = self._report()
-        found = report["by_name"].get(name)
-        if found is None:
+        finding = report["by_name"].get(name)
+        if finding is None:
             return None
-        return Verdict(found, report["when"], found["revision"] == self.head(name))
+        return Verdict(finding, report["when"], finding["revision"] == self.head(name))
 
     def _report(self) -> dict[str, Any]:
         path = self._settings.audit_file
@@ -212,7 +213,7 @@ class Shelf:
 
 
 def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> dict[str, Any]:
-    """A line of a list, of one revision."""
+    """Return the line of one revision in a list."""
     check_manifest(group, digest, contents=False)
     metadata = read_metadata(group)
     return {
@@ -234,10 +235,10 @@ def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> 
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """The findings of a report by material; none of a file that is no report."""
+    """Return the findings of a report by material; none for a file that is no report."""
     try:
         report = orjson.loads(path.read_bytes())
-        by_name = {each["material"]: each for each in report["materials"] if _complete(each)}
+        by_name = {entry["material"]: entry for entry in report["materials"] if _complete(entry)}
         return {"when": str(report["when"]), "by_name": by_name}
     except (OSError, ValueError, KeyError, TypeError):
         return {"when": "", "by_name": {}}
@@ -246,8 +247,8 @@ def _read(path: Path) -> dict[str, Any]:
 def _complete(finding: Any) -> bool:
     """Return True if the audit of a material has what is shown of it; those of older reports do not."""
     try:
-        words = [each[field] for each in finding["sentences"] for field in ("title", "word", "text")]
+        words = [sentence[field] for sentence in finding["sentences"] for field in ("title", "word", "text")]
         shown = (finding["revision"], finding["verdict"], finding["model"], *words)
     except (KeyError, TypeError):
         return False
-    return all(isinstance(each, str) for each in shown)
+    return all(isinstance(text, str) for text in shown)

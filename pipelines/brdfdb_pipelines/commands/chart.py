@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "names",
         nargs="+",
         metavar="NAME",
-        help="built-in materials, or materials and families of the recipe or the store",
+        help="presets, or materials and families of the recipe or the store",
     )
     add_store(parser)
     add_out(parser, "brdf-chart")

@@ -20,9 +20,9 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb.store import revisions
     from brdfdb_pipelines import terminal
 
-    found = revisions.history(options.store, options.name)
+    history = revisions.history(options.store, options.name)
     terminal.print_table(
-        f"{len(found)} revisions of {options.name} in {options.store}",
+        f"{len(history)} revisions of {options.name} in {options.store}",
         ("revision", "built", "model", "version", "stored", "request", ""),
         [
             (
@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
                 revision.summary["request_sha256"][:8] or "-",
                 "current" if revision.current else "",
             )
-            for revision in found
+            for revision in history
         ],
         numbers=("version", "stored"),
     )

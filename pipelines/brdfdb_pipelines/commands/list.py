@@ -19,7 +19,7 @@ HELP = "List the materials and families of the store, or the built-in presets."
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the store and the choice of presets."""
     add_store(parser)
-    parser.add_argument("--presets", action="store_true", help="the built-in materials that recipes can name")
+    parser.add_argument("--presets", action="store_true", help="list the presets, which recipes can name")
     add_snapshot(parser)
 
 
@@ -41,7 +41,7 @@ def _print_presets() -> None:
     from brdfdb_pipelines import terminal
 
     rows = [(m.name, m.title, m.model, m.source) for m in presets().values()]
-    terminal.print_table(f"{len(rows)} built-in materials", ("material", "title", "model", "source"), rows)
+    terminal.print_table(f"{len(rows)} presets", ("material", "title", "model", "source"), rows)
 
 
 def _print_materials(store: Store, root: Path) -> list[str]:

@@ -28,13 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Render the scene, write NAME.png and NAME.exr, and print where they are."""
-    from brdfdb.errors import ParameterError
+    from brdfdb.errors import ParameterError, import_extra
     from brdfdb.scenes import image
     from brdfdb.scenes.gbuffer import gather
     from brdfdb.scenes.recorded_directions import Recorded
     from brdfdb.scenes.renderer import reflectors, render
     from brdfdb_pipelines import scene_file, terminal
 
+    for module in ("matplotlib.image", "OpenEXR"):  # before the time is spent
+        import_extra(module)
     name, directory = options.scene, options.out
     scene = scene_file.load(name)
     if isinstance(scene.objects[0].shape, Recorded) and (options.width is not None or options.across is not None):
@@ -55,6 +57,6 @@ def run(options: argparse.Namespace) -> int:
     stem = directory / Path(name).stem
     for write, suffix in ((image.write_png, ".png"), (image.write_exr, ".exr")):
         write(stem.with_name(stem.name + suffix), scene, radiance)
-    points = sum(len(each.at) for each in view.points)
-    print(f"{stem}.png and {stem.name}.exr: {view.width} x {view.height} pixels, {points} points")
+    count = sum(len(points.at) for points in view.points)
+    print(f"{stem}.png and {stem.name}.exr: {view.width} x {view.height} pixels, {count} points")
     return 0

@@ -72,7 +72,7 @@ def _print_family(family: Family) -> None:
     at = ", ".join(f"{x} {value:g}" for x, value in record.worst.parameters.items())
     print(f"  worst       {terminal.error(record.worst.p99)} at {at}, of {record.points} sets of parameters")
     if record.specular_error is not None:
-        print(f"  Dirac part  within {record.specular_error:.3g} of the model's reflectance")
+        print(f"  specular    within {record.specular_error:.3g} of the model's reflectance")
 
 
 def _origin(metadata: TableMetadata) -> list[str]:
@@ -115,7 +115,7 @@ def _assumption(parameter: str, assumption: Assumption) -> list[str]:
 
 
 def _print_grid(table: Table) -> None:
-    """Axes, how many values are stored and how, and how f_r comes of them."""
+    """Print the axes, the number and precision of the stored values, and how f_r is reconstructed from them."""
     from brdfdb_pipelines import terminal
 
     metadata, wavelength = table.metadata, table.wavelength_nm
@@ -141,7 +141,7 @@ def _print_grid(table: Table) -> None:
 
 
 def _interpolation(table: Table) -> str:
-    """How a table is interpolated, in words."""
+    """Return the interpolation of a table in words."""
     how = table.interpolation
     what = "f_r" if how.power == 0.0 else f"f_r (cos theta_i cos theta_r)^{how.power:g}"
     if table.uniform is not None:
@@ -152,7 +152,7 @@ def _interpolation(table: Table) -> str:
 
 
 def _print_error(error: Error | None) -> None:
-    """Print the error that is stated: overall, and by bands and places at the wavelength where it is largest."""
+    """Print the stated error: overall, and by bands and places at the wavelength where it is largest."""
     from brdfdb.tables.places import RINGS_DEG
     from brdfdb_pipelines import terminal
 
@@ -173,10 +173,10 @@ def _print_error(error: Error | None) -> None:
     print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
     for label, bands in rows:
         print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in bands))
-    said = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
-    said += [] if error.between is None else ["between: any wavelength between those of the table"]
-    if said:
-        print(f"    {'; '.join(said)}")
+    notes = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
+    notes += [] if error.between is None else ["between: any wavelength between those of the table"]
+    if notes:
+        print(f"    {'; '.join(notes)}")
         print("    98 of 100 values are within these limits, and within those next to the horizon, if given")
     if error.places is None:
         return
@@ -186,25 +186,25 @@ def _print_error(error: Error | None) -> None:
 
 
 def _print_albedo(table: Table) -> None:
-    """Directional albedo of the table at a few angles: the first, the middle and the last wavelength."""
+    """Print the directional albedo [1] of the table at a few angles, at the first, middle and last wavelength."""
     import numpy as np
 
     from brdfdb.geometry import radians
     from brdfdb.tables.albedo import directional_albedo
 
-    found = directional_albedo(table)
-    diffuse = found.mean
+    albedo = directional_albedo(table)
+    diffuse = albedo.mean
     wavelength = table.wavelength_nm
     columns = sorted({0, diffuse.shape[1] // 2, diffuse.shape[1] - 1})
     print(
         "  albedo, as tabulated "
         + "".join(f"{f'{angle:g}°':>9}" for angle in ALBEDO_ANGLES_DEG)
-        + "  (theta_i; with the Dirac part)"
+        + "  (theta_i; with the specular part)"
     )
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
-        values = np.interp(ALBEDO_ANGLES_DEG, found.theta_i_deg, diffuse[:, w]) + specular
+        values = np.interp(ALBEDO_ANGLES_DEG, albedo.theta_i_deg, diffuse[:, w]) + specular
         print(f"    {'grey' if at is None else f'{at:g} nm':<10}" + "".join(f"{value:9.4f}" for value in values))
 
 

@@ -51,8 +51,10 @@ def _create(root: Path, name: str) -> None:
 
 def _list(root: Path) -> None:
     """Print a line for each snapshot of a store."""
-    from brdfdb.store.manifest import seal_of, snapshot_names, snapshot_path
+    from brdfdb.store.paths import snapshot_path
     from brdfdb.store.reader import Store
+    from brdfdb.store.sealed_json import seal_of
+    from brdfdb.store.snapshot_record import snapshot_names
 
     names = snapshot_names(Store(root).root)
     for name in names:
@@ -62,7 +64,7 @@ def _list(root: Path) -> None:
 
 
 def _contents(root: Path, name: str) -> str:
-    from brdfdb.store.manifest import read_snapshot
+    from brdfdb.store.snapshot_record import read_snapshot
 
     content = read_snapshot(root, name)
     return f"{name}: {len(content['materials'])} materials, {len(content['families'])} families"

@@ -2,7 +2,7 @@
 
 import { element, short } from "./dom.js";
 import { mirrorWords, scaled, shortOfHorizon, span, ticks } from "./scales.js";
-import { number, quantityWords } from "./series.js";
+import { lobe, number, quantityWords } from "./series.js";
 
 const RADIAN = Math.PI / 180;
 const VIRIDIS = [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121],
@@ -16,8 +16,10 @@ const [PER_PIXEL, PER_KEY] = [0.5, 5]; // degrees
 const camera = { ...START };
 let repaint = () => {}; // what is shown, from where the camera is now
 
+export default { name: "hemisphere", title: "Hemisphere", order: 2, request: lobe, draw: hemisphere, begin: turns };
+
 /** Draw the lobe of each series into an element; the caption. */
-export function hemisphere(into, series, answers, state) {
+function hemisphere(into, series, answers, state) {
   const kept = answers.map((answer) => shortOfHorizon(answer.axes_deg.theta_r));
   const values = answers.map((answer, i) => kept[i].map((k) => answer.brdf[k].map(number(answer))));
   const range = span(values.flat(2), state), height = scaled(state, range[0]);
@@ -46,7 +48,8 @@ export function hemisphere(into, series, answers, state) {
 }
 
 /** Let a hand and keys turn what is drawn into an element. */
-export function turns(into) {
+function turns(into) {
+  into.tabIndex = 0;
   const turn = (azimuth, elevation) => {
     camera.azimuth -= azimuth;
     camera.elevation = Math.min(Math.max(camera.elevation + elevation, 5), 88);

@@ -2,15 +2,17 @@
 
 import { element, percent, short } from "./dom.js";
 import { RELATIVE, floorOf, mirrorWords, relative, scaled, shortOfHorizon, span, ticks } from "./scales.js";
-import { number, quantityWords } from "./series.js";
+import { lobe, number, quantityWords } from "./series.js";
 import { MODEL } from "./state.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const RADIAN = Math.PI / 180;
 const TOP = 26, STRIP = 110, LABEL = 40; // pixels: room above, height of what tells the difference, width of a number
 
+export default { name: "cut", title: "Cut", order: 1, request: lobe, draw: cut };
+
 /** Draw the cut into an element; its caption. */
-export function cut(into, series, answers, state) {
+function cut(into, series, answers, state) {
   const width = into.clientWidth, radius = Math.min((width - 80) / 2, 300);
   const against = state.compare === MODEL;
   const kept = answers.map((answer) => shortOfHorizon(answer.axes_deg.theta_r));

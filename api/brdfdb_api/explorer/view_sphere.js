@@ -1,9 +1,9 @@
 // A sphere of the material, lit from one direction and looked at from far away, drawn pixel by pixel.
 
-import { lookup } from "./api.js";
+import { address, lookup } from "./api.js";
 import { element } from "./dom.js";
 import { unseenWords } from "./scales.js";
-import { quantity } from "./series.js";
+import { azimuth, quantity } from "./series.js";
 
 const SIZE = 96; // pixels across
 const DEGREE = 180 / Math.PI;
@@ -11,14 +11,29 @@ const DEGREE = 180 / Math.PI;
 const WORDS = "The viewer is far above the page; the light is θᵢ away from the viewer, to the right (+x) at φᵢ = 0 and to the " +
   "top (+y) at 90°, and as bright as makes a white matt surface white. The x axis of the surface runs around the vertical " +
   "axis of the sphere.";
-const MIRROR = " The mirror image, a Dirac part, is not drawn.";
+const MIRROR = " The mirror image, a specular part, is not drawn.";
 
-/** What the service says of all lit pixels of a series. */
-export const lit = (each, state, signal) =>
-  lookup(each.name, quantity(each, state, "linear-srgb"), geometry(state).directions, signal);
+export default {
+  name: "sphere",
+  title: "Sphere",
+  order: 6,
+  place: "spheres",
+  idle: ["log"],
+  turned: true, // phi_i moves the light, of isotropic materials, too
+  /** Of the middle of the sphere, to be copied: the picture takes thousands of directions. */
+  request(each, state, series) {
+    const { theta_i } = state, phi_i = azimuth(state, series);
+    const phi_r = ((phi_i ?? 0) + state.turn) % 360;
+    return address(each.name, "lookup", { theta_i, phi_i, theta_r: 0, phi_r, ...quantity(each, state, "linear-srgb") });
+  },
+  /** What the service says of all lit pixels of a series. */
+  answer: (each, state, signal) =>
+    lookup(each.name, quantity(each, state, "linear-srgb"), geometry(state).directions, signal),
+  draw: spheres,
+};
 
 /** Draw the sphere of each series into an element; the caption. */
-export function spheres(into, series, answers, state) {
+function spheres(into, series, answers, state) {
   const scene = geometry(state);
   while (into.children.length < answers.length) into.append(made());
   while (into.children.length > answers.length) into.lastChild.remove();

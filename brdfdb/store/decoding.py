@@ -1,0 +1,52 @@
+"""Decoding of a revision: its arrays as a table, and its metadata without its arrays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brdfdb.errors import (
+    ParameterError,
+    StoreError,
+)
+from brdfdb.store.paths import METADATA
+from brdfdb.store.sealed_json import read_json
+
+if TYPE_CHECKING:
+    from brdfdb.store.zarr_store import Whole
+    from brdfdb.tables.metadata import TableMetadata
+    from brdfdb.tables.table import Table
+
+
+def decode(name: str, path: Path, files: Whole, digest: str) -> Table:
+    """Return the table of a revision; StoreError if it is damaged, or no table that this program can look up."""
+    import numpy as np
+    import zarr
+
+    from brdfdb.tables.table import table_from
+
+    try:
+        group = zarr.open_group(files, mode="r")
+        stored = dict(group.arrays())
+        arrays = {key: np.asarray(array[...]) for key, array in stored.items()}
+    except StoreError:
+        raise
+    except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
+        raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
+    try:
+        table = table_from(name, path.name, arrays, dict(group.attrs))
+        variable = "brdf" if "brdf" in stored else "parts"
+        dims, axes = stored[variable].metadata.dimension_names or (), table.grid.names  # type: ignore[union-attr]
+        if dims[: len(axes)] != axes:
+            raise ParameterError(variable, f"its dimensions {dims} must begin with {axes}")
+        return replace(table, digest=digest)
+    except ValueError as error:  # written by another program
+        raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error
+
+
+def read_metadata(group: Path) -> TableMetadata:
+    """Return the metadata in the directory of a revision, whose files were checked against its manifest."""
+    from brdfdb.tables.metadata import TableMetadata
+
+    return TableMetadata.read(read_json(group / METADATA).get("attributes", {}))

@@ -1,0 +1,96 @@
+"""The lock of a material, and the sentence for what cannot be written."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import IO
+
+from brdfdb.errors import (
+    BusyError,
+    StoreError,
+)
+from brdfdb.store.paths import staged_path, staging_path
+
+
+@contextmanager
+def writing(root: Path, name: str) -> Iterator[None]:
+    """Turn an OSError of the block into a StoreError of one sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(f"cannot write {name} to the store at {root}: {error.strerror or error}") from error
+
+
+class Lock:
+    """The right to change a material: a context manager; others see it with `held_elsewhere`.
+
+    Parameters
+    ----------
+    root : Path
+        Directory of the store.
+    name : str
+        Of the material.
+    wait : bool
+        Whether to wait for another holder; without, `BusyError` is raised.
+
+    Raises
+    ------
+    BusyError
+        If another process, or another thread of this one, holds it.
+    """
+
+    def __init__(self, root: Path, name: str, *, wait: bool = True) -> None:
+        self.path = staged_path(root, name) / "lock"
+        self.root, self.name, self.wait = root, name, wait
+        self._handle: IO[bytes] | None = None
+
+    def __enter__(self) -> Lock:
+        with writing(self.root, self.name):
+            staging_path(self.root).mkdir(exist_ok=True)
+            while self._handle is None:
+                self._handle = self._acquired()
+        return self
+
+    def _acquired(self) -> IO[bytes] | None:
+        """Return the locked file; None if its holder took it away in the meantime."""
+        try:
+            self.path.parent.mkdir(exist_ok=True)
+            handle = self.path.open("ab")
+        except (FileNotFoundError, FileExistsError):  # its holder took the directory away, maybe between two calls
+            if self.path.parent.is_file():  # one look: between two the directory may go
+                raise
+            return None
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX if self.wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.fstat(handle.fileno()).st_ino == self.path.stat().st_ino:
+                return handle
+        except BlockingIOError:
+            handle.close()
+            raise BusyError(f"another build is at work on {self.name}") from None
+        except FileNotFoundError:
+            pass
+        except BaseException:
+            handle.close()
+            raise
+        handle.close()
+        return None
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """Give it back, and take the directory away if nothing is left in it."""
+        assert self._handle is not None
+        try:
+            if os.listdir(self.path.parent) == ["lock"]:
+                self.path.unlink()
+                self.path.parent.rmdir()
+        except OSError:  # another build has come in: it is theirs
+            pass
+        fcntl.flock(self._handle, fcntl.LOCK_UN)  # closing is not enough where a child was forked meanwhile
+        self._handle.close()
+        self._handle = None

@@ -1,0 +1,186 @@
+"""Albedos above 1 that are known as published or accepted, and the report of a store."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import version
+from typing import Any
+
+import jsonschema
+import numba
+import numpy as np
+import pytest
+
+from brdfdb.audit import FINDINGS, AuditReport, audit, report
+from brdfdb.audit.energy import Energy
+from brdfdb.audit.table_energy import table_energy_of
+from brdfdb.audit.values import Values
+from brdfdb.materials import presets
+from brdfdb.materials.provenance import KnownExcess
+from brdfdb.tables.albedo import directional_albedo
+from tests.audit.a_table import (
+    ABOUT,
+    ANISOTROPIC,
+    ISOTROPIC,
+    SCHEMA,
+    fine,
+    known,
+    lambert,
+    material,
+    node,
+    tabulated,
+    verdicts,
+    written,
+)
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
+
+
+@pytest.fixture(autouse=True)
+def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samplers are audited at length in test_audit_model.py."""
+    monkeypatch.setattr("brdfdb.audit.sampling.SAMPLES", 2000)
+
+
+# What is known
+
+
+@pytest.mark.parametrize(
+    ("excess", "verdict", "reason"),
+    [
+        (
+            known(1.06, 60.0),
+            "known published excess",
+            "reflects 1.05 of what arrives at 80 degrees: Somebody 1991, p. 3",
+        ),
+        (
+            known(1.06, 10.0),
+            "known published excess",
+            "reflects 1.05 of what arrives at 80 degrees: Somebody 1991, p. 3",
+        ),
+        (known(1.04, 60.0), "violates", "reflects 1.05 of what arrives at 80 degrees"),
+        (known(1.06, 60.1), "violates", "reflects 1.05 of what arrives at 80 degrees"),
+        (None, "violates", "reflects 1.05 of what arrives at 80 degrees"),
+    ],
+)
+def test_an_excess_is_known_up_to_its_albedo_and_from_its_angle_on(
+    excess: KnownExcess | None, verdict: str, reason: str
+) -> None:
+    table = lambert(0.5)
+    mirror = np.array([0.1, 0.1, 0.1, 0.51, 0.55, 0.5], dtype=np.float32)
+    found = table_energy_of(replace(table, specular=mirror), excess)
+    assert (found.verdict, found.reason) == (verdict, reason)
+    assert found.max_at_theta_i_deg == 80.0
+    # 0.6 at 30 degrees, 1.01 at 60, and linear between them
+    assert found.exceeds_1_from_theta_i_deg == pytest.approx(30.0 + 30.0 * 0.4 / 0.41, abs=0.002)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_no_excess_is_known_to_be_infinite(value: float) -> None:
+    table = node(lambert(0.5), value)
+    assert table_energy_of(table, known(1e300, 0.0)).verdict == "violates"
+
+
+@pytest.mark.parametrize("accept", [False, True])
+def test_an_excess_is_accepted_of_the_model_not_of_a_table_that_exceeds_1_where_it_does_not(accept: bool) -> None:
+    table = tabulated(material("oren_nayar", {"rho": 0.98, "sigma_deg": 40}), fine(2.0))
+    bright = table.brdf * np.float32(1.02 / np.max(directional_albedo(table).albedo))
+    found = audit(replace(table, values=bright), accept_excess=accept)
+    assert found.of(Energy).model.exceeds_1_from_theta_i_deg is None
+    assert (found.of(Energy).table.max_albedo, found.of(Energy).table.verdict) == (
+        pytest.approx(1.02, rel=1e-6),
+        "violates",
+    )
+
+
+def test_the_published_magnesium_oxide_is_a_known_excess() -> None:
+    found = audit(tabulated(presets()["magnesium-oxide-ceramic"], fine(1.0), np.array([500.0])))
+    assert verdicts(found) == {"energy": "known published excess"}
+    assert found.verdict == "known published excess"
+    assert " of what arrives at 83 degrees: He et al. 1991, section 3.2.3" in found.of(Energy).table.reason
+    # ERRATA: 0.977 at 30 degrees, 1.016 at 60, 1.11 at 85, above 1 from about 54 on
+    at = {
+        theta: row[0]
+        for theta, row in zip(found.of(Energy).table.theta_i_deg, found.of(Energy).table.albedo, strict=True)
+    }
+    assert at[30.0] == pytest.approx(0.977, abs=0.002)
+    assert at[60.0] == pytest.approx(1.016, abs=0.002)
+    assert at[85.0] == pytest.approx(1.11, abs=0.015)
+    assert found.of(Energy).table.exceeds_1_from_theta_i_deg == pytest.approx(54.0, abs=1.0)
+
+
+# Directional albedo at 89 degrees with rho = 1, interreflection included: ERRATA of eqs 27 and 28
+@pytest.mark.parametrize(("sigma_deg", "albedo"), [(10, 1.031), (20, 1.042), (30, 1.012)])
+def test_oren_nayar_with_rho_1_violates_unless_it_is_accepted(sigma_deg: float, albedo: float) -> None:
+    table = tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": sigma_deg}), fine(2.0))
+    found = audit(table)
+    assert (found.verdict, verdicts(found)) == ("violates", {"energy": "violates"})
+    assert "; this model does so by itself for such parameters: up to 1.0" in found.of(Energy).model.reason
+    assert "(Oren and Nayar 1994, eqs 27, 28 and 30: " in found.of(Energy).model.reason
+    accepted = audit(table, accept_excess=True)
+    assert (accepted.verdict, accepted.of(Energy).verdict) == ("accepted excess", "accepted excess")
+    assert "this model does so by itself" in accepted.of(Energy).reason
+    assert found.of(Energy).table.albedo[-2] == [pytest.approx(albedo, abs=0.002)]
+
+
+def test_what_a_recipe_says_of_an_excess_is_repeated_and_excuses_nothing() -> None:
+    ward = {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": 1.0, "alpha_y": 0.001}
+    claim = {"max_albedo": 2.0, "from_theta_i_deg": 0.0, "citation": "I say so"}
+    table = tabulated(material("ward_half_vector", ward, known_excess=claim), ANISOTROPIC)
+    found = audit(table)
+    assert (found.verdict, found.of(Energy).verdict) == ("violates", "violates")
+    assert found.of(Energy).reason.endswith("; its recipe excuses it, which counts for nothing: I say so")
+
+
+def test_what_is_accepted_excuses_nothing_but_the_energy_of_the_model() -> None:
+    table = node(tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": 20}), fine(5.0)), -1.0)
+    found = audit(table, accept_excess=True)
+    assert (found.verdict, found.of(Energy).model.verdict, found.of(Values).positivity) == (
+        *("violates", "accepted excess"),
+        "violates",
+    )
+
+
+def test_oren_nayar_with_rho_1_conserves_energy_on_a_rough_surface() -> None:
+    found = audit(tabulated(material("oren_nayar", {"rho": 1.0, "sigma_deg": 40}), fine(2.0)))
+    assert found.verdict == "passes"
+
+
+# The report
+
+
+def test_the_report_names_the_violations_and_nothing_else() -> None:
+    good, bad = lambert(0.5), node(lambert(0.5), -1.0)
+    excused = tabulated(presets()["blue-plastic"], ISOTROPIC, np.array([460.0]))
+    named = {"good": good, "bad": bad, "excused": excused}
+    audits = [audit(replace(table, name=name)) for name, table in named.items()]
+    document = written(audits)
+    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 5, ["bad"])
+    assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]
+    assert AuditReport.model_validate(document) == report(audits, **ABOUT)
+
+
+def test_an_empty_report_is_a_report() -> None:
+    about = {"store": "a store", "brdfdb": version("brdfdb"), "when": "2026-11-21T00:00:00Z"}
+    empty: dict[str, list[Any]] = {"materials": [], "atlas": [], "gallery": [], "damaged": [], "violations": []}
+    document = written([])
+    assert [each["key"] for each in document.pop("explanations")] == list(FINDINGS)
+    assert document == {"format": "brdfdb-audit", "version": 5, **about, **empty}
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda document: document.pop("violations"),
+        lambda document: document.update(comment="fine"),
+        lambda document: document["materials"][0].update(verdict="fine"),
+        lambda document: document["materials"][0]["findings"]["energy"]["table"].update(max_albedo="1.0"),
+        lambda document: document["materials"][0]["findings"]["values"].pop("count"),
+    ],
+)
+def test_the_schema_refuses_what_is_no_report(spoil: Callable[[dict[str, Any]], Any]) -> None:
+    document = written([audit(lambert(0.5))])
+    spoil(document)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(document, SCHEMA)
