@@ -150,7 +150,7 @@ F = TypeVar("F", bound=Finding)
 
 
 class NotJudged(Finding):
-    """A finding on a table whose source is not known, and why it takes one."""
+    """A finding that takes a source which cannot be evaluated, and the reason."""
 
     verdict: Literal["not judged"] = "not judged"
     reason: str

@@ -73,7 +73,7 @@ class _Way(NamedTuple):
 
 
 class _Measured(NamedTuple):
-    """What is known at the points: members around them, the model, directions."""
+    """Values at the points: of the members around them and of the model, at drawn directions."""
 
     points: list[_Point]
     parameters: list[dict[str, float]]  # in the units of the model
@@ -110,7 +110,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     Parameters
     ----------
     sweep : Sweep
-        Which tables, over which parameters.
+        The tables, and the parameters that they are swept over.
     tables : mapping of str to Table
         The members by name, such as the store.
     seed : int

@@ -167,7 +167,7 @@ def _print(root: Path, found: AuditReport, report_path: Path) -> None:
         for problem in a.problems():
             print(f"{a.material}: {problem}")
         if a.not_judged:
-            print(f"{a.material}: its source is not known; not judged: {', '.join(a.not_judged).lower()}")
+            print(f"{a.material}: its source cannot be evaluated; not judged: {', '.join(a.not_judged).lower()}")
     for key, kind in FINDINGS.items():
         for sentence in kind.overview([a.findings[key] for a in audits]):
             print(sentence)
