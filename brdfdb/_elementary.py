@@ -27,7 +27,7 @@ _SQRT_HALF = np.int64(0x3FE6A09E667F3BCD)
 
 @kernel
 def exp(x: float) -> float:
-    """e**x for x <= 700, within 4e-16 relative; 0 below -708; nan for nan."""
+    """Return e**x for x <= 700, within 4e-16 relative; 0 below -708; nan for nan."""
     shifted = x * _LOG2_E + _ROUND
     n = shifted - _ROUND
     r = (x - n * _LN2_HIGH) - n * _LN2_LOW
@@ -51,7 +51,7 @@ def exp(x: float) -> float:
 
 @kernel
 def summand_exp(x: float) -> float:
-    """e**x for x <= 700, 3e-13 of it where abs(x) < 100: for terms of a sum; at most 1e-300 below -700."""
+    """Return e**x for x <= 700, 3e-13 of it where abs(x) < 100: for terms of a sum; at most 1e-300 below -700."""
     y = x * _LOG2_E
     y = -1021.0 if y < -1021.0 else y  # nan too
     shifted = y + _ROUND
@@ -74,7 +74,7 @@ def summand_exp(x: float) -> float:
 
 @kernel
 def log(x: float) -> float:
-    """ln(x) of a positive normal float64, within 4e-16 relative or, next to 1, absolute."""
+    """Return ln(x) of a positive normal float64, within 4e-16 relative or, next to 1, absolute."""
     bits = np.float64(x).view(np.int64)
     # x = 2**n m with m in [sqrt(1/2), sqrt(2))
     n = (bits - _SQRT_HALF) >> np.int64(52)
@@ -95,7 +95,7 @@ def log(x: float) -> float:
 
 @kernel
 def arcsin(x: float) -> float:
-    """The angle [rad] whose sine is x, for abs(x) <= sqrt(1/2), within 3e-16 relative."""
+    """Return the angle [rad] whose sine is x, for abs(x) <= sqrt(1/2), within 3e-16 relative."""
     u = x * x
     # arcsin(x) / x, Chebyshev's series to 5e-18
     p = 1.155747740211758
@@ -122,7 +122,7 @@ def arcsin(x: float) -> float:
 
 @kernel
 def _quarter_turns(x: float) -> tuple[float, float, float]:
-    """Of how many quarter turns x [rad] is, rounded, as a whole number, modulo 4; the sine and cosine of the rest."""
+    """Return the quarter turns in x [rad], rounded, modulo 4; and the sine and cosine of the rest."""
     shifted = x * _TWO_OVER_PI + _ROUND
     n = shifted - _ROUND
     r = ((x - n * _HALF_PI_HIGH) - n * _HALF_PI_MIDDLE) - n * _HALF_PI_LOW
@@ -148,7 +148,7 @@ def _quarter_turns(x: float) -> tuple[float, float, float]:
 
 @kernel
 def sine(x: float) -> float:
-    """The sine of x [rad], within 2e-16 for abs(x) < 1e5 and within 2e-16 abs(x) beyond; nan for nan."""
+    """Return the sine of x [rad], within 2e-16 for abs(x) < 1e5 and within 2e-16 abs(x) beyond; nan for nan."""
     quarter, s, c = _quarter_turns(x)
     value = s if (quarter == 0.0) | (quarter == 2.0) else c
     return -value if quarter >= 2.0 else value
@@ -156,7 +156,7 @@ def sine(x: float) -> float:
 
 @kernel
 def cos(x: float) -> float:
-    """The cosine of x [rad], within 2e-16 for abs(x) < 1e5 and within 2e-16 abs(x) beyond; nan for nan."""
+    """Return the cosine of x [rad], within 2e-16 for abs(x) < 1e5 and within 2e-16 abs(x) beyond; nan for nan."""
     quarter, s, c = _quarter_turns(x)
     value = c if (quarter == 0.0) | (quarter == 2.0) else s
     return -value if (quarter == 1.0) | (quarter == 2.0) else value
@@ -164,7 +164,7 @@ def cos(x: float) -> float:
 
 @kernel
 def erfcx(x: float) -> float:
-    """exp(x**2) erfc(x) for x >= 0, within 5e-15 relative; nan for nan and infinity."""
+    """Return exp(x**2) erfc(x) for x >= 0, within 5e-15 relative; nan for nan and infinity."""
     s = (x - 3.0) / (x + 3.0)
     # (x + 3) erfcx(x), Chebyshev's series
     p = 1.9972062594364032e-09
@@ -195,5 +195,5 @@ def erfcx(x: float) -> float:
 
 @kernel
 def cosine(z: float) -> float:
-    """The cosine of a direction, from its z, at the horizon or above; nan for nan."""
+    """Return the cosine of a direction, from its z, at the horizon or above; nan for nan."""
     return COS_HORIZON if z < COS_HORIZON else z

@@ -1,4 +1,4 @@
-"""What a plot shows, as data: curves, maps and pictures, and beside them what a paper says one sees."""
+"""Figures as data: curves, maps and pictures, and statements of a paper about them."""
 
 from __future__ import annotations
 
@@ -100,23 +100,23 @@ class Figure(BaseModel):
 
 
 def curve_of(label: str, x: ArrayLike, y: ArrayLike, role: Role = "other") -> Curve:
-    """A line of a panel through arrays; y is drawn to five digits, with gaps where it is not finite."""
+    """Return the curve of a panel through arrays; y has five digits, and gaps where it is not finite."""
     return Curve(label=label, x=np.asarray(x, dtype=np.float64).tolist(), y=numbers(y), role=role)
 
 
 def numbers(values: ArrayLike, digits: int = 5) -> Numbers:
-    """A list of numbers to that many significant digits; what is not finite becomes None."""
+    """Return a list of numbers with that many significant digits; numbers that are not finite become None."""
     flat = np.asarray(values, dtype=np.float64).ravel()
     return [float(f"{value:.{digits}g}") if np.isfinite(value) else None for value in flat.tolist()]
 
 
 def rows(values: ArrayLike, digits: int = 5) -> list[Numbers]:
-    """`numbers` of each row of an array (rows, columns)."""
+    """Return `numbers` of each row of an array (rows, columns)."""
     return [numbers(row, digits) for row in np.asarray(values)]
 
 
 def listed(values: Iterable[float], form: str = ".3g") -> str:
-    """Numbers in a sentence, as "1, 2 and 3"."""
+    """Return numbers as part of a sentence: "1, 2 and 3"."""
     *most, last = (format(float(value), form) for value in values)
     return f"{', '.join(most)} and {last}" if most else last
 

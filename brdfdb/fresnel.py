@@ -13,7 +13,7 @@ from brdfdb._numba import elementwise, kernel
 
 @kernel
 def _interface(cos_theta: float, n: float, k: float) -> tuple[float, float, float, float, float]:
-    """Real and imaginary part of w = (n + ik)^2 - 1, real part of 1 + w, and both of q = sqrt(cos^2 + w).
+    """Return real and imaginary part of w = (n + ik)^2 - 1, real part of 1 + w, and both of q = sqrt(cos^2 + w).
 
     Of the two roots q has the parts that are not negative: the wave in the substance goes and decays away from the
     surface, with the time factor exp(-i omega t). The difference that cancels as n -> 1 is taken once, in w.
@@ -37,7 +37,7 @@ def _interface(cos_theta: float, n: float, k: float) -> tuple[float, float, floa
 
 @kernel
 def reflectance(cos_theta: float, n: float, k: float) -> float:
-    """|F|^2 = (|F_s|^2 + |F_p|^2) / 2 at a vacuum interface of complex index n + ik.
+    """Return |F|^2 = (|F_s|^2 + |F_p|^2) / 2 at a vacuum interface of complex index n + ik.
 
     With w and q of `_interface`, F_s = -w / (cos + q)^2 and F_p = w (cos^2 (1 + w) - sin^2) / ((1 + w) cos + q)^2: the
     same as the textbook quotients without their cancellation as n -> 1.
@@ -64,7 +64,7 @@ def reflectance(cos_theta: float, n: float, k: float) -> float:
 
 @kernel
 def _half_sum_and_difference(cos_theta: float, n: float, k: float) -> tuple[complex, complex]:
-    """(F_s + F_p) / 2 = T sin^2 and (F_s - F_p) / 2 = T q cos, with T = -w / ((cos + q) ((1 + w) cos + q)).
+    """Return (F_s + F_p) / 2 = T sin^2 and (F_s - F_p) / 2 = T q cos, with T = -w / ((cos + q) ((1 + w) cos + q)).
 
     One is 0 at normal incidence, the other at grazing: written like this, neither is a difference that cancels.
     """
@@ -78,7 +78,7 @@ def _half_sum_and_difference(cos_theta: float, n: float, k: float) -> tuple[comp
 
 @kernel
 def _amplitudes(cos_theta: float, n: float, k: float) -> tuple[complex, complex]:
-    """F_s and F_p as in `reflectance`."""
+    """Return F_s and F_p as in `reflectance`."""
     w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
     if w_re == 0.0 and w_im == 0.0:  # no interface, and 0 / 0 at grazing
         return complex(0.0, 0.0), complex(0.0, 0.0)
@@ -120,7 +120,7 @@ Complexes = NDArray[np.complexfloating]
 
 
 def amplitudes(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
-    """Complex F_s and F_p, reflected over incident electric field, for the index n + ik and the time exp(-i omega t).
+    """Return complex F_s and F_p, reflected over incident field, for the index n + ik and the time exp(-i omega t).
 
     At normal incidence F_p = -F_s = (n + ik - 1) / (n + ik + 1), since p = s x (direction of propagation) turns over
     on reflection; at grazing both are -1.
@@ -129,13 +129,13 @@ def amplitudes(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Comple
 
 
 def half_sum_and_difference(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
-    """(F_s + F_p) / 2 and (F_s - F_p) / 2 of `amplitudes`, with all their digits where one of them is nearly 0."""
+    """Return (F_s + F_p) / 2 and (F_s - F_p) / 2 of `amplitudes`, with all digits where one of them is nearly 0."""
     return _pair(_fill_half_sum_and_difference, cos_theta, n, k)
 
 
 def _pair(fill: Callable[..., None], cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
-    arrays = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (cos_theta, n, k)))
+    arrays = np.broadcast_arrays(*(np.asarray(array, dtype=np.float64) for array in (cos_theta, n, k)))
     first, second = np.empty((2, arrays[0].size), dtype=np.complex128)
-    fill(*(np.ravel(each) for each in arrays), first, second)
+    fill(*(np.ravel(array) for array in arrays), first, second)
     shape = arrays[0].shape
     return first.reshape(shape)[()], second.reshape(shape)[()]

@@ -26,12 +26,12 @@ UNIT_LENGTH = 1e-5  # how far from 1 the length of a unit vector may be; float32
 
 
 def radians(angle_deg: ArrayLike) -> NDArray[np.float64]:
-    """Degrees to radians (90 degrees gives exactly the float64 nearest pi/2)."""
+    """Return degrees in radians (90 degrees gives exactly the float64 nearest pi/2)."""
     return np.deg2rad(np.asarray(angle_deg, dtype=np.float64))
 
 
 def degrees(angle: ArrayLike) -> NDArray[np.float64]:
-    """Radians to degrees."""
+    """Return radians in degrees."""
     return np.rad2deg(np.asarray(angle, dtype=np.float64))
 
 
@@ -215,8 +215,8 @@ def _unit_vectors(name: str, w: ArrayLike) -> Floats:
 
 
 def asked_for(*directions: ArrayLike) -> np.dtype[Any]:
-    """float32 if the arrays among the directions are, else float64."""
-    arrays = [each for each in directions if isinstance(each, np.ndarray | np.generic)]
+    """Return float32 if the arrays among the directions are, else float64."""
+    arrays = [array for array in directions if isinstance(array, np.ndarray | np.generic)]
     single = bool(arrays) and np.result_type(*arrays) == np.float32
     return np.dtype(np.float32 if single else np.float64)
 
@@ -232,27 +232,27 @@ def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Fl
     def aligned(array: NDArray[Any]) -> NDArray[Any]:
         return array.reshape(array.shape + (1,) * trailing)
 
-    shape = np.broadcast_shapes(np.shape(values), *(aligned(each).shape for each in directions.given), own)
+    shape = np.broadcast_shapes(np.shape(values), *(aligned(angle).shape for angle in directions.given), own)
     result: Floats = values if np.shape(values) == shape else np.broadcast_to(values, shape)
     if np.any(directions.below):
         result = np.where(aligned(directions.below), 0.0, result)
-    for each in directions.given:
-        if np.any(np.isnan(each)):
-            result = np.where(aligned(np.isnan(each)), np.nan, result)
+    for angle in directions.given:
+        if np.any(np.isnan(angle)):
+            result = np.where(aligned(np.isnan(angle)), np.nan, result)
     if result.dtype != directions.dtype or not result.flags.writeable:
         result = result.astype(directions.dtype)
     return result[()]
 
 
 def unit_vector(theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-    """The unit vectors, shape (..., 3), of directions (theta, phi) [rad]."""
+    """Return the unit vectors, shape (..., 3), of directions (theta, phi) [rad]."""
     sin_theta = np.sin(theta)
     x, y, z = np.broadcast_arrays(sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta))
     return np.stack([x, y, z], axis=-1)
 
 
 def spherical_angles(w: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The angles (theta, phi) [rad] of vectors of shape (..., 3); phi in (-pi, pi], 0 at the pole."""
+    """Return the angles (theta, phi) [rad] of vectors of shape (..., 3); phi in (-pi, pi], 0 at the pole."""
     x, y, z = np.moveaxis(np.asarray(w, dtype=np.float64), -1, 0)
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
@@ -260,7 +260,7 @@ def spherical_angles(w: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.floa
 def directions_from_half_difference(
     theta_h: ArrayLike, phi_h: ArrayLike, theta_d: ArrayLike, phi_d: ArrayLike
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Directions of light and viewer from half/difference angles (Rusinkiewicz 1998, ``rusinkiewicz1998``).
+    """Return directions of light and viewer from half/difference angles (Rusinkiewicz 1998, ``rusinkiewicz1998``).
 
     Parameters
     ----------

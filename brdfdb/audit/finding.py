@@ -86,13 +86,15 @@ class NumberTable(NamedTuple):
 class Finding(BaseModel):
     """One finding on one table: the data of the report, and how terminal, page and explorer show it.
 
-    A subclass gives the class attributes and `judge`, and is listed in `brdfdb.audit.findings.FINDINGS`. `verdict` is
-    a field of it.
+    A subclass gives the class attributes and `judge`; `brdfdb.audit.findings.FINDINGS` finds it in its module.
+    `verdict` is a field of it.
 
     Attributes
     ----------
     key : str
         Name in the report, of lower-case letters and underscores.
+    order : int
+        Place among the findings: they are judged and shown in this order.
     title : str
         Name for people.
     columns : tuple of str
@@ -104,6 +106,7 @@ class Finding(BaseModel):
     model_config = STRICT
 
     key: ClassVar[str]
+    order: ClassVar[int] = 100
     title: ClassVar[str]
     columns: ClassVar[tuple[str, ...]]
     explanation: ClassVar[str]
@@ -150,7 +153,7 @@ F = TypeVar("F", bound=Finding)
 
 
 class NotJudged(Finding):
-    """A finding on a table whose source is not known, and why it takes one."""
+    """A finding that takes a source which cannot be evaluated, and the reason."""
 
     verdict: Literal["not judged"] = "not judged"
     reason: str
@@ -188,7 +191,7 @@ class Subject:
 
     @cached_property
     def pairs(self) -> Pairs:
-        """f_r of table and source at the directions that several findings share."""
+        """Return f_r [1/sr] of table and source at the directions that several findings share."""
         return pairs_of(self.table, self.source)
 
     def not_judged(self, needs: str) -> NotJudged:

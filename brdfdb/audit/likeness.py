@@ -71,7 +71,7 @@ def _changes(anisotropic: bool) -> Iterator[tuple[str, Callable[[Floats, Floats]
 
 
 def _turned(w: Floats, degrees: float) -> Floats:
-    """Unit vectors turned about the normal."""
+    """Return unit vectors turned about the normal."""
     cos, sin = np.cos(radians(degrees)), np.sin(radians(degrees))
     return np.stack([cos * w[:, 0] - sin * w[:, 1], sin * w[:, 0] + cos * w[:, 1], w[:, 2]], axis=-1)
 
@@ -81,6 +81,6 @@ def _mirrored(w: Floats) -> Floats:
 
 
 def _upended(w: Floats) -> Floats:
-    """Unit vectors whose polar angles are what is left of theirs to 90 degrees."""
+    """Return unit vectors with the complements of their polar angles."""
     theta, phi = spherical_angles(w)
     return unit_vector(np.clip(np.pi / 2.0 - theta, 0.0, np.pi / 2.0 - 1e-9), phi)

@@ -93,9 +93,9 @@ class _Lights(NamedTuple):
 
 
 class _Reflected(NamedTuple):
-    """Albedos (theta_i, wavelengths): over azimuths the largest and the mean, the Dirac part in them.
+    """Albedos (theta_i, wavelengths): the largest and the mean over azimuths, with the specular part in them.
 
-    Of the errors (theta_i, 1), over azimuths and wavelengths the largest: what one light is off by excuses no other.
+    `error` (theta_i, 1) is the largest over azimuths and wavelengths: the error of one light excuses no other.
     """
 
     largest: Floats
@@ -147,7 +147,7 @@ def model_energy_of(
 def _refined(
     source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _Reflected
 ) -> tuple[_Lights, _Reflected]:
-    """More lights where the albedo is largest, each time half way to those beside: peaks lie between round angles."""
+    """Return more lights around the largest albedo, half way to their neighbours: peaks lie between round angles."""
     for _ in range(ROUNDS):
         worst, _ = _worst(found.largest)
         around = slice(max(worst - 1, 0), worst + 2)
@@ -194,7 +194,7 @@ def _explained(source: Source, found: _Reflected, first: float, known: KnownExce
 
 
 def _worst(albedo: Floats) -> tuple[int, int]:
-    """Where the largest is, or what is not finite; of many angles where it is the same the first: rounding differs."""
+    """Return the index of the largest albedo. Non-finite values rank first; ties resolve to the smallest angle."""
     ranked = np.where(np.isfinite(albedo), np.round(albedo, 12), np.inf)
     theta, wavelength = np.unravel_index(np.argmax(ranked), ranked.shape)
     return int(theta), int(wavelength)
@@ -240,7 +240,7 @@ def _verdict(
 
 
 def _lights(source: Source) -> _Lights:
-    """The lights of a model: 90 degrees itself is one of them where it has no pole there."""
+    """Return the lights of a source; 90 degrees is one of them unless f_r has a pole there."""
     x, weight = np.polynomial.legendre.leggauss(NODES)
     nodes, weights = np.round(45.0 * (1.0 + x), 4), weight * (np.pi / 4.0)  # people read them
     others = np.array(THETA_I_DEG if source.grazing_pole else (*THETA_I_DEG, 90.0))

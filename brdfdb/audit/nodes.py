@@ -29,6 +29,7 @@ class Nodes(Finding):
     """The numbers that a table stores, beside those that its source gives at the same nodes."""
 
     key = "nodes"
+    order = 4
     title = "Nodes"
     columns = ("nodes",)
     explanation = "What is stored against what the model gives at the same nodes: the same but for rounding."
@@ -117,7 +118,7 @@ def nodes_of(table: Table, source: Source) -> Nodes:
 
 
 def _rows(layout: Layout) -> Iterator[slice]:
-    """Slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
+    """Yield slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
     slow = isinstance(layout.source, Material) and layout.source.spec.slow
     most = (_MOST_SLOW if slow else MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
@@ -162,17 +163,17 @@ def _uniform(table: Table, layout: Layout) -> Iterator[str]:
 
 
 def _dirac(table: Table, layout: Layout) -> Iterator[str]:
-    """Yield a sentence on a Dirac part that is missing, or whose nodes are not those of the layout."""
+    """Yield a sentence on a specular part that is missing, or whose nodes are not those of the layout."""
     if not layout.source.has_specular:
         return
     if table.specular is None:
-        yield "the Dirac part of the model is not stored"
+        yield "the specular part of the model is not stored"
         return
     nodes = table.axes_deg.get("theta_i") if table.specular_theta_deg is None else table.specular_theta_deg
     expected = specular_nodes(layout)
     if nodes is None or not np.array_equal(nodes, expected):
         count = 0 if nodes is None else len(nodes)
-        yield f"the Dirac part is stored at {count} angles that are not the {len(expected)} of its layout"
+        yield f"the specular part is stored at {count} angles that are not the {len(expected)} of its layout"
 
 
 def _unstated(table: Table) -> Iterator[str]:

@@ -12,7 +12,8 @@ from brdfdb.tables.error_measurement import Draw
 from brdfdb.tables.table import Table
 
 SEED = 1967  # not that of a build or a planner: their directions have been looked at
-# Of each band of theta_i, half of them in the lobe; of more than _FEW wavelengths, which vary alike, fewer
+# Directions per band of theta_i, half of them in the lobe. Tables of many wavelengths, which vary
+# alike, use fewer
 DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
 
 
@@ -44,5 +45,5 @@ def pairs_of(table: Table, source: Source | None) -> Pairs:
 
 
 def representative_nm(table: Table) -> float | None:
-    """The wavelength [nm] in the middle of those of a table, where what would fill pages is shown; None if grey."""
+    """Return the middle wavelength [nm] of a table, for findings that show one wavelength only; None if grey."""
     return None if table.wavelength_nm is None else float(table.wavelength_nm[table.wavelength_nm.size // 2])

@@ -1,4 +1,4 @@
-"""Whether light and viewer may be exchanged: of a model at the parameters of a table, and of the table."""
+"""Reciprocity of a model at the parameters of a table, and of the table: light and viewer exchanged."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.table import Table
 
-# The models are reciprocal; what is left is rounding, worst where exp(-V) has a large exponent: measured 3e-13
+# The models are reciprocal up to rounding, which is worst where exp(-V) has a large exponent: measured 3e-13
 MODEL_RECIPROCITY_TOLERANCE = 1e-11
 # float32 rounds two values that differ by that to the same number or to neighbours, 6e-8 apart: measured 0
 TABLE_RECIPROCITY_TOLERANCE = 1e-6
@@ -44,6 +44,7 @@ class Reciprocity(Finding):
     """
 
     key = "reciprocity"
+    order = 2
     title = "Reciprocity"
     columns = ("reciprocity",)
     explanation = (
@@ -63,8 +64,13 @@ class Reciprocity(Finding):
     @classmethod
     def judge(cls, subject: Subject) -> Reciprocity:
         """Judge a table and its source; without a source the table alone."""
-        found = reciprocity_of(subject.table, subject.pairs)
-        return found if subject.source else found.model_copy(update={"model_random": None, "model_lobe": None})
+        both = reciprocity_of(subject.table, subject.pairs)
+        return both if subject.source else both.model_copy(update={"model_random": None, "model_lobe": None}).judged()
+
+    def judged(self) -> Reciprocity:
+        """Return the same asymmetries with the verdict that follows from them."""
+        good = all(pairs.tolerance is None or pairs.max <= pairs.tolerance for _, pairs in self.named())
+        return self.model_copy(update={"verdict": "passes" if good else "violates"})
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the largest asymmetry of those that are judged."""
@@ -102,7 +108,7 @@ class Reciprocity(Finding):
 
 
 def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
-    """Random pairs, pairs in the lobe, and all pairs of nodes."""
+    """Return the asymmetry of random pairs, of pairs in the lobe, and of all pairs of nodes."""
     above, in_lobe = pairs.drawn.above, pairs.drawn.in_lobe
     how = table.interpolation
     mu = np.maximum(pairs.drawn.wi[:, 2:] * pairs.drawn.wr[:, 2:], COS_HORIZON**2)
@@ -117,12 +123,11 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
         table_nodes=None if table.grid.half_difference else _node_asymmetry(table),
         verdict="passes",
     )
-    good = all(each.tolerance is None or each.max <= each.tolerance for _, each in found.named())
-    return found if good else found.model_copy(update={"verdict": "violates"})
+    return found.judged()
 
 
 def _interpolant_tolerance(grid: Grid) -> float | None:
-    """An interpolant is as symmetric as its nodes where light and viewer have the same; elsewhere nobody can say."""
+    """Return the allowed asymmetry [1] of lookups; None where light and viewer have different nodes."""
     if grid.half_difference:
         return LOOKUP_RECIPROCITY_TOLERANCE
     same = np.array_equal(grid.axes["theta_i"], grid.axes["theta_r"])
@@ -132,7 +137,7 @@ def _interpolant_tolerance(grid: Grid) -> float | None:
 
 
 def _node_asymmetry(table: Table) -> Asymmetry:
-    """Stored values against stored values, all of them: one that is wrong is found."""
+    """Return the asymmetry of all stored values, so that a single wrong one is found."""
     axes = table.axes_deg
     _, i, r = np.intersect1d(axes["theta_i"], axes["theta_r"], return_indices=True)
     if table.anisotropic:
@@ -151,7 +156,7 @@ def _over(chosen: NDArray[np.bool_], f: Floats, exchanged: Floats, tolerance: fl
 
 
 def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmetry:
-    """Of values of shape (pairs, wavelengths)."""
+    """Return the asymmetry of values of shape (pairs, wavelengths)."""
     differs = f != exchanged  # nan does; hardly any other node, which saves the time of the rest
     one, other = f[differs].astype(np.float64), exchanged[differs].astype(np.float64)
     with np.errstate(invalid="ignore"):  # what is not finite counts as 1

@@ -75,7 +75,7 @@ class MaterialAudit(BaseModel):
 
     @property
     def not_judged(self) -> list[str]:
-        """Titles of the findings that are not judged."""
+        """Return the titles of the findings that are not judged."""
         return [FINDINGS[key].title for key, found in self.findings.items() if isinstance(found, NotJudged)]
 
 

@@ -43,6 +43,7 @@ class Sampling(Finding):
     """The sampler of the model at the parameters of the material, for some lights."""
 
     key = "sampling"
+    order = 7
     title = "Sampling"
     columns = ("sampling",)
     explanation = (
@@ -109,7 +110,7 @@ def _probability(value: float | None) -> str:
 
 
 class _Light(NamedTuple):
-    """What is found for one light, as in `Sampling`, and whether that is good."""
+    """Numbers of one light, as in `Sampling`, and the verdict on them."""
 
     chi_square_p: float
     largest_weight: float
@@ -160,9 +161,9 @@ def _light(spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, co
 
 
 def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
-    """p of directions by Pearson's chi-square, in bins of their half vectors and one for all others.
+    """Return the p [1] of directions by Pearson's chi-square, in bins of their half vectors and one for all others.
 
-    In slopes in units of the lobe bins are as fine as the density needs, however narrow the lobe is.
+    Bins are in slopes in units of the lobe, so that they are as fine as the density needs, however narrow it is.
     """
     alpha = np.array([lobe.alpha_x, lobe.alpha_y], dtype=np.float64)
     h = wr + wi
@@ -197,14 +198,14 @@ def _shares(wi: Array, lobe: Lobe, alpha: Array, t_edges: Array) -> Array:
 
 
 def _gauss(edges: Array) -> tuple[Array, Array]:
-    """Nodes and weights between edges, as rows."""
+    """Return nodes and weights between edges, as rows."""
     x, weight = np.polynomial.legendre.leggauss(_NODES)
     half = np.diff(edges)[:, np.newaxis] / 2.0
     return (edges[:-1] + edges[1:])[:, np.newaxis] / 2.0 + half * x, half * weight
 
 
 def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
-    """Bins from the fullest on, those of which too little is expected in one with the emptiest of the others."""
+    """Return the bins from the fullest on. Bins with few expected samples are merged with the emptiest other."""
     order = np.argsort(expected)[::-1]
     last = max(int(np.count_nonzero(expected >= _ENOUGH)) - 1, 0)
     starts = np.arange(last + 1)

@@ -76,6 +76,7 @@ class Smoothness(Finding):
     """Jumps of the model across its branches, and of the table across the seams of its grid."""
 
     key = "smoothness"
+    order = 5
     title = "Smoothness"
     columns = ("smoothness",)
     explanation = (
@@ -152,7 +153,7 @@ def _rounding(*_: Array) -> Floats:
 
 
 def _stated(error: Error | None, wi: Array, wr: Array) -> Floats:
-    """The jumps that a table states for pairs of directions, shape (N, L)."""
+    """Return the jumps [1] that the stated error allows at pairs of directions, shape (N, L)."""
     if error is None:
         return np.full((1, 1), TABLE_TOLERANCE)
     theta, _ = spherical_angles(np.stack([wi, wr]))
@@ -196,7 +197,7 @@ def _of_table(table: Table) -> Iterator[_Seam]:
 
 
 def _columns(table: Table) -> list[int]:
-    """Which of the four angles each axis of a grid is; phi_i and phi_h of isotropic ones are 0."""
+    """Return the index of the angle of each axis of a grid; phi_i and phi_h of isotropic grids are 0."""
     return list(range(4)) if table.anisotropic else [0, 2, 3]
 
 
@@ -205,7 +206,7 @@ def _all(*angles: Floats) -> Array:
 
 
 def _directions(angles: Array, half_difference: bool) -> tuple[Array, Array]:
-    """Unit vectors of light and viewer."""
+    """Return unit vectors of light and viewer."""
     t_i, p_i, t_r, p_r = np.moveaxis(angles, -1, 0)
     if half_difference:
         t_i, p_i, t_r, p_r = directions_from_half_difference(t_i, p_i, t_r, p_r)
@@ -213,7 +214,7 @@ def _directions(angles: Array, half_difference: bool) -> tuple[Array, Array]:
 
 
 def _crossed(seams: Iterable[_Seam]) -> Iterator[_Seam]:
-    """Seams with those of their directions that are above the horizon, if there are any."""
+    """Yield seams with their directions above the horizon, if there are any."""
     for seam in seams:
         wi, wr = _directions(seam.at, seam.half_difference)
         above = np.minimum(wi[:, 2], wr[:, 2]) > _LOWEST
@@ -234,7 +235,7 @@ def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: F
 
 
 def _between_methods(source: Source, wavelength_nm: Array | None, floor: Floats) -> Jump:
-    """Between values along an azimuth, of which He-Torrance takes a sum from a table, and the same one by one."""
+    """Return the jump between values along an azimuth, where He-Torrance reads a table, and single values."""
     theta_i, theta_r, phi_r = np.meshgrid(_THETA, _THETA, np.linspace(0.0, np.pi, _ROW), indexing="ij")
     rows, single = (
         np.reshape(source.lookup(*angles, wavelength_nm), (theta_i.size, -1))
@@ -246,7 +247,7 @@ def _between_methods(source: Source, wavelength_nm: Array | None, floor: Floats)
 
 
 def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
-    """Jumps between values of shape (N, L), relative to the larger or the floor."""
+    """Return jumps [1] between values (N, L), relative to the larger one or the floor."""
     with np.errstate(invalid="ignore"):  # what is not finite counts as 1
         relative = np.abs(after - before) / np.maximum(np.maximum(np.abs(after), np.abs(before)), floor)
     return np.where(np.isfinite(relative), relative, 1.0)
@@ -255,7 +256,7 @@ def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
 def _largest(
     seam: str, relative: Floats, at: tuple[Array, Array], wavelength_nm: Array | None, allowed: Floats
 ) -> Jump:
-    """The jump that is largest of what is allowed there."""
+    """Return the jump that is largest relative to its tolerance."""
     allowed = np.broadcast_to(allowed, relative.shape)
     row, column = np.unravel_index(int(np.argmax(relative / allowed)), relative.shape)
     where = _where(*(w[row] for w in at))

@@ -68,7 +68,7 @@ class Disagreement(BaseModel):
 
     @property
     def text(self) -> str:
-        """Both numbers, and their place, in words."""
+        """Return both numbers, and their place, in words."""
         low, high = self.theta_i_deg
         where = "overall" if (low, high) == (0.0, 90.0) else f"at theta_i of {low:g} to {high:g} degrees"
         at = "" if self.wavelength_nm is None else f", {self.wavelength_nm:g} nm"
@@ -175,7 +175,7 @@ def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> It
 
 
 def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None]) -> Iterator[Disagreement]:
-    """The floor is a share of the mean reflectance over uniform directions: an integral over the same draws."""
+    """Yield the disagreements on the floor, a share of the mean reflectance over uniform directions."""
     values = error_measurement.FLOOR / np.pi * pairs.drawn.weight[:, np.newaxis] * pairs.model
     fresh = values.mean(axis=0)
     off = STANDARD_ERRORS * values.std(axis=0) / np.sqrt(band.drawn) * np.sqrt(1.0 + band.drawn / band.stated)
@@ -185,7 +185,7 @@ def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None])
 
 
 def _bands(error: Error, drawn: Draw) -> Iterator[_Band]:
-    """Each band of theta_i, then all of them; a draw has the same share of directions in each as another."""
+    """Yield each band of theta_i, then all of them; every draw has the same share of directions in each."""
     share = error.directions / max(int(np.count_nonzero(drawn.above)), 1)
     for number, name in enumerate(zip(BANDS_DEG[:-1].tolist(), BANDS_DEG[1:].tolist(), strict=True)):
         here = drawn.band == number
@@ -229,7 +229,7 @@ def _exceeding(values: Floats, limit: Floats) -> Counts:
 
 
 def _ratio(wrong: Floats, whole: Floats, weight: Floats, band: _Band) -> tuple[Floats, Floats]:
-    """The ratio of two integrals over a band, and the standard error of its difference from that of a statement."""
+    """Return the ratio of two integrals over a band, and the standard error of its difference from a stated one."""
     rows = band.chosen
     weights = weight[rows, np.newaxis]
     above, below = weights * wrong[rows], weights * whole[rows]

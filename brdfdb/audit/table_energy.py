@@ -19,14 +19,14 @@ from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
 
-# More cannot be asked of a planner: a table that states more is judged as if it stated this
+# Largest stated error [1] that counts: a table that states more is judged as if it stated this
 MOST_ERROR = 0.5
 _BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
 _NOT_FINITE, _FINITE = 1e30, 1e20  # what stands for an albedo that is not finite, and what is below any mean of it
 
 
 class Bands(BaseModel):
-    """What a table that states its error is judged by: what exceeds 1, on average over bands of theta_i."""
+    """Excess over 1 on average over bands of theta_i, by which a table that states its error is judged."""
 
     model_config = STRICT
 
@@ -44,7 +44,7 @@ class Bands(BaseModel):
 
 
 class TableEnergy(BaseModel):
-    """Directional albedo of the table, specular part included: what leaves, of unit flux from theta_i.
+    """Directional albedo of the table, specular part included: the share of the light from theta_i that leaves.
 
     A table that states its error does so over bands of theta_i. What exceeds 1, or what is known of the material, may
     be as much of a band as that error explains, and no more.
@@ -80,11 +80,11 @@ class TableEnergy(BaseModel):
 
 
 class _Judge(NamedTuple):
-    """What is averaged before an albedo is held against a table, and by how much it then may exceed.
+    """Averages of an albedo that are judged, and the excess that the stated error of the table explains.
 
-    `means` (rows, theta_i) are weights of averages, `covers`, of that shape, which theta_i a row is about, `l1` (rows,
-    wavelengths) the error that a table states, and `reflected`, of that shape, a mean of the albedo without the Dirac
-    part that a model may have if that error is true.
+    `means` (rows, theta_i) holds the weights of averages, `covers`, of that shape, the theta_i that a row is about.
+    `l1` (rows, wavelengths) is the error that a table states. `reflected`, of that shape, is the mean albedo without
+    the specular part that a model may have if that error is true.
     """
 
     means: Floats
@@ -93,15 +93,15 @@ class _Judge(NamedTuple):
     reflected: Floats
 
     def explained(self, limit: Floats) -> Floats:
-        """The integral of abs(table - model), in means: l1 of what the model reflects, which keeps to the limit."""
+        """Return the mean albedo [1] that the stated error explains: l1 of what the model may reflect."""
         return self.l1 * np.minimum(self.reflected, (self.means @ limit)[:, np.newaxis])
 
     def excess(self, albedo: Floats, limit: Floats) -> Floats:
-        """What is above a limit, over rows and wavelengths; the limit is over theta_i."""
+        """Return the mean albedo [1] above a limit (theta_i,), over rows and wavelengths."""
         return np.asarray(self.means @ np.maximum(albedo - limit[:, np.newaxis], 0.0))
 
     def unexplained(self, albedo: Floats, limit: Floats) -> NDArray[np.bool_]:
-        """At which theta_i a limit is exceeded, and nothing explains it."""
+        """Return a mask over theta_i: True where a limit is exceeded beyond the stated error."""
         rows = self.excess(albedo, limit) > self.explained(limit)
         both = (albedo > limit[:, np.newaxis]) & (self.covers.T.astype(int) @ rows.astype(int) > 0)
         return np.asarray(np.any(both, axis=1))
@@ -179,7 +179,7 @@ def _share(albedo: float) -> str:
 
 
 def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
-    """Each theta_i of a table without a stated error; of others the mean over bands, over which they state it.
+    """Return a judge of each theta_i of a table without a stated error; of others, of the mean over bands of theta_i.
 
     What is above a limit that the model keeps to is wrong, and no more of a band can be wrong than l1 of what the model
     reflects there: 1 / (1 - l1) of what the table does, at most.
@@ -200,19 +200,19 @@ def _bands(error: Error, explained: Floats, excess: Floats) -> Bands:
 
 
 def _known(values: Floats) -> Floats:
-    """Values of which those that are not finite are replaced by one that exceeds everything."""
+    """Return values, with those that are not finite replaced by one that exceeds all others."""
     return np.where(np.isfinite(values), values, _NOT_FINITE)
 
 
 def _band_means(theta_i_deg: Axis, edges: Axis) -> Floats:
-    """Weights, (bands, theta_i), of the mean over each band of what is linear between theta_i and the same beyond."""
+    """Return weights (bands, theta_i) of the mean over each band, of values that are linear between theta_i."""
     share = (np.arange(_BAND_POINTS) + 0.5) / _BAND_POINTS
     inside = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * share
     return np.stack([np.interp(inside, theta_i_deg, one).mean(axis=1) for one in np.eye(theta_i_deg.size)], axis=1)
 
 
 def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats:
-    """The reflectance of the Dirac part, over theta_i and wavelength."""
+    """Return the reflectance [1] of the specular part, over theta_i and wavelength."""
     if table.specular is None:
         return np.zeros(shape)
     if table.specular_theta_deg is None and np.array_equal(theta_i_deg, table.axes_deg["theta_i"]):

@@ -18,11 +18,11 @@ from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.table import Table
 
-# Of the Dirac part, which is stored as float32: measured 6e-8
+# Tolerance of the specular part, which is stored as float32: measured 6e-8
 SPECULAR_TOLERANCE = 1e-6
 _STEP_DEG = 3.0  # of the maps
 _LAST_DEG = 89.0
-LEAST, _MOST = 1e-6, 1.0  # what is less is drawn as the least: zeros have no colour; all maps have the same colours
+LEAST, _MOST = 1e-6, 1.0  # smaller errors are drawn as LEAST, because zero has no logarithm; all maps share one scale
 # Azimuth [degree] of viewers at negative theta_r
 _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90.0}
 
@@ -31,6 +31,7 @@ class TableError(Finding):
     """The table less the model, over planes of incidence, and at fresh directions against what the table states."""
 
     key = "table_error"
+    order = 6
     title = "Table error"
     columns = ("table error",)
     explanation = (
@@ -129,7 +130,7 @@ def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "pa
 
 
 def _specular_error(table: Table, source: Source) -> float | None:
-    """The largest difference of the stored reflectances of the Dirac part from the model's; None: there is none."""
+    """Return the largest difference [1] of the stored specular part from that of the source; None without one."""
     if table.specular is None or not source.has_specular:
         return None
     nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg

@@ -29,6 +29,7 @@ class Validity(Finding):
     """All limits of a model that its paper states. The verdict on the table does not count them."""
 
     key = "validity"
+    order = 8
     title = "Validity"
     columns = ("validity",)
     explanation = (

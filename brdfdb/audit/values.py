@@ -1,4 +1,4 @@
-"""Whether the stored values, and those of f_r that come of them, are finite and not negative."""
+"""The stored values, and f_r looked up between them: finite, and not negative."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ class Values(Finding):
     """The stored values themselves, and those of f_r that come of them."""
 
     key = "values"
+    order = 3
     title = "Values"
     columns = ("values",)
     explanation = (

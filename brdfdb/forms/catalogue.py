@@ -107,10 +107,10 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
     if not isinstance(source, Material):
         itself = Form("function", source.title, "exact", f"source {source.name}", source.brdf_at(at), 0)
         return [itself, *_tables(source, source, at, tolerances, "table")]
-    found = list(_of_model(source, at))
+    listed = list(_of_model(source, at))
     tabulated = _exact(source)
-    title = "table" if found[0].python == f"models.{tabulated.model}" else "table of the fit"
-    return [*found, *_tables(source, tabulated, at, tolerances, title)]
+    title = "table" if listed[0].python == f"models.{tabulated.model}" else "table of the fit"
+    return [*listed, *_tables(source, tabulated, at, tolerances, title)]
 
 
 def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Form]:
@@ -162,7 +162,7 @@ def _exact(material: Material) -> Material:
     model, parameters = exact
     stated = {
         "sources": {name: source for name, source in material.sources.items() if name in parameters},
-        "assumed": {name: each for name, each in material.assumed.items() if name in parameters},
+        "assumed": {name: assumption for name, assumption in material.assumed.items() if name in parameters},
         "known_excess": None,  # of the other model
     }
     return material.model_copy(update={"model": model, "parameters": parameters, **stated})
@@ -211,8 +211,8 @@ def of_family(family: Family) -> Form:
     count = 1 if family.wavelength_nm is None else family.wavelength_nm.size
 
     def evaluate(wi: Floats, wr: Floats) -> Floats:
-        found: Floats = family.lookup_vectors(wi, wr, **at)
-        return found.reshape(len(wi), count)
+        values: Floats = family.lookup_vectors(wi, wr, **at)
+        return values.reshape(len(wi), count)
 
     size = sum(of_table(table, "", "").bytes for table in tables)
     return Form("between", "between members", "table", "Family.lookup_vectors", evaluate, size)
@@ -229,7 +229,7 @@ def of_table(table: Table, key: str, title: str) -> Form:
         return of_table(replace(table, values=table.values.copy()), key, title).evaluate
 
     arrays = (table.values, *table.axes_deg.values(), table.spectra, table.uniform)
-    size = sum(each.nbytes for each in arrays if each is not None)
+    size = sum(array.nbytes for array in arrays if array is not None)
     return Form(key, title, "table", "Table.lookup_vectors", evaluate, size, copied=copied)
 
 

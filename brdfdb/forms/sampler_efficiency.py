@@ -93,10 +93,10 @@ def works(
                 if row == 0:
                     estimate(draw, u[:, :256])  # compile
                 start = clock()
-                found = estimate(draw, u)
+                estimates = estimate(draw, u)
                 seconds = (clock() - start) / samples
-                mean = found.mean()
-                spread = found.var() if problem == 0 else found.var(axis=1, ddof=1).mean()
+                mean = estimates.mean()
+                spread = estimates.var() if problem == 0 else estimates.var(axis=1, ddof=1).mean()
                 numbers[number, problem, :, row] = mean, spread / mean**2 if mean > 0.0 else 0.0, seconds
     return {key: (Work(*numbers[number, 0]), Work(*numbers[number, 1])) for number, key in enumerate(draws)}
 
@@ -144,7 +144,7 @@ def _sphere(draw: Draw, u: Array) -> Array:
     t = np.stack([n[:, 2] / level, np.zeros(points), -n[:, 0] / level], axis=-1)
     b = np.cross(n, t)
     viewer = np.stack([t[:, 2], b[:, 2], n[:, 2]], axis=-1)
-    t, b, n, viewer = (np.repeat(each, PER_POINT, axis=0) for each in (t, b, n, viewer))
+    t, b, n, viewer = (np.repeat(vector, PER_POINT, axis=0) for vector in (t, b, n, viewer))
     light, weight = draw(u[0, : len(n)], u[1, : len(n)], viewer)
     world = light[:, :1] * t + light[:, 1:2] * b + light[:, 2:] * n
     sky = _SKY * (1.0 + world[:, 1])

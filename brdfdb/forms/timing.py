@@ -155,7 +155,7 @@ def _directions(form: Form, wi: Floats, wr: Floats, count: int) -> tuple[Floats,
 
 
 def _counts(forms: Sequence[Form], wi: Floats, wr: Floats, most: int, clock: Callable[[], float]) -> list[int]:
-    """At how many directions each form is timed: the largest step that fits."""
+    """Return the number of directions at which each form is timed: the largest step that fits."""
     if most <= _STEPS[0]:
         return [most] * len(forms)
     few, more = _STEPS[0], 4 * _STEPS[0]
@@ -184,7 +184,7 @@ def clearly_cheaper(costs: Floats, one: int, other: int) -> bool:
 
 
 def front(errors: Sequence[float], costs: Floats) -> list[int]:
-    """The forms worth having, from the most accurate one down, each clearly cheaper than the one before.
+    """Return the forms worth having, from the most accurate one down, each clearly cheaper than the one before.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ def chart(
         for key, (albedo, sphere) in sampler_efficiency.works(source, middle).items()
     ]
     tick()
-    seconds = np.stack([each.seconds for each in batch], axis=1)
+    seconds = np.stack([cost.seconds for cost in batch], axis=1)
     rungs = [number for number, form in enumerate(forms) if form.kind in ("exact", "quadrature") and not form.rounded]
 
     def front(costs: Floats) -> list[str]:
@@ -110,7 +110,7 @@ def chart(
         ladder=[forms[number].key for number in sorted(rungs, key=lambda number: errors[number]["l1"])],
         fronts=Fronts(
             batch=front(seconds),
-            single=front(np.stack([each.seconds for each in single], axis=1)),
+            single=front(np.stack([cost.seconds for cost in single], axis=1)),
             bytes=front(np.array([[form.bytes for form in forms]], dtype=np.float64)),
         ),
         samplers=samplers,
@@ -124,12 +124,12 @@ def _against(
     seconds: Floats,
     forms: Sequence[Form],
 ) -> dict[str, Any]:
-    """The cheapest rung that is as accurate as a form, and the ratio of their times: fields of a `Point`."""
+    """Return the cheapest rung that is as accurate as a form, and the ratio of their times: fields of a `Point`."""
     if forms[number].kind in ("exact", "quadrature"):
         return {"rung": None, "saving": None}
     own = errors[number]
-    as_good = [each for each in rungs if errors[each]["l1"] <= own["l1"] and errors[each]["p99"] <= own["p99"]]
-    rung = min(as_good, key=lambda each: float(np.median(seconds[:, each])))
+    as_good = [rival for rival in rungs if errors[rival]["l1"] <= own["l1"] and errors[rival]["p99"] <= own["p99"]]
+    rung = min(as_good, key=lambda rival: float(np.median(seconds[:, rival])))
     ratios = seconds[:, rung] / seconds[:, number]
     low, middle, high = (float(f"{ratio:.3g}") for ratio in np.percentile(ratios, [25.0, 50.0, 75.0]).tolist())
     return {"rung": forms[rung].key, "saving": Saving(low=low, times=middle, high=high)}
@@ -185,12 +185,12 @@ def chart_family(
     between = None if family is None else of_family(family)
     drawn = error_measurement.draw(materials[len(materials) // 2], wavelength_nm, DIRECTIONS, SEED)
     batch, block, single = _timed([*timed, *([between] if between else [])], drawn, tick)
-    seconds = np.stack([each.seconds for each in batch], axis=1)
+    seconds = np.stack([cost.seconds for cost in batch], axis=1)
     fronts = []
-    for found in errors:
-        present = [index for index, form in enumerate(timed) if form.key in found]
+    for member in errors:
+        present = [index for index, form in enumerate(timed) if form.key in member]
         rivals = [timed[index] for index in present]
-        fronts.append(_front(rivals, [found[form.key]["l1"] for form in rivals], seconds[:, present]))
+        fronts.append(_front(rivals, [member[form.key]["l1"] for form in rivals], seconds[:, present]))
     return FamilyChart(
         family=sweep.name,
         title=sweep.title,
@@ -204,8 +204,8 @@ def chart_family(
             Curve(
                 **_described(form, *costs),
                 timed=sweep.members[number],
-                l1=[found[form.key]["l1"] if form.key in found else None for found in errors],
-                p99=[found[form.key]["p99"] if form.key in found else None for found in errors],
+                l1=[member[form.key]["l1"] if form.key in member else None for member in errors],
+                p99=[member[form.key]["p99"] if form.key in member else None for member in errors],
             )
             for (number, form), *costs in zip(kept.values(), batch, block, single, strict=False)
         ],
@@ -243,12 +243,12 @@ def _forms_of_members(
 
 def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:
     """Return what the model of a family names as its diagnostic, for each member; None if it names none."""
-    found = materials[0].spec.diagnostic
-    if found is None:
+    diagnostic = materials[0].spec.diagnostic
+    if diagnostic is None:
         return None
     middle = None if wavelength_nm is None else wavelength_nm[wavelength_nm.size // 2]
-    values = [float(f"{found.value(material.arguments(middle)):.3g}") for material in materials]
-    return Diagnostic(symbol=found.symbol, title=found.title, values=values)
+    values = [float(f"{diagnostic.value(material.arguments(middle)):.3g}") for material in materials]
+    return Diagnostic(symbol=diagnostic.symbol, title=diagnostic.title, values=values)
 
 
 def _timed(
@@ -263,7 +263,7 @@ def _timed(
 
 
 def _front(forms: Sequence[Form], l1: Sequence[float], costs: Floats) -> list[str]:
-    """Keys of the forms worth having, of which costs has a column each."""
+    """Return keys of the forms worth having, of which costs has a column each."""
     # black is free, and has an l1 of 1
     rivals = [
         index
@@ -274,7 +274,7 @@ def _front(forms: Sequence[Form], l1: Sequence[float], costs: Floats) -> list[st
 
 
 def _described(form: Form, batch: timing.Times, block: timing.Times, single: timing.Times) -> dict[str, Any]:
-    """The fields of a `Form`."""
+    """Return the fields of a `Form`."""
     return {
         "key": form.key,
         "title": form.title,
@@ -289,27 +289,27 @@ def _described(form: Form, batch: timing.Times, block: timing.Times, single: tim
 
 
 def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[str, Any]]:
-    """Of each form against the first one: the errors of a `Point`, to three digits."""
+    """Return the errors of each form against the first one, as a `Point` has them, to three digits."""
     truth = forms[0].evaluate(drawn.wi, drawn.wr)
     classes = error_measurement.classes(drawn)
     rows = []
     for form in forms:
         given = drawn.wi.astype(form.dtype), drawn.wr.astype(form.dtype)
-        found = truth if form is forms[0] else form.evaluate(*given).astype(np.float64)
-        overall = error_measurement.compare(found, truth, drawn, SEED).overall
+        values = truth if form is forms[0] else form.evaluate(*given).astype(np.float64)
+        overall = error_measurement.compare(values, truth, drawn, SEED).overall
         parts = {
-            name: float(f"{error_measurement.mean_error(found, truth, np.where(some, drawn.weight, 0.0)).max():.3g}")
+            name: float(f"{error_measurement.mean_error(values, truth, np.where(some, drawn.weight, 0.0)).max():.3g}")
             for name, some in classes.items()
         }
         low, high = _tail(
-            error_measurement.relative(found, truth, error_measurement.floor_of(truth, drawn))[drawn.above]
+            error_measurement.relative(values, truth, error_measurement.floor_of(truth, drawn))[drawn.above]
         )
         rows.append({"l1": overall.l1, "p99": overall.p99, "p99_low": low, "p99_high": high, **parts})
     return rows
 
 
 def _tail(errors: Floats) -> tuple[float, float | None]:
-    """Confidence interval of the 99th percentile of errors (N, L), at the worst wavelength: two of the errors.
+    """Return confidence interval of the 99th percentile of errors (N, L), at the worst wavelength: two of the errors.
 
     Directions count as independent. They are stratified in theta_i, which makes the interval wider than it need be.
     """

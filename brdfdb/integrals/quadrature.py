@@ -80,7 +80,7 @@ def directional_albedo(
     specular: bool = False,
     **parameters: ArrayLike,
 ) -> Albedo:
-    """The share that a model reflects of the light from one direction: f_r cos theta_r integrated over all viewers.
+    """Return the directional albedo [1] of a model: f_r cos theta_r integrated over all viewers.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def directional_albedo(
     tolerance : float
         The absolute error to stay below, in [1e-13, 1].
     specular : bool
-        Add the reflectance of the Dirac part, for models that have one.
+        Add the reflectance of the specular part (a Dirac delta), for models that have one.
     **parameters : array_like
         Those of the model; they broadcast with the angles.
 
@@ -142,7 +142,7 @@ def _check_tolerance(tolerance: float) -> None:
 
 
 def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters of a model with its defaults filled in, or the TypeError that the model itself would raise."""
+    """Return the parameters of a model with its defaults; TypeError as the model itself would raise it."""
     try:
         bound = inspect.signature(spec.vectors).bind(None, None, **parameters)
     except TypeError as error:
@@ -152,7 +152,7 @@ def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def spec_of(model: ModelSpec | str) -> ModelSpec:
-    """A model by its name, or itself."""
+    """Return a model by its name, or itself."""
     return model if isinstance(model, ModelSpec) else MODELS[model]
 
 
@@ -187,7 +187,7 @@ def reflected_share(
     width: int = 1,
     mirrored: bool = False,
 ) -> Albedo:
-    """The directional albedo of any function of unit vectors that gives several values of f_r at once.
+    """Return the directional albedo of any function of unit vectors that gives several values of f_r at once.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def spectral_albedo(
     most_panels: int = MOST_PANELS,
     mirrored: bool = False,
 ) -> Albedo:
-    """The directional albedo of a model for several sets of parameters at once, as those of wavelengths are.
+    """Return the directional albedo of a model for several sets of parameters at once, as those of wavelengths are.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def spectral_albedo(
     Returns
     -------
     Albedo
-        As of `reflected_share`, width L, or 1 where all parameters are numbers; without the Dirac part.
+        As of `reflected_share`, width L, or 1 where all parameters are numbers; without the specular part.
 
     Raises
     ------
@@ -257,11 +257,11 @@ def spectral_albedo(
     """
     _check_tolerance(tolerance)
     width = np.broadcast(*parameters.values()).size
-    each = [{name: np.ravel(value)[w % np.size(value)] for name, value in parameters.items()} for w in range(width)]
+    sets = [{name: np.ravel(value)[w % np.size(value)] for name, value in parameters.items()} for w in range(width)]
 
     def brdf(wi: Array, wr: Array) -> Floats:
         with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in each]  # in one row: models are faster so
+            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in sets]  # in one row: models are faster so
         return np.stack(values, axis=-1).reshape(*wr.shape[:-1], width)
 
     lobe = narrowest(spec, float(np.cos(theta_i)), parameters)
@@ -278,7 +278,7 @@ def spectral_albedo(
 
 
 def narrowest(spec: ModelSpec, cos_i: float, parameters: Mapping[str, Any]) -> Lobe | None:
-    """The lobe of a model where parameters make it narrowest: panels that resolve it resolve the others."""
+    """Return the lobe of a model where parameters make it narrowest: panels that resolve it resolve the others."""
     if spec.lobe is None:
         return None
     lobe = spec.lobe(np.asarray(cos_i), **parameters)
@@ -294,7 +294,7 @@ def _panels_of(
     lobe: Lobe | None,
     mirrored: bool = False,
 ) -> tuple[Integrand, Array]:
-    """The integrand and its first panels: on one side of the plane of incidence, twice, where the other is the same."""
+    """Return the integrand and its first panels; for a mirrored f_r those on one side of the plane of incidence."""
     if lobe is None:
         integrand, panels = _over_the_hemisphere(reflected, theta_i, phi_i)
         begin = phi_i
@@ -307,7 +307,7 @@ def _panels_of(
 
 
 def _over_the_hemisphere(reflected: Callable[[Array], Array], theta_i: float, phi_i: float) -> tuple[Integrand, Array]:
-    """The integrand over theta_r and phi_r, and panels with edges where Oren and Nayar's model has its own."""
+    """Return the integrand over theta_r and phi_r, and panels with edges where Oren and Nayar's model has its own."""
 
     def integrand(theta: Array, phi: Array) -> Array:
         return reflected(unit_vector(theta, phi)) * np.sin(theta)[..., np.newaxis]
@@ -317,7 +317,7 @@ def _over_the_hemisphere(reflected: Callable[[Array], Array], theta_i: float, ph
 
 
 def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe) -> tuple[Integrand, Array, float]:
-    """The integrand over x in [0, 1], how far out on a ray, and psi, the azimuth on the ellipse of the lobe.
+    """Return the integrand over x in [0, 1], how far out on a ray, and psi, the azimuth on the ellipse of the lobe.
 
     Last, where one side of the plane of incidence begins, of a lobe that is round.
     """
@@ -350,7 +350,7 @@ def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe)
 
 
 def _panels(first: Floats, second: Floats) -> Array:
-    """Rectangles between edges: rows of the centre and half the width in the first, and in the second variable."""
+    """Return rectangles between edges, as rows: the centre, then half the width, in the first and second variable."""
     centres = [(edges[:-1] + edges[1:]) / 2.0 for edges in (first, second)]
     halves = [np.diff(edges) / 2.0 for edges in (first, second)]
     return np.stack(
@@ -365,7 +365,7 @@ def _panels(first: Floats, second: Floats) -> Array:
 def _adaptive(
     integrand: Integrand, panels: Array, tolerance: float, most_panels: int = MOST_PANELS, width: int = 1
 ) -> tuple[Array, float]:
-    """The integrals, of shape (width,), over rectangles, halved where the error is large until all are good enough."""
+    """Return the integrals (width,) over rectangles, which are halved where the error is large."""
     values, errors = _rules(integrand, panels, width)
     done = 0
     while errors.sum() > tolerance and done < most_panels:
@@ -384,7 +384,7 @@ def _adaptive(
 
 
 def _halved(panels: Array, errors: Array) -> Array:
-    """Each panel cut in two, across the variable in which its rules differ most."""
+    """Return each panel cut in two, across the variable in which its rules differ most."""
     axis = np.argmax(errors, axis=1)
     row = np.arange(len(panels))
     low, high = panels.copy(), panels.copy()
@@ -396,7 +396,7 @@ def _halved(panels: Array, errors: Array) -> Array:
 
 
 def _rules(integrand: Integrand, panels: Array, width: int) -> tuple[Array, Array]:
-    """Integrals over each panel, and by how much the worst changes with Gauss's rule in the first or second variable.
+    """Return integrals over each panel, and the change of the worst with Gauss's rule in the first or second variable.
 
     The integrand gives `width` values a point, in a last axis.
     """

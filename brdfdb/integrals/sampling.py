@@ -64,7 +64,7 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     with a density of cos theta_r / pi. u1 chooses, and is stretched to serve again. Directions that a lobe throws below
     the horizon are kept, with a weight of 0: they are a part of the density. Ward's samples are not "uniformly
     weighted": the weights are those of `Sample`.
-    The Dirac part of a model is not drawn: add `spec.specular` in the mirror direction.
+    The specular part of a model is not drawn: add `spec.specular` in the mirror direction.
 
     References
     ----------
@@ -94,7 +94,7 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
 
 
 def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: ArrayLike) -> Floats:
-    """The density [1/sr] with which `sample` draws `wr` for the light `wi`.
+    """Return the density [1/sr] with which `sample` draws `wr` for the light `wi`.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
 
 
 def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> Lobe:
-    """Where a model has its lobe, of lights `i`; of a diffuse model, a lobe that has no share."""
+    """Return the lobe of a model for lights `i`; for a diffuse model, a lobe that has no share."""
     for parameter in spec.parameters:
         if parameter.name in parameters:
             parameter.check(parameters[parameter.name])
@@ -149,7 +149,7 @@ def _uniform(name: str, u: ArrayLike) -> Array:
 
 
 def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
-    """Directions (..., 3) whose density is `mixture_density`: u1 chooses lobe or cosine, stretched it serves again."""
+    """Return directions (..., 3) with the density `mixture_density`: u1 selects lobe or cosine, and is rescaled."""
     in_lobe = (u1 < lobe.share) | (lobe.share >= 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):  # of the component that is not taken
         stretched = np.where(in_lobe, u1 / lobe.share, (u1 - lobe.share) / (1.0 - lobe.share))
@@ -175,7 +175,7 @@ def _cosine_weighted(u1: Array, angle: Array) -> Array:
 
 
 def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
-    """Density [1/sr] of the mixture over the whole sphere."""
+    """Return density [1/sr] of the mixture over the whole sphere."""
     cosine = np.maximum(r[..., 2], 0.0) / np.pi
     if not np.any(lobe.share):
         return np.asarray(cosine + 0.0 * i[..., 2])

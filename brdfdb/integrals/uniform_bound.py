@@ -141,8 +141,8 @@ def _peak(x: Array, y: Floats, f: Callable[[float], Array], tolerance: float) ->
 def _tops(x: Array, y: Floats) -> Array:
     """Return the highest points of the parabolas through the largest values and their neighbours, not beyond these."""
     middle = np.clip(np.argmax(y, axis=0), 1, x.size - 2)
-    each = np.arange(y.shape[1])
-    (x0, x1, x2), (y0, y1, y2) = (x[middle + i] for i in (-1, 0, 1)), (y[middle + i, each] for i in (-1, 0, 1))
+    column = np.arange(y.shape[1])
+    (x0, x1, x2), (y0, y1, y2) = (x[middle + i] for i in (-1, 0, 1)), (y[middle + i, column] for i in (-1, 0, 1))
     rise, fall = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
     bend = (fall - rise) / (x2 - x0)
     # of y1 + s (x - x1) + bend (x - x1)^2, with the slope s at x1

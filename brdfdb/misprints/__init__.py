@@ -1,7 +1,7 @@
 """Misprints, ambiguities and unsafe forms of the three papers: each beside the right form, and nothing else.
 
 The models hold the right forms only. The printed ones stand here, literal and short, for the atlas that sets the two
-side by side and for the chart of their costs; no other module of the library knows them. Angles are radians, lengths of
+side by side; no other room of the library knows them. Angles are radians, lengths of
 the surface micrometres; a BRDF is f_r in 1/sr, by the conventions of `brdfdb.geometry`. Division by zero gives inf or
 nan here, as it does in print.
 """

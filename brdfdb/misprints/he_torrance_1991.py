@@ -28,7 +28,7 @@ def _smith(theta: Any, slope: Any) -> Any:
 
 
 def _smith_over_cos(cos_theta: Any, slope: Any) -> Any:
-    """S_1 / cos(theta) of eq. 24, as the model computes it."""
+    """Return S_1 / cos(theta) of eq. 24, as the model computes it."""
     return shadowing(np.sqrt((1.0 - cos_theta) * (1.0 + cos_theta)), cos_theta, slope)
 
 
@@ -50,7 +50,7 @@ def _smith_divided_by_cos(cos_theta: Any, slope: Any) -> Any:
 
 
 def _hidden_slope(theta_i: Any, theta_r: Any, slope: Any) -> Any:
-    """(K_i + K_r) / 4 of eqs 81-83."""
+    """Return (K_i + K_r) / 4 of eqs 81-83."""
     tangents = np.tan(theta_i), np.tan(theta_r)
     return sum(tan * _erfc(1.0 / (2.0 * slope * np.maximum(tan, 1e-300))) for tan in tangents) / 4.0
 
@@ -66,17 +66,17 @@ def _height_by_newton(theta_i: Any, theta_r: Any, slope: Any) -> Any:
 
 
 def _effective_variance(theta_i: Any, theta_r: Any, slope: Any) -> Any:
-    """(sigma / sigma_0)^2 of eq. 80, as the model computes it."""
+    """Return (sigma / sigma_0)^2 of eq. 80, as the model computes it."""
     return variance(sum(hidden(np.sin(theta), np.cos(theta), slope) for theta in (theta_i, theta_r)))
 
 
 def _height_by_lambert_w(theta_i: Any, theta_r: Any, slope: Any) -> Any:
-    """z_0 / sigma_0 of the model, eq. 80 solved for it."""
+    """Return z_0 / sigma_0 of the model, eq. 80 solved for it."""
     return np.sqrt(1.0 / _effective_variance(theta_i, theta_r, slope) - 1.0)
 
 
 def _rough_mirror(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **surface: Any) -> Any:
-    """Eq. 71 with abs(F)^2 = 1."""
+    """Return eq. 71 with abs(F)^2 = 1."""
     directions = checked_angles(theta_i, phi_i, theta_r, phi_r)
     return directional_diffuse(directions, checked_surface(**surface, n=1.0, k=0.0))
 
@@ -93,7 +93,7 @@ def _rough_mirror_by_eq_71(
     shadowed: bool,
     wave_number: bool,
 ) -> Any:
-    """Eq. 71 with abs(F)^2 = 1, with S of eq. 23 and 2 pi / lambda in v_xy of eq. 78 or without."""
+    """Return eq. 71 with abs(F)^2 = 1, with S of eq. 23 and 2 pi / lambda in v_xy of eq. 78 or without."""
     wavelength, slope = wavelength_nm / 1000.0, sigma_0_um / tau_um
     k_i, k_r = propagation(theta_i, phi_i, theta_r, phi_r)
     # Eq. (84)
@@ -125,7 +125,7 @@ def _normalised_bidirectional(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any
 
 
 def _specular_of_a_plate(theta_i: Any, *, n: Any, k: Any, wavelength_nm: Any) -> Any:
-    """rho_s of a smooth plate by eqs 58, 59, 65 to 67 and 4, for 1 sr: d omega_i cancels."""
+    """Return rho_s of a smooth plate by eqs 58, 59, 65 to 67 and 4, for 1 sr: d omega_i cancels."""
     cos_theta = np.cos(theta_i)
     # Eq. (58) as printed, g = 0
     N = (2.0 * np.pi * wavelength_nm) ** 2 / cos_theta
@@ -151,7 +151,7 @@ def _reflectance_without_moduli(cos_theta: Any, *, n: Any, k: Any) -> Any:
 
 
 def _bases(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, local: bool = False) -> tuple[Any, ...]:
-    """v, abs(k_r x k_i)^2, s_i.k_r, p_i.k_r, s_r.k_i and p_r.k_i of eqs 84 to 86, n the z axis or the local normal."""
+    """Return v, abs(k_r x k_i)^2, s_i.k_r, p_i.k_r, s_r.k_i and p_r.k_i of eqs 84 to 86; n is z or the local normal."""
     k_i, k_r = propagation(theta_i, phi_i, theta_r, phi_r)
     v = k_r - k_i
     (s_i, p_i), (s_r, p_r) = (polarisation(k, v if local else (0.0, 0.0, 1.0)) for k in (k_i, k_r))
@@ -183,7 +183,7 @@ def _jones(
     sign_of_ps: float = -1.0,
     local: bool = False,
 ) -> Any:
-    """M_ss, M_sp; M_ps, M_pp over abs(k_r x k_i)^2, shape (..., 2, 2)."""
+    """Return M_ss, M_sp; M_ps, M_pp over abs(k_r x k_i)^2, shape (..., 2, 2)."""
     with np.errstate(all="ignore"):
         v, across2, si_kr, pi_kr, sr_ki, pr_ki = _bases(theta_i, phi_i, theta_r, phi_r, local=local)
         F_s, F_p = fresnel.amplitudes(np.linalg.norm(v, axis=-1) / 2.0, n, k)
@@ -197,7 +197,7 @@ def _jones(
 
 
 def _jones_of_one_matrix(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, n: Any, k: Any) -> Any:
-    """s_r and p_r of the field of eq. 46, of light in s_i or p_i, shape (..., 2, 2)."""
+    """Return s_r and p_r of the field of eq. 46, of light in s_i or p_i, shape (..., 2, 2)."""
     k_i, k_r = propagation(theta_i, phi_i, theta_r, phi_r)
     incident, reflected = polarisation(k_i, (0.0, 0.0, 1.0)), polarisation(k_r, (0.0, 0.0, 1.0))
     amplitudes = fresnel.amplitudes(np.linalg.norm(k_r - k_i, axis=-1) / 2.0, n, k)

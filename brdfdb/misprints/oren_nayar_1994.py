@@ -13,7 +13,7 @@ from brdfdb.misprints._entry import ORENNAYAR, Array, Misprint, at, part
 
 
 def _cavity(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, theta_a: Any, phi_a: Any) -> tuple[Any, ...]:
-    """<s,n>, <v,n>, <a,n> and, for both facets of a cavity, <s,a>, <v,a>, <s,a'>, <v,a'>."""
+    """Return <s,n>, <v,n>, <a,n> and, for both facets of a cavity, <s,a>, <v,a>, <s,a'>, <v,a'>."""
     s, v = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
     a, b = unit_vector(theta_a, phi_a), unit_vector(theta_a, phi_a + np.pi)
     facets = (s @ a, v @ a, s @ b, v @ b), (s @ b, v @ b, s @ a, v @ a)
@@ -72,7 +72,7 @@ def _nodes() -> tuple[Array, Array]:
 
 
 def _slopes(sigma: Any) -> tuple[Array, Array]:
-    """Slopes theta_a from 0 to pi/2 and the weight exp(-theta_a^2 / (2 sigma^2)) sin(theta_a) of each, eq. 26."""
+    """Return slopes theta_a from 0 to pi/2 and their weights exp(-theta_a^2 / (2 sigma^2)) sin(theta_a), eq. 26."""
     x, w = _nodes()
     theta_a = (x + 1.0) * np.pi / 4.0
     return theta_a, w * np.pi / 4.0 * np.exp(-(theta_a**2) / (2.0 * sigma**2)) * np.sin(theta_a)
@@ -131,7 +131,7 @@ _K_S = 0.085  # of k_b
 
 
 def _towel_without_e_0(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, e_0: Any) -> Any:
-    """f_r = L_r / (E_0 cos(theta_i)) of sample E, from the radiance of eq. 32 in a light of irradiance E_0."""
+    """Return f_r = L_r / (E_0 cos(theta_i)) of sample E, from the radiance of eq. 32 in a light of irradiance E_0."""
     cos_i = np.cos(theta_i)
     body = e_0 * cos_i * models.oren_nayar(theta_i, phi_i, theta_r, phi_r, **_TOWEL)
     # Eq. (32), with eq. (31) as printed
@@ -139,7 +139,7 @@ def _towel_without_e_0(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, e_
 
 
 def _towel(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **_: Any) -> Any:
-    """f_r of sample E as its preset has it: with the unit of k_s chosen, a BRDF has no irradiance in it."""
+    """Return f_r of sample E as its preset has it: with the unit of k_s chosen, a BRDF has no irradiance in it."""
     return models.oren_nayar_body_surface(theta_i, phi_i, theta_r, phi_r, **_TOWEL, k_s=_K_S, e_0=np.pi)
 
 

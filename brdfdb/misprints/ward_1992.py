@@ -25,7 +25,7 @@ def _slope_without_arctan(u1: Any, u2: Any, *, alpha_x: Any, alpha_y: Any) -> An
 
 
 def _slope_sampled(u1: Any, u2: Any, *, alpha_x: Any, alpha_y: Any) -> Any:
-    """delta [rad] of the half vector: half the angle at which a ray along the normal leaves."""
+    """Return delta [rad] of the half vector: half the angle at which a ray along the normal leaves."""
     wr = _sample(u1, u2, alpha_x=alpha_x, alpha_y=alpha_y).wr
     return np.arctan2(np.hypot(wr[..., 0], wr[..., 1]), wr[..., 2]) / 2.0
 
@@ -41,7 +41,7 @@ def _deviation_as_named(*, alpha_x: Any, **_: Any) -> Any:
 
 
 def _deviation_of_samples(*, alpha_x: Any, alpha_y: Any) -> Any:
-    """Root mean square of the slope along x of the half vectors that eq. 7 draws for light along the normal.
+    """Return root mean square of the slope along x of the half vectors that eq. 7 draws for light along the normal.
 
     Gauss and Laguerre in -log(u1) and eight azimuths: exact for a square of the slope.
     """

@@ -28,14 +28,14 @@ _SQRT_TWO_PI = 2.5066282746310002
 
 @kernel
 def roughly_lambert_w(y: float, log_y: float) -> float:
-    """W_0(y), the root of w e^w = y, to about a percent, for y > 1e-4 (Iacono and Boyd)."""
+    """Return W_0(y), the root of w e^w = y, to about a percent, for y > 1e-4 (Iacono and Boyd)."""
     log_1p_y = log_y if log_y > 40.0 else log(1.0 + (0.0 if log_y > 40.0 else y))  # log_y says enough of inf
     return log_1p_y * (1.0 - log(1.0 + log_1p_y) / (2.0 + log_1p_y))
 
 
 @kernel
 def nearer_lambert_w(w: float, log_y: float) -> float:
-    """A step of fourth order towards W_0(y) (Fritsch, Shafer and Crowley): 3e-9 of it after one, rounding after two."""
+    """Return W_0(y) after a step of fourth order (Fritsch, Shafer, Crowley): 3e-9 after one, rounding after two."""
     z = log_y - log(w) - w
     v = 1.0 + w
     q = 2.0 * v * (v + z * (2.0 / 3.0))
@@ -44,7 +44,7 @@ def nearer_lambert_w(w: float, log_y: float) -> float:
 
 @kernel
 def _peak(g: float, log_g: float, V: float) -> float:
-    """u = W_0(2 V / g^2): the summand peaks at m* = g e^(u / 2), where ln(g / m) + V / m^2 = 0."""
+    """Return u = W_0(2 V / g^2): the summand peaks at m* = g e^(u / 2), where ln(g / m) + V / m^2 = 0."""
     y = 2.0 * V / g / g
     log_y = log(2.0 * V) - 2.0 * log_g
     log_y = -9.0 if log_y < -9.0 else log_y
@@ -54,7 +54,7 @@ def _peak(g: float, log_g: float, V: float) -> float:
 
 @kernel
 def _exponent_at_peak(u: float) -> float:
-    """e^(u / 2) (1 - u) - 1 with all its digits."""
+    """Return e^(u / 2) (1 - u) - 1 with all its digits."""
     # Its Taylor series, coefficients 2^-k / k! - 2^(1 - k) / (k - 1)!
     p = -4.900831249030034e-13
     p = p * u - 1.172278834767984e-11
@@ -81,7 +81,7 @@ def log_series(
     work: NDArray[np.float64],
     index: NDArray[np.int64],
 ) -> None:
-    """log_sum = ln of `diffraction_series` of g and V, of at most BLOCK values each.
+    """Fill log_sum with ln of `diffraction_series` of g and V, of at most BLOCK values each.
 
     reach, in (0, 1], is the share of the distance from the peak up to which terms are summed; the steps of the
     trapezoid rule are as much wider, so that the number of its nodes goes with the square. 1 is the model. work, of
@@ -158,7 +158,7 @@ def _trapezoid(
     log_sum: NDArray[np.float64],
     work: NDArray[np.float64],
 ) -> None:
-    """Around m*, with m = m* e^t, Stirling's formula gives the summand as m^(-3/2) exp(m* phi(t) - stirling_error(m)).
+    """Sum by the trapezoid rule in t, m = m* e^t: by Stirling m^(-3/2) exp(m* phi(t) - stirling_error(m)).
 
     phi(t) = e^t (1 - t) - 1 - u / 2 (e^t + e^-t - 2) - miss (e^-t - 1); miss = V / m*^2 - u / 2 is what `_peak` left.
     Nodes are equally far apart in t, so that e^t needs no exponential; d = e^t - 1 keeps its digits next to the peak.
@@ -229,7 +229,7 @@ def _series(g: NDArray[np.float64], V: NDArray[np.float64], log_sum: NDArray[np.
 
 
 def diffraction_series(g: Floats, V: Floats) -> Floats:
-    """Sum over m >= 1 of g^(m - 1) e^-g / (m! m) exp(-V / m): the sum of eq. 78 over g, so that g = 0 has a limit.
+    """Return the sum of eq. 78 over g, finite at g = 0: over m >= 1 of g^(m - 1) e^-g / (m! m) exp(-V / m).
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ TERMS, TERMS_OF_FLOAT32 = 16, 8  # of the series in p, and in q: whole vectors o
 
 @functools.cache
 def series_table(terms: int) -> NDArray[np.float64]:
-    """The table, of shape (patches in p, terms, patches in q, terms), at most 3 MB; 30 ms when it is first asked for.
+    """Return the table, of shape (patches in p, terms, patches in q, terms): at most 3 MB, made in 30 ms.
 
     With TERMS the error of the logarithm is below 1e-11, with TERMS_OF_FLOAT32 below 2e-6.
     """
@@ -285,8 +285,8 @@ def series_table(terms: int) -> NDArray[np.float64]:
     values = np.empty(V.size)
     _series(np.ravel(np.broadcast_to(g, V.shape)), np.ravel(V), values)
     series = np.einsum("kx,pxqy,ly->pkql", to_series, values.reshape(V.shape), to_series, optimize=True)
-    powers = [np.polynomial.chebyshev.cheb2poly(each) for each in np.eye(terms)]
-    return np.ascontiguousarray(series @ np.array([np.pad(each, (0, terms - each.size)) for each in powers]))
+    powers = [np.polynomial.chebyshev.cheb2poly(row) for row in np.eye(terms)]
+    return np.ascontiguousarray(series @ np.array([np.pad(row, (0, terms - row.size)) for row in powers]))
 
 
 @loop
@@ -299,7 +299,7 @@ def log_series_of_row(
     log_sum: NDArray[np.float64],
     row: NDArray[np.float64],
 ) -> None:
-    """log_sum of one g, G_LOW <= g < G_HIGH, by the table, of V within [V_low, V_high].
+    """Fill log_sum for one g, G_LOW <= g < G_HIGH, from the table, for V within [V_low, V_high].
 
     row, of shape (Q_PATCHES, terms), is written over.
     """

@@ -34,7 +34,7 @@ WHOLE, LIMIT, CORRECTED_LIMIT = 0, -1, -2
 
 @kernel
 def _shadowing_and_hidden(sin_theta: float, cos_theta: float, slope: float) -> tuple[float, float]:
-    """S_1(theta) / cos theta of eqs 23-25, and K of eqs 82-83, how much of the valleys a direction does not reach.
+    """Return S_1(theta) / cos theta of eqs 23-25, and K of eqs 82-83, the part of the valleys that is not reached.
 
     slope is sigma_0 / tau; the first is finite up to and including 90 degrees.
     """
@@ -59,14 +59,14 @@ def _hidden_slope(sin_theta: float, cos_theta: float, slope: float) -> float:
 
 @kernel
 def _difference_of_sines(sin_i: float, cos_i: float, sin_r: float, cos_r: float) -> float:
-    """sin(theta_i) - sin(theta_r), without the difference of numbers near 1."""
+    """Return sin(theta_i) - sin(theta_r), without the difference of numbers near 1."""
     sines, cosines = sin_i + sin_r, cos_i + cos_r
     return sin_i - sin_r if sines < cosines else (cos_r - cos_i) * cosines / sines
 
 
 @kernel
 def _effective_variance(K: float) -> float:
-    """(sigma / sigma_0)^2 of eqs 80-81 for K = K_i + K_r: z_0^2 / sigma_0^2 = W_0(K^2 / (8 pi))."""
+    """Return (sigma / sigma_0)^2 of eqs 80-81 for K = K_i + K_r: z_0^2 / sigma_0^2 = W_0(K^2 / (8 pi))."""
     y = K * K * (0.125 / np.pi)
     series = y * (1.0 - y * (1.0 - y * (1.5 - y * (8.0 / 3.0))))
     large = 1e-4 if y < 1e-4 else y
@@ -88,7 +88,7 @@ def _roughness(
     g_over_vz2: NDArray[np.float64],
     shadow: NDArray[np.float64],
 ) -> None:
-    """g / v_z^2, and S / (cos theta_i cos theta_r): what eq. 71 needs of a pair of polar angles."""
+    """Fill in g / v_z^2, and S / (cos theta_i cos theta_r): what eq. 71 needs of a pair of polar angles."""
     sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
     wave, slope = surface[0], surface[2]
     count = shadow.shape[0]
@@ -107,7 +107,7 @@ def _roughness(
 def _first_terms(
     terms: int, g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64], power: NDArray[np.float64]
 ) -> None:
-    """The first terms of the sum of eq. 78 over g, m outermost; power is written over."""
+    """Add the first terms of the sum of eq. 78 over g, m outermost; power is written over."""
     count = total.shape[0]
     for j in range(count):
         total[j] = 0.0
@@ -121,7 +121,7 @@ def _first_terms(
 
 @loop
 def _limit(corrected: bool, g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64]) -> None:
-    """The limit of the sum of eq. 78 over g for g -> infinity, e^-b / g^2, b = V / g; corrected: to first order in 1/g.
+    """Fill in the sum of eq. 78 over g for g -> infinity, e^-b / g^2, b = V / g; corrected: to first order in 1/g.
 
     The correction is held above 0: it belongs to large g.
     """
@@ -142,7 +142,7 @@ def _evaluate(
     work: NDArray[np.float64],
     index: NDArray[np.int64],
 ) -> None:
-    """f_r of at most BLOCK pairs of directions, with the sum of eq. 78 as `series` says: one of the three, or terms.
+    """Evaluate f_r of at most BLOCK pairs of directions, with the sum of eq. 78 that `series` names.
 
     reach is that of `log_series`, for the whole sum. geometry and surface hold the rows named below.
     """
@@ -192,28 +192,28 @@ def specular_rows(scalars: NDArray[np.float64], rho_s: NDArray[np.float64]) -> N
 def scattered(
     features: NDArray[np.float64], surface: NDArray[np.float64], series: int, reach: float, f_r: NDArray[np.float64]
 ) -> None:
-    """Pairs of directions one by one: features of shape (5, N) as in `_evaluate`, surface (6, 1) or (6, N)."""
+    """Evaluate pairs of directions one by one: features (5, N) as in `_evaluate`, surface (6, 1) or (6, N)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, geometry, width = np.empty((6, BLOCK)), np.empty((5, BLOCK)), surface.shape[1]
     for start in range(0, f_r.shape[0], BLOCK):
         count = min(BLOCK, f_r.shape[0] - start)
-        for each in range(5):
+        for column in range(5):
             for j in range(count):
-                geometry[each, j] = features[each, start + j]
-        for each in range(6):
+                geometry[column, j] = features[column, start + j]
+        for column in range(6):
             for j in range(count):
-                lanes[each, j] = surface[each, min(start + j, width - 1)]
+                lanes[column, j] = surface[column, min(start + j, width - 1)]
         _evaluate(geometry, lanes, series, reach, f_r[start : start + count], work, index)
 
 
 @loop
 def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], series: int, reach: float, f_r: Floats) -> None:
-    """As `scattered`, of unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
+    """Evaluate as `scattered` does, for unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
-    for each in range(6):
+    for column in range(6):
         for j in range(BLOCK):
-            lanes[each, j] = surface[each, 0]
+            lanes[column, j] = surface[column, 0]
     for start in range(0, f_r.shape[0], BLOCK):
         count = min(BLOCK, f_r.shape[0] - start)
         i, r = w_i[start : start + count].reshape(-1), w_r[start : start + count].reshape(-1)
@@ -247,7 +247,7 @@ def angle_rows(
     scalars: NDArray[np.float64],
     f_r: Floats,
 ) -> None:
-    """Rows along the azimuth, which share polar angles and surface: what eq. 71 needs of these is computed once."""
+    """Evaluate rows along the azimuth, which share polar angles and surface, and what eq. 71 needs of these."""
     length = f_r.shape[1]
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, g_over_vz2, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
@@ -264,8 +264,8 @@ def angle_rows(
         if lane == 0:
             rows = min(BLOCK, f_r.shape[0] - row)
             for i in range(rows):
-                for each in range(10):
-                    lanes[each, i] = scalars[row + i, each]
+                for column in range(10):
+                    lanes[column, i] = scalars[row + i, column]
             _roughness(lanes[:4], lanes[4:], g_over_vz2[:rows], shadow[:rows])
         s, f, turned = scalars[row], f_r[row], one_plus_cos[min(row, one_plus_cos.shape[0] - 1)]
         correlation, n, k, uniform = s[5], s[7], s[8], s[9]

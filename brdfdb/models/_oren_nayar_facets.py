@@ -38,7 +38,7 @@ def _gauss_legendre(nodes: int) -> NDArray[np.float64]:
 
 @kernel
 def _direct(p: float, q: float, C: float) -> float:
-    """Eqs (10) and (11): one facet by direct light."""
+    """Return eqs (10) and (11): one facet by direct light."""
     s_a, v_a = C + p, C + q  # over cos(theta_i), cos(theta_r)
     if s_a <= 0.0 or v_a <= 0.0:
         return 0.0
@@ -55,19 +55,19 @@ def _direct(p: float, q: float, C: float) -> float:
 
 @kernel
 def _bounce_open(p: float, q: float, S: float, C: float) -> float:
-    """The second bounce where nothing is hidden: IF = pi (1 - cos(theta_a))."""
+    """Return the second bounce where nothing is hidden: IF = pi (1 - cos(theta_a))."""
     return S * S * (C + p) * (C + q) / (C * (1.0 + C))
 
 
 @kernel
 def _bounce_one_hidden(p: float, q: float, S: float, C: float) -> float:
-    """The second bounce where one facet is partly hidden, p > C >= q."""
+    """Return the second bounce where one facet is partly hidden, p > C >= q."""
     return S * S * (C + q) * (1.0 / (p + math.sqrt(p * p + S * S)) + 1.0 / (1.0 + C))
 
 
 @kernel
 def _bounce_both_hidden(p: float, q: float, S: float, C: float) -> float:
-    """The second bounce where both facets are partly hidden, p >= q > C."""
+    """Return the second bounce where both facets are partly hidden, p >= q > C."""
     R_p, R_q = math.sqrt(p * p + S * S), math.sqrt(q * q + S * S)
     along, across = p * q - C * C, p - q
     # d(m_s, m_v)
@@ -78,7 +78,7 @@ def _bounce_both_hidden(p: float, q: float, S: float, C: float) -> float:
 
 @kernel
 def _bounce(p: float, q: float, S: float, C: float) -> float:
-    """Eq. (18): light that met the adjacent facet at p, from the facet that meets the viewer at q."""
+    """Return eq. (18): light that met the adjacent facet at p, from the facet that meets the viewer at q."""
     low, high = min(p, q), max(p, q)
     if low <= -C:
         return 0.0
@@ -109,7 +109,7 @@ bounce_of_cavity = elementwise(_bounce_of_cavity)
 
 @kernel
 def _sin_cos(x: float) -> tuple[float, float]:
-    """Sine and cosine on [0, pi/2], within 3e-16 absolute, the sine also relative: Taylor series, without branches."""
+    """Return sine and cosine on [0, pi/2], within 3e-16 absolute, the sine also relative: series, no branches."""
     u = x * x
     s = u / 51090942171709440000.0 - 1.0 / 121645100408832000.0
     s = s * u + 1.0 / 355687428096000.0
@@ -136,7 +136,7 @@ def _sin_cos(x: float) -> tuple[float, float]:
 
 @kernel
 def _critical(slope: float, sigma: float, x_max: float) -> float:
-    """The slope, over sigma, from which on facets at this azimuth are partly hidden, eq. (39): cot(theta_a) = slope."""
+    """Return the slope over sigma from which facets are partly hidden, eq. (39): cot(theta_a) = slope."""
     hypotenuse = 1.0 / math.sqrt(1.0 + slope * slope)
     steep = slope > 1.0
     angle = arcsin(hypotenuse if steep else slope * hypotenuse)
@@ -191,7 +191,7 @@ def _add_azimuths(
 
 @kernel
 def _weight(x: float, S: float) -> float:
-    """Eq. (26) with the sine of eq. (8), for x = theta_a / sigma; not normalised."""
+    """Return eq. (26) with the sine of eq. (8), for x = theta_a / sigma; not normalised."""
     return exp(-0.5 * x * x) * S
 
 
@@ -207,7 +207,7 @@ def _add_slopes(
     rays: NDArray[np.float64],
     count: int,
 ) -> tuple[float, float]:
-    """Light of all slopes along the first `count` of `rays`, with their weights: direct if `lit`, reflected twice if
+    """Return light of all slopes along the first `count` of `rays`, weighted: direct if `lit`, reflected twice if
     `bounce`; 0 of what is not asked for.
 
     A ray holds both facets of every cavity at one azimuth, and is cut where one of them, then both begin to be hidden.
@@ -263,7 +263,7 @@ def _add_slopes(
 
 @kernel
 def _normalisation(sigma: float, x_max: float, nodes: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
-    """1 / c of eq. (26), over slope alone."""
+    """Return 1 / c of eq. (26), over slope alone."""
     total = 0.0
     for panel in range(2):
         for node in range(nodes.shape[0]):
@@ -286,7 +286,7 @@ def _gaussian(
     bounce: bool,
     rays: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Eq. (8) with eqs (10) to (20), for the tangents of the polar angles: direct and twice reflected light.
+    """Return eq. (8) with eqs (10) to (20) for the tangents of the polar angles: direct and twice reflected light.
 
     The weight of eq. (26) is not normalised. x and w are the nodes and weights of the quadrature.
     """
@@ -354,10 +354,10 @@ def gaussian(*features: Floats, lit: bool = True, bounce: bool = True, nodes: in
         Of the quadrature in each piece of a ray of slopes and each panel of azimuths, in [1, NODES]. NODES is the
         model; fewer make a coarser and faster integral of the same integrand.
     """
-    shape = np.broadcast_shapes(*(np.shape(each) for each in features))
+    shape = np.broadcast_shapes(*(np.shape(feature) for feature in features))
     columns = np.empty((len(features), int(np.prod(shape))))
-    for column, each in zip(columns, features, strict=True):
-        column[:] = np.broadcast_to(each, shape).ravel()
+    for column, feature in zip(columns, features, strict=True):
+        column[:] = np.broadcast_to(feature, shape).ravel()
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     with np.errstate(all="ignore"):  # as `elementwise`: nan goes through
         _gaussian_loop(columns, _gauss_legendre(nodes), _gauss_legendre(NODES), lit, bounce, direct, bounced)

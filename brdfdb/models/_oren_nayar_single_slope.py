@@ -19,7 +19,7 @@ _TINY = 1e-300  # guards 0 / 0 and nothing else
 
 @kernel
 def _hidden(cot: float) -> tuple[float, float]:
-    """pi/2 - phi_c and cos(phi_c), for cot = 1 / (tan(theta_a) tan(theta))."""
+    """Return pi/2 - phi_c and cos(phi_c), for cot = 1 / (tan(theta_a) tan(theta))."""
     # Eq. (39)
     cos = min(cot, 1.0)
     sin = math.sqrt((1.0 - cos) * (1.0 + cos))
@@ -29,7 +29,7 @@ def _hidden(cot: float) -> tuple[float, float]:
 
 @kernel
 def _arc_less_chord(rest: float) -> float:
-    """(2 x - sin(2 x)) / pi of A_1 and of eq. (49), for x = pi/2 - phi_c."""
+    """Return (2 x - sin(2 x)) / pi of A_1 and of eq. (49), for x = pi/2 - phi_c."""
     y = 2.0 * rest
     u = y * y
     series = 1.0 - u / 110.0 * (1.0 - u / 156.0 * (1.0 - u / 210.0))
@@ -39,7 +39,7 @@ def _arc_less_chord(rest: float) -> float:
 
 @kernel
 def _coefficients(tan_i: float, tan_r: float, S: float, C: float) -> tuple[float, float, float]:
-    """A_1 tan(beta), A_3, and 1 - Z: Z is what -cos(phi_r - phi_i) multiplies in eq. (49).
+    """Return A_1 tan(beta), A_3, and 1 - Z: Z is what -cos(phi_r - phi_i) multiplies in eq. (49).
 
     In the mirror half plane Z is A_1 tan(beta) + A_2 of eq. (45), too, and 1 - Z what is left of the direct light: near
     the horizon no difference may make it.
@@ -64,14 +64,14 @@ def _coefficients(tan_i: float, tan_r: float, S: float, C: float) -> tuple[float
 
 @kernel
 def _direct(cos_dphi: float, one_less_cos: float, C: float, A_1: float, A_3: float, rest_Z: float) -> float:
-    """Eq. (45), of `_coefficients`; one_less_cos is 1 - abs(cos_dphi)."""
+    """Return eq. (45), of `_coefficients`; one_less_cos is 1 - abs(cos_dphi)."""
     in_plane = 1.0 + cos_dphi * A_1 if cos_dphi >= 0.0 else one_less_cos - cos_dphi * rest_Z
     return max(0.0, C * (in_plane + one_less_cos * A_3))
 
 
 @kernel
 def _bounce(cos_dphi: float, one_less_cos: float, S: float, C: float, rest_Z: float) -> float:
-    """Eq. (49), of `_coefficients`."""
+    """Return eq. (49), of `_coefficients`."""
     bracket = one_less_cos + cos_dphi * rest_Z if cos_dphi >= 0.0 else 1.0 - cos_dphi * (1.0 - rest_Z)
     return max(0.0, C * S * S / (1.0 + C) * bracket)
 
@@ -99,7 +99,7 @@ def _over_slopes(
     direct: NDArray[np.float64],
     bounced: NDArray[np.float64],
 ) -> None:
-    """Weighted sums over slopes. `slopes`, of shape (3, S), holds sine, cosine and weight of each.
+    """Add weighted values over slopes. `slopes`, of shape (3, S), holds sine, cosine and weight of each.
 
     A block of directions takes one slope at a time, so that the inner loop vectorises.
     """

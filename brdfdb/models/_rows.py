@@ -34,21 +34,21 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dt
     array
         In the broadcast shape.
     """
-    shape = np.broadcast_shapes(*(np.shape(each) for each in (*columns, *scalars)))
+    shape = np.broadcast_shapes(*(np.shape(array) for array in (*columns, *scalars)))
     rows, length, leading = _split(shape, scalars)
     values: Floats = np.empty((rows, length), dtype=dtype)
     if values.size:
-        loop(*(_column(each, shape, rows, length) for each in columns), _packed(scalars, leading, rows), values)
+        loop(*(_column(array, shape, rows, length) for array in columns), _packed(scalars, leading, rows), values)
     return values.reshape(shape)[()]
 
 
 def by_rows_of_vectors(loop: Loop, directions: Vectors, scalars: Sequence[Floats]) -> Floats:
-    """As `by_rows`, of unit vectors: ``loop(w_i, w_r, scalars, values)`` with vectors of shape (rows or 1, length, 3).
+    """Call ``loop(w_i, w_r, scalars, values)`` as `by_rows` does, with unit vectors of shape (rows or 1, length, 3).
 
     The loop itself writes 0 below the horizon and nan where a vector is nan; values have the dtype asked for.
     """
     w_i, w_r = directions.w_i, directions.w_r
-    shape = np.broadcast_shapes(w_i.shape[:-1], w_r.shape[:-1], *(np.shape(each) for each in scalars))
+    shape = np.broadcast_shapes(w_i.shape[:-1], w_r.shape[:-1], *(np.shape(array) for array in scalars))
     rows, length, leading = _split(shape, scalars)
     values: Floats = np.empty((rows, length), dtype=directions.dtype)
     if values.size:
@@ -57,8 +57,8 @@ def by_rows_of_vectors(loop: Loop, directions: Vectors, scalars: Sequence[Floats
 
 
 def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int, tuple[int, ...]]:
-    """Rows, their length, and the shape that scalars broadcast to."""
-    along = bool(shape) and all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in scalars)
+    """Return rows, their length, and the shape that scalars broadcast to."""
+    along = bool(shape) and all(np.ndim(array) == 0 or np.shape(array)[-1] == 1 for array in scalars)
     leading = (*shape[:-1], 1) if along else shape
     length = shape[-1] if along else 1
     return int(np.prod(leading)), length, leading

@@ -35,7 +35,7 @@ def _constants(rho_d: float, rho_s: float, alpha_x: float, alpha_y: float) -> tu
 
 @kernel
 def _lobe(form: int, h_x: float, h_y: float, h_z: float, cos_cos: float, peak: float, u_x: float, u_y: float) -> float:
-    """The specular part, for h = d_r + d_i, not normalised, u = 1 / alpha, peak = rho_s / (4 pi alpha_x alpha_y)."""
+    """Return the lobe for h = d_r + d_i, not normalised, u = 1 / alpha and peak = rho_s / (4 pi alpha_x alpha_y)."""
     h_z2 = h_z * h_z
     h_xy2 = (h_x * u_x) ** 2 + (h_y * u_y) ** 2
     # each takes one inverse of a product: a division takes as long as half of the rest
@@ -145,7 +145,7 @@ def by_angles(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Floats:
-    """f_r [1/sr] of one form for theta_i, phi_i, theta_r, phi_r [rad] and parameters, all of which it checks."""
+    """Return f_r [1/sr] of one form for theta_i, phi_i, theta_r, phi_r [rad] and parameters, all of which it checks."""
     checked = checked_angles(*angles)
     light = (checked.x_i, checked.y_i, checked.cos_i)
     parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
@@ -163,7 +163,7 @@ def by_vectors(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Floats:
-    """f_r [1/sr] of one form for unit vectors and parameters, all of which it checks."""
+    """Return f_r [1/sr] of one form for unit vectors and parameters, all of which it checks."""
     parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
     return by_rows_of_vectors(_VECTOR_LOOPS[form], checked_vectors(wi, wr), parameters)
 
@@ -180,7 +180,7 @@ def lobe(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Lobe:
-    """Where to look for the lobe of these models: share by reflectance, slopes by the alphas."""
+    """Return the lobe of these models: its share by reflectance, its slopes by the alphas."""
     diffuse, specular = np.asarray(rho_d, dtype=np.float64), np.asarray(rho_s, dtype=np.float64)
     total = diffuse + specular
     share = np.divide(specular, total, where=total > 0.0, out=np.zeros(np.shape(total)))
@@ -188,13 +188,13 @@ def lobe(
 
 
 def lossless(parameters: Mapping[str, float]) -> dict[str, float]:
-    """Both reflectances scaled to a sum of 1; of a black surface the diffuse one is 1."""
+    """Return both reflectances scaled to a sum of 1; of a black surface the diffuse one is 1."""
     rho_d, rho_s = parameters["rho_d"], parameters["rho_s"]
     total = rho_d + rho_s
     return {"rho_d": rho_d / total, "rho_s": rho_s / total} if total > 0.0 else {"rho_d": 1.0, "rho_s": 0.0}
 
 
 def wide_lobe(cos_i: Floats, **parameters: ArrayLike) -> Lobe:
-    """`lobe` for eq. (5b), which falls off more slowly than the Gaussian of slopes: the rest goes to the hemisphere."""
-    found = lobe(cos_i, **parameters)
-    return found._replace(share=np.minimum(found.share, _WIDE_SHARE))
+    """Return `lobe` for eq. (5b), which falls off more slowly than the Gaussian; the rest goes to the hemisphere."""
+    narrow = lobe(cos_i, **parameters)
+    return narrow._replace(share=np.minimum(narrow.share, _WIDE_SHARE))

@@ -17,7 +17,7 @@ SIGMA = Parameter("sigma", "σ'", "1", 0.0, 1.0, "ratio of the non-diffuse to th
 
 @kernel
 def _fujii(cos_i: float, cos_r: float, s: float, rho: float, sigma: float) -> float:
-    """Of s = <l,v> - <n,l> <n,v>."""
+    """Return f_r [1/sr] for s = <l,v> - <n,l> <n,v>."""
     t = max(cos_i, cos_r) if s > 0.0 else 1.0
     A = 1.0 / (np.pi + (np.pi / 2.0 - 2.0 / 3.0) * sigma)
     B = sigma * A
@@ -49,7 +49,7 @@ def oren_nayar_fujii(
     rho: ArrayLike,
     sigma: ArrayLike,
 ) -> Floats:
-    """BRDF of Fujii's form of the qualitative Oren-Nayar model, rho (A + B s / t).
+    """Return the BRDF [1/sr] of Fujii's form of the qualitative Oren-Nayar model, rho (A + B s / t).
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def he_torrance(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Floats:
-    """BRDF of a Gaussian rough surface: the directional diffuse and the uniform diffuse part.
+    """Return the BRDF [1/sr] of a Gaussian rough surface: the directional diffuse and the uniform diffuse part.
 
     The third part, specular, is a Dirac delta in direction: `he_torrance_specular` gives its reflectance.
 
@@ -182,7 +182,7 @@ def with_sum(
 
 
 def directional_diffuse(directions: Directions, surface: Surface) -> Floats:
-    """f_r [1/sr] of the directional diffuse part, eq. 71, over |F|^2: what the roughness does, in any polarisation."""
+    """Return f_r [1/sr] of the directional diffuse part, eq. 71, over |F|^2: the same in any polarisation."""
     return evaluated(directions, (*surface.features, _NO_FRESNEL, _NO_FRESNEL, _NO_FRESNEL))
 
 
@@ -192,16 +192,16 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
     `reach`, in (0, 1], is that of `log_series`: less than 1 is a coarser sum. `surface` holds `Surface.features`, n, k
     and the uniform part [1/sr]; they broadcast with the directions.
     """
-    uniform = all(np.size(each) == 1 for each in surface)
+    uniform = all(np.size(feature) == 1 for feature in surface)
     if isinstance(directions, Vectors) and uniform:
 
         def rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], values: Floats) -> None:
             vector_rows(w_i, w_r, series, reach, scalars, values)
 
         return by_rows_of_vectors(rows, directions, surface)
-    shape = np.broadcast_shapes(*(np.shape(each) for each in (*directions.given, *surface)))
+    shape = np.broadcast_shapes(*(np.shape(feature) for feature in (*directions.given, *surface)))
     pair = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
-    by_azimuth = all(np.ndim(each) == 0 or np.shape(each)[-1] == 1 for each in (*pair, *surface))
+    by_azimuth = all(np.ndim(feature) == 0 or np.shape(feature)[-1] == 1 for feature in (*pair, *surface))
     if series == WHOLE and reach == 1.0 and shape and shape[-1] > 1 and by_azimuth:
         terms = TERMS_OF_FLOAT32 if directions.dtype == np.float32 else TERMS
         table = series_table(terms) if shape[-1] >= WORTH_THE_TABLE else np.empty((1, 1, 1, terms))
@@ -214,11 +214,11 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
         )
     v_xy2, _ = v_squared(directions)
     features = np.empty((5, *shape))
-    for i, each in enumerate((*pair, v_xy2)):
-        features[i] = each
+    for i, feature in enumerate((*pair, v_xy2)):
+        features[i] = feature
     constants = np.empty((6, 1)) if uniform else np.empty((6, *shape))
-    for i, each in enumerate(surface):
-        constants[i] = np.reshape(each, ()) if uniform else each
+    for i, feature in enumerate(surface):
+        constants[i] = np.reshape(feature, ()) if uniform else feature
     values: NDArray[np.float64] = np.empty(shape)
     if values.size:
         scattered(features.reshape(5, -1), constants.reshape(6, -1), series, reach, values.reshape(-1))
@@ -226,14 +226,14 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
 
 
 def cos_bisecting(directions: Directions) -> Floats:
-    """Cosine of half the angle between light and viewer: of the incidence on a facet that mirrors one to the other."""
+    """Return the cosine of half the angle between light and viewer: the incidence on a facet between them."""
     v_xy2, v_z2 = v_squared(directions)
     cos: Floats = np.minimum(0.5 * np.sqrt(v_xy2 + v_z2), 1.0)
     return cos
 
 
 def v_squared(directions: Directions) -> tuple[Floats, Floats]:
-    """v_xy^2 and v_z^2 of eq. 84, k_r - k_i; v_xy^2 with its digits near the mirror direction, up to the horizon."""
+    """Return v_xy^2 and v_z^2 of eq. 84, k_r - k_i; v_xy^2 keeps its digits near the mirror direction."""
     v_z = directions.cos_i + directions.cos_r
     across = difference_of_sines(directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r)
     return across**2 + (2.0 * directions.sin_i * directions.sin_r) * directions.one_plus_cos_dphi, v_z**2
@@ -248,7 +248,7 @@ def he_torrance_specular(
     n: ArrayLike,
     k: ArrayLike,
 ) -> Floats:
-    """Reflectance of the specular part: the share of the light that leaves in the exact mirror direction.
+    """Return reflectance of the specular part: the share of the light that leaves in the exact mirror direction.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def he_torrance_specular_vectors(
 
 
 def rho_s(directions: Directions, surface: Surface) -> Floats:
-    """Reflectance [1] of the specular part, eq. 73, for the direction of the light."""
+    """Return reflectance [1] of the specular part, eq. 73, for the direction of the light."""
     wave, _, slope = surface.features
     return by_rows(specular_rows, (), (directions.sin_i, directions.cos_i, wave, slope, surface.n, surface.k))
 
@@ -309,7 +309,7 @@ def lobe(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Lobe:
-    """Where the directional diffuse part is: the width of the term of eq. 78 that is largest in the mirror direction.
+    """Return the lobe of the directional diffuse part: as wide as the term of eq. 78 that is largest at the mirror.
 
     The slope of the half vector is v_xy / v_z, and the term m is exp(-(pi tau v_xy / lambda)^2 / m). Terms of larger m
     are wider: a tenth of the directional diffuse part is left to be found anywhere.
@@ -326,7 +326,7 @@ def lobe(
 
 
 def lossless(_: Mapping[str, Any]) -> dict[str, float]:
-    """The index of a metal that absorbs next to nothing, and no uniform part: what is left is single scattering.
+    """Return the index of a metal that absorbs next to nothing, and no uniform part: what is left is single scattering.
 
     1 - |F|^2 is about 2 (cos + 1 / cos) n / k^2, and nowhere more than n / k: 4e-11 at normal incidence, 1e-8 at 89.9
     degrees.

@@ -32,7 +32,7 @@ def he_torrance_very_rough(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Floats:
-    """BRDF of a very rough surface: the limit of `he_torrance` for g -> infinity, geometrical optics.
+    """Return the BRDF [1/sr] of a very rough surface: the limit of `he_torrance` for g -> infinity, geometrical optics.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def he_torrance_very_rough(
     Returns
     -------
     array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan. There is no Dirac part.
+        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan; no specular part.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def he_torrance_very_rough_vectors(
 
 
 def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
-    """Specular reflectance of a smooth surface: the limit of `he_torrance_specular` for sigma_0 / wavelength -> 0.
+    """Return the specular reflectance [1] of a smooth surface: `he_torrance_specular` for sigma_0 / wavelength -> 0.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def he_torrance_parts(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> HeTorranceParts:
-    """The directional diffuse and the uniform diffuse part of `he_torrance`, apart.
+    """Return the directional diffuse and the uniform diffuse part of `he_torrance`, apart.
 
     The third part of eq. (5) is a Dirac delta in direction: `he_torrance_specular` gives its reflectance.
 
@@ -223,7 +223,7 @@ def he_torrance_aperture(
     a: ArrayLike = 0.0,
     rings: int = 2,
 ) -> Floats:
-    """BRDF as light from a cone and a receiver of a cone measure it: all three parts, the specular one spread.
+    """Return BRDF as light from a cone and a receiver of a cone measure it: all three parts, the specular one spread.
 
     Parameters
     ----------
@@ -357,7 +357,7 @@ def _aperture(directions: Directions, apertures: _Apertures, surface: full.Surfa
 
 
 def _common_area(first: Floats, second: Floats, apart: Floats) -> Floats:
-    """Solid angle [sr] common to two circular cones of the half angles `first` and `second` [rad], axes `apart`.
+    """Return the solid angle [sr] common to two circular cones of half angles `first` and `second`, axes `apart` [rad].
 
     Two sectors, less twice the triangle of both axes and a point where the circles cross: L'Huilier's formula for its
     area, half-angle formulas for its angles, so that small cones keep their digits.
@@ -381,13 +381,13 @@ def _common_area(first: Floats, second: Floats, apart: Floats) -> Floats:
 
 
 def _versine(angle: Floats) -> Floats:
-    """1 - cos."""
+    """Return 1 - cos."""
     versine: Floats = 2.0 * np.sin(0.5 * angle) ** 2
     return versine
 
 
 def _averaged(directions: Directions, apertures: _Apertures, surface: full.Surface, albedo: Floats) -> Floats:
-    """The diffuse parts [1/sr], averaged over both cones."""
+    """Return the diffuse parts [1/sr], averaged over both cones."""
     light, weights = _nodes(_frame(directions, "i"), apertures.incident, apertures.rings)
     viewers, _ = _nodes(_frame(directions, "r"), apertures.received, apertures.rings)
     total: Any = 0.0
@@ -408,7 +408,7 @@ def _averaged(directions: Directions, apertures: _Apertures, surface: full.Surfa
 
 
 def _frame(directions: Directions, which: str) -> tuple[Floats, Floats, Floats]:
-    """The axis of a cone, and the unit vectors of growing theta and phi there."""
+    """Return the axis of a cone, and the unit vectors of growing theta and phi there."""
     x, y, z, sin = (getattr(directions, f"{name}_{which}") for name in ("x", "y", "cos", "sin"))
     if isinstance(directions, Vectors):
         z = getattr(directions, f"w_{which}")[..., 2].astype(np.float64)  # below the horizon cos is not its cosine
@@ -424,7 +424,7 @@ def _frame(directions: Directions, which: str) -> tuple[Floats, Floats, Floats]:
 
 
 def _nodes(frame: tuple[Floats, Floats, Floats], solid_angle: Floats, rings: int) -> tuple[Floats, NDArray[np.float64]]:
-    """Unit vectors (..., nodes, 3) in a cone, and their weights, which add up to 1."""
+    """Return unit vectors (..., nodes, 3) in a cone, and their weights, which add up to 1."""
     axis, along, across = (vector[..., None, :] for vector in frame)
     if rings == 0:
         return axis, np.ones(1)

@@ -42,7 +42,7 @@ def he_torrance_jones(
     n: ArrayLike,
     k: ArrayLike,
 ) -> Complexes:
-    """Jones matrix of the facet that mirrors light to viewer, between the s and p of the mean surface.
+    """Return the Jones matrix [1] of the facet that mirrors light to viewer, between s and p of the mean surface.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def he_torrance_mueller(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Floats:
-    """Mueller BRDF of a Gaussian rough surface: directional diffuse and uniform diffuse part, for any polarisation.
+    """Return the Mueller BRDF [1/sr] of a Gaussian rough surface: directional and uniform diffuse part.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def he_torrance_specular_mueller(
     n: ArrayLike,
     k: ArrayLike,
 ) -> Floats:
-    """Mueller matrix of the specular part: what leaves in the exact mirror direction.
+    """Return the Mueller matrix of the specular part: what leaves in the exact mirror direction.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def _finished_mueller(directions: Directions, surface: unpolarised.Surface, albe
 
 
 def _jones(directions: Directions, n: Floats, k: Floats) -> tuple[Complexes, Complexes, Complexes, Complexes]:
-    """J_ss, J_sp, J_ps, J_pp in the broadcast shape; A and B as in the notes of `he_torrance_jones`."""
+    """Return J_ss, J_sp, J_ps, J_pp in the broadcast shape; A and B as in the notes of `he_torrance_jones`."""
     sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
     sin_dphi, cos2_half, sin2_half = _azimuth(directions)
     # cos^2 and sin^2 of (theta_i - theta_r) / 2 and of (theta_i + theta_r) / 2, none by a difference that cancels
@@ -289,7 +289,7 @@ def _jones(directions: Directions, n: Floats, k: Floats) -> tuple[Complexes, Com
 
 
 def _azimuth(directions: Directions) -> tuple[Floats, Floats, Floats]:
-    """sin(delta_phi), cos^2 and sin^2 of delta_phi / 2, the azimuth of a pole taken as 0 for unit vectors."""
+    """Return sin(delta_phi), cos^2 and sin^2 of delta_phi / 2, the azimuth of a pole taken as 0 for unit vectors."""
     if isinstance(directions, Vectors):
         cos_phi_i, sin_phi_i = unit_azimuth(directions.x_i, directions.y_i, directions.sin_i)
         cos_phi_r, sin_phi_r = unit_azimuth(directions.x_r, directions.y_r, directions.sin_r)
@@ -304,7 +304,7 @@ def _azimuth(directions: Directions) -> tuple[Floats, Floats, Floats]:
 
 
 def unit_azimuth(x: Floats, y: Floats, sin_theta: Floats) -> tuple[Floats, Floats]:
-    """cos(phi) and sin(phi) of unit vectors; phi = 0 at the pole."""
+    """Return cos(phi) and sin(phi) of unit vectors; phi = 0 at the pole."""
     away = sin_theta != 0.0  # nan too
     lift = np.where(sin_theta < 1e-290, 2.0**600, 1.0)  # subnormal numbers carry too few digits
     x, y = lift * x, lift * y
@@ -313,7 +313,7 @@ def unit_azimuth(x: Floats, y: Floats, sin_theta: Floats) -> tuple[Floats, Float
 
 
 def _mueller(J_ss: Complexes, J_sp: Complexes, J_ps: Complexes, J_pp: Complexes) -> NDArray[np.float64]:
-    """The Mueller matrix of a Jones matrix, (..., 4, 4)."""
+    """Return the Mueller matrix of a Jones matrix, (..., 4, 4)."""
     ss, sp, ps, pp = (z.real**2 + z.imag**2 for z in (J_ss, J_sp, J_ps, J_pp))
     rows_s, rows_p = J_ss * J_sp.conj(), J_ps * J_pp.conj()
     columns_s, columns_p = J_ss * J_ps.conj(), J_sp * J_pp.conj()

@@ -25,7 +25,7 @@ def _vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Fl
 
 
 def lambert(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike, *, rho: ArrayLike) -> Floats:
-    """BRDF of an ideal diffuser, the same in every direction.
+    """Return the BRDF [1/sr] of an ideal diffuser, the same in every direction.
 
     Parameters
     ----------

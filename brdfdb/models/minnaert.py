@@ -32,7 +32,7 @@ def minnaert(
     k: ArrayLike,
     rho: ArrayLike = 1.0,
 ) -> Floats:
-    """BRDF of Minnaert's law, rho (k + 1) / (2 pi) (cos theta_i cos theta_r)^(k - 1).
+    """Return the BRDF [1/sr] of Minnaert's law, rho (k + 1) / (2 pi) (cos theta_i cos theta_r)^(k - 1).
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ _NO_AZIMUTH = 1e-300  # smaller products of two sines: an azimuth means nothing
 
 @kernel
 def _angle(sin_theta: float, cos_theta: float) -> tuple[float, float]:
-    """A polar angle and what is left of it to pi/2, each with all its digits."""
+    """Return a polar angle and what is left of it to pi/2, each with all its digits."""
     steep = sin_theta > cos_theta
     small = arcsin(cos_theta if steep else sin_theta)
     large = HALF_PI - small + _HALF_PI_REST
@@ -65,7 +65,7 @@ def _functional(
     sigma: float,
     interreflection: float,
 ) -> tuple[float, float, float, float]:
-    """Eq. (29) as f_r = c_0 + c_1 cos(dphi) + c_2 (1 - abs(cos(dphi))): c_0, c_1 backward and forward, c_2.
+    """Return eq. (29) as f_r = c_0 + c_1 cos(dphi) + c_2 (1 - abs(cos(dphi))): c_0, c_1 backward and forward, c_2.
 
     beta_rest is pi/2 - beta, versine_rest is 1 - sin(alpha): near the horizon neither may be a difference.
     """
@@ -165,7 +165,7 @@ def _functional_of_vectors(
 
 @kernel
 def _qualitative(sin_alpha: float, tan_beta: float, rho: float, sigma: float, offset: float) -> tuple[float, float]:
-    """Eq. (30) as f_r = c_0 + c_1 max(0, cos(dphi)): c_0 and c_1."""
+    """Return eq. (30) as f_r = c_0 + c_1 max(0, cos(dphi)): c_0 and c_1."""
     sigma2 = sigma * sigma
     # Eq. (30)
     A = 1.0 - 0.5 * sigma2 / (sigma2 + offset) if sigma2 > 0.0 else 1.0
@@ -209,7 +209,7 @@ def oren_nayar(
     sigma: ArrayLike,
     interreflection: ArrayLike = True,
 ) -> Floats:
-    """BRDF of an isotropic surface of Lambertian V-cavities with Gaussian slopes, the paper's functional fit.
+    """Return the BRDF [1/sr] of Lambertian V-cavities with Gaussian slopes, by the paper's functional fit.
 
     Parameters
     ----------
@@ -284,7 +284,7 @@ def oren_nayar_parts(
     rho: ArrayLike,
     sigma: ArrayLike,
 ) -> Parts:
-    """`oren_nayar` in its parts, direct light (eq. 27) and the second bounce (eq. 28).
+    """Return `oren_nayar` in its parts, direct light (eq. 27) and the second bounce (eq. 28).
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def oren_nayar_parts(
     """
     angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
     parameters = {"rho": RHO.check(rho), "sigma": SIGMA.check(sigma)}
-    direct, total = (oren_nayar(*angles.given, **parameters, interreflection=each) for each in (False, True))
+    direct, total = (oren_nayar(*angles.given, **parameters, interreflection=bounce) for bounce in (False, True))
     return _apart(angles, direct, total, **parameters)
 
 
@@ -322,7 +322,7 @@ def oren_nayar_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, si
     """`oren_nayar_parts` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
     vectors = checked_vectors(wi, wr)
     parameters = {"rho": RHO.check(rho), "sigma": SIGMA.check(sigma)}
-    direct, total = (oren_nayar_vectors(wi, wr, **parameters, interreflection=each) for each in (False, True))
+    direct, total = (oren_nayar_vectors(wi, wr, **parameters, interreflection=bounce) for bounce in (False, True))
     return _apart(vectors, direct, total, **parameters)
 
 
@@ -348,7 +348,7 @@ def oren_nayar_qualitative(
     sigma: ArrayLike,
     offset: ArrayLike = 0.33,
 ) -> Floats:
-    """BRDF of the paper's qualitative model: the functional fit without its third term and without interreflection.
+    """Return the BRDF [1/sr] of the paper's qualitative model: the fit without its third term and interreflection.
 
     Parameters
     ----------

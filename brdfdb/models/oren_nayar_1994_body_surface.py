@@ -37,7 +37,7 @@ def oren_nayar_body_surface(
     n: ArrayLike | None = None,
     k: ArrayLike | None = None,
 ) -> Floats:
-    """BRDF of a rough body with a glossy surface, k_b times `oren_nayar` plus k_s / e_0 times `torrance_sparrow`.
+    """Return the BRDF [1/sr] of a rough body with a glossy surface: k_b `oren_nayar` + k_s / e_0 `torrance_sparrow`.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def lobe(
     e_0: ArrayLike = 1.0,
     **_: ArrayLike,
 ) -> Lobe:
-    """Where to look for the lobe of the surface: share by the albedos, slopes by sigma."""
+    """Return the lobe of the surface: its share by the albedos, its slopes by sigma."""
     whole = torrance_sparrow_1967.lobe(cos_i, sigma=sigma)
     surface = np.asarray(k_s) / np.asarray(e_0) * 4.0 * np.pi * whole.alpha_x**2  # albedo of a narrow lobe with F = 1
     body = np.asarray(k_b) * np.asarray(rho)

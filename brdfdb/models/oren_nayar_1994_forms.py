@@ -95,7 +95,7 @@ def _smooth(wi: Floats, wr: Floats, *, rho: float, **_: float) -> Floats:
 
 
 def _mixed(facets: PartName, other: Callable[..., Floats]) -> Callable[..., Floats]:
-    """One part of the facets, and the other one by a form of its own."""
+    """Return a function that takes one part from the facets, and the other one from a form of its own."""
 
     def evaluate(wi: Floats, wr: Floats, **own: float) -> Floats:
         return gaussian_part(wi, wr, **own, part=facets) + other(wi, wr, **own)
@@ -104,7 +104,7 @@ def _mixed(facets: PartName, other: Callable[..., Floats]) -> Callable[..., Floa
 
 
 def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float, lit: bool = True, bounce: bool = True) -> Floats:
-    """The closed forms of appendix B.2, eqs 45 and 49, averaged over slopes with the weights of eqs 25 and 26."""
+    """Return the closed forms of appendix B.2, eqs 45 and 49, averaged over slopes by the weights of eqs 25 and 26."""
     theta_a, weight = _slopes(sigma)
     return single_slope_mean(wi, wr, rho=rho, theta_a=theta_a, weight=weight, lit=lit, bounce=bounce)
 

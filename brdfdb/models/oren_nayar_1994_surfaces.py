@@ -29,7 +29,7 @@ def oren_nayar_unidirectional(
     theta_a: ArrayLike,
     phi_a: ArrayLike,
 ) -> Floats:
-    """BRDF of parallel V-cavities of one slope with Lambertian facets: exact in direct light and the second bounce.
+    """Return the BRDF [1/sr] of parallel V-cavities of one slope: exact in direct light and the second bounce.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def oren_nayar_unidirectional_parts(
     theta_a: ArrayLike,
     phi_a: ArrayLike,
 ) -> Parts:
-    """`oren_nayar_unidirectional` in its parts, direct light and the second bounce.
+    """Return `oren_nayar_unidirectional` in its parts, direct light and the second bounce.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _unidirectional(
 
 
 def _scaled(direct: Floats, bounce: Floats, rho: Floats, directions: Directions) -> tuple[Floats, Floats, Directions]:
-    """From radiances over rho E_0 cos(theta_i) / pi, and rho times that, to the BRDF."""
+    """Return the BRDF [1/sr] from radiances over rho E_0 cos(theta_i) / pi, and rho times that."""
     return rho / np.pi * direct, rho * rho / np.pi * bounce, directions
 
 
@@ -167,7 +167,7 @@ def oren_nayar_single_slope(
     rho: ArrayLike,
     theta_a: ArrayLike,
 ) -> Floats:
-    """BRDF of V-cavities of one slope in all azimuths alike, the paper's closed forms.
+    """Return the BRDF [1/sr] of V-cavities of one slope in all azimuths alike, the paper's closed forms.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def oren_nayar_single_slope_parts(
     rho: ArrayLike,
     theta_a: ArrayLike,
 ) -> Parts:
-    """`oren_nayar_single_slope` in its parts, direct light and the second bounce.
+    """Return `oren_nayar_single_slope` in its parts, direct light and the second bounce.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def oren_nayar_gaussian(
     rho: ArrayLike,
     sigma: ArrayLike,
 ) -> Floats:
-    """BRDF of V-cavities with Gaussian slopes, integrated: what the functional fit `oren_nayar` approximates.
+    """Return the BRDF [1/sr] of V-cavities with Gaussian slopes, integrated: the fit `oren_nayar` approximates it.
 
     Parameters
     ----------
@@ -353,7 +353,7 @@ def oren_nayar_gaussian_parts(
     rho: ArrayLike,
     sigma: ArrayLike,
 ) -> Parts:
-    """`oren_nayar_gaussian` in its parts, direct light and the second bounce.
+    """Return `oren_nayar_gaussian` in its parts, direct light and the second bounce.
 
     Parameters
     ----------
@@ -389,7 +389,7 @@ def oren_nayar_gaussian_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: Arra
 
 
 def gaussian_part(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, part: PartName) -> Floats:
-    """One part of `oren_nayar_gaussian_parts_vectors`, without the work of the other."""
+    """Return one part of `oren_nayar_gaussian_parts_vectors` [1/sr], without the work of the other."""
     return _part(part, *_gaussian(checked_vectors(wi, wr), rho, sigma, part))
 
 
@@ -408,7 +408,7 @@ def gaussian_rung(
 def _gaussian(
     directions: Directions, rho: ArrayLike, sigma: ArrayLike, only: PartName | None = None, nodes: int = NODES
 ) -> tuple[Floats, Floats, Directions]:
-    """Both parts, or only one, and then nothing of use for the other."""
+    """Return both parts, or only one; the other then means nothing."""
     albedo, deviation = RHO.check(rho), SIGMA.check(sigma)
     tangents = directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r
     features = *tangents, directions.cos_dphi, directions.sin_dphi, deviation

@@ -19,7 +19,7 @@ _C2 = 2.0 / 3.0 - 28.0 / (15.0 * np.pi)  # mean of E_FON = A (1 + C2 r)
 
 @kernel
 def _lost(cos_theta: float, sin_theta: float) -> float:
-    """(1 - E_FON) / (A r), the share that a single scattering loses, without differences that cancel at the horizon."""
+    """Return (1 - E_FON) / (A r), the share that a single scattering loses; no difference cancels at the horizon."""
     small = arcsin(min(cos_theta, sin_theta))
     rest = small if cos_theta < sin_theta else np.pi / 2 - small  # pi/2 - theta
     versine = cos_theta * cos_theta / (1.0 + sin_theta)  # 1 - sin(theta)
@@ -57,7 +57,7 @@ def oren_nayar_energy_preserving(
     rho: ArrayLike,
     roughness: ArrayLike,
 ) -> Floats:
-    """BRDF of the energy-preserving Oren-Nayar model (EON): with rho = 1 the albedo is 1 at every angle.
+    """Return the BRDF [1/sr] of the energy-preserving Oren-Nayar model (EON): with rho = 1 it reflects all light.
 
     Parameters
     ----------

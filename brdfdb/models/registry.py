@@ -49,8 +49,8 @@ class Registry(dict[str, ModelSpec]):
         for entry in importlib.metadata.entry_points(group=GROUP):
             origin = f"entry point {entry.name} = {entry.value}"
             try:
-                found: Any = entry.load()
-                specs = [found] if isinstance(found, ModelSpec) else list(found)
+                given: Any = entry.load()
+                specs = [given] if isinstance(given, ModelSpec) else list(given)
             except Exception as error:
                 raise BrdfdbError(f"{origin}: {_said(error)}") from error
             self.add(specs, origin)
@@ -72,8 +72,8 @@ class Registry(dict[str, ModelSpec]):
         for path in paths:
             file = Path(path).absolute()
             self._add_file(file)
-            known = [each for each in os.environ.get(VARIABLE, "").split(os.pathsep) if each]
-            if str(file) not in (str(Path(each).absolute()) for each in known):
+            known = [entry for entry in os.environ.get(VARIABLE, "").split(os.pathsep) if entry]
+            if str(file) not in (str(Path(entry).absolute()) for entry in known):
                 os.environ[VARIABLE] = os.pathsep.join([*known, str(file)])
 
     def add_environment(self) -> None:
@@ -98,7 +98,7 @@ class Registry(dict[str, ModelSpec]):
             except Exception as error:
                 raise BrdfdbError(f"{file}: {_said(error)}") from error
             ours = {id(spec) for spec in self.values()}
-            specs = {id(each): each for each in vars(module).values() if isinstance(each, ModelSpec)}
+            specs = {id(spec): spec for spec in vars(module).values() if isinstance(spec, ModelSpec)}
             new = [spec for key, spec in specs.items() if key not in ours]
             if not new:
                 raise BrdfdbError(f"{file}: it defines no brdfdb.parameters.ModelSpec")

@@ -25,7 +25,7 @@ _TINY = 1e-300  # guards 0 / 0 at sigma = 0
 def _half(
     cos_i: float, sin_i: float, cos_r: float, sin_r: float, one_plus_cos_dphi: float
 ) -> tuple[float, float, float]:
-    """Sine and cosine of theta_a, the slope of the half vector, and the cosine of half the angle between s and v."""
+    """Return sine and cosine of theta_a, the slope of the half vector, and the cosine of half the angle of s and v."""
     h_z = cos_i + cos_r
     # sin_i - sin_r, without the difference of numbers near 1
     sum_of_sines = sin_i + sin_r
@@ -65,7 +65,7 @@ def torrance_sparrow(
     n: ArrayLike | None = None,
     k: ArrayLike | None = None,
 ) -> Floats:
-    """BRDF of mirror-like facets in V-cavities with Gaussian slopes: a lobe of height 1, not normalised.
+    """Return the BRDF [1/sr] of mirror-like facets with Gaussian slopes: a lobe of height 1, not normalised.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def _f_r(directions: Directions, sigma: ArrayLike, n: ArrayLike | None, k: Array
 
 
 def lobe(cos_i: Floats, *, sigma: ArrayLike, **_: ArrayLike) -> Lobe:
-    """Where to look for the lobe of this model: slopes by sigma, and a fifth of it in the wider tails."""
+    """Return the lobe of this model: slopes by sigma, and a fifth of it in the wider tails."""
     alpha = np.maximum(np.sqrt(2.0) * np.asarray(sigma, dtype=np.float64), 1e-6)
     return Lobe(np.full(np.broadcast_shapes(np.shape(cos_i), alpha.shape), 0.8), alpha, alpha)
 

@@ -37,7 +37,7 @@ def ward(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Floats:
-    """BRDF of the elliptical Gaussian model; isotropic (eq. 4) where alpha_x equals alpha_y.
+    """Return the BRDF [1/sr] of the elliptical Gaussian model; isotropic (eq. 4) where alpha_x equals alpha_y.
 
     Parameters
     ----------
@@ -97,17 +97,12 @@ def ward_half_vector(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Floats:
-    """BRDF of the elliptical Gaussian model as its half-vector form computes it; isotropic where the alphas are equal.
+    """Return the BRDF [1/sr] of the elliptical Gaussian model in its half-vector form; isotropic for equal alphas.
 
     Parameters
     ----------
-    theta_i, phi_i, theta_r, phi_r : array_like [rad]
-        Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; phi from x.
-    rho_d, rho_s : array_like [1]
-        Diffuse and specular reflectance, each in [0, 1].
-    alpha_x, alpha_y : array_like [1]
-        Widths of the slopes along x and y, exp(-(slope / alpha)^2), in [1e-6, 2]; the paper holds the model good to
-        0.2. It calls them standard deviations, which are alpha / sqrt(2): see `brdfdb.roughness`.
+    theta_i, phi_i, theta_r, phi_r, rho_d, rho_s, alpha_x, alpha_y : array_like
+        As in `ward`: angles [rad], reflectances [1] in [0, 1], widths of the slopes [1] in [1e-6, 2].
 
     Returns
     -------

@@ -13,7 +13,7 @@ from brdfdb.reference import Number, mp
 
 
 def uniform_diffuse(a: Number) -> Number:
-    """f_r [1/sr] of the uniform diffuse part, Eq. (72) with the albedo `a` [1] divided by pi."""
+    """Return f_r [1/sr] of the uniform diffuse part, Eq. (72) with the albedo `a` [1] divided by pi."""
     # Eq. (72)
     return mp.mpf(a) / mp.pi
 
@@ -28,7 +28,7 @@ def directional_diffuse(
     n: Number,
     k: Number,
 ) -> Number:
-    """f_r [1/sr] of the directional diffuse part, Eq. (71), for the refractive index n + i k."""
+    """Return f_r [1/sr] of the directional diffuse part, Eq. (71), for the refractive index n + i k."""
     theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
     # Eq. (75), at the bisecting angle arccos(|v|/2)
     fresnel = fresnel_unpolarised(_cos_bisecting(theta_i, theta_r, delta_phi), n, k)
@@ -37,7 +37,7 @@ def directional_diffuse(
 
 
 def jones(theta_i: Number, theta_r: Number, delta_phi: Number, n: Number, k: Number) -> Any:
-    """The complex 2x2 matrix [1] of Eqs. (61)-(64) over |k_r x k_i|^2, for the refractive index n + i k.
+    """Return the complex 2x2 matrix [1] of Eqs. (61)-(64) over |k_r x k_i|^2, for the refractive index n + i k.
 
     The field E_r = J E_i of the reflected wave, in the order (s, p): J[0, 1] is s reflected from p incident, the M_sp
     of the paper. The fields vary as exp(i k.r - i omega t), and F_s and F_p have the signs of `_fresnel`.
@@ -67,7 +67,7 @@ def mueller(
     n: Number,
     k: Number,
 ) -> Any:
-    """The real 4x4 matrix [1/sr] that takes incident to reflected Stokes vectors, for the directional diffuse part.
+    """Return the 4x4 matrix [1/sr] from incident to reflected Stokes vectors, for the directional diffuse part.
 
     I = |E_s|^2 + |E_p|^2, Q = |E_s|^2 - |E_p|^2, U + i V = 2 E_s conj(E_p), in the bases and with the time factor of
     `jones`: a wave with V > 0 has positive helicity. The first element is `directional_diffuse`. The matrix does not
@@ -88,7 +88,7 @@ def mueller(
 
 
 def very_rough(theta_i: Number, theta_r: Number, delta_phi: Number, slope: Number, n: Number, k: Number) -> Number:
-    """f_r [1/sr] in the limit of wavelength 0: `directional_diffuse` with Beckmann's exp(-V/g) / g for the sum.
+    """Return f_r [1/sr] in the limit of wavelength 0: `directional_diffuse` with Beckmann's exp(-V/g) / g for the sum.
 
     The paper gives it in words (section 4 on sandpaper, and Figure 13 a): the wavelength drops out of V / g and of
     tau^2 / (wavelength^2 g), and only `slope` = sigma_0 / tau [1] is left, in the effective roughness and in S too.
@@ -112,7 +112,7 @@ def very_rough(theta_i: Number, theta_r: Number, delta_phi: Number, slope: Numbe
 
 
 def smooth(theta_i: Number, n: Number, k: Number) -> Number:
-    """The specular reflectivity [1] of a smooth surface, the factor |F|^2 of Eq. (10)."""
+    """Return the specular reflectivity [1] of a smooth surface, the factor |F|^2 of Eq. (10)."""
     # Eq. (10)
     return fresnel_unpolarised(mp.cos(mp.mpf(theta_i)), n, k)
 
@@ -120,7 +120,7 @@ def smooth(theta_i: Number, n: Number, k: Number) -> Number:
 def specular_reflectance(
     theta_i: Number, wavelength_nm: Number, sigma_0_um: Number, tau_um: Number, n: Number, k: Number
 ) -> Number:
-    """The specular reflectivity rho_s [1] of Eq. (73), in the mirror direction theta_r = theta_i."""
+    """Return the specular reflectivity rho_s [1] of Eq. (73), in the mirror direction theta_r = theta_i."""
     theta_i = mp.mpf(theta_i)
     wavelength = mp.mpf(wavelength_nm) / 1000
     sigma_0, tau = mp.mpf(sigma_0_um), mp.mpf(tau_um)
@@ -133,14 +133,14 @@ def specular_reflectance(
 
 
 def fresnel_unpolarised(cos_theta: Number, n: Number, k: Number) -> Number:
-    """|F|^2 [1], Eq. (75): the reflectance of a plane interface to n + i k at incidence arccos(`cos_theta`)."""
+    """Return |F|^2 [1], Eq. (75): the reflectance of a plane interface to n + i k at incidence arccos(`cos_theta`)."""
     f_s, f_p = _fresnel(cos_theta, n, k)
     # Eq. (75)
     return (abs(f_s) ** 2 + abs(f_p) ** 2) / 2
 
 
 def shadowing(theta: Number, sigma_0: Number, tau: Number) -> Number:
-    """S_i or S_r [1] of Eq. (24), the shadowing of one direction; the model takes the product of both, Eq. (23).
+    """Return S_i or S_r [1] of Eq. (24), the shadowing of one direction; the model takes the product of both, Eq. (23).
 
     `theta` [rad]; `sigma_0` and `tau` in the same unit of length.
     """
@@ -156,7 +156,7 @@ def shadowing(theta: Number, sigma_0: Number, tau: Number) -> Number:
 
 
 def effective_roughness(theta_i: Number, theta_r: Number, sigma_0: Number, tau: Number) -> Number:
-    """sigma of Eq. (80), the roughness that is lit and seen, in the unit of length of `sigma_0` and `tau`."""
+    """Return sigma of Eq. (80), the roughness that is lit and seen, in the unit of length of `sigma_0` and `tau`."""
     sigma_0 = mp.mpf(sigma_0)
     # Eqs. (82), (83)
     k_i = _shadowed_tangent(theta_i, sigma_0, tau)
@@ -168,14 +168,14 @@ def effective_roughness(theta_i: Number, theta_r: Number, sigma_0: Number, tau: 
 
 
 def surface_roughness(theta_i: Number, theta_r: Number, wavelength: Number, sigma_0: Number, tau: Number) -> Number:
-    """g [1] of Eq. (79); `wavelength`, `sigma_0` and `tau` in the same unit of length."""
+    """Return g [1] of Eq. (79); `wavelength`, `sigma_0` and `tau` in the same unit of length."""
     sigma = effective_roughness(theta_i, theta_r, sigma_0, tau)
     # Eq. (79)
     return (2 * mp.pi * sigma / mp.mpf(wavelength) * (mp.cos(mp.mpf(theta_i)) + mp.cos(mp.mpf(theta_r)))) ** 2
 
 
 def lateral_phase(theta_i: Number, theta_r: Number, delta_phi: Number, wavelength: Number, tau: Number) -> Number:
-    """V = v_xy^2 tau^2 / 4 [1] of Eq. (78), with the wave number in v; `wavelength` and `tau` in the same unit."""
+    """Return V = v_xy^2 tau^2 / 4 [1] of Eq. (78), with the wave number in v; both lengths in the same unit."""
     v_x, v_y, _ = _wave_vector_change(mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi))
     # Eq. (20)
     wave_number = 2 * mp.pi / mp.mpf(wavelength)
@@ -184,7 +184,7 @@ def lateral_phase(theta_i: Number, theta_r: Number, delta_phi: Number, wavelengt
 
 
 def series(g: Number, V: Number) -> Number:
-    """The sum [1] of Eq. (78), g^m e^-g / (m! m) exp(-V/m) over m from 1 on, with V = v_xy^2 tau^2 / 4.
+    """Return the sum [1] of Eq. (78), g^m e^-g / (m! m) exp(-V/m) over m from 1 on, with V = v_xy^2 tau^2 / 4.
 
     Term by term, up and down from the largest one until a term is below 1e-50 of the sum: thousands of terms, about a
     second at g = 1e6.
@@ -203,7 +203,7 @@ def series(g: Number, V: Number) -> Number:
 
 
 def _fresnel(cos_theta: Number, n: Number, k: Number) -> tuple[Number, Number]:
-    """F_s and F_p [1] of Eq. (44): F_p = -F_s = (index - 1) / (index + 1) at normal incidence, both -1 at grazing."""
+    """Return F_s and F_p [1] of Eq. (44): F_p = -F_s = (index - 1) / (index + 1) at the normal, both -1 at grazing."""
     cos_theta = mp.mpf(cos_theta)
     index = mp.mpc(n, k)
     # Snell's law: index * cos of the (complex) angle of refraction
@@ -214,7 +214,7 @@ def _fresnel(cos_theta: Number, n: Number, k: Number) -> tuple[Number, Number]:
 
 
 def _jones(theta_i: Number, theta_r: Number, delta_phi: Number, n: Number, k: Number) -> Any:
-    """`jones` at the precision that is set."""
+    """Return `jones` at the precision that is set."""
     k_i = (-mp.sin(theta_i), mp.zero, -mp.cos(theta_i))
     k_r = (mp.sin(theta_r) * mp.cos(delta_phi), mp.sin(theta_r) * mp.sin(delta_phi), mp.cos(theta_r))
     f_s, f_p = _fresnel(_cos_bisecting(theta_i, theta_r, delta_phi), n, k)
@@ -248,7 +248,7 @@ def _jones(theta_i: Number, theta_r: Number, delta_phi: Number, n: Number, k: Nu
 def _directional_diffuse_of_a_mirror(
     theta_i: Number, theta_r: Number, delta_phi: Number, wavelength_nm: Number, sigma_0_um: Number, tau_um: Number
 ) -> Number:
-    """Eq. (71) [1/sr] with |F|^2 = 1."""
+    """Return eq. (71) [1/sr] with |F|^2 = 1."""
     theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
     wavelength = mp.mpf(wavelength_nm) / 1000
     sigma_0, tau = mp.mpf(sigma_0_um), mp.mpf(tau_um)
@@ -268,7 +268,7 @@ def _directional_diffuse_of_a_mirror(
 
 
 def _terms(g: Number, V: Number, start: int, step: int) -> Iterator[Number]:
-    """The terms of Eq. (78) from m = `start`: upwards without an end (step 1) or downwards to m = 1 (step -1)."""
+    """Yield the terms of Eq. (78) from m = `start`: upwards without an end (step 1) or down to m = 1 (step -1)."""
     m = start
     poisson = mp.exp(m * mp.log(g) - g - mp.loggamma(m + 1))  # g^m e^-g / m!
     while m >= 1:
@@ -279,7 +279,7 @@ def _terms(g: Number, V: Number, start: int, step: int) -> Iterator[Number]:
 
 
 def _largest_term(g: Number, V: Number) -> int:
-    """The m of the largest term of Eq. (78): the first whose successor is not larger, by bisection.
+    """Return the m of the largest term of Eq. (78): the first whose successor is not larger, by bisection.
 
     The ratio of term m + 1 to term m falls as m grows, so the terms have a single peak.
     """
@@ -297,7 +297,7 @@ def _largest_term(g: Number, V: Number) -> int:
 
 
 def _shadowed_tangent(theta: Number, sigma_0: Number, tau: Number) -> Number:
-    """K_i or K_r [1] of Eqs. (82), (83)."""
+    """Return K_i or K_r [1] of Eqs. (82), (83)."""
     theta, sigma_0, tau = mp.mpf(theta), mp.mpf(sigma_0), mp.mpf(tau)
     if theta == 0 or sigma_0 == 0:
         return mp.zero  # the argument of erfc is infinite
@@ -306,7 +306,7 @@ def _shadowed_tangent(theta: Number, sigma_0: Number, tau: Number) -> Number:
 
 
 def _wave_vector_change(theta_i: Number, theta_r: Number, delta_phi: Number) -> tuple[Number, Number, Number]:
-    """v = k_r - k_i [1] of Eq. (84) for unit wave vectors, the light at azimuth 0."""
+    """Return v = k_r - k_i [1] of Eq. (84) for unit wave vectors, the light at azimuth 0."""
     # Eq. (84)
     v_x = mp.sin(theta_r) * mp.cos(delta_phi) + mp.sin(theta_i)
     v_y = mp.sin(theta_r) * mp.sin(delta_phi)
@@ -315,7 +315,7 @@ def _wave_vector_change(theta_i: Number, theta_r: Number, delta_phi: Number) -> 
 
 
 def _cos_bisecting(theta_i: Number, theta_r: Number, delta_phi: Number) -> Number:
-    """|v|/2 [1], the cosine of the bisecting angle."""
+    """Return |v|/2 [1], the cosine of the bisecting angle."""
     v = _wave_vector_change(theta_i, theta_r, delta_phi)
     return mp.sqrt(mp.fdot(v, v)) / 2
 

@@ -23,7 +23,7 @@ def aperture_specular(
     n: Number,
     k: Number,
 ) -> Number:
-    """f_r [1/sr] of the specular part, Eq. (70), as a receiver of a circular cone sees light from a circular cone.
+    """Return f_r [1/sr] of the specular part, Eq. (70), for a circular cone of light and one of the receiver.
 
     The mirror image of the cone of light has the radiance rho_s L, and nothing else has any; the receiver takes the
     mean over its own solid angle, and the irradiance is L cos(theta_i) times the solid angle of light. The angles are
@@ -55,7 +55,7 @@ def aperture_diffuse(
     n: Number,
     k: Number,
 ) -> float:
-    """f_r [1/sr] of the directional diffuse part, Eq. (71), averaged over two circular cones by solid angle.
+    """Return f_r [1/sr] of the directional diffuse part, Eq. (71), averaged over two circular cones by solid angle.
 
     The cones are those of `aperture_specular` and lie above the horizon. Float64, not 40 digits: Gauss and Legendre in
     the angle from the axis, equal steps around it, refined until a doubling of the nodes moves the mean by less than
@@ -77,7 +77,7 @@ def aperture_diffuse(
 
 
 def _common_area(first: Number, second: Number, apart: Number) -> Number:
-    """Area common to two circles of the radii `first` and `second` on the unit sphere, their centres `apart`."""
+    """Return area common to two circles of the radii `first` and `second` on the unit sphere, their centres `apart`."""
     if apart >= first + second:
         return mp.zero
     if apart <= abs(first - second):
@@ -93,7 +93,7 @@ def _common_area(first: Number, second: Number, apart: Number) -> Number:
 
 
 def _cone(theta: float, phi: float, solid_angle: float, nodes: int) -> tuple[Array, Array]:
-    """Unit vectors in a cone, of shape (2 nodes^2, 3), and their weights, which add up to 1."""
+    """Return unit vectors in a cone, of shape (2 nodes^2, 3), and their weights, which add up to 1."""
     half = math.asin(math.sqrt(solid_angle / math.pi))
     x, weight = np.polynomial.legendre.leggauss(nodes)
     off, turn = np.meshgrid(half * (1 + x) / 2, np.pi * np.arange(2 * nodes) / nodes, indexing="ij")
@@ -109,7 +109,7 @@ def _cone(theta: float, phi: float, solid_angle: float, nodes: int) -> tuple[Arr
 def _directional_diffuse(
     light: Array, viewer: Array, wavelength_nm: float, sigma_0: float, tau: float, n: float, k: float
 ) -> Array:
-    """`directional_diffuse` in float64 on arrays of unit vectors, with wave vectors in 1/um."""
+    """Return `directional_diffuse` in float64 on arrays of unit vectors, with wave vectors in 1/um."""
     wavelength = wavelength_nm / 1000
     # Eq. (84)
     v_x, v_y, v_z = np.moveaxis(light + viewer, -1, 0)
@@ -147,7 +147,7 @@ def _directional_diffuse(
 
 @np.errstate(divide="ignore")  # x along the normal
 def _shadowing(z: Array, slope: float) -> tuple[Array, Array]:
-    """S_i or S_r of Eq. (24) and K_i or K_r of Eqs. (82), (83) in float64, for a direction of that z."""
+    """Return S_i or S_r of Eq. (24) and K_i or K_r of Eqs. (82), (83) in float64, for a direction of that z."""
     tan = np.sqrt(1 - z**2) / z
     x = 1 / (2 * slope * tan)
     erfc = np.vectorize(math.erfc, otypes=[float])(x)

@@ -4,5 +4,5 @@ from brdfdb.reference import Number, mp
 
 
 def lambert(rho: Number) -> Number:
-    """f_r [1/sr] of an ideal diffuse surface with albedo `rho` [1]."""
+    """Return f_r [1/sr] of an ideal diffuse surface with albedo `rho` [1]."""
     return mp.mpf(rho) / mp.pi

@@ -4,7 +4,7 @@ from brdfdb.reference import Number, mp
 
 
 def minnaert(theta_i: Number, theta_r: Number, k: Number, rho: Number = 1) -> Number:
-    """f_r [1/sr] for polar angles [rad], darkening exponent `k` [1] and scale `rho` [1].
+    """Return f_r [1/sr] for polar angles [rad], darkening exponent `k` [1] and scale `rho` [1].
 
     The paper has no `rho`; 1 is its equation. For k < 1 the value grows without bound as either angle reaches pi/2.
     """

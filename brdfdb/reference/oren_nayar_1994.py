@@ -24,7 +24,7 @@ def unidirectional(
     theta_a: Number,
     phi_a: Number,
 ) -> tuple[Number, Number]:
-    """Direct and interreflected part of f_r [1/sr] of parallel V-cavities, Eq. (22): slope theta_a, azimuth phi_a.
+    """Return both parts of f_r [1/sr] of parallel V-cavities, Eq. (22): direct and interreflected.
 
     The mean of the projected radiances (Eqs. 10-21) of the two facets, at azimuth phi_a and phi_a + pi. A facet that
     faces away from the viewer adds nothing, one that faces away from the light no direct part.
@@ -47,7 +47,7 @@ def unidirectional(
 def single_slope(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, theta_a: Number
 ) -> tuple[Number, Number]:
-    """Direct (Eq. 24) and interreflected (Eq. 49) part of f_r [1/sr] of facets of slope theta_a, all azimuths alike.
+    """Return direct (Eq. 24) and interreflected (Eq. 49) part of f_r [1/sr] of facets of one slope, all azimuths alike.
 
     The paper's closed forms: between the plane of incidence and the one across it weighted by Eq. (44), and with the
     interreflection factor of Eq. (48). `single_slope_integral` has neither approximation.
@@ -95,7 +95,7 @@ def _single_slope(
 def single_slope_integral(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, theta_a: Number
 ) -> tuple[Number, Number]:
-    """Direct (Eq. 23) and interreflected (Eq. 46, with the factor of Eq. 47) part of f_r [1/sr], integrated.
+    """Return direct (Eq. 23) and interreflected (Eq. 46, with the factor of Eq. 47) part of f_r [1/sr], integrated.
 
     `unidirectional` averaged over the azimuth of the cavities by the tanh-sinh rule, in pieces between the azimuths
     where shadowing or masking begins, ends or takes over from the other. About a second a value.
@@ -121,7 +121,7 @@ def single_slope_integral(
 
 
 def gaussian(theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, sigma: Number) -> tuple[float, float]:
-    """Direct and interreflected part of f_r [1/sr] for slopes with a Gaussian distribution, Eqs. (8), (10-20), (26).
+    """Return direct and interreflected part of f_r [1/sr] for Gaussian slopes, Eqs. (8), (10-20), (26).
 
     The weight is P sin(theta_a) = exp(-theta_a^2 / (2 sigma^2)) sin(theta_a), normalised to one over theta_a from 0 to
     pi/2, and phi_a is averaged. Float64, not 40 digits: the tanh-sinh rule in both angles, in pieces between the kinks,
@@ -153,7 +153,7 @@ def body_surface(
     n: Number | None = None,
     k: Number | None = None,
 ) -> tuple[Number, Number, Number]:
-    """The terms of f_r [1/sr] by Eq. (32): k_b times Eq. (27), k_b times Eq. (28), k_s times Eq. (31).
+    """Return the terms of f_r [1/sr] by Eq. (32): k_b times Eq. (27), k_b times Eq. (28), k_s times Eq. (31).
 
     The first and the last are the combination of section 5, which leaves the interreflection out; all three are k_b
     times Eq. (29) plus k_s times Eq. (31). The radiance of Eq. (31) does not contain E_0 cos theta_i: E_0 is 1, and
@@ -168,7 +168,7 @@ def body_surface(
 def functional(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, sigma: Number
 ) -> tuple[Number, Number]:
-    """Direct (Eq. 27) and interreflected (Eq. 28) part of f_r [1/sr]; their sum is the model (Eq. 29).
+    """Return direct (Eq. 27) and interreflected (Eq. 28) part of f_r [1/sr]; their sum is the model (Eq. 29).
 
     The direct part turns negative for rough surfaces near grazing in the mirror half plane, and there the sum may too:
     the value stays as the equation gives it.
@@ -202,7 +202,7 @@ def functional(
 def qualitative(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, sigma: Number, offset: Number = "0.33"
 ) -> Number:
-    """f_r [1/sr] by Eq. (30); `offset` [rad^2] is 0.33, or 0.57 (note 7) to stand in for the interreflection.
+    """Return f_r [1/sr] by Eq. (30); `offset` [rad^2] is 0.33, or 0.57 (note 7) to stand in for the interreflection.
 
     A float64 `offset` is taken as it is: pass "0.57" for the exact decimal.
     """
@@ -233,7 +233,7 @@ def _projected_radiance(
     rho: Number,
     theta_a: Number,
 ) -> tuple[Number, Number]:
-    """L^1_rp and L^2_rp of one facet, Eqs. (10)-(20), over E_0 cos theta_i."""
+    """Return L^1_rp and L^2_rp of one facet, Eqs. (10)-(20), over E_0 cos theta_i."""
 
     def d(x: Number, y: Number) -> Number:
         # Eq. (20)
@@ -261,7 +261,7 @@ def _projected_radiance(
 
 
 def _critical_angle(theta_a: Number, theta: Number) -> Number:
-    """phi_c [rad] of Eq. (39)."""
+    """Return phi_c [rad] of Eq. (39)."""
     product = mp.tan(mp.mpf(theta_a)) * mp.tan(mp.mpf(theta))
     # Eq. (39)
     return mp.acos(1 / product) if product > 1 else mp.zero
@@ -270,7 +270,7 @@ def _critical_angle(theta_a: Number, theta: Number) -> Number:
 def _gaussian(
     theta_i: float, theta_r: float, delta_phi: float, rho: float, sigma: float, nodes: int
 ) -> tuple[float, float]:
-    """The double integral of Eq. (8) in float64, with as many nodes a piece and an angle."""
+    """Return the double integral of Eq. (8) in float64, with as many nodes a piece and an angle."""
     tan_i, tan_r = np.tan(theta_i), np.tan(theta_r)
     # the azimuths where tan(theta) cos(phi_a - phi) of the two directions have the same size
     x_r, y_r = tan_r * np.cos(delta_phi), tan_r * np.sin(delta_phi)
@@ -295,7 +295,7 @@ def _gaussian(
 
 
 def _pieces(edges: Array, nodes: int) -> tuple[Array, Array]:
-    """Nodes and weights of the tanh-sinh rule between neighbours of the last axis of `edges`."""
+    """Return nodes and weights of the tanh-sinh rule between neighbours of the last axis of `edges`."""
     t = np.linspace(-3.15, 3.15, nodes)
     u = np.pi / 2 * np.sinh(t)
     x = 1 / (1 + np.exp(-2 * u))
@@ -305,7 +305,7 @@ def _pieces(edges: Array, nodes: int) -> tuple[Array, Array]:
 
 
 def _azimuths(theta_a: Array, theta_i: float, theta_r: float, delta_phi: float, ties: Array) -> Array:
-    """Once around, for each theta_a: the azimuths where shadowing or masking begins, ends or takes over."""
+    """Return, for each theta_a, the azimuths where shadowing or masking begins, ends or takes over."""
     edges = []
     for theta, phi in ((theta_i, 0.0), (theta_r, delta_phi)):
         # Eq. (39)
@@ -320,7 +320,7 @@ def _azimuths(theta_a: Array, theta_i: float, theta_r: float, delta_phi: float, 
 def _facets(
     theta_i: float, theta_r: float, delta_phi: float, rho: float, theta_a: Array, phi_a: Array
 ) -> tuple[Array, Array]:
-    """`_projected_radiance` in float64 on arrays; the terms of Eq. (19) are combined so that none cancels."""
+    """Return `_projected_radiance` in float64 on arrays; the terms of Eq. (19) are combined so that none cancels."""
     s_n, v_n, a_n = np.cos(theta_i), np.cos(theta_r), np.cos(theta_a)
     across_i = np.sin(theta_i) * np.sin(theta_a) * np.cos(phi_a)
     across_r = np.sin(theta_r) * np.sin(theta_a) * np.cos(phi_a - delta_phi)

@@ -7,7 +7,7 @@ from brdfdb.reference.fujii_2013 import fujii
 def energy_preserving(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, roughness: Number
 ) -> tuple[Number, Number]:
-    """Single and multiple scattering part of f_r [1/sr] for `rho` and `roughness` [1], each in [0, 1]; the sum is EON.
+    """Return single and multiple scattering part of f_r [1/sr], whose sum is EON; `rho` and `roughness` in [0, 1].
 
     The single scattering is Fujii's lobe (there called FON). What it loses at rho = 1 comes back in the multiple
     scattering, tinted by rho: with rho = 1 the albedo is 1 for every direction and roughness.
@@ -24,7 +24,7 @@ def energy_preserving(
 
 
 def fujii_albedo(theta: Number, roughness: Number) -> Number:
-    """The directional albedo [1] of Fujii's lobe at rho = 1, for light or viewer at `theta` [rad]."""
+    """Return the directional albedo [1] of Fujii's lobe at rho = 1, for light or viewer at `theta` [rad]."""
     theta, roughness = mp.mpf(theta), mp.mpf(roughness)
     sin, cos = mp.sin(theta), mp.cos(theta)
     # tan(theta) (1 - sin(theta)^3), with 1 - sin = cos^2 / (1 + sin): finite at grazing
@@ -34,11 +34,11 @@ def fujii_albedo(theta: Number, roughness: Number) -> Number:
 
 
 def fujii_mean_albedo(roughness: Number) -> Number:
-    """The mean of `fujii_albedo` [1] over all directions, weighted by the cosine."""
+    """Return the mean of `fujii_albedo` [1] over all directions, weighted by the cosine."""
     roughness = mp.mpf(roughness)
     return _amplitude(roughness) * (1 + (mp.mpf(2) / 3 - 28 / (15 * mp.pi)) * roughness)
 
 
 def _amplitude(roughness: Number) -> Number:
-    """A_F [1]."""
+    """Return A_F [1]."""
     return 1 / (1 + (mp.mpf(1) / 2 - 2 / (3 * mp.pi)) * roughness)

@@ -12,7 +12,7 @@ def torrance_sparrow(
     n: Number | None = None,
     k: Number | None = None,
 ) -> Number:
-    """f_r [1/sr] by Eq. (31) of Oren and Nayar 1994 over cos theta_i, with E_0 = 1; the lobe is not normalised.
+    """Return f_r [1/sr] by Eq. (31) of Oren and Nayar 1994 over cos theta_i, with E_0 = 1; the lobe is not normalised.
 
     The facet normal lies along the half vector: theta_a is its polar angle [rad], `sigma` [rad] the deviation of the
     slope angle. F is 1, as that paper has it, or with a refractive index n + i k the reflectance of a plane interface

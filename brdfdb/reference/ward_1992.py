@@ -9,7 +9,7 @@ from brdfdb.reference import Number, mp
 def circular(
     theta_i: Number, theta_r: Number, delta_phi: Number, rho_d: Number, rho_s: Number, alpha: Number
 ) -> Number:
-    """f_r [1/sr] by Eq. (4), the isotropic model."""
+    """Return f_r [1/sr] by Eq. (4), the isotropic model."""
     theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
     rho_d, rho_s, alpha = mp.mpf(rho_d), mp.mpf(rho_s), mp.mpf(alpha)
     h_x, h_y, h_z = _half_vector(theta_i, mp.zero, theta_r, delta_phi)
@@ -30,7 +30,7 @@ def elliptical(
     alpha_x: Number,
     alpha_y: Number,
 ) -> Number:
-    """f_r [1/sr] by Eq. (5a)."""
+    """Return f_r [1/sr] by Eq. (5a)."""
     theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
     rho_d, rho_s, alpha_x, alpha_y = mp.mpf(rho_d), mp.mpf(rho_s), mp.mpf(alpha_x), mp.mpf(alpha_y)
     h_x, h_y, h_z = _half_vector(theta_i, phi_i, theta_r, phi_r)
@@ -53,7 +53,7 @@ def half_vector(
     alpha_x: Number,
     alpha_y: Number,
 ) -> Number:
-    """f_r [1/sr] by Eq. (5b); "approximation" in the paper, it differs from Eq. (5a) away from the peak."""
+    """Return f_r [1/sr] by Eq. (5b); "approximation" in the paper, it differs from Eq. (5a) away from the peak."""
     theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
     rho_d, rho_s, alpha_x, alpha_y = mp.mpf(rho_d), mp.mpf(rho_s), mp.mpf(alpha_x), mp.mpf(alpha_y)
     h_x, h_y, h_z = _half_vector(theta_i, phi_i, theta_r, phi_r)
@@ -66,7 +66,7 @@ def half_vector(
 def sampling_pdf(
     theta_i: Number, phi_i: Number, theta_r: Number, phi_r: Number, alpha_x: Number, alpha_y: Number
 ) -> Number:
-    """The density [1/sr] over the directions (theta_r, phi_r) of the samples that Eq. (7) makes for a light.
+    """Return the density [1/sr] over the directions (theta_r, phi_r) of the samples that Eq. (7) makes for a light.
 
     Eq. (7a) with tan delta on its left, where the paper has delta: the slopes of h have the Gaussian density of Eq.
     (5a) over pi alpha_x alpha_y, 1 / cos^3 delta is the area of slopes in a unit of solid angle of h, and 4 h.i the
@@ -85,7 +85,7 @@ def sampling_pdf(
 
 
 def _half_vector(theta_i: Number, phi_i: Number, theta_r: Number, phi_r: Number) -> tuple[Number, Number, Number]:
-    """The unit vector h, below Eq. (5b)."""
+    """Return the unit vector h, below Eq. (5b)."""
     theta_i, phi_i, theta_r, phi_r = mp.mpf(theta_i), mp.mpf(phi_i), mp.mpf(theta_r), mp.mpf(phi_r)
     h_x = mp.sin(theta_r) * mp.cos(phi_r) + mp.sin(theta_i) * mp.cos(phi_i)
     h_y = mp.sin(theta_r) * mp.sin(phi_r) + mp.sin(theta_i) * mp.sin(phi_i)

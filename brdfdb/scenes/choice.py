@@ -249,15 +249,13 @@ def choose(
     Parameters
     ----------
     planned : Look
-        The picture, and places near edges: where forms are compared, each against a picture that is true
-        otherwise.
+        Picture, and places near edges, where each form is compared with a picture that is true otherwise.
     check : callable
-        Gives the same scene at fresh places for a round from 1 on, where all choices at once are held to the tolerance;
-        None of a scene that has no other places.
+        Gives the scene at fresh places for a round from 1 on, to check all choices at once; None if it has no others.
     offered : mapping
-        By the name of each material, its forms, the truth first.
+        Forms of each material by its name, the truth first.
     costs : mapping
-        The same, what each of them costs, of shape (rounds, forms).
+        Costs of the forms of each material, of shape (rounds, forms).
     tick : callable
         Called for each material, and for each round of checks.
 

@@ -108,8 +108,8 @@ class Choice(BaseModel):
     picture: tuple[int, int] = Field(
         description="pixels across and down: the choices keep to the tolerance at each of them, seen through its middle"
     )
-    confidence: float = Field(description="of what is clause of samples, for each material and each kind of sample")
-    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is clause beyond")
+    confidence: float = Field(description="of statements on samples, for each material and each kind of sample")
+    grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is stated beyond")
     statement: str = Field(description="what is proven, and what is sampled, in a few sentences")
     materials: list[Material]
 

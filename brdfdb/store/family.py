@@ -65,7 +65,7 @@ class Sweep(BaseModel):
 
 
 class Blend(BaseModel):
-    """How values between members are found: by polynomials, in one parameter after the other."""
+    """The interpolation between members: by polynomials, in one parameter after the other."""
 
     model_config = _STRICT
 
@@ -207,7 +207,7 @@ class Family:
     Attributes
     ----------
     record : FamilyRecord
-        What the store says of it: members, interpolation, measured error.
+        The record in the store: members, interpolation, measured error.
     axes : dict of str to array
         The values of the swept parameters, in the units of the model: angles in radians.
 
@@ -231,7 +231,7 @@ class Family:
 
     @property
     def name(self) -> str:
-        """Of the family."""
+        """Name of the family."""
         return self.record.name
 
     @property

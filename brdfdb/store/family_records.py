@@ -73,7 +73,7 @@ class _Way(NamedTuple):
 
 
 class _Measured(NamedTuple):
-    """What is known at the points: members around them, the model, directions."""
+    """Values at the points: of the members around them and of the model, at drawn directions."""
 
     points: list[_Point]
     parameters: list[dict[str, float]]  # in the units of the model
@@ -110,7 +110,7 @@ def measure(sweep: Sweep, tables: Mapping[str, Table], seed: int = SEED) -> Fami
     Parameters
     ----------
     sweep : Sweep
-        Which tables, over which parameters.
+        The tables, and the parameters that they are swept over.
     tables : mapping of str to Table
         The members by name, such as the store.
     seed : int
@@ -195,7 +195,6 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[n
     count = max(
         _FEWEST_DIRECTIONS, min(_DIRECTIONS if at_nm is None else _DIRECTIONS_BETWEEN, _CORNER_VALUES // values)
     )
-    spec = base.spec
     parameters, corners, truth, draws, specular_corners, specular_truth = [], [], [], [], [], []
     for number, (cell, within) in enumerate(points):
         at = {
@@ -210,16 +209,11 @@ def _look(sweep: Sweep, tables: Mapping[str, Table], seed: int, at_nm: NDArray[n
         draws.append(drawn)
         truth.append(error_measurement.model_values(material, wavelength_nm, drawn.wi, drawn.wr))
         corners.append([table.lookup_vectors(drawn.wi, drawn.wr, at_nm).reshape(truth[-1].shape) for table in around])
-        if spec.specular is not None and at_nm is None:
+        if base.has_specular and at_nm is None:
             specular_corners.append(
                 [table.specular_reflectance(_THETA_I).reshape(_THETA_I.size, -1) for table in around]
             )
-            arguments = material.arguments(wavelength_nm)
-            specular_truth.append(
-                spec.specular(
-                    _THETA_I[:, np.newaxis], **{name: arguments[name] for name in spec.specular_parameters}
-                ).reshape(_THETA_I.size, -1)
-            )
+            specular_truth.append(material.specular_reflectance(_THETA_I, wavelength_nm).reshape(_THETA_I.size, -1))
     return _Measured(
         points,
         parameters,

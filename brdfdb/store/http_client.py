@@ -27,35 +27,31 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# Of one request, within what services and proxies take unless they were told otherwise: 413 halves them
+# Limits of one request. Services and proxies accept them by default; an answer 413 halves them
 _NPY_POINTS, _NPY_VALUES = 32_000, 2_000_000  # bodies of 1.02 MB, of which nginx takes 1.05; larger ones are no faster
-
-
 _JSON_POINTS, _JSON_VALUES = 10_000, 200_000
-
-
 _WAVELENGTHS = 200  # stand in the address, 33 bytes each; nginx cuts it at 8 kB
 
 
 @dataclass(frozen=True, eq=False)
 class RemoteTable(BaseTable):
-    """The table of one revision of one material, looked up by a service; methods as of `brdfdb.tables.table.Table`.
+    """The table of one revision of one material, looked up by a service; methods as of `Table`.
 
-    Answers are those of the revision that it was opened with, also when the service has a newer one. They are
-    StoreErrors where the service is gone, and UnknownRevisionErrors where that revision is.
+    Answers are those of the revision that it was opened with, also when the service has a newer one. A lookup raises
+    StoreError if the service is gone, and UnknownRevisionError if that revision is.
 
     Attributes
     ----------
     name, revision : str
-        Which material, and which of its revisions.
+        Name of the material, and its revision.
     attrs : dict
-        What the store says of it: title, model, parameters, sources and more; not the request of its build.
+        The attributes as stored, without the request of the build; `metadata` is the typed record of them.
     axes_deg : dict of arrays [degree]
         Nodes of the angular axes by name.
     wavelength_nm : array (L,) [nm] or None
         Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
     anisotropic : bool
-        Whether the table resolves how the surface is turned about its normal.
+        True if the table has an axis for the azimuth of the surface.
     """
 
     name: str
@@ -228,11 +224,11 @@ class RemoteStore(Mapping[str, RemoteTable]):
         return remote_dataset(f"{self.url}/v1/store/materials/{name}/{document['revision']}")
 
     def families(self) -> NoReturn:
-        """Not served: a StoreError that says so."""
+        """Raise StoreError: a service has no families."""
         raise StoreError(f"{self.url} serves materials, no families; open the directory of the store for those")
 
     def family(self, name: str) -> NoReturn:  # noqa: ARG002  # as a Store is asked
-        """Not served: a StoreError that says so."""
+        """Raise StoreError: a service has no families."""
         self.families()
 
     def _lines(self, words: str = "") -> Iterator[dict[str, Any]]:
@@ -275,9 +271,9 @@ def remote_dataset(url: str) -> xr.Dataset:
 
 
 def _sendable(angle: NDArray[Any]) -> NDArray[np.float64]:
-    """Degrees that a service takes: azimuths of one turn, and 0 for nan, which `geometry.finished` puts back."""
+    """Return angles in degrees for a service: azimuths within one turn, and 0 for nan, which is put back later."""
     known = np.nan_to_num(angle.astype(np.float64), nan=0.0)
-    # far from 0 degrees have fewer digits than radians
+    # azimuths of many turns would lose digits in degrees
     return degrees(np.where(np.abs(known) > np.pi, np.arctan2(np.sin(known), np.cos(known)), known))
 
 

@@ -36,7 +36,7 @@ class Lock:
     name : str
         Of the material.
     wait : bool
-        Whether to wait for another holder; without, `BusyError` is raised.
+        Wait for another holder; otherwise `BusyError` is raised.
 
     Raises
     ------

@@ -98,7 +98,7 @@ def check_manifest(group: Path, digest: str | None, *, contents: bool) -> Manife
     group, digest
         As in `read_manifest`.
     contents : bool
-        Whether to read every file.
+        Read every file.
 
     Raises
     ------

@@ -377,7 +377,7 @@ _NUMBERS = itertools.count()
 def _after_fork() -> None:
     """Give the stores of a child new locks: a fork copies one thread only, and what others held stays locked.
 
-    What the locks guard is whole at any moment. Waiting for the threads before a fork is no way: they may need locks
+    The state behind the locks is valid at any moment. Waiting for the threads before a fork fails: they may need locks
     that the fork has taken already, such as that of thread pools.
     """
     for store in list(_OPEN.values()):

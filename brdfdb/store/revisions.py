@@ -34,7 +34,7 @@ SNAPSHOTS = ".snapshots"  # the lock that snapshots and collections take in turn
 
 @dataclass(frozen=True)
 class Standing:
-    """How a material stands to a request.
+    """The standing of a material towards a request.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ def rollback(root: Path, name: str, revision: str) -> str:
 
 @dataclass
 class Collected:
-    """What a collection removed.
+    """The result of a collection.
 
     Attributes
     ----------
@@ -180,9 +180,9 @@ def collect(root: Path, keep: int = 2, *, damaged: bool = False) -> Collected:
     root : Path
         Directory of the store.
     keep : int
-        How many revisions of each material stay, the current one included; at least 1.
+        Number of revisions of each material that stay, the current one included; at least 1.
     damaged : bool
-        Whether to read all other revisions that stay but the current one, and remove those that are damaged.
+        Read the other revisions that stay, too, and remove those that are damaged.
 
     Raises
     ------

@@ -37,9 +37,9 @@ class Slice:
     kind : str
         "half_difference", "in_plane" or "lobe".
     description : str
-        How to read the picture, in words.
+        Explanation of the axes in words.
     x, y : Axis
-        What the columns and the rows are.
+        Columns and rows.
     fixed_deg : tuple of (str, float)
         The angles that are the same in every pixel, by name [degrees].
     values : float32 array, shape (H, W) or (H, W, L) [1/sr]
@@ -70,12 +70,12 @@ class Slice:
 
 
 def half_difference_slice(table: Table, *, phi_h_deg: float = 0.0, phi_d_deg: float = 90.0) -> Slice:
-    """The image slice of a table: theta_h to the right, theta_d upwards, one pixel a degree.
+    """Return f_r [1/sr] over theta_h (to the right) and theta_d (upwards), one pixel a degree.
 
     Parameters
     ----------
     table : Table
-        What is sliced.
+        Table in memory.
     phi_h_deg : float [degree]
         Azimuth of the half vector; matters for anisotropic tables only.
     phi_d_deg : float [degree]
@@ -106,12 +106,12 @@ def half_difference_slice(table: Table, *, phi_h_deg: float = 0.0, phi_d_deg: fl
 
 
 def in_plane_slice(table: Table, *, phi_i_deg: float = 0.0) -> Slice:
-    """The plane of incidence: theta_r with a sign to the right, theta_i upwards, one pixel a degree.
+    """Return f_r [1/sr] in the plane of incidence over signed theta_r (to the right) and theta_i (upwards).
 
     Parameters
     ----------
     table : Table
-        What is sliced.
+        Table in memory.
     phi_i_deg : float [degree]
         Azimuth of the light; matters for anisotropic tables only.
 
@@ -139,12 +139,12 @@ def in_plane_slice(table: Table, *, phi_i_deg: float = 0.0) -> Slice:
 
 
 def lobe_map(table: Table, *, theta_i_deg: float = 45.0, phi_i_deg: float = 0.0) -> Slice:
-    """The hemisphere of viewing directions for one light, as a disc whose radius is theta_r.
+    """Return f_r [1/sr] over the hemisphere of viewers for one light, as a disc with the radius theta_r.
 
     Parameters
     ----------
     table : Table
-        What is sliced.
+        Table in memory.
     theta_i_deg : float [degree]
         Polar angle of the light, 0 to 90.
     phi_i_deg : float [degree]

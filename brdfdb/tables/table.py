@@ -96,7 +96,7 @@ class Table(BaseTable):
 
     @property
     def anisotropic(self) -> bool:
-        """Whether the table resolves how the surface is turned about its normal."""
+        """True if the table has an axis for the azimuth of the surface."""
         return self.grid.anisotropic
 
     @functools.cached_property
@@ -116,7 +116,7 @@ class Table(BaseTable):
 
     @property
     def values_are_brdf(self) -> bool:
-        """Whether the stored numbers are f_r itself."""
+        """True if the stored numbers are f_r itself."""
         return self.spectra is None and self.uniform is None and self.interpolation.plain
 
     def lookup(

@@ -1,4 +1,4 @@
-"""What a table says of itself, wherever its values are: its wavelengths, and the error that it states."""
+"""The base of tables, in memory or behind a service: lookups, wavelengths, metadata and stated error."""
 
 from __future__ import annotations
 

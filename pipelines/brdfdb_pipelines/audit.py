@@ -1,4 +1,4 @@
-"""The audit job: audit tables of a store, write the JSON report, show what was found."""
+"""The audit job: audit tables of a store, write the report as JSON and as a page, print the findings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Task = Callable[[], Any]
 
 
 class Section(NamedTuple):
-    """What a task found, drawn for the page."""
+    """Result of a task, with its plots for the page."""
 
     subject: Any
     plots: list[audit_page.Plot]
@@ -50,11 +50,11 @@ def run(
         The JSON report, which ends in .json; the page is written beside it, as .html. Both are written when everything
         has been audited.
     jobs : int
-        How many processes work at it; 1: this one.
+        Number of processes; 1: this one.
     figures : bool
         Compute the atlas and the gallery, too.
     allow : sequence of str
-        Materials whose models may reflect more than they receive: that is accepted, and shown as such.
+        Materials whose models may reflect more than they receive; the report says that this was accepted.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def _check_path(report_path: Path) -> None:
 
 
 def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
-    """What each task returns, as it is done."""
+    """Yield the name and the result of each task as it is done."""
     if jobs == 1:
         for name, task in tasks.items():
             yield name, task()
@@ -138,7 +138,7 @@ def _outcomes(tasks: dict[str, Task], jobs: int) -> Iterator[tuple[str, Any]]:
 
 
 def _audited(root: Path, name: str, accept_excess: bool) -> Section | StoreError:
-    """One material; or what is wrong with its files, which is no reason to leave the others."""
+    """Audit one material; return an error of its files, so that the others are audited."""
     store = brdfdb.open(root)
     try:
         store.verify(name)
@@ -167,7 +167,7 @@ def _print(root: Path, found: AuditReport, report_path: Path) -> None:
         for problem in a.problems():
             print(f"{a.material}: {problem}")
         if a.not_judged:
-            print(f"{a.material}: its source is not known; not judged: {', '.join(a.not_judged).lower()}")
+            print(f"{a.material}: its source cannot be evaluated; not judged: {', '.join(a.not_judged).lower()}")
     for key, kind in FINDINGS.items():
         for sentence in kind.overview([a.findings[key] for a in audits]):
             print(sentence)

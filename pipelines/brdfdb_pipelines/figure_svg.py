@@ -132,7 +132,7 @@ def _curves(panel: Panel) -> Canvas:
 
 
 def _polar(panel: Panel) -> Canvas:
-    """The upper half disc, normal at the top."""
+    """Draw the upper half disc, with the normal at the top."""
     if panel.log_x or panel.log_y:
         raise ValueError(f"{panel.title!r}: the axes of a polar panel are linear")
     if any(abs(x) > 90.0 for curve in panel.curves for x in curve.x):
@@ -170,7 +170,7 @@ def _polar(panel: Panel) -> Canvas:
 
 
 def _map(drawn: Map) -> Canvas:
-    """Values as an image of few pixels; dark is little, or where both signs occur, none."""
+    """Draw values as an image of few pixels; dark is the smallest value, or zero where both signs occur."""
     canvas, axes = _canvas(drawn.title, [], _PLOT_HEIGHT + 12.0, right=62.0)
     values = np.array([_array(row) for row in drawn.values])
     usable = values[np.isfinite(values) & ((values > 0.0) | (not drawn.log))]
@@ -213,7 +213,7 @@ def _map(drawn: Map) -> Canvas:
 
 
 def _edges(centres: list[float], *, log: bool) -> Floats:
-    """Where values at some centres meet: half way between them, and as far out as in at the ends."""
+    """Return the edges of pixels with given centres: half way between them, and as far out as in at the ends."""
     middle = np.log(centres) if log else np.array(centres)
     half = np.diff(middle) / 2.0 if middle.size > 1 else np.array([0.5])
     edges = np.concatenate([[middle[0] - half[0]], middle[:-1] + half[: middle.size - 1], [middle[-1] + half[-1]]])
@@ -221,7 +221,7 @@ def _edges(centres: list[float], *, log: bool) -> Floats:
 
 
 def _picture(picture: Picture) -> str:
-    """An image in sRGB, each value a pixel; the background shows what lies behind."""
+    """Draw an image in sRGB, one pixel a value; the background is transparent."""
     radiance = np.array([_array(row) for row in picture.radiance])
     linear = np.clip(np.nan_to_num(radiance), 0.0, 1.0)
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
@@ -244,7 +244,7 @@ def _picture(picture: Picture) -> str:
 
 
 def _described(drawing: Drawing) -> str:
-    """What a reader who does not see the drawing is told, escaped for an attribute."""
+    """Return the description of a drawing for readers who do not see it, escaped for an attribute."""
     if isinstance(drawing, Picture):
         text = f"{drawing.title or 'Rendered image'}"
     elif isinstance(drawing, Map):
@@ -260,7 +260,7 @@ def _described(drawing: Drawing) -> str:
 def _canvas(
     title: str, labels: list[str], plot: float, right: float = _RIGHT, below: float = _BELOW
 ) -> tuple[Canvas, Axes]:
-    """A figure with room for its title and for a legend above the axes, where it hides no curve."""
+    """Return a figure with room for its title and for a legend above the axes, where it hides no curve."""
     above = 13.0 + (_TITLE if title else 0.0) + _ROW * math.ceil(len(labels) / _columns(labels))
     height = above + plot + below
     canvas = Canvas(figsize=(WIDTH / 72.0, height / 72.0))
@@ -272,7 +272,7 @@ def _canvas(
 
 
 def _columns(labels: list[str]) -> int:
-    """How many columns of a legend fit; matplotlib fills one after the other, the first ones with one more."""
+    """Return the number of columns of a legend that fit; matplotlib fills them one after the other."""
     for columns in range(len(labels), 1, -1):
         widest = [max(map(len, column)) for column in np.array_split(np.array(labels), columns)]
         if sum(_SAMPLE + _LETTER * letters for letters in widest) < WIDTH - 12.0:
@@ -298,7 +298,7 @@ def _legend(canvas: Canvas, lines: list[Line2D], titled: bool) -> None:
 
 
 def _lines(curves: list[Curve]) -> list[Line2D]:
-    """A line for each curve, without data yet: its look is that of its role, of others one after the other."""
+    """Draw an empty line for each curve, in the style of its role, or in the next style of the cycle."""
     lines, others = [], 0
     seen: Counter[Role] = Counter()
     for curve in curves:
@@ -324,7 +324,7 @@ def _lines(curves: list[Curve]) -> list[Line2D]:
 
 
 def _scale(axes: Axes, which: Literal["x", "y"], values: Iterable[float | None], *, log: bool) -> None:
-    """Limits, from 0 where that costs less than half of the height; ticks."""
+    """Set limits and ticks; limits start at 0 where that costs less than half of the height."""
     finite = [v for v in values if v is not None and math.isfinite(v) and (v > 0.0 or not log)]
     low, high = (min(finite), max(finite)) if finite else (0.1, 1.0)
     if log:
@@ -365,7 +365,7 @@ def _plain(value: float) -> str:
 
 
 def _power(value: float) -> str:
-    """A power of ten; of what is left of one below the smallest float, nothing."""
+    """Return the label of a power of ten; empty below the smallest float."""
     if value <= 0.0:
         return ""
     exponent = round(math.log10(value))
@@ -377,7 +377,7 @@ def _array(values: Numbers) -> Floats:
 
 
 def shortened(text: str) -> str:
-    """An SVG of matplotlib from its first tag on, without digits, names and bytes that nobody sees."""
+    """Return an SVG of matplotlib from its first tag on, without invisible digits, names and bytes."""
     text = text[text.index("<svg") :]
     for unseen in (
         r"<!--.*?-->",
@@ -391,7 +391,7 @@ def shortened(text: str) -> str:
 
 
 def kept_ids(text: str, prefix: str) -> str:
-    """An SVG in which only those elements have ids that others refer to, each with a prefix."""
+    """Return an SVG in which only elements that others refer to have ids, each with a prefix."""
     used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', text))
     text = re.sub(r' id="([^"]*)"', lambda m: f' id="{prefix}-{m[1]}"' if m[1] in used else "", text)
     text = re.sub(r'(url\(|href=")#', rf"\1#{prefix}-", text)
@@ -400,7 +400,7 @@ def kept_ids(text: str, prefix: str) -> str:
 
 
 def _inline(text: str, key: str, described: str) -> str:
-    """What stands in a page: variables for colours, ids of its own."""
+    """Return an SVG for a page, with variables for colours and unique ids."""
     text = shortened(text)
     (box,) = re.findall(r'viewBox="[^"]*"', text)
     text = text[text.index(">") + 1 :]
@@ -414,7 +414,7 @@ def _with_variables(tag: re.Match[str]) -> str:
 
 
 def _terse(tag: re.Match[str]) -> str:
-    """A tag with a decimal for each point."""
+    """Return a tag with one decimal per point."""
     text = re.sub(r' transform="rotate\(-0 [^"]*"', "", tag[0])
     if "scale(" not in text:
         text = re.sub(r"-?\d+\.\d{2,}(?!\w)", lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), text)

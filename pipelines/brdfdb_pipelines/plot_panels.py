@@ -68,7 +68,7 @@ def error_axis(axes: Axes, top: float) -> None:
 
 
 def cost_axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
-    low, high = min(costs), max(costs)
+    low, high = min(c for c in costs if c > 0.0), max(costs)  # the memory of a function is not known: 0
     decades = max(math.log10(high / low), 1.0)
     axes.set_xscale("log")
     axes.set_xlim(low / 10 ** (0.06 * decades), high * 10 ** (0.09 * decades))

@@ -185,8 +185,7 @@ class Job:
         return {
             **member,
             "table_version": TABLE_VERSION,
-            "model_version": self.material.spec.version,
-            "material": self.material.model_dump(mode="json"),
+            **self.material.document(),
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
             "grid": None if self.grid is None else {name: nodes.tolist() for name, nodes in self.grid.axes.items()},
             "interpolation": None if self.grid is None else self.interpolation,

@@ -72,13 +72,13 @@ def cluster(address: str) -> Iterator[Workers]:
         If dask is not installed.
     """
     distributed: Any = import_extra("distributed")
+    # a dead scheduler is one sentence of ours; dask sets levels of its own loggers
+    for name in ("distributed", "distributed.client", "distributed.core", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         client = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise WorkersError(f"no dask scheduler answers at {address}") from error
-    # a dead scheduler is one sentence of ours; dask sets levels of its own loggers
-    for name in ("distributed", "distributed.client", "distributed.core", "tornado", "asyncio"):
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     asked_at, known = -_ASK_S, 1
 
     def slots() -> int:

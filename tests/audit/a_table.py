@@ -28,6 +28,7 @@ from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
+from tests.models.draws import middle
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "schemas" / "audit.schema.json").read_text(encoding="utf-8"))
 
@@ -40,14 +41,16 @@ ANISOTROPIC = Grid(
 WAVELENGTHS = np.array([450.0, 500.0, 700.0])
 
 
-def middle(spec: ModelSpec) -> dict[str, float]:
-    """Return parameters in the middle of their ranges below 1, as files write them."""
-    values = {written_name(p): (p, 0.5 * (p.low + min(p.high, 1.0))) for p in spec.parameters}
-    return {name: float(degrees(value)) if p.unit == "rad" else value for name, (p, value) in values.items()}
+def in_file(spec: ModelSpec) -> dict[str, float]:
+    """Return parameters in the middle of their ranges, as files write them."""
+    values = middle(spec)
+    return {
+        written_name(p): float(degrees(values[p.name])) if p.unit == "rad" else values[p.name] for p in spec.parameters
+    }
 
 
 # What a table of each model takes: a model without a line here is tested in its middle
-PARAMETERS: dict[str, dict[str, Any]] = {name: middle(spec) for name, spec in MODELS.items()} | {
+PARAMETERS: dict[str, dict[str, Any]] = {name: in_file(spec) for name, spec in MODELS.items()} | {
     "lambert": {"rho": 0.6},
     "minnaert": {"k": 0.6, "rho": 0.5},
     "oren_nayar": {"rho": 0.6, "sigma_deg": 30},

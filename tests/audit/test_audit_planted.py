@@ -140,11 +140,13 @@ def sound() -> list[tuple[str, Table]]:
 def test_a_dirac_part_that_is_missing_or_has_other_nodes_is_named() -> None:
     table = copper()
     assert table.specular is not None
-    assert nodes_of(replace(table, specular=None), table.source).beside == ["the Dirac part of the model is not stored"]
+    assert nodes_of(replace(table, specular=None), table.source).beside == [
+        "the specular part of the model is not stored"
+    ]
     ends = np.array([0, len(table.specular) - 1])
     fewer = replace(table, specular=table.specular[ends], specular_theta_deg=np.array([0.0, 90.0]))
     (said,) = nodes_of(fewer, table.source).beside
-    assert said.startswith("the Dirac part is stored at 2 angles that are not the ")
+    assert said.startswith("the specular part is stored at 2 angles that are not the ")
 
 
 def test_a_planned_table_that_states_no_error_is_named() -> None:

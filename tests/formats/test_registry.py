@@ -12,7 +12,7 @@ import pytest
 from brdfdb.errors import ParameterError
 from brdfdb.formats import EXPORTERS, IMPORTERS, Option, options_of, parsed_options
 from brdfdb.materials import Material
-from brdfdb.store.staging import publish_dataset
+from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate

@@ -9,6 +9,7 @@ import pytest
 from brdfdb import models
 from brdfdb.integrals.quadrature import directional_albedo, spectral_albedo
 from brdfdb.models import MODELS
+from tests.models.draws import middle
 
 HALF_PI = np.pi / 2
 THETA_DEG = (0.0, 1e-6, 30.0, 60.0, 85.0, 89.9)
@@ -29,8 +30,7 @@ def parameters_of(name: str) -> list[dict[str, float]]:
     if name in PARAMETERS:
         return PARAMETERS[name]
     spec = MODELS[name]
-    middle = {p.name: 0.5 * (p.low + min(p.high, 1.0)) for p in spec.parameters}
-    return [middle | (COPPER if spec.spectral else {})]
+    return [middle(spec) | (COPPER if spec.spectral else {})]
 
 
 CASES = [pytest.param(name, each, id=f"{name}-{i}") for name in MODELS for i, each in enumerate(parameters_of(name))]

@@ -15,6 +15,7 @@ from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.sampling import Sample, pdf, sample
 from brdfdb.models import MODELS
 from brdfdb.reference import ward_1992
+from tests.models.draws import middle
 
 HALF_PI = np.pi / 2
 PHI = 0.4
@@ -67,8 +68,7 @@ def parameters_of(name: str) -> dict[str, float]:
     if name in PARAMETERS:
         return PARAMETERS[name]
     spec = MODELS[name]
-    middle = {p.name: 0.5 * (p.low + min(p.high, 1.0)) for p in spec.parameters}
-    return middle | (GOLD if spec.spectral else {})
+    return middle(spec) | (GOLD if spec.spectral else {})
 
 
 def light(theta_deg: float) -> Array:

@@ -47,6 +47,11 @@ def drawn(spec: ModelSpec, rng: np.random.Generator, count: int | None = None) -
     return {name: rng.uniform(low, high, count) for name, (low, high) in ranges.items()}
 
 
+def middle(spec: ModelSpec) -> dict[str, float]:
+    """Each parameter in the middle of the part of its range below 1."""
+    return {parameter.name: 0.5 * (parameter.low + min(parameter.high, 1.0)) for parameter in spec.parameters}
+
+
 def drawn_angles(rng: np.random.Generator, count: int) -> tuple[NDArray[np.float64], ...]:
     theta_i, theta_r = rng.uniform(0.0, HALF_PI, (2, count))
     phi_i, phi_r = rng.uniform(-np.pi, np.pi, (2, count))

@@ -51,6 +51,25 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
         assert f" {terminal.error(error.overall.p99)}  " in line
 
 
+def test_a_table_of_another_program_is_shown_with_a_sentence_on_what_it_lacks(tmp_path: Path, capsys: Captured) -> None:
+    grid = Grid({"theta_i": [0, 45, 85], "theta_r": [0, 45, 85], "delta_phi": [0, 90, 180]})
+    whole = tabulate(Layout(presets()["clay-vase"], grid))
+    publish_dataset(tmp_path, "bare", whole[["brdf"]].drop_attrs(deep=False))
+    publish_dataset(tmp_path, "whole", whole)
+    gaps = "does not state its title, material, table version, model, model version, parameters, source, conventions"
+    assert run("list", "--store", tmp_path) == 0
+    assert capsys.readouterr().out.endswith(f"\nbare r000001 {gaps}\n")
+    assert run("show", "bare", "--store", tmp_path) == 0
+    out = capsys.readouterr().out
+    assert out.startswith(f"bare: no title\n  incomplete  the table {gaps}\n  grid\n")
+    assert "  error       not measured\n" in out
+    assert "\n  albedo, as tabulated" in out
+    assert run("verify", "--store", tmp_path) == 0
+    captured = capsys.readouterr()
+    assert f"brdfdb: bare r000001 {gaps}\n" in captured.err
+    assert captured.out.endswith(": none damaged\n")
+
+
 def test_list_goes_on_past_what_is_damaged_and_fails(planned: Path, tmp_path: Path, capsys: Captured) -> None:
     root = tmp_path / "store"
     shutil.copytree(planned, root)

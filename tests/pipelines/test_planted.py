@@ -175,16 +175,20 @@ def test_a_mirror_part_that_is_too_weak_is_named(
     assert entry_of(report)["findings"]["table_error"]["specular"] == pytest.approx(0.02 * 0.2, abs=0.02)
 
 
-def test_a_table_that_is_none_of_ours_is_named_and_the_others_are_audited(
+def test_a_table_that_does_not_name_its_source_is_audited_alone(
     sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     report, root = tmp_path / "report.json", tmp_path / "store"
     dataset = xr.open_zarr(brdfdb.open(sound).path("dark")).load()
-    publish_dataset(root, "dark", dataset)
-    publish_dataset(root, "other", dataset.assign_attrs(model="phong"))
-    assert cli.main(["audit", "dark", "other", "--jobs", "1", "--store", str(root), "--report", str(report)]) == 2
-    assert capsys.readouterr().err.splitlines()[-1].startswith("brdfdb: other cannot be audited: ")
-    assert entry_of(report)["material"] == "dark"
+    dataset.attrs = {key: value for key, value in dataset.attrs.items() if key not in ("source_record", "request")}
+    publish_dataset(root, "other", dataset)
+    assert audited(root, "other", report) == 0
+    line = "other: its source is not known; not judged: nodes, table error, sampling, validity\n"
+    assert line in capsys.readouterr().out
+    entry = entry_of(report)
+    assert (entry["model"], entry["verdict"], entry["findings"]["energy"]["model"]) == ("", "passes", None)
+    publish_dataset(root, "other", negative(dataset))
+    assert audited(root, "other", report) == 1
 
 
 def test_a_sampler_that_weighs_too_much_is_named(

@@ -138,7 +138,7 @@ BAD = [
     changed("[0, 80]", "[0, 91]", "grids.isotropic.theta_r_deg: ends at 91 degrees, must end at or below 90"),
     changed("[0, 180]", "[0, 90]", "grids.isotropic.delta_phi_deg: ends at 90 degrees, must end at 180"),
     changed("phi_i_deg = [0, 180, 360]", "phi_i_deg = [0, 120]", "grids.anisotropic.phi_i_deg: ends at 120 degrees"),
-    changed("[0, 80]", "[0, 90]", "foam on grids.isotropic: grid: theta of 90 degrees is a pole of the model"),
+    changed("[0, 80]", "[0, 90]", "foam on grids.isotropic: grid: theta of 90 degrees is a pole of foam"),
     # wavelengths
     changed("[500, 550]", "[]", "wavelengths_nm: "),
     changed("[500, 550]", "[550, 500]", "wavelengths_nm: must be positive and increase strictly"),

@@ -16,6 +16,7 @@ from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.renderer import render
 from brdfdb_pipelines import cli
 from brdfdb_pipelines.documents import schema
+from brdfdb_pipelines.exit_codes import REFUSED
 from brdfdb_pipelines.scene_file import SceneError, load, shipped
 
 COARSE = [float(wavelength) for wavelength in range(420, 681, 20)]
@@ -151,7 +152,7 @@ def test_the_command_line_renders_a_scene(tmp_path: Path, capsys: pytest.Capture
 def test_a_scene_that_shows_nothing_is_one_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
 ) -> None:
-    assert cli.main(["render", changed(tmp_path, old, new), "--out", str(tmp_path / "out")]) == cli.FAILED
+    assert cli.main(["render", changed(tmp_path, old, new), "--out", str(tmp_path / "out")]) == REFUSED
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
@@ -162,7 +163,7 @@ def test_a_recorded_scene_has_the_pixels_of_its_file(tmp_path: Path, capsys: pyt
     np.savez(tmp_path / "flat.npz", normal=np.tile([0.0, -1.0, 0.0], (2, 3, 1)))
     path = changed(tmp_path, 'kind = "sphere", radius = 1', 'kind = "recorded", file = "flat.npz"')
     for option in ("--width", "--across"):
-        assert cli.main(["render", path, "--out", str(tmp_path), option, "8"]) == cli.FAILED
+        assert cli.main(["render", path, "--out", str(tmp_path), option, "8"]) == REFUSED
         assert f"{path}: is recorded, and has the pixels of its file" in capsys.readouterr().err
     assert cli.main(["render", path, "--out", str(tmp_path)]) == 0
     assert "3 x 2 pixels" in capsys.readouterr().out

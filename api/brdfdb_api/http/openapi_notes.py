@@ -105,7 +105,9 @@ def _option(option: Option) -> dict[str, Any]:
 # Of all formats: an option that a format does not have is refused
 EXPORT_OPTIONS = [
     _option(option)
-    for option in {name: option for each in EXPORTERS.values() for name, option in options_of(each).items()}.values()
+    for option in {
+        name: option for exporter in EXPORTERS.values() for name, option in options_of(exporter).items()
+    }.values()
 ]
 
 

@@ -179,7 +179,9 @@ def _directions(view: View, theta_i: float, phi_i: float) -> tuple[dict[str, NDA
     "/export/{file_format}",
     router=views,
     tags=["views"],
-    responses=answers(None, 304, 404, 422, 503, media={each.media_type: each.summary for each in EXPORTERS.values()}),
+    responses=answers(
+        None, 304, 404, 422, 503, media={exporter.media_type: exporter.summary for exporter in EXPORTERS.values()}
+    ),
     openapi_extra={"parameters": EXPORT_OPTIONS},
 )
 def export(
