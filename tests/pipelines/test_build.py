@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import re
 import shutil
-import tempfile
 import threading
 import time
-from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -20,67 +17,21 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import StoreError
-from brdfdb.store import files
-from brdfdb.store.lock import Lock
 from brdfdb.store.reader import Store
 from brdfdb.tables import layout as layouts
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
 from brdfdb.tables.xarray_view import plain_attributes
 from brdfdb_pipelines import build_resources, cli
-from brdfdb_pipelines.build import Built, build
-from brdfdb_pipelines.exit_codes import BUG
-from brdfdb_pipelines.recipe_file import Job, Recipe, RecipeError, load
+from brdfdb_pipelines.build import build
+from brdfdb_pipelines.recipe_file import Job, Recipe, load
 from brdfdb_pipelines.workers import Workers
-
-Captured = pytest.CaptureFixture[str]
-
-
-class OneByOne(Executor):
-    """Runs a task when it is submitted, and notes what came."""
-
-    def __init__(self) -> None:
-        self.submitted: list[tuple[str, tuple[Any, ...]]] = []
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        self.submitted.append((fn.__name__, args))
-        future: Future[Any] = Future()
-        try:
-            future.set_result(fn(*args, **kwargs))
-        except BaseException as error:
-            future.set_exception(error)
-        return future
+from tests.pipelines.a_build import Captured, OneByOne, changed, failing, staged, states
 
 
 def chunks(store: Store, name: str) -> dict[str, bytes]:
     group = store.path(name)
     return {str(path.relative_to(group)): path.read_bytes() for path in group.rglob("c/**/*") if path.is_file()}
-
-
-def failing(monkeypatch: pytest.MonkeyPatch, name: str, error: BaseException) -> None:
-    """Let the tabulation of one material fail."""
-    block = tabulation.block
-
-    def fail(layout: Layout, rows: slice) -> Any:
-        if layout.source.name == name:
-            raise error
-        return block(layout, rows)
-
-    monkeypatch.setattr(tabulation, "block", fail)
-
-
-def changed(recipe: Path, to: Path) -> Path:
-    """The recipe with another isotropic grid: foam, blue-plastic are new tables, and the others are not."""
-    to.write_text(recipe.read_text(encoding="utf-8").replace("step = 15", "step = 30"), encoding="utf-8")
-    return to
-
-
-def states(built: list[Built]) -> dict[str, tuple[str, str, str]]:
-    return {b.job.material.name: (b.state, b.revision, b.why) for b in built}
-
-
-def staged(root: Path) -> list[str]:
-    return sorted(path.name for path in (root / ".staging").iterdir())
 
 
 # What is built
@@ -250,174 +201,6 @@ def test_what_is_damaged_is_named_and_built_again(
         assert capsys.readouterr().err.endswith("(not the current revision); `brdfdb gc --damaged` removes it\n")
         assert cli.main(["gc", "--damaged", "--store", str(root)]) == 0
     assert cli.main(["verify", "foam", "--store", str(root)]) == 0
-
-
-# What cannot be built
-
-
-def test_a_recipe_that_cannot_be_built_is_refused_before_anything_is_written(recipe: Path, tmp_path: Path) -> None:
-    content = load(recipe).model_dump()
-    content["grids"]["isotropic"]["theta_i_deg"] = [0.0, 90.0]
-    with pytest.raises(RecipeError, match=r"^foam on grids\.isotropic: "):
-        build(Recipe.model_validate(content), tmp_path / "store", OneByOne())
-    assert not (tmp_path / "store").exists()
-
-
-def test_a_block_that_does_not_fit_into_the_memory_is_refused(recipe: Path, tmp_path: Path, capsys: Captured) -> None:
-    assert cli.main(["build", str(recipe), "--store", str(tmp_path / "store"), "--memory", "1MB"]) == 2
-    _, err = capsys.readouterr()
-    assert err.splitlines()[-1].startswith("brdfdb: memory: a block of ")
-    assert err.splitlines()[-1].endswith(" MB, more than the 1 MB allowed")
-    assert not (tmp_path / "store").exists()
-    assert cli.main(["build", str(recipe), "--store", str(tmp_path / "store"), "--memory", "0.1GB"]) == 0
-
-
-def test_one_table_that_fails_takes_no_other_with_it(
-    recipe: Path, tmp_path: Path, names: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    failing(monkeypatch, "foam", ZeroDivisionError("a bug"))
-    events: list[dict[str, Any]] = []
-    with pytest.raises(ZeroDivisionError, match="a bug"):
-        build(load(recipe), tmp_path, OneByOne(), events.append)
-    assert {event["material"]: event["error"] for event in events if event["event"] == "failed"} == {"foam": "a bug"}
-    store = brdfdb.open(tmp_path)
-    assert list(store) == sorted(set(names) - {"foam"})
-    for name in store:
-        store.verify(name)
-    assert staged(tmp_path) == ["foam"]
-    monkeypatch.undo()
-    assert states(build(load(recipe), tmp_path, OneByOne()))["foam"] == ("published", "r000001", "new")
-    assert staged(tmp_path) == []
-
-
-@pytest.mark.parametrize(
-    ("error", "code", "sentence"),
-    [
-        (KeyboardInterrupt(), 130, "brdfdb: interrupted; published tables and complete blocks stay"),
-        (MemoryError("Unable to allocate 3.64 TiB"), 2, "brdfdb: Unable to allocate 3.64 TiB"),
-        (StoreError("cannot write foam: No space left"), 2, "brdfdb: cannot write foam: No space left"),
-    ],
-)
-def test_a_build_that_is_broken_off_says_so_and_the_old_revision_is_served(
-    error: BaseException,
-    code: int,
-    sentence: str,
-    recipe: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: Captured,
-) -> None:
-    command = ["build", str(recipe), "--store", str(tmp_path / "store"), "--jobs", "1"]
-    assert cli.main(command) == 0
-    capsys.readouterr()
-    command[1] = str(changed(recipe, tmp_path / "other.toml"))
-    failing(monkeypatch, "foam", error)
-    assert cli.main(command) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.splitlines()[-1].startswith(sentence)
-    if code == 130:
-        assert err.splitlines()[-1].endswith("to resume: brdfdb " + " ".join(command))
-    assert "Traceback" not in err
-    store = brdfdb.open(tmp_path / "store")
-    store.verify("foam")
-    assert store["foam"].revision == "r000001"
-    monkeypatch.undo()
-    assert cli.main(command) == 0
-    assert store["foam"].revision == "r000002"
-    assert staged(tmp_path / "store") == []
-
-
-def test_a_bug_in_the_program_keeps_its_traceback(
-    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    failing(monkeypatch, "foam", ZeroDivisionError("a bug"))
-    assert cli.main(["build", str(recipe), "--store", str(tmp_path / "store"), "--jobs", "1"]) == BUG
-    (file,) = tmp_path.glob("brdfdb-*.txt")
-    assert capsys.readouterr().err.endswith(f"its traceback is in {file} (ZeroDivisionError: a bug)\n")
-    assert file.read_text(encoding="utf-8").endswith("\nZeroDivisionError: a bug\n")
-
-
-def test_a_full_disk_is_one_sentence_and_what_was_written_is_kept(
-    recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
-) -> None:
-    root, written = tmp_path / "store", 0
-    monkeypatch.setattr(layouts, "_BLOCK_VALUES", 50)
-    write = files.write_file
-
-    def fill(path: Path, data: bytes, temporary: Path) -> Any:
-        nonlocal written
-        written += len(data)
-        if written > 60_000:
-            raise OSError(errno.ENOSPC, "No space left on device", str(path))
-        return write(path, data, temporary)
-
-    with monkeypatch.context() as patch:
-        for user in ("brdfdb.store.staging.write_file", "brdfdb.store.sealed_json.write_file"):
-            patch.setattr(user, fill)
-        assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "1"]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("brdfdb: ")) == ("", 1)
-    assert err.splitlines()[-1].startswith("brdfdb: cannot write ")
-    assert err.splitlines()[-1].endswith(f" to the store at {root}: No space left on device")
-    markers = len(list((root / ".staging").rglob("blocks/*.json")))
-    assert markers > 5
-    events: list[dict[str, Any]] = []
-    build(load(recipe), root, OneByOne(), events.append)
-    assert sum(event.get("kept", False) for event in events) == markers
-    assert staged(root) == []
-
-
-# Two builds at once
-
-
-def test_a_second_build_of_a_material_waits_and_then_has_nothing_to_do(
-    recipe: Path, tmp_path: Path, names: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    began, go, computed = threading.Event(), threading.Event(), []
-    block = tabulation.block
-
-    def slow(layout: Layout, rows: slice) -> Any:
-        computed.append(layout.source.name)
-        if layout.source.name == "foam":
-            began.set()
-            assert go.wait(30)
-        return block(layout, rows)
-
-    monkeypatch.setattr(tabulation, "block", slow)
-    with ThreadPoolExecutor(2) as executor, ThreadPoolExecutor(1) as other:
-        first = other.submit(build, load(recipe), tmp_path, executor)
-        assert began.wait(30)
-        events: list[dict[str, Any]] = []
-
-        def report(event: dict[str, Any]) -> None:
-            events.append(event)
-            if event == {"event": "waiting", "material": "foam"}:
-                go.set()
-
-        second = build(load(recipe), tmp_path, executor, report)
-        assert {state for state, _, _ in states(first.result(30)).values()} <= {"published", "unchanged"}
-    assert sorted(computed) == sorted(names)
-    assert states(second)["foam"] == ("unchanged", "r000001", "")
-    assert [event["material"] for event in events if event["event"] == "waiting"].count("foam") == 1
-    assert staged(tmp_path) == []
-
-
-def test_a_build_waits_for_whoever_holds_the_lock(recipe: Path, built: Path, tmp_path: Path, capsys: Captured) -> None:
-    root = tmp_path / "store"
-    shutil.copytree(built, root)
-    other = changed(recipe, tmp_path / "other.toml")
-    with ThreadPoolExecutor(1) as executor, Lock(root, "foam"):
-        done = executor.submit(build, load(other), root, OneByOne())
-        deadline = time.monotonic() + 20
-        while brdfdb.open(root).head("blue-plastic") != "r000002":
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-        assert not done.done()
-        assert cli.main(["gc", "--keep", "1", "--store", str(root)]) == 0
-        assert "left foam alone: a build is at work on it" in capsys.readouterr().out
-    assert states(done.result(30))["foam"] == ("published", "r000002", "grid changed")
 
 
 # What is told
