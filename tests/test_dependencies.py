@@ -12,13 +12,16 @@ import venv
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 from packaging.requirements import Requirement
 
 import brdfdb
 import brdfdb_api
 import brdfdb_pipelines
 from brdfdb import _numba
+from brdfdb.store.publication import publish_dataset
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -160,9 +163,7 @@ def test_the_core_alone_tabulates_and_looks_up(core: Path, tmp_path: Path) -> No
 def test_a_missing_extra_is_a_sentence_that_names_it(
     core: Path, tmp_path: Path, command: list[str], extra: str
 ) -> None:
-    from brdfdb.store.marker import make_store
-
-    make_store(tmp_path / "store")
+    publish_dataset(tmp_path / "store", "rolled-brass", xr.Dataset({"brdf": (("theta_i", "theta_r"), np.ones((2, 2)))}))
     arguments = [part.format(store=tmp_path / "store") for part in command]
     done = _run(core, "-m", "brdfdb_pipelines.cli", *arguments)
     assert done.returncode == 2, done.stderr

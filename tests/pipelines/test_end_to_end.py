@@ -75,13 +75,13 @@ def test_every_table_is_audited(built: Path, names: list[str], tmp_path: Path) -
     entries = {entry["material"]: entry for entry in json.loads(report.read_bytes())["materials"]}
     assert sorted(entries) == sorted(names)
     for entry in entries.values():
-        assert entry["reciprocity"]["verdict"] == entry["values"]["positivity"] == entry["values"]["finiteness"]
-        assert entry["reciprocity"]["verdict"] == "passes"
+        reciprocity, values = entry["findings"]["reciprocity"], entry["findings"]["values"]
+        assert reciprocity["verdict"] == values["positivity"] == values["finiteness"] == "passes"
     # grids this coarse smear the lobes of the others past 1: what is stored is what is audited
     assert {entries[name]["verdict"] for name in ("foam", "mirror")} == {"passes"}
     assert code == int(any(entry["verdict"] == "violates" for entry in entries.values()))
-    mirror = np.array(entries["mirror"]["energy"]["table"]["albedo"])
-    np.testing.assert_array_equal(mirror, entries["mirror"]["energy"]["table"]["specular"])
+    mirror = np.array(entries["mirror"]["findings"]["energy"]["table"]["albedo"])
+    np.testing.assert_array_equal(mirror, entries["mirror"]["findings"]["energy"]["table"]["specular"])
     assert 0.3 < mirror.min() < mirror.max() <= 1.0
 
 

@@ -183,7 +183,7 @@ def test_a_table_that_does_not_name_its_source_is_audited_alone(
     dataset.attrs = {key: value for key, value in dataset.attrs.items() if key not in ("source_record", "request")}
     publish_dataset(root, "other", dataset)
     assert audited(root, "other", report) == 0
-    line = "other: its source is not known; not judged: nodes, table error, sampling, validity\n"
+    line = "other: its source cannot be evaluated; not judged: nodes, table error, sampling, validity\n"
     assert line in capsys.readouterr().out
     entry = entry_of(report)
     assert (entry["model"], entry["verdict"], entry["findings"]["energy"]["model"]) == ("", "passes", None)
