@@ -7,7 +7,7 @@ from datetime import datetime
 from importlib.metadata import version
 
 from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, Verdict
-from brdfdb.audit.findings import FINDINGS
+from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.figure import Figure
 from brdfdb.materials import Material, Source

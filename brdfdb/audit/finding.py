@@ -86,7 +86,7 @@ class NumberTable(NamedTuple):
 class Finding(BaseModel):
     """One finding on one table: the data of the report, and how terminal, page and explorer show it.
 
-    A subclass gives the class attributes and `judge`; `brdfdb.audit.findings.FINDINGS` finds it in its module.
+    A subclass gives the class attributes and `judge`; `brdfdb.audit.registry.FINDINGS` finds it in its module.
     `verdict` is a field of it.
 
     Attributes

@@ -10,7 +10,7 @@ from pydantic import BaseModel, BeforeValidator, Field, GetJsonSchemaHandler, Se
 from pydantic_core import CoreSchema
 
 from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, Verdict
-from brdfdb.audit.findings import FINDINGS
+from brdfdb.audit.registry import FINDINGS
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
 
