@@ -1,8 +1,8 @@
-"""The only file that calls numba: how kernels are compiled.
+"""Compilation of kernels. This is the only file that calls numba.
 
-A kernel calls kernels of its own file, and of the files in `SHARED`. numba keeps compiled code under the digest of the
-file that holds the kernel, to which `_stamp` adds those of the shared ones: a kernel that calls into any other file
-would go on running the old code when that file changes.
+A kernel calls kernels of its own file and of the files in `SHARED`. numba stores compiled code under the digest of the
+file that holds the kernel, and `_stamp` adds the digests of the shared files. A kernel that called into any other file
+would continue to run old code after a change of that file.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ def kernel(function: F) -> F:
     """Compile a function of scalars, or a loop over arrays, when it is first called.
 
     nogil: the batch layer runs kernels on threads. error_model="numpy": the Python model checks every division,
-    which costs a factor of 5 to 7 on Ward's model, and the limits want inf from 1/0. Of fastmath only "contract", fused
-    multiply-add: it rounds less, and nan and inf keep their meaning. cache: 0.2 s instead of seconds next time.
-    forceinline: a loop vectorises only if all that it calls is part of it.
+    which costs a factor of 5 to 7 on Ward's model, and limits need inf from 1/0. fastmath has only "contract", fused
+    multiply-add, which rounds less; nan and inf keep their meaning. cache: the next process starts in 0.2 s instead of
+    seconds. forceinline: a loop vectorises only if all functions that it calls are inlined.
     """
     return _compiled(function, forceinline=True)
 
 
 def loop(function: F) -> F:
-    """As `kernel`, for a loop over arrays that several kernels call: compiled once, not once inside of each."""
+    """Compile a loop over arrays that several kernels call once, not inside each of them as `kernel` does."""
     return _compiled(function, forceinline=False)
 
 
@@ -55,9 +55,9 @@ def _shared_digest() -> bytes:
 
 
 def _stamp(cache: Any) -> None:
-    """Let compiled code in numba's cache count as old when a file of `SHARED` has changed, too.
+    """Make numba's cache depend on the files of `SHARED`, too.
 
-    A cache that cannot be written, on a disk that is full, costs time and not the result.
+    If the cache cannot be written, for example on a full disk, compilation is repeated and results stay the same.
     """
     file = cache._cache_file
     file._source_stamp += _shared_digest()
@@ -71,11 +71,11 @@ def _stamp(cache: Any) -> None:
 
 
 def elementwise(function: F) -> Callable[..., Any]:
-    """Wrap a scalar kernel as a NumPy ufunc: it broadcasts without copying, so work on axes stays on axes.
+    """Wrap a scalar kernel as a NumPy ufunc, which broadcasts without copying: work on one axis is done once.
 
-    Compiled when it is first called, under a lock: numba's own lazy ufuncs warn when two threads come first together.
-    Floating-point flags are ignored: the branch not taken of a vectorised select raises them too. What is finite is
-    tested, not flagged.
+    It is compiled at the first call, under a lock, because numba's own lazy ufuncs warn if two threads call first.
+    Floating-point flags are ignored, because a vectorised select raises them in the branch not taken, too. Tests
+    check that values are finite.
     """
     lock = threading.Lock()
     compiled: list[Callable[..., Any]] = []

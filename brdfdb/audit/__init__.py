@@ -1,4 +1,4 @@
-"""The audit of a table: what it and its model conserve, where they jump or err, and where the model is valid."""
+"""The audit of a table: energy, reciprocity, values, jumps and errors of table and model, validity of the model."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from datetime import datetime
 from importlib.metadata import version
 
 from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, Verdict
-from brdfdb.audit.findings import FINDINGS
+from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.figure import Figure
 from brdfdb.materials import Material, Source
@@ -17,44 +17,44 @@ __all__ = ["FINDINGS", "AuditReport", "Finding", "MaterialAudit", "audit", "repo
 
 
 def audit(table: Table, *, source: Source | None = None, accept_excess: bool = False) -> MaterialAudit:
-    """Audit one table: each finding of `FINDINGS`, for what is looked up in the table.
+    """Return the audit of one table: each finding of `FINDINGS`, on values that are looked up in the table.
 
     Parameters
     ----------
     table : Table
-        A decoded table. Where it does not give back its source, the table is audited alone, and findings that take a
-        source are not judged.
+        A decoded table. If its source is not known, the table is audited alone, and findings that need a source are
+        not judged.
     source : Source, optional
-        Source of the table, such as a function, which no store can give back; by default that of the table.
+        Source of the table, for example a function, which a store does not hold; by default the source of the table.
     accept_excess : bool
         Accept that the model reflects more than it receives at these parameters, and the table with it.
 
     Returns
     -------
     MaterialAudit
-        The findings. The verdict on energy is "known published excess" where the albedo of the model exceeds 1, its
-        parameters are those that a paper prints, as a built-in material has them, and the albedos of model and table
-        go no further than is recorded there. It is "accepted excess" where the caller accepts that of the model, and
-        "violates" where either exceeds 1 otherwise. A table that states its error may exceed 1, or what is known, by
-        what that error explains. That a model "loses" light that nothing absorbs is said, and passes.
+        The findings. The verdict on energy is "known published excess" if the albedo of the model exceeds 1, its
+        parameters are those of a preset, and the albedos of model and table are within the excess that is recorded
+        for the preset. It is "accepted excess" if the caller accepts the excess of the model, and "violates" if either
+        albedo exceeds 1 otherwise. A table may exceed these limits by as much as its stated error explains. A model
+        that "loses" light which nothing absorbs is reported, and passes.
     """
     if source is None and isinstance(table.source, Material):
         source = table.source
     subject = Subject(table, source, accept_excess)
     sentences: list[Sentence] = []
     for key, kind in FINDINGS.items():
-        finding = subject.found[key] = kind.judge(subject)
+        finding = subject.findings[key] = kind.judge(subject)
         if isinstance(finding, NotJudged):
             sentences.append(kind.sentence("not judged", finding.reason))
         else:
             sentences += finding.sentences()
-    words = {finding.verdict for finding in subject.found.values()}
+    words = {finding.verdict for finding in subject.findings.values()}
     verdict: Verdict = next((word for word in DECISIVE if word in words), "passes")
     return MaterialAudit(
         material=table.name,
         revision=table.revision,
         model=source.model if isinstance(source, Material) else "",
-        findings=subject.found,
+        findings=subject.findings,
         sentences=sentences,
         verdict=verdict,
     )

@@ -1,4 +1,4 @@
-"""Energy of a material: of the model behind a table and of the table, and the worse of the two."""
+"""Energy of a material: the verdict on the model behind a table, that on the table, and the worse of the two."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _ACCEPTED = "accepted, not published"
 
 
 class Energy(Finding):
-    """What the model behind a table does with light, and what the table makes of it."""
+    """Directional albedo of the model behind a table and of the table, and the verdict on both."""
 
     key = "energy"
     order = 1
@@ -44,22 +44,22 @@ class Energy(Finding):
     columns = ("albedo of the model", "albedo of the table", "white furnace")
     explanation = (
         "Directional albedo is the share of the light from one direction that leaves the surface in any direction, "
-        "specular part included: the integral of f_r cos theta_r over the hemisphere. More than 1 is light from "
-        "nowhere. Looked at up to 90°, of models that grow without bound there up to 89.9°. The white furnace is "
-        "the surface in light that is the same from everywhere, with its parameters set so that nothing is "
-        "absorbed. An ideal model then shows 1 at every angle; less is what single scattering loses, more is energy "
-        "made up. The table of all materials has the mean over angles, where a loss or a gain counts as one beyond "
-        "1 %; a model loses light where it does so at any angle up to 85°."
+        "specular part included: the integral of f_r cos theta_r over the hemisphere. An albedo above 1 creates "
+        "energy. Lights up to 90° are examined, or up to 89.9° for models that grow without bound at the horizon. The "
+        "white furnace is the surface in uniform light, with its parameters set so that nothing is absorbed. An ideal "
+        "model then shows 1 at every angle. Less than 1 is light that single scattering loses, more than 1 is energy "
+        "that the model creates. The table of all materials shows the mean over angles, which counts as a loss or a "
+        "gain beyond 1 %. The verdict is that a model loses light if it loses more than 1 % at any angle up to 85°."
     )
 
     model: ModelEnergy | None = Field(description="null: the source is not known")
     table: TableEnergy
     verdict: EnergyVerdict = Field(description="the worse of the two")
-    reason: str = Field(description="of the one that is worse")
+    reason: str = Field(description="reason of the worse verdict")
 
     @classmethod
     def judge(cls, subject: Subject) -> Energy:
-        """Judge the energy of a table and its source; without a source that of the table alone."""
+        """Judge the energy of a table and its source, or of the table alone if the source is not known."""
         return energy_of(subject.table, subject.source, accept_excess=subject.accept_excess)
 
     def sentences(self) -> list[Sentence]:
@@ -89,12 +89,12 @@ class Energy(Finding):
         return sentences
 
     def problems(self) -> list[str]:
-        """Return a sentence where light is made up, also where the stated error of the table explains it."""
+        """Return a sentence if an albedo exceeds 1, even if the stated error of the table explains it."""
         reason = self.table.reason if self.verdict in ("conserves", "loses") else self.reason
         return [reason] if reason else []
 
     def cells(self) -> list[Cell]:
-        """Return the largest albedos, and what a lossless surface shows in uniform light."""
+        """Return the largest albedos, and the albedo of the lossless surface in uniform light."""
         model, table = self.model, self.table
         of_table = _largest(table.verdict, table.max_albedo, table.max_at_theta_i_deg)
         if model is None:
@@ -108,20 +108,20 @@ class Energy(Finding):
         return [*panels_of(self.model, self.table)]
 
     @classmethod
-    def overview(cls, found: Sequence[Finding]) -> list[str]:
+    def overview(cls, findings: Sequence[Finding]) -> list[str]:
         """Return a sentence on tables that exceed 1 where their models do not, and on models that lose light."""
-        energies = [each for each in found if isinstance(each, Energy)]
+        energies = [finding for finding in findings if isinstance(finding, Energy)]
         sentences = []
-        if any(each.table.verdict == "violates" for each in energies):
+        if any(energy.table.verdict == "violates" for energy in energies):
             sentences.append(
                 "a table whose grid is too coarse for its lobe can exceed 1 where its model does not: try a finer grid"
             )
-        within = sum(each.table.verdict == "passes" and bool(each.table.reason) for each in energies)
+        within = sum(energy.table.verdict == "passes" and bool(energy.table.reason) for energy in energies)
         if within:
             sentences.append(
                 f"{within} exceed 1 by no more than the error that they state, or that of the integration, and pass"
             )
-        losing = sum(each.verdict == "loses" for each in energies)
+        losing = sum(energy.verdict == "loses" for energy in energies)
         if losing:
             sentences.append(
                 f"{losing} are of models that lose light even where nothing absorbs it: the report says how much, and "
@@ -139,7 +139,7 @@ def _albedo(value: float | None) -> str:
 
 
 def furnace_cell(furnace: Furnace | None) -> Cell:
-    """Return what a lossless surface shows in uniform light, at the wavelength that is worst."""
+    """Return the albedo [1] of the lossless surface in uniform light, at the worst wavelength."""
     values = [] if furnace is None else [value for value in furnace.hemispherical if value is not None]
     if not values:
         return Cell("unknown", "–", LAST)
@@ -166,7 +166,7 @@ def _of_bound(bound: UniformBound) -> Sentence:
 
 
 def energy_of(table: Table, source: Source | None, *, accept_excess: bool = False) -> Energy:
-    """Return the energy of a model and its table. With `accept_excess` both may exceed 1 as far as the model does."""
+    """Return the energy of a model and its table. With `accept_excess` both may exceed 1 by the excess of the model."""
     if source is None:
         stored = table_energy_of(table, None)
         verdict: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
@@ -174,7 +174,7 @@ def energy_of(table: Table, source: Source | None, *, accept_excess: bool = Fals
     known = published_excess(source, table.wavelength_nm) if isinstance(source, Material) else None
     claim = str(table.attrs.get("known_excess", {}).get("citation", ""))
     model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess)
-    # what is published, or accepted, is an excess of the model: where it has none, that of a table is the table's own
+    # The excess that is published or accepted is that of the model. An excess of the table alone is excused by neither
     excess = {"known published excess": known, "accepted excess": _of_model(model)}.get(model.verdict)
     accepted = model.verdict == "accepted excess"
     stored = table_energy_of(table, excess, "accepted excess" if accepted else "known published excess")
@@ -186,7 +186,7 @@ def energy_of(table: Table, source: Source | None, *, accept_excess: bool = Fals
 
 
 def _of_model(model: ModelEnergy) -> KnownExcess | None:
-    """Return the excess that a model has, as far as it goes."""
+    """Return the excess of a model: its largest albedo [1], and the angle [degree] above which it exceeds 1."""
     if model.exceeds_1_from_theta_i_deg is None or model.max_albedo is None or not np.isfinite(model.max_albedo):
         return None
     return KnownExcess(

@@ -9,20 +9,20 @@ from brdfdb.audit.model_energy import Furnace, ModelEnergy, UniformBound
 from brdfdb.audit.table_energy import TableEnergy
 from brdfdb.figure import Curve, Numbers, Panel
 
-_CURVES = 4  # wavelengths of a plot, at most
+_CURVES = 4  # largest number of wavelengths in a plot
 _ALL_OF_IT = Curve(label="all that arrives", x=[0.0, 90.0], y=[1.0, 1.0])
 _IDEAL = Curve(label="ideal", x=[0.0, 90.0], y=[1.0, 1.0], role="truth")
 _THETA, _ALBEDO = "angle of the light, degrees", "directional albedo"
 
 
 def panels_of(model: ModelEnergy | None, table: TableEnergy) -> list[Panel]:
-    """Return the panels of a table, and of its model where it is known."""
+    """Return the panels of a table, and of its model if it is known."""
     panels: list[Panel] = []
-    where, at = 0, ""
+    strongest, at = 0, ""
     wavelengths, albedo = table.wavelength_nm, table.albedo if model is None else model.albedo
     if wavelengths is not None and len(wavelengths) > 1:
-        where = _strongest(albedo)
-        at = f" at {wavelengths[where]:g} nm"
+        strongest = _strongest(albedo)
+        at = f" at {wavelengths[strongest]:g} nm"
         if model is not None:
             curves = _spectral(model.theta_i_deg, model.albedo, wavelengths)
             panels.append(Panel(title="Albedo of the model", x_label=_THETA, y_label=_ALBEDO, curves=curves))
@@ -30,9 +30,9 @@ def panels_of(model: ModelEnergy | None, table: TableEnergy) -> list[Panel]:
         if model is not None:
             curves.append(Curve(label="model", x=wavelengths, y=model.hemispherical, role="truth"))
         panels.append(Panel(title="In uniform light", x_label="wavelength, nm", y_label="albedo", curves=curves))
-    both = [Curve(label="table", x=table.theta_i_deg, y=_column(table.albedo, where), role="ours")]
+    both = [Curve(label="table", x=table.theta_i_deg, y=_column(table.albedo, strongest), role="ours")]
     if model is not None:
-        both.append(Curve(label="model", x=model.theta_i_deg, y=_column(model.albedo, where), role="truth"))
+        both.append(Curve(label="model", x=model.theta_i_deg, y=_column(model.albedo, strongest), role="truth"))
     title = f"{'Table' if model is None else 'Model and table'}{at}"
     panels.append(Panel(title=title, x_label=_THETA, y_label=_ALBEDO, curves=[*both, _ALL_OF_IT]))
     if model is not None and model.furnace is not None:

@@ -1,4 +1,4 @@
-"""Interface of a finding of the audit, one module each: its verdict, sentences, cells, plots and tables."""
+"""The interface of a finding of the audit: verdict, sentences, cells, plots and tables. Each finding is a module."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STRICT = ConfigDict(frozen=True, extra="forbid")
 
 Level = Literal["good", "calm", "note", "bad"]
 Verdict = Literal["passes", "known published excess", "accepted excess", "violates"]
-# Every word that a finding may use, the worst first: tables are sorted by it
+# Words that a finding may use, the worst first. Tables are sorted in this order
 Word = Literal[
     "violates",
     "accepted excess",
@@ -33,7 +33,7 @@ Word = Literal[
     "passes",
     "inside",
 ]
-# How loud each word is shown
+# Emphasis of each word in page and explorer
 LEVELS: dict[Word, Level] = {
     "violates": "bad",
     "accepted excess": "note",
@@ -49,13 +49,13 @@ LEVELS: dict[Word, Level] = {
     "inside": "good",
 }
 RANKS: dict[Word, int] = {word: rank for rank, word in enumerate(LEVELS)}
-# Words that decide on a table, the worst first; all others let it pass
+# Words that decide the verdict on a table, the worst first. All other words let it pass
 DECISIVE: tuple[Verdict, ...] = ("violates", "accepted excess", "known published excess")
-LAST = 1e300  # key that sorts after every number
+LAST = 1e300  # sort key of cells without a number: it sorts after every number
 
 
 class Cell(NamedTuple):
-    """A verdict on one table in a column of the table of all: word, text beside it, number to sort by."""
+    """A verdict on one table in the table of all materials: its word, the text beside it, and the number to sort by."""
 
     word: Word
     text: str
@@ -63,7 +63,7 @@ class Cell(NamedTuple):
 
 
 class Sentence(BaseModel):
-    """One sentence about a table, under the title of what it is about."""
+    """One sentence about a table, with the title of its subject."""
 
     model_config = STRICT
 
@@ -84,17 +84,17 @@ class NumberTable(NamedTuple):
 
 
 class Finding(BaseModel):
-    """One finding on one table: the data of the report, and how terminal, page and explorer show it.
+    """One finding on one table: the data of the report, and the text and plots of terminal, page and explorer.
 
-    A subclass gives the class attributes and `judge`; `brdfdb.audit.findings.FINDINGS` finds it in its module.
-    `verdict` is a field of it.
+    A subclass defines the class attributes, the field `verdict` and the method `judge`. `brdfdb.audit.registry` finds
+    it in its module.
 
     Attributes
     ----------
     key : str
-        Name in the report, of lower-case letters and underscores.
+        Name in the report: lower-case letters and underscores.
     order : int
-        Place among the findings: they are judged and shown in this order.
+        Position among the findings, which are judged and shown in this order.
     title : str
         Name for people.
     columns : tuple of str
@@ -115,7 +115,7 @@ class Finding(BaseModel):
 
     @classmethod
     def judge(cls, subject: Subject) -> Finding:
-        """Judge a table; return `NotJudged` where it takes a source that is not known."""
+        """Judge a table; return `NotJudged` if the finding needs a source that is not known."""
         raise NotImplementedError
 
     def sentences(self) -> list[Sentence]:
@@ -123,12 +123,12 @@ class Finding(BaseModel):
         raise NotImplementedError
 
     def cells(self) -> list[Cell]:
-        """Return one cell a column."""
+        """Return one cell for each column."""
         raise NotImplementedError
 
     def problems(self) -> list[str]:
-        """Return the sentences that a terminal prints: those on what is no plain pass."""
-        return [each.text for each in self.sentences() if each.word in DECISIVE]
+        """Return the sentences that a terminal prints: those whose verdict is not a plain pass."""
+        return [sentence.text for sentence in self.sentences() if sentence.word in DECISIVE]
 
     def figures(self) -> list[Panel | Map]:
         """Return the plots of the finding."""
@@ -139,13 +139,13 @@ class Finding(BaseModel):
         return []
 
     @classmethod
-    def overview(cls, found: Sequence[Finding]) -> list[str]:  # noqa: ARG003
-        """Return sentences on this finding of all tables of a report."""
+    def overview(cls, findings: Sequence[Finding]) -> list[str]:  # noqa: ARG003
+        """Return sentences on all findings of this kind in a report."""
         return []
 
     @classmethod
     def sentence(cls, word: Word, text: str, *, title: str = "", quote: str = "", where: str = "") -> Sentence:
-        """Return a sentence under the title of the finding, or another one."""
+        """Return a sentence with the title of the finding, or another title."""
         return Sentence(finding=cls.key, title=title or cls.title, word=word, text=text, quote=quote, where=where)
 
 
@@ -153,17 +153,17 @@ F = TypeVar("F", bound=Finding)
 
 
 class NotJudged(Finding):
-    """A finding that takes a source which cannot be evaluated, and the reason."""
+    """A finding that needs a source which cannot be evaluated, with the reason."""
 
     verdict: Literal["not judged"] = "not judged"
     reason: str
 
     def sentences(self) -> list[Sentence]:
-        """Return nothing: `audit` puts the reason under the title of the finding."""
+        """Return no sentences: `audit` reports the reason under the title of the finding."""
         return []
 
     def cells(self) -> list[Cell]:
-        """Return nothing: there is a dash in each column of the finding."""
+        """Return no cells: the table shows a dash in each column of the finding."""
         return []
 
 
@@ -174,20 +174,20 @@ class Subject:
     Attributes
     ----------
     table : Table
-        As a store holds it, or in memory.
+        Table of a store, or in memory.
     source : Source or None
-        Material or function that gave the values of the table; None where it is not known, or a function that the
-        store knows by name only.
+        Material or function that gave the values of the table. None if it is not known, or if it is a function, of
+        which a store holds the name only.
     accept_excess : bool
         Accept that the model reflects more than it receives.
-    found : dict
-        Findings so far, in the order of the registry.
+    findings : dict
+        Findings that have been judged, in the order of the registry.
     """
 
     table: Table
     source: Source | None
     accept_excess: bool = False
-    found: dict[str, Finding] = field(default_factory=dict)
+    findings: dict[str, Finding] = field(default_factory=dict)
 
     @cached_property
     def pairs(self) -> Pairs:
@@ -195,12 +195,12 @@ class Subject:
         return pairs_of(self.table, self.source)
 
     def not_judged(self, needs: str) -> NotJudged:
-        """Return the finding on a table whose source does not allow it; `needs` says in a few words why."""
+        """Return `NotJudged`; `needs` is what the finding needs of the source, in a few words."""
         return NotJudged(reason=f"{needs}; {self.without}")
 
     @property
     def without(self) -> str:
-        """Say why a table is audited without a source, or without a model."""
+        """The reason why a table is audited without a source, or without a model."""
         if self.source is not None:
             return f"the source of this table, {self.source.title}, is a function"
         if isinstance(self.table.source, FunctionRecord):

@@ -1,7 +1,7 @@
-"""A name for what is wrong with a table: a change of its model that the table agrees with much better.
+"""A name for the fault of a wrong table: the change of its model with which the table agrees much better.
 
-The signed error decides nothing alone, since a coarse table is bright or dark by itself. It tells a wrong scale, a
-wrong side and a wrong axis apart once a table is known to be wrong.
+The signed error decides nothing by itself, because a coarse table is too bright or too dark anyway. Once a table is
+known to be wrong, it distinguishes a wrong scale, a wrong side and a wrong axis.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.table import Table
 
-DIRECTIONS = 3000  # at which changed models are evaluated
-MUCH_BETTER = 0.5  # of the mean error that is left without the change
-_TURNS_DEG = range(15, 180, 15)  # half a turn is the same for a lobe with two axes
-_SCALE = 0.01  # a scale that differs from 1 by less is not worth a name
+DIRECTIONS = 3000  # number of directions at which changed models are evaluated
+MUCH_BETTER = 0.5  # largest mean error with the change, as a share of the mean error without it
+_TURNS_DEG = range(15, 180, 15)  # angles below half a turn, because a lobe with two axes repeats after half a turn
+_SCALE = 0.01  # smallest difference of a scale from 1 that is reported
 
 Directions = tuple[Floats, Floats]
 
 
 def bias_of(pairs: Pairs) -> float | None:
-    """Return the signed mean error [1] at the wavelength where it is largest: by how much a table reflects more."""
+    """Return the signed mean error [1] at the wavelength where it is largest; positive if the table is too bright."""
     weight = pairs.drawn.weight
     whole = weight @ pairs.model
     with np.errstate(invalid="ignore"):
@@ -36,24 +36,24 @@ def bias_of(pairs: Pairs) -> float | None:
 
 
 def likeness_of(table: Table, source: Source, pairs: Pairs) -> str:
-    """Return what a table agrees with at least twice as well as with its model, in words; empty if with nothing."""
-    some = np.flatnonzero(pairs.drawn.above)[:: max(len(pairs.drawn.wi) // DIRECTIONS, 1)]
+    """Return, in words, the changed model with which a table agrees at least twice as well; empty if there is none."""
+    chosen = np.flatnonzero(pairs.drawn.above)[:: max(len(pairs.drawn.wi) // DIRECTIONS, 1)]
     middle = pairs.table.shape[1] // 2
     wavelength = representative_nm(table)
     at = None if wavelength is None else np.array([wavelength])
-    found, truth, weight = pairs.table[some, middle], pairs.model[some, middle], pairs.drawn.weight[some]
-    if not np.isfinite(found).all():
+    values, truth, weight = pairs.table[chosen, middle], pairs.model[chosen, middle], pairs.drawn.weight[chosen]
+    if not np.isfinite(values).all():
         return ""
-    light, viewer = pairs.drawn.wi[some], pairs.drawn.wr[some]
-    left = {"": weight @ np.abs(found - truth)}
-    scale = float(weight @ found / (weight @ truth)) if weight @ truth > 0.0 else 1.0
+    light, viewer = pairs.drawn.wi[chosen], pairs.drawn.wr[chosen]
+    errors = {"": weight @ np.abs(values - truth)}
+    scale = float(weight @ values / (weight @ truth)) if weight @ truth > 0.0 else 1.0
     if abs(scale - 1.0) > _SCALE:
-        left[f"the model times {scale:.3g}"] = weight @ np.abs(found - scale * truth)
+        errors[f"the model times {scale:.3g}"] = weight @ np.abs(values - scale * truth)
     for name, changed in _changes(source.anisotropic):
         model = error_measurement.model_values(source, at, *changed(light, viewer))[:, 0]
-        left[name] = weight @ np.abs(found - model)
-    best = min(left, key=lambda name: left[name])
-    return best if left[best] < MUCH_BETTER * left[""] else ""
+        errors[name] = weight @ np.abs(values - model)
+    best = min(errors, key=lambda name: errors[name])
+    return best if errors[best] < MUCH_BETTER * errors[""] else ""
 
 
 def _changes(anisotropic: bool) -> Iterator[tuple[str, Callable[[Floats, Floats], Directions]]]:

@@ -20,33 +20,37 @@ from brdfdb.tables.grids import Axis
 
 EnergyVerdict = Literal["conserves", "loses", "known published excess", "accepted excess", "violates"]
 
-TOLERANCE = 1e-6  # absolute, of each albedo
-MOST_PANELS = 1000  # where the quadrature of one light gives up
-BOUND_TOLERANCE = 2e-5  # absolute, of the largest a
-# Lights that people ask for [degree]. Gauss's nodes in theta_i join them, so that the mean over uniform light,
-# 2 int albedo cos theta_i sin theta_i dtheta_i, is a sum over some of the same lights
+TOLERANCE = 1e-6  # absolute tolerance of each albedo [1]
+MOST_PANELS = 1000  # number of panels at which the quadrature of one light stops
+BOUND_TOLERANCE = 2e-5  # absolute tolerance of the largest a(lambda) [1]
+# Lights at round angles [degree]. Gauss's nodes in theta_i are added to them, so that the mean over uniform light,
+# 2 int albedo cos theta_i sin theta_i dtheta_i, is a sum over lights that are computed anyway
 THETA_I_DEG = (0.0, 10.0, 30.0, 45.0, 60.0, 75.0, 80.0, 85.0, 87.5, 89.0, 89.5, 89.9)
-NODES = 16  # the mean is within 2e-4 of that of 48 nodes for every material of the papers
-# Lights are added beside the largest albedo, so many times, as long as it differs by more than this from those beside
+NODES = 16  # number of Gauss nodes: the mean differs by less than 2e-4 from that of 48 nodes, for all presets
+# Lights are added next to the largest albedo in at most ROUNDS rounds, until it differs by less than FLAT from its
+# neighbours
 ROUNDS, FLAT = 4, 1e-6
-# A lossless model loses light if it reflects less than this share of it, up to this angle [degree]: beyond, shadowing
-# alone takes more from every model of single scattering
+# A lossless model loses light if it reflects less than this share at an angle [degree] up to this one. At larger angles
+# shadowing alone takes more from every model of single scattering
 LOSSLESS, LOSS_UP_TO_DEG = 0.99, 85.0
-GAIN = 1e-4  # beyond 1, of a lossless model, that is worth saying
-_ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])  # azimuths of a light over a lobe with two axes: the rest is the same
+GAIN = 1e-4  # smallest excess over 1 of a lossless model that is reported
+# Azimuths of a light over a lobe with two axes; the other quadrants repeat them
+_ELLIPSE_DEG = np.array([0.0, 30.0, 60.0, 90.0])
 _TURN_DEG = np.arange(0.0, 360.0, 60.0)
 
 
 class Furnace(BaseModel):
-    """The white furnace: the model made lossless, in light that is the same from everywhere; an ideal one shows 1."""
+    """The white furnace: the model with lossless parameters in uniform light. An ideal model shows 1."""
 
     model_config = STRICT
 
-    lossless: str = Field(description="which parameters were set to what")
+    lossless: str = Field(description="parameters that were changed, with their values")
     theta_i_deg: list[float]
-    wavelength_nm: list[float] | None = Field(description="null: grey; of many wavelengths the ends and the middle")
+    wavelength_nm: list[float] | None = Field(
+        description="null: grey. Spectral tables use the first, the middle and the last wavelength"
+    )
     albedo: list[Numbers] = Field(description="[theta_i][wavelength], specular part included")
-    hemispherical: Numbers = Field(description="[wavelength], the mean over uniform light")
+    hemispherical: Numbers = Field(description="[wavelength], albedo in uniform light")
     smallest: float | None = Field(description="null: not finite")
     smallest_at_theta_i_deg: float
     largest: float | None = Field(description="null: not finite")
@@ -54,14 +58,14 @@ class Furnace(BaseModel):
 
 
 class UniformBound(BaseModel):
-    """The largest uniform diffuse part a(lambda) that conserves energy at all angles, against the material's own."""
+    """The largest uniform diffuse part a(lambda) that conserves energy at all angles, and that of the material."""
 
     model_config = STRICT
 
     wavelength_nm: list[float]
     largest: Numbers
     preset: Numbers
-    keeps: bool = Field(description="whether the material's own is no larger at any wavelength")
+    keeps: bool = Field(description="true: the a(lambda) of the material is no larger at any wavelength")
 
 
 class ModelEnergy(BaseModel):
@@ -71,10 +75,10 @@ class ModelEnergy(BaseModel):
 
     theta_i_deg: list[float]
     wavelength_nm: list[float] | None = Field(description="null: grey")
-    albedo: list[Numbers] = Field(description="[theta_i][wavelength]; over the azimuths of the light the largest")
-    specular: list[Numbers] = Field(description="[theta_i][wavelength], the share of the specular part in it")
-    integration_error: float | None = Field(description="of the albedo, the largest estimate; null: not finite")
-    hemispherical: Numbers = Field(description="[wavelength], of light that is the same from everywhere")
+    albedo: list[Numbers] = Field(description="[theta_i][wavelength]; largest over the azimuths of the light")
+    specular: list[Numbers] = Field(description="[theta_i][wavelength], the specular part of the albedo")
+    integration_error: float | None = Field(description="largest estimated error of the albedo; null: not finite")
+    hemispherical: Numbers = Field(description="[wavelength], albedo in uniform light")
     max_albedo: float | None = Field(description="null: not finite")
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
@@ -82,7 +86,7 @@ class ModelEnergy(BaseModel):
     furnace: Furnace | None = Field(description="null: the model has no lossless parameters")
     bound_on_a: UniformBound | None = Field(description="null: the model has no such part")
     verdict: EnergyVerdict
-    reason: str = Field(description="how much, where; of a known excess the citation")
+    reason: str = Field(description="largest albedo and its angle; for a known excess the citation")
 
 
 class _Lights(NamedTuple):
@@ -93,9 +97,9 @@ class _Lights(NamedTuple):
 
 
 class _Reflected(NamedTuple):
-    """Albedos (theta_i, wavelengths): the largest and the mean over azimuths, with the specular part in them.
+    """Albedos [1], shape (theta_i, wavelengths): largest and mean over azimuths, specular part included.
 
-    `error` (theta_i, 1) is the largest over azimuths and wavelengths: the error of one light excuses no other.
+    `error` (theta_i, 1) is the largest error over azimuths and wavelengths. The error of one light excuses no other.
     """
 
     largest: Floats
@@ -114,44 +118,44 @@ def model_energy_of(
 ) -> ModelEnergy:
     """Return the energy of a material or a function, at wavelengths [nm] if it is spectral.
 
-    `known` is the excess that is known as published. `claim` is what a recipe says of an excess: it is repeated, and
-    excuses nothing. With `accept_excess` one that is not known is accepted.
+    `known` is the excess that is known as published. `claim` is the sentence of a recipe on an excess: the reason
+    quotes it, and it excuses nothing. With `accept_excess` an excess that is not known is accepted.
     """
     lights = _lights(source)
     furnace = _furnace(source, wavelength_nm, lights)
-    lights, found = _refined(source, wavelength_nm, lights, _reflected(source, wavelength_nm, lights))
-    theta, wavelength = _worst(found.largest)
-    first = _first_above_1(source, wavelength_nm, lights, found)
-    verdict, reason = _verdict(lights, found, furnace, known)
+    lights, reflected = _refined(source, wavelength_nm, lights, _reflected(source, wavelength_nm, lights))
+    theta, wavelength = _worst(reflected.largest)
+    first = _first_above_1(source, wavelength_nm, lights, reflected)
+    verdict, reason = _verdict(lights, reflected, furnace, known)
     if verdict == "violates" and first is not None:
-        reason += _explained(source, found, first, known, claim)
-        verdict = "accepted excess" if accept_excess and np.isfinite(found.largest).all() else verdict
+        reason += _explained(source, reflected, first, known, claim)
+        verdict = "accepted excess" if accept_excess and np.isfinite(reflected.largest).all() else verdict
     return ModelEnergy(
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
-        albedo=rows(found.largest, DIGITS),
-        specular=rows(found.specular, DIGITS),
-        integration_error=_finite(float(f"{found.error.max():.2g}")),
-        hemispherical=numbers(lights.weights @ found.mean, 4),
-        max_albedo=_finite(found.largest[theta, wavelength]),
+        albedo=rows(reflected.largest, DIGITS),
+        specular=rows(reflected.specular, DIGITS),
+        integration_error=_finite(float(f"{reflected.error.max():.2g}")),
+        hemispherical=numbers(lights.weights @ reflected.mean, 4),
+        max_albedo=_finite(reflected.largest[theta, wavelength]),
         max_at_theta_i_deg=float(lights.theta_i_deg[theta]),
         max_at_wavelength_nm=None if wavelength_nm is None else float(wavelength_nm[wavelength]),
         exceeds_1_from_theta_i_deg=first,
         furnace=furnace,
-        bound_on_a=_bound(source, wavelength_nm, lights, found),
+        bound_on_a=_bound(source, wavelength_nm, lights, reflected),
         verdict=verdict,
         reason=reason,
     )
 
 
 def _refined(
-    source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _Reflected
+    source: Source, wavelength_nm: Axis | None, lights: _Lights, reflected: _Reflected
 ) -> tuple[_Lights, _Reflected]:
-    """Return more lights around the largest albedo, half way to their neighbours: peaks lie between round angles."""
+    """Return lights and albedos with more lights around the largest albedo, because peaks lie between round angles."""
     for _ in range(ROUNDS):
-        worst, _ = _worst(found.largest)
+        worst, _ = _worst(reflected.largest)
         around = slice(max(worst - 1, 0), worst + 2)
-        if not np.ptp(found.largest[around].max(axis=1)) > FLAT:  # nan is not
+        if not np.ptp(reflected.largest[around].max(axis=1)) > FLAT:  # nan is not
             break
         beside = lights.theta_i_deg[around]
         between = np.round((beside[1:] + beside[:-1]) / 2.0, 4)
@@ -159,21 +163,21 @@ def _refined(
         order = np.argsort(np.concatenate([lights.theta_i_deg, between]))
         lights = _Lights(*(np.concatenate(pair)[order] for pair in zip(lights, more, strict=True)))
         new = _reflected(source, wavelength_nm, more)
-        found = _Reflected(*(np.concatenate(pair)[order] for pair in zip(found, new, strict=True)))
-    return lights, found
+        reflected = _Reflected(*(np.concatenate(pair)[order] for pair in zip(reflected, new, strict=True)))
+    return lights, reflected
 
 
-def _first_above_1(source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _Reflected) -> float | None:
-    """Return the angle [degree] above which an albedo exceeds 1: its crossing of 1 between two lights."""
+def _first_above_1(source: Source, wavelength_nm: Axis | None, lights: _Lights, reflected: _Reflected) -> float | None:
+    """Return the angle [degree] above which an albedo exceeds 1, or None. It lies between two lights."""
 
-    def excess(of: _Reflected) -> Axis:
-        return np.asarray(np.max(of.largest - of.error, axis=1) - 1.0 - ENERGY_TOLERANCE)
+    def excess(reflected: _Reflected) -> Axis:
+        return np.asarray(np.max(reflected.largest - reflected.error, axis=1) - 1.0 - ENERGY_TOLERANCE)
 
-    at = excess(found)
-    if not np.any(at > 0.0):
+    excesses = excess(reflected)
+    if not np.any(excesses > 0.0):
         return None
-    first = int(np.argmax(at > 0.0))
-    if first == 0 or not np.isfinite(at[first - 1]):
+    first = int(np.argmax(excesses > 0.0))
+    if first == 0 or not np.isfinite(excesses[first - 1]):
         return float(lights.theta_i_deg[first])
 
     def between(theta_i_deg: float) -> float:
@@ -182,15 +186,15 @@ def _first_above_1(source: Source, wavelength_nm: Axis | None, lights: _Lights, 
     return crossing(between, *lights.theta_i_deg[first - 1 : first + 1].tolist())
 
 
-def _explained(source: Source, found: _Reflected, first: float, known: KnownExcess | None, claim: str) -> str:
-    """Return a sentence on an excess that is not known as published: its origin, and what does not excuse it."""
-    most = float(np.max(np.where(np.isfinite(found.largest), found.largest, -np.inf)))
-    said = f"; this model does so by itself for such parameters: up to {most:.4g}, from {first:.4g} degrees"
+def _explained(source: Source, reflected: _Reflected, first: float, known: KnownExcess | None, claim: str) -> str:
+    """Return a clause on an excess that is not known as published: its origin, and the claim on it."""
+    most = float(np.max(np.where(np.isfinite(reflected.largest), reflected.largest, -np.inf)))
+    clause = f"; this model does so by itself for such parameters: up to {most:.4g}, from {first:.4g} degrees"
     if isinstance(source, Material) and source.spec.excess:
-        said += f" ({source.spec.excess})"
+        clause += f" ({source.spec.excess})"
     if known is not None:
-        return f"{said}; published are {known.max_albedo:.4g}, from {known.from_theta_i_deg:.4g} degrees"
-    return f"{said}; its recipe excuses it, which counts for nothing: {claim}" if claim else said
+        return f"{clause}; the paper has up to {known.max_albedo:.4g}, from {known.from_theta_i_deg:.4g} degrees"
+    return f"{clause}; its recipe excuses it, which is not accepted: {claim}" if claim else clause
 
 
 def _worst(albedo: Floats) -> tuple[int, int]:
@@ -205,24 +209,24 @@ def _finite(value: float) -> float | None:
 
 
 def _verdict(
-    lights: _Lights, found: _Reflected, furnace: Furnace | None, known: KnownExcess | None
+    lights: _Lights, reflected: _Reflected, furnace: Furnace | None, known: KnownExcess | None
 ) -> tuple[EnergyVerdict, str]:
-    theta_i_deg, certain = lights.theta_i_deg, found.largest - found.error
+    theta_i_deg, certain = lights.theta_i_deg, reflected.largest - reflected.error
     if not np.isfinite(certain).all():
         broken = theta_i_deg[~np.isfinite(certain).all(axis=1)]
         return "violates", f"the model reflects no finite share of what arrives at {broken[0]:g} degrees"
     if np.any(certain > 1.0 + ENERGY_TOLERANCE):
         beyond = np.max(certain, axis=1) - limit_of(known, theta_i_deg) - ENERGY_TOLERANCE
-        worst, _ = _worst(found.largest)
+        worst, _ = _worst(reflected.largest)
         if known is None or np.all(beyond <= 0.0):
-            share = f"{found.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
+            share = f"{reflected.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
             if known is not None:
                 return "known published excess", f"reflects {share}: {known.citation}"
             return "violates", f"the model reflects {share}"
         worst = int(np.argmax(beyond))
-        share = f"{found.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
+        share = f"{reflected.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
         return "violates", f"the model reflects {share}"
-    largest = f"reflects at most {np.max(found.largest):.4g} of what arrives"
+    largest = f"reflects at most {np.max(reflected.largest):.4g} of what arrives"
     if furnace is None:
         return "conserves", f"{largest}; no parameters make the model lossless"
     gains = ""
@@ -240,9 +244,9 @@ def _verdict(
 
 
 def _lights(source: Source) -> _Lights:
-    """Return the lights of a source; 90 degrees is one of them unless f_r has a pole there."""
+    """Return the lights of a source, 90 degrees included unless f_r has a pole at grazing."""
     x, weight = np.polynomial.legendre.leggauss(NODES)
-    nodes, weights = np.round(45.0 * (1.0 + x), 4), weight * (np.pi / 4.0)  # people read them
+    nodes, weights = np.round(45.0 * (1.0 + x), 4), weight * (np.pi / 4.0)  # rounded for the report
     others = np.array(THETA_I_DEG if source.grazing_pole else (*THETA_I_DEG, 90.0))
     theta_i_deg = np.concatenate([nodes, others])
     weights = np.concatenate([weights * np.sin(2.0 * radians(nodes)), np.zeros(others.size)])
@@ -251,7 +255,7 @@ def _lights(source: Source) -> _Lights:
 
 
 def _reflected(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> _Reflected:
-    """Return the albedos of a source for lights from all azimuths that matter."""
+    """Return the albedos [1] of a source for lights from all azimuths that differ."""
     theta_i = radians(lights.theta_i_deg)
     phi_i_deg, weights = np.zeros(1), np.ones(1)
     if source.anisotropic and source.elliptical:
@@ -259,34 +263,34 @@ def _reflected(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> _
     elif source.anisotropic:
         phi_i_deg, weights = _TURN_DEG, np.full(_TURN_DEG.size, 1.0 / _TURN_DEG.size)
     limits: dict[str, Any] = {"tolerance": TOLERANCE, "most_panels": MOST_PANELS}
-    found = [
+    albedos = [
         [source_albedo(source, float(theta), float(phi), wavelength_nm, **limits) for phi in radians(phi_i_deg)]
         for theta in theta_i
     ]
-    diffuse = np.array([[each.albedo for each in row] for row in found])
+    diffuse = np.array([[albedo.albedo for albedo in row] for row in albedos])
     specular = np.reshape(source.specular_reflectance(theta_i, wavelength_nm), (theta_i.size, -1))
     specular = np.broadcast_to(specular, diffuse[:, 0].shape)
     mean = np.einsum("tpw,p->tw", diffuse, weights) + specular
-    error = np.array([[max(float(each.error) for each in row)] for row in found])
+    error = np.array([[max(float(albedo.error) for albedo in row)] for row in albedos])
     return _Reflected(diffuse.max(axis=1) + specular, mean, specular, error)
 
 
 def _furnace(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> Furnace | None:
-    """Return the source with nothing absorbed, of many wavelengths at the first, the middle and the last."""
+    """Return the white furnace of a source, or None; at the first, the middle and the last wavelength."""
     lossless = source.lossless
     if lossless is None:
         return None
-    some = wavelength_nm
+    wavelengths = wavelength_nm
     if wavelength_nm is not None:
-        some = wavelength_nm[np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])]
-    found = _reflected(lossless.source, some, lights)
-    low, high = found.largest.min(axis=1), found.largest.max(axis=1)
+        wavelengths = wavelength_nm[np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])]
+    reflected = _reflected(lossless.source, wavelengths, lights)
+    low, high = reflected.largest.min(axis=1), reflected.largest.max(axis=1)
     return Furnace(
         lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.changes.items()),
         theta_i_deg=lights.theta_i_deg.tolist(),
-        wavelength_nm=None if some is None else some.tolist(),
-        albedo=rows(found.largest, DIGITS),
-        hemispherical=numbers(lights.weights @ found.mean, 4),
+        wavelength_nm=None if wavelengths is None else wavelengths.tolist(),
+        albedo=rows(reflected.largest, DIGITS),
+        hemispherical=numbers(lights.weights @ reflected.mean, 4),
         smallest=_finite(low.min()),
         smallest_at_theta_i_deg=float(lights.theta_i_deg[np.argmin(low)]),
         largest=_finite(high.max()),
@@ -294,10 +298,10 @@ def _furnace(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> Fur
     )
 
 
-def _bound(source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _Reflected) -> UniformBound | None:
-    """Return the largest albedo of a uniform part that only energy bounds; None of other models.
+def _bound(source: Source, wavelength_nm: Axis | None, lights: _Lights, reflected: _Reflected) -> UniformBound | None:
+    """Return the largest uniform part [1] that conserves energy; None unless the model leaves that part free.
 
-    With a uniform part of a, a surface reflects as much more than without it, at every light.
+    A uniform part a raises the albedo by a at every angle of the light.
     """
     if not isinstance(source, Material):
         return None
@@ -306,7 +310,9 @@ def _bound(source: Source, wavelength_nm: Axis | None, lights: _Lights, found: _
         return None
     a = float(source.parameters[spec.uniform])
     surfaces = {name: value for name, value in arguments.items() if name != spec.uniform}
-    largest = largest_uniform_beside(spec, radians(lights.theta_i_deg), found.largest - a, surfaces, BOUND_TOLERANCE)
+    largest = largest_uniform_beside(
+        spec, radians(lights.theta_i_deg), reflected.largest - a, surfaces, BOUND_TOLERANCE
+    )
     nm = np.ravel(arguments["wavelength_nm"])
     return UniformBound(
         wavelength_nm=nm.tolist(),

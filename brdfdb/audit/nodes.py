@@ -1,4 +1,4 @@
-"""The numbers that a table stores, against those that its model gives at the same nodes; and its refractive indices."""
+"""The stored numbers and refractive indices of a table, compared with those of its model at the same nodes."""
 
 from __future__ import annotations
 
@@ -15,32 +15,36 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import block, rounded, specular_nodes
 
-# Values of the model that are computed for the comparison. A table with more nodes is compared at some rows of its
-# first axis, evenly spread from the first to the last. A value of the facets' integral takes 30 us, others 0.2 us
+# Largest number of values of the model that are computed for the comparison. Tables with more nodes are compared at
+# some rows of their first axis, evenly spread. A value of the integral over facets takes 30 us, other values 0.2 us
 MOST_VALUES, _MOST_SLOW = 1 << 20, 1 << 15
-# Numbers are the same but for rounding: to the bits that are stored, and of float64 sums on another processor,
-# relative to the largest number of the table
+# Rounding error of float64 sums on another processor, relative to the largest number of the table. It is allowed beside
+# the rounding to the stored bits
 _ROUNDING = 1e-11
-# n, k and the uniform part are stored as float64, and computed from the same package or parameter
+# Relative tolerance of n, k and the uniform part, which are stored as float64
 SAME = 1e-9
 
 
 class Nodes(Finding):
-    """The numbers that a table stores, beside those that its source gives at the same nodes."""
+    """The stored numbers of a table, compared with those of its source at the same nodes."""
 
     key = "nodes"
     order = 4
     title = "Nodes"
     columns = ("nodes",)
-    explanation = "What is stored against what the model gives at the same nodes: the same but for rounding."
+    explanation = "Stored numbers are compared with those of the model at the same nodes. They differ by rounding only."
 
-    compared: int = Field(description="of the stored numbers; of large tables those of some rows of the first axis")
-    count: int = Field(description="of the stored numbers")
-    wrong: int = Field(description="of those compared, by more than rounding")
-    stored: float | None = Field(description="the number that is furthest off; null: none is, or it is not finite")
-    expected: float | None = Field(description="what the model gives in its place")
+    compared: int = Field(
+        description="number of stored numbers that were compared; large tables: some rows of the first axis"
+    )
+    count: int = Field(description="number of stored numbers")
+    wrong: int = Field(description="number of compared numbers that differ by more than rounding")
+    stored: float | None = Field(
+        description="the stored number with the largest difference; null: none is wrong, or it is not finite"
+    )
+    expected: float | None = Field(description="number of the model at that node")
     beside: list[str] = Field(
-        description="a sentence each on n, k and the uniform part, where they are not those of entry and parameters"
+        description="sentences on n, k, uniform part, specular part and stated error, where they are wrong"
     )
     verdict: Verdict
 
@@ -69,12 +73,12 @@ class Nodes(Finding):
 
 
 def nodes_of(table: Table, source: Source) -> Nodes:
-    """Return how many stored numbers are those of the model, and the one that is furthest off.
+    """Return the number of stored numbers that are not those of the model, and the one with the largest difference.
 
     Raises
     ------
     ValueError
-        If the table is not laid out as one of its source can be.
+        If no layout of the source has the shape of the table.
     """
     bits = int(table.attrs.get("bits", 23))
     layout = Layout(
@@ -94,18 +98,18 @@ def nodes_of(table: Table, source: Source) -> Nodes:
             layout.shape,
         )
     rows, wrong, worst = 0, 0, (0.0, 0.0, 0.0)
-    for some in _rows(layout):
-        stored, expected = table.values[some].astype(np.float64), block(layout, some).astype(np.float64)
-        rows += some.stop - some.start
+    for span in _rows(layout):
+        stored, expected = table.values[span].astype(np.float64), block(layout, span).astype(np.float64)
+        rows += span.stop - span.start
         off, allowed = np.abs(stored - expected), 2.0**-bits * np.abs(expected)
         off = np.where(np.isfinite(off) | (stored == expected), off, np.inf)
         excess = off - allowed * (1.0 + _ROUNDING) - _ROUNDING * np.max(np.abs(expected))
-        beyond = (excess > 0.0) | (rounded(table.values[some], bits) != table.values[some])
+        beyond = (excess > 0.0) | (rounded(table.values[span], bits) != table.values[span])
         wrong += int(np.count_nonzero(beyond))
         if beyond.any() and (largest := float(np.max(excess, where=beyond, initial=-np.inf))) > worst[0]:
             at = np.unravel_index(int(np.argmax(np.where(beyond, excess, -np.inf))), excess.shape)
             worst = largest, float(stored[at]), float(expected[at])
-    beside = [*_refraction(table, source), *_uniform(table, layout), *_dirac(table, layout), *_unstated(table)]
+    beside = [*_refraction(table, source), *_uniform(table, layout), *_specular(table, layout), *_unstated(table)]
     return Nodes(
         compared=rows * (table.values.size // table.values.shape[0]),
         count=table.values.size,
@@ -118,7 +122,7 @@ def nodes_of(table: Table, source: Source) -> Nodes:
 
 
 def _rows(layout: Layout) -> Iterator[slice]:
-    """Yield slices of the first axis: all rows, or as many single ones as `MOST_VALUES` allows."""
+    """Yield slices of the first axis: all rows, or as many single rows as `MOST_VALUES` allows."""
     wavelengths = 1 if layout.wavelength_nm is None else layout.wavelength_nm.size
     slow = isinstance(layout.source, Material) and layout.source.spec.slow
     most = (_MOST_SLOW if slow else MOST_VALUES) // (int(np.prod(layout.grid.shape[1:])) * wavelengths)
@@ -130,7 +134,7 @@ def _rows(layout: Layout) -> Iterator[slice]:
 
 
 def _refraction(table: Table, source: Source) -> Iterator[str]:
-    """Yield a sentence on each of n and k that is not that of the entry; tables in memory may store neither."""
+    """Yield a sentence on each of n and k that differs from the entry. Tables in memory may store neither."""
     indices = source.refractive_indices(table.wavelength_nm)
     if indices is None or table.wavelength_nm is None:
         return
@@ -155,14 +159,14 @@ def _refraction(table: Table, source: Source) -> Iterator[str]:
 
 
 def _uniform(table: Table, layout: Layout) -> Iterator[str]:
-    """Yield a sentence on the part of f_r [1/sr] that is the same in all directions, if it is not the parameter's."""
+    """Yield a sentence on the uniform part of f_r [1/sr] if it is not that of the parameters."""
     expected = 0.0 if layout.uniform is None else float(layout.uniform[0])
     stored = np.zeros(1) if table.uniform is None else table.uniform
     if not np.all(np.abs(stored - expected) <= SAME * max(expected, FLOOR / np.pi)):
         yield f"the uniform part is stored as {float(np.ravel(stored)[0]):.5g} 1/sr, the parameters make {expected:.5g}"
 
 
-def _dirac(table: Table, layout: Layout) -> Iterator[str]:
+def _specular(table: Table, layout: Layout) -> Iterator[str]:
     """Yield a sentence on a specular part that is missing, or whose nodes are not those of the layout."""
     if not layout.source.has_specular:
         return

@@ -1,4 +1,4 @@
-"""Pairs of directions at which a table and its model are looked at, with light and viewer exchanged, too."""
+"""Pairs of directions at which a table and its model are evaluated, also with light and viewer exchanged."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.error_measurement import Draw
 from brdfdb.tables.table import Table
 
-SEED = 1967  # not that of a build or a planner: their directions have been looked at
-# Directions per band of theta_i, half of them in the lobe. Tables of many wavelengths, which vary
-# alike, use fewer
+SEED = 1967  # differs from the seeds of build and planner, which the table was fitted to
+# Directions per band of theta_i, half of them in the lobe. Tables with more than `_FEW` wavelengths use fewer, because
+# their wavelengths vary alike
 DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
 
 
 class Pairs(NamedTuple):
-    """f_r [1/sr] at pairs of directions, all of shape (N, L): of light and viewer, and of the two exchanged.
+    """f_r [1/sr] of table and model at pairs of directions, shape (N, L), and with light and viewer exchanged.
 
     Where the source of a table is not known, `model` and `model_exchanged` are those of the table itself.
     """
@@ -31,16 +31,18 @@ class Pairs(NamedTuple):
 
 
 def pairs_of(table: Table, source: Source | None) -> Pairs:
-    """Look up a table, and evaluate its source if it is known, at all wavelengths of the table."""
+    """Return f_r [1/sr] of a table, and of its source if it is known, at all wavelengths of the table."""
     count = DIRECTIONS if wavelengths_of(table) <= _FEW else _FEWER_DIRECTIONS
     drawn = error_measurement.draw(table.source if source is None else source, table.wavelength_nm, count, SEED)
     shape = (len(drawn.wi), wavelengths_of(table))
     both = ((drawn.wi, drawn.wr), (drawn.wr, drawn.wi))
-    looked_up = [table.lookup_vectors(*each).reshape(shape) for each in both]
+    looked_up = [table.lookup_vectors(*directions).reshape(shape) for directions in both]
     if source is None:
         return Pairs(drawn, *looked_up, *looked_up)
     return Pairs(
-        drawn, *looked_up, *(error_measurement.model_values(source, table.wavelength_nm, *each) for each in both)
+        drawn,
+        *looked_up,
+        *(error_measurement.model_values(source, table.wavelength_nm, *directions) for directions in both),
     )
 
 

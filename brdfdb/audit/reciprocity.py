@@ -1,4 +1,4 @@
-"""Reciprocity of a model at the parameters of a table, and of the table: light and viewer exchanged."""
+"""Reciprocity of a table and of its model: f_r compared with f_r with light and viewer exchanged."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.table import Table
 
-# The models are reciprocal up to rounding, which is worst where exp(-V) has a large exponent: measured 3e-13
+# Tolerance of the asymmetry of a model [1]. Rounding is worst where exp(-V) has a large exponent: measured 3e-13
 MODEL_RECIPROCITY_TOLERANCE = 1e-11
-# float32 rounds two values that differ by that to the same number or to neighbours, 6e-8 apart: measured 0
+# Tolerance of the asymmetry of stored values [1]. float32 rounds values that differ by the tolerance of the model to
+# the same number or to neighbours, 6e-8 apart: measured 0
 TABLE_RECIPROCITY_TOLERANCE = 1e-6
-# Sums of the same numbers in another order, of f_r with the offset of its logarithm: measured 1.6e-14. Where the pole
-# at the horizon is taken out, the offset is divided by the cosines as f_r is
+# Tolerance of the asymmetry of lookups [1], after the offset of the logarithm is added to f_r. The same numbers are
+# summed in another order: measured 1.6e-14. If the pole at the horizon is taken out, the offset is divided by the
+# cosines, as f_r is
 LOOKUP_RECIPROCITY_TOLERANCE = 5e-14
-_TINY = 1e-270  # 1/sr; smaller values carry too few digits
+_TINY = 1e-270  # value [1/sr] below which f_r carries too few digits
 
 
 class Asymmetry(BaseModel):
-    """abs(f - f') / (abs(f) + abs(f')) over pairs of directions, f' with light and viewer exchanged."""
+    """The asymmetry abs(f - f') / (abs(f) + abs(f')) over pairs of directions; f' has light and viewer exchanged."""
 
     model_config = STRICT
 
@@ -34,13 +36,15 @@ class Asymmetry(BaseModel):
     min: float
     mean: float
     max: float
-    tolerance: float | None = Field(description="of max; null: not judged, the two are interpolated from other nodes")
+    tolerance: float | None = Field(
+        description="largest allowed max; null: not judged, because f and f' are interpolated from different nodes"
+    )
 
 
 class Reciprocity(Finding):
     """Asymmetry of the model at the parameters of the table, and of the table.
 
-    Tables are looked up; to values that are interpolated in logarithms the offset of the logarithms is added.
+    Values of the table are looked up. If they are interpolated in logarithms, the offset of the logarithms is added.
     """
 
     key = "reciprocity"
@@ -49,15 +53,17 @@ class Reciprocity(Finding):
     columns = ("reciprocity",)
     explanation = (
         "Asymmetry is |f − f′| / (|f| + |f′|), where f′ has light and viewer exchanged. 0 is reciprocal "
-        "(Helmholtz), 1 as far from it as can be."
+        "(Helmholtz), 1 is the largest possible asymmetry."
     )
 
     model_random: Asymmetry | None = Field(description="viewers over the hemisphere; null: the source is not known")
-    model_lobe: Asymmetry | None = Field(description="viewers in the lobe and on its shoulder; null: it has none")
+    model_lobe: Asymmetry | None = Field(
+        description="viewers in the lobe and on its shoulder; null: the model has no lobe"
+    )
     table_random: Asymmetry
     table_lobe: Asymmetry | None
     table_nodes: Asymmetry | None = Field(
-        description="over every pair that the grid holds both ways round; null: half and difference vectors hold none"
+        description="over all pairs of nodes that the grid also holds exchanged; null: half and difference vectors"
     )
     verdict: Verdict
 
@@ -74,9 +80,11 @@ class Reciprocity(Finding):
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the largest asymmetry of those that are judged."""
-        judged = [(each.max, each.tolerance) for _, each in self.named() if each.tolerance is not None]
+        judged = [
+            (asymmetry.max, asymmetry.tolerance) for _, asymmetry in self.named() if asymmetry.tolerance is not None
+        ]
         if not judged:
-            text = "light and viewer have different nodes, so that what is looked up need not be symmetric"
+            text = "light and viewer have different nodes, so that lookups need not be symmetric"
             return [self.sentence(self.verdict, text)]
         most, allowed = max(judged, key=lambda pair: (pair[0] > pair[1], pair[0]))
         text = f"asymmetry up to {number(most)}, of {number(allowed)} allowed"
@@ -84,14 +92,18 @@ class Reciprocity(Finding):
 
     def cells(self) -> list[Cell]:
         """Return the largest asymmetry."""
-        largest = max(each.max for _, each in self.named())
+        largest = max(asymmetry.max for _, asymmetry in self.named())
         return [Cell(self.verdict, number(largest, 2), largest)]
 
     def tables(self) -> list[NumberTable]:
         """Return the asymmetry of each set of pairs."""
         rows = [
-            (name, str(each.pairs), *(number(value, 2) for value in (each.min, each.mean, each.max, each.tolerance)))
-            for name, each in self.named()
+            (
+                name,
+                str(asymmetry.pairs),
+                *(number(value, 2) for value in (asymmetry.min, asymmetry.mean, asymmetry.max, asymmetry.tolerance)),
+            )
+            for name, asymmetry in self.named()
         ]
         return [NumberTable("Asymmetry", ("of", "pairs", "smallest", "mean", "largest", "allowed"), rows)]
 
@@ -104,18 +116,18 @@ class Reciprocity(Finding):
             ("table, in the lobe", self.table_lobe),
             ("table, its nodes", self.table_nodes),
         )
-        return [(name, each) for name, each in named if each is not None]
+        return [(name, asymmetry) for name, asymmetry in named if asymmetry is not None]
 
 
 def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
     """Return the asymmetry of random pairs, of pairs in the lobe, and of all pairs of nodes."""
     above, in_lobe = pairs.drawn.above, pairs.drawn.in_lobe
-    how = table.interpolation
+    interpolation = table.interpolation
     mu = np.maximum(pairs.drawn.wi[:, 2:] * pairs.drawn.wr[:, 2:], COS_HORIZON**2)
-    offset = how.offset / mu**how.power  # of f_r far below it, rounding alone is left
+    offset = interpolation.offset / mu**interpolation.power  # f_r far below the offset is rounding only
     looked_up = (pairs.table + offset, pairs.table_exchanged + offset, _interpolant_tolerance(table.grid))
     model = (pairs.model, pairs.model_exchanged, MODEL_RECIPROCITY_TOLERANCE)
-    found = Reciprocity(
+    asymmetries = Reciprocity(
         model_random=_over(above & ~in_lobe, *model),
         model_lobe=_over(above & in_lobe, *model) if in_lobe.any() else None,
         table_random=_over(above & ~in_lobe, *looked_up),
@@ -123,7 +135,7 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
         table_nodes=None if table.grid.half_difference else _node_asymmetry(table),
         verdict="passes",
     )
-    return found.judged()
+    return asymmetries.judged()
 
 
 def _interpolant_tolerance(grid: Grid) -> float | None:
@@ -137,7 +149,7 @@ def _interpolant_tolerance(grid: Grid) -> float | None:
 
 
 def _node_asymmetry(table: Table) -> Asymmetry:
-    """Return the asymmetry of all stored values, so that a single wrong one is found."""
+    """Return the asymmetry [1] of all stored values, so that a single wrong value is noticed."""
     axes = table.axes_deg
     _, i, r = np.intersect1d(axes["theta_i"], axes["theta_r"], return_indices=True)
     if table.anisotropic:
@@ -145,7 +157,7 @@ def _node_asymmetry(table: Table) -> Asymmetry:
         f = table.brdf[np.ix_(i, phi_i, r, phi_r)]
         exchanged = np.moveaxis(f, (0, 1), (2, 3))
     else:
-        f = table.brdf[np.ix_(i, r)]  # exchanging them turns delta_phi to -delta_phi, where the table is the same
+        f = table.brdf[np.ix_(i, r)]  # the exchange turns delta_phi to -delta_phi, where the table is the same
         exchanged = np.swapaxes(f, 0, 1)
     width = wavelengths_of(table)
     return _asymmetry(f.reshape(-1, width), exchanged.reshape(-1, width), TABLE_RECIPROCITY_TOLERANCE)
@@ -157,7 +169,7 @@ def _over(chosen: NDArray[np.bool_], f: Floats, exchanged: Floats, tolerance: fl
 
 def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmetry:
     """Return the asymmetry of values of shape (pairs, wavelengths)."""
-    differs = f != exchanged  # nan does; hardly any other node, which saves the time of the rest
+    differs = f != exchanged  # True for nan. Few nodes differ, and only they are computed
     one, other = f[differs].astype(np.float64), exchanged[differs].astype(np.float64)
     with np.errstate(invalid="ignore"):  # what is not finite counts as 1
         relative = np.abs(one - other) / (np.abs(one) + np.abs(other) + _TINY)

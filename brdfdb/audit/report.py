@@ -10,27 +10,27 @@ from pydantic import BaseModel, BeforeValidator, Field, GetJsonSchemaHandler, Se
 from pydantic_core import CoreSchema
 
 from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, Verdict
-from brdfdb.audit.findings import FINDINGS
+from brdfdb.audit.registry import FINDINGS
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
 
 
-def _read(found: Any) -> Any:
-    """Return findings as objects, from those of a JSON document."""
-    if not isinstance(found, Mapping):
-        return found
-    if unknown := [key for key in found if key not in FINDINGS]:
+def _read(findings: Any) -> Any:
+    """Return findings as objects, from objects or a JSON document."""
+    if not isinstance(findings, Mapping):
+        return findings
+    if unknown := [key for key in findings if key not in FINDINGS]:
         raise ParameterError("findings", f"{unknown[0]!r} is not one of {', '.join(FINDINGS)}")
-    return {key: each if isinstance(each, Finding) else _one(key, each) for key, each in found.items()}
+    return {key: value if isinstance(value, Finding) else _finding(key, value) for key, value in findings.items()}
 
 
-def _one(key: str, found: Any) -> Finding:
-    judged = not (isinstance(found, Mapping) and found.get("verdict") == "not judged")
-    return (FINDINGS[key] if judged else NotJudged).model_validate(found)
+def _finding(key: str, value: Any) -> Finding:
+    judged = not (isinstance(value, Mapping) and value.get("verdict") == "not judged")
+    return (FINDINGS[key] if judged else NotJudged).model_validate(value)
 
 
 class _Registered:
-    """The JSON schema of findings: each of the registry, or that it is not judged."""
+    """The JSON schema of findings: for each kind of the registry, the finding or `NotJudged`."""
 
     @classmethod
     def __get_pydantic_json_schema__(cls, _: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -52,9 +52,11 @@ class MaterialAudit(BaseModel):
     material: str
     revision: str
     model: str = Field(description="name of the model behind the table; empty: the table was audited alone")
-    findings: Findings = Field(description="by key; the report says what each is about")
-    sentences: list[Sentence] = Field(description="all findings in words, for readers without this library")
-    verdict: Verdict = Field(description="worst of the findings; validity, and what is not judged, do not count")
+    findings: Findings = Field(description="by key; the report explains each of them")
+    sentences: list[Sentence] = Field(description="all findings in words, for programs without this library")
+    verdict: Verdict = Field(
+        description="worst of the findings. Validity, and findings that are not judged, do not count"
+    )
 
     def of(self, kind: type[F]) -> F:
         """Return the finding of one kind.
@@ -64,23 +66,23 @@ class MaterialAudit(BaseModel):
         LookupError
             If it is not judged.
         """
-        found = self.findings[kind.key]
-        if not isinstance(found, kind):
+        finding = self.findings[kind.key]
+        if not isinstance(finding, kind):
             raise LookupError(f"{kind.key} of {self.material} is not judged")
-        return found
+        return finding
 
     def problems(self) -> list[str]:
-        """Return a sentence on each finding that is no plain pass."""
-        return [sentence for found in self.findings.values() for sentence in found.problems()]
+        """Return sentences on the findings that are not a plain pass."""
+        return [sentence for finding in self.findings.values() for sentence in finding.problems()]
 
     @property
     def not_judged(self) -> list[str]:
         """Return the titles of the findings that are not judged."""
-        return [FINDINGS[key].title for key, found in self.findings.items() if isinstance(found, NotJudged)]
+        return [FINDINGS[key].title for key, finding in self.findings.items() if isinstance(finding, NotJudged)]
 
 
 class Explanation(BaseModel):
-    """What one finding of the report is about."""
+    """The explanation of one finding of the report."""
 
     model_config = STRICT
 
@@ -101,14 +103,16 @@ class AuditReport(BaseModel):
 
     format: Literal["brdfdb-audit"] = "brdfdb-audit"
     version: Literal[5] = 5
-    store: str = Field(description="its directory")
+    store: str = Field(description="directory of the store")
     brdfdb: str = Field(description="version of the library")
     when: datetime
-    explanations: list[Explanation] = Field(description="each finding, in the order of the findings")
+    explanations: list[Explanation] = Field(description="explanations of the findings, in their order")
     materials: list[MaterialAudit]
-    atlas: list[Figure] = Field(description="where methods fail: forms of the models against high-precision values")
+    atlas: list[Figure] = Field(
+        description="figures on the failures of methods: forms of the models compared with high-precision values"
+    )
     gallery: list[Figure] = Field(description="the figures of the papers, computed")
-    damaged: list[str] = Field(description="a sentence on each table that is damaged, and was not audited")
+    damaged: list[str] = Field(description="a sentence on each damaged table, which was not audited")
     violations: list[str] = Field(
-        description="names of the materials that violate something that is neither known as published nor accepted"
+        description="names of the materials with a violation that is neither known as published nor accepted"
     )

@@ -1,4 +1,4 @@
-"""The sampler of the model behind a table: its histogram against its density, its weights against the albedo."""
+"""The sampler of the model behind a table: histogram compared with density, weights compared with the albedo."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from brdfdb.materials import Material
 from brdfdb.parameters import ModelSpec
 from brdfdb.tables.table import Table
 
-SAMPLES = 100_000  # for each light
-FEWER_SAMPLES = 4000  # of a model whose values are integrals
+SAMPLES = 100_000  # number of samples for each light
+FEWER_SAMPLES = 4000  # number of samples if the values of the model are integrals
 THETA_I_DEG, PHI_I_DEG = (10.0, 45.0, 80.0), 30.0
-LEAST_CHANCE = 1e-6  # below this p, samples are not those of the density
-STANDARD_ERRORS = 6.0  # chance makes one difference of 500 million as large
-_ROUNDING = 1e-12  # of a mean of weights that are all the same
+LEAST_CHANCE = 1e-6  # smallest p of a sound sampler
+STANDARD_ERRORS = 6.0  # allowed difference of the albedos, in standard errors; chance exceeds it once in 500 million
+_ROUNDING = 1e-12  # rounding error of a mean of equal weights
 _ALBEDO_TOLERANCE = 1e-6
-_ENOUGH = 10.0  # samples that are expected in a bin
-# Bins of half vectors: of t, the slope in widths of the lobe, tenths of its distribution, and half octaves beyond them;
-# and of the azimuth on its ellipse
+_ENOUGH = 10.0  # smallest expected number of samples in a bin
+# Edges of the bins of half vectors. t is the slope in widths of the lobe: its bins are tenths of the distribution, then
+# half octaves. psi is the azimuth on the ellipse of the lobe
 _TENTHS = 1.0 - np.arange(10) / 10.0
 _HALF_OCTAVES = 2.0 ** (np.arange(1, 33) / 2.0)
 _PSI_EDGES = np.linspace(-np.pi, np.pi, 13)
-_NODES = 12  # of Gauss's rule, along each side of a bin
+_NODES = 12  # number of Gauss nodes along each side of a bin
 
 Array = NDArray[np.float64]
 
@@ -47,11 +47,11 @@ class Sampling(Finding):
     title = "Sampling"
     columns = ("sampling",)
     explanation = (
-        "p is the chance of a histogram worse than that of the samples if their density is what the model says. The "
-        "weight of a sample is f_r cos theta_r over that density."
+        "p is the probability that samples with the density of the model have a worse histogram. The weight of a "
+        "sample is f_r cos theta_r over that density."
     )
 
-    samples: int = Field(description="of each light")
+    samples: int = Field(description="number of samples for each light")
     theta_i_deg: list[float]
     phi_i_deg: float
     wavelength_nm: float | None
@@ -59,7 +59,7 @@ class Sampling(Finding):
     largest_weight: Numbers
     weight_spread: Numbers = Field(description="standard deviation of the weights over their mean")
     monte_carlo: Numbers = Field(description="albedo without the specular part")
-    monte_carlo_error: Numbers = Field(description="its standard error")
+    monte_carlo_error: Numbers = Field(description="standard error of the sampled albedo")
     quadrature: Numbers
     verdict: Verdict
 
@@ -77,7 +77,7 @@ class Sampling(Finding):
         else:
             text = f"the smallest p of {len(self.theta_i_deg)} lights is {_probability(self._smallest)}"
         if self.verdict == "violates":
-            text = f"samples of the model do not have the density or the albedo that they should; {text}"
+            text = f"samples of the model have a wrong density or a wrong albedo; {text}"
         return [self.sentence(self.verdict, text)]
 
     def cells(self) -> list[Cell]:
@@ -93,7 +93,7 @@ class Sampling(Finding):
             for theta, p, *rest in zip(self.theta_i_deg, self.chi_square_p, *columns, strict=True)
         ]
         at = "" if self.wavelength_nm is None else f" at {self.wavelength_nm:g} nm"
-        caption = f"Sampling: {self.samples} samples of each light{at}"
+        caption = f"Sampling: {self.samples} samples for each light{at}"
         headings = ("light", "p", "largest weight", "spread", "diffuse albedo, sampled", "standard error", "integrated")
         return [NumberTable(caption, headings, rows)]
 
@@ -103,7 +103,7 @@ class Sampling(Finding):
 
 
 def _probability(value: float | None) -> str:
-    """Return a probability for people, without digits that mean nothing."""
+    """Return a probability as text, without digits that carry no information."""
     if value is None:
         return "–"
     return "below 0.001" if value < 0.001 else f"{value:.3f}"
@@ -122,19 +122,19 @@ class _Light(NamedTuple):
 
 
 def sampling_of(table: Table, material: Material) -> Sampling:
-    """Draw for each light, at the wavelength in the middle of those of the table."""
+    """Return the finding on samples for each light, at the middle wavelength of the table."""
     wavelength = representative_nm(table)
     count = min(SAMPLES, FEWER_SAMPLES) if material.spec.slow else SAMPLES
     arguments = material.arguments(wavelength)
-    found = [_light(material.spec, arguments, theta, count) for theta in THETA_I_DEG]
-    columns = {name: numbers([getattr(light, name) for light in found]) for name in _Light._fields if name != "good"}
+    lights = [_light(material.spec, arguments, theta, count) for theta in THETA_I_DEG]
+    columns = {name: numbers([getattr(light, name) for light in lights]) for name in _Light._fields if name != "good"}
     return Sampling(
         samples=count,
         theta_i_deg=list(THETA_I_DEG),
         phi_i_deg=PHI_I_DEG,
         wavelength_nm=wavelength,
         **columns,
-        verdict="passes" if all(light.good for light in found) else "violates",
+        verdict="passes" if all(light.good for light in lights) else "violates",
     )
 
 
@@ -161,18 +161,19 @@ def _light(spec: ModelSpec, arguments: Mapping[str, Any], theta_i_deg: float, co
 
 
 def _chance(wr: Array, wi: Array, lobe: Lobe) -> float:
-    """Return the p [1] of directions by Pearson's chi-square, in bins of their half vectors and one for all others.
+    """Return the p [1] of directions by Pearson's chi-square test, in bins of their half vectors.
 
-    Bins are in slopes in units of the lobe, so that they are as fine as the density needs, however narrow it is.
+    Bins are in slopes in units of the lobe, so that they are fine enough for a narrow lobe, too. One bin holds all
+    other directions.
     """
     alpha = np.array([lobe.alpha_x, lobe.alpha_y], dtype=np.float64)
     h = wr + wi
     s = h[:, :2] / h[:, 2:] / alpha
     t, psi = np.hypot(s[:, 0], s[:, 1]), np.arctan2(s[:, 1], s[:, 0])
     t_edges = _t_edges(lobe)
-    found, _, _ = np.histogram2d(t, psi, bins=(t_edges, _PSI_EDGES))
+    counts, _, _ = np.histogram2d(t, psi, bins=(t_edges, _PSI_EDGES))
     expected = len(wr) * _shares(wi, lobe, alpha, t_edges)
-    observed, wanted = _pooled(np.append(found, len(wr) - found.sum()), np.append(expected, len(wr) - expected.sum()))
+    observed, wanted = _pooled(np.append(counts, len(wr) - counts.sum()), np.append(expected, len(wr) - expected.sum()))
     chi_square = float(np.sum((observed - wanted) ** 2 / wanted))
     return float(mpmath.gammainc((len(wanted) - 1) / 2.0, chi_square / 2.0, regularized=True))
 
@@ -205,7 +206,7 @@ def _gauss(edges: Array) -> tuple[Array, Array]:
 
 
 def _pooled(observed: Array, expected: Array) -> tuple[Array, Array]:
-    """Return the bins from the fullest on. Bins with few expected samples are merged with the emptiest other."""
+    """Return the bins, the fullest first. Bins with few expected samples are merged into the last one."""
     order = np.argsort(expected)[::-1]
     last = max(int(np.count_nonzero(expected >= _ENOUGH)) - 1, 0)
     starts = np.arange(last + 1)

@@ -1,4 +1,4 @@
-"""Jumps of f_r: of the model where it changes its formula, of the table across the seams of its grid."""
+"""Jumps of f_r: those of the model where its formula changes, and those of the table across the seams of its grid."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
 
-# Rounding of directions, times how steep a lobe is, measured 1e-12; the table of He-Torrance's sum is to 1e-11
+# Tolerance of a jump of a model [1]: the rounding of directions times the slope of a lobe, measured 1e-12, and the
+# error of the table of He-Torrance's sum, 1e-11
 MODEL_TOLERANCE = 2e-11
-# Nodes that stand for one direction, at a pole or both ends of a turn, are rounded to float32 one by one. A table may
-# jump there by the error that it states of the band, up to this
+# Tolerance of a jump of a table without stated error [1]: nodes for the same direction, at a pole or at both ends of a
+# turn, are rounded to float32 one by one. Other tables may jump by the stated error of the band, up to _MOST_ERROR
 TABLE_TOLERANCE, _MOST_ERROR = 1e-6, 0.5
-_STEP = 1e-9  # [rad]
+_STEP = 1e-9  # distance [rad] of the points next to a seam
 _BESIDE = _STEP * np.array([-2.0, -1.0, 1.0, 2.0])
-_TINY = 1e-30  # 1/sr; smaller values are exponentials of numbers so large that they have lost digits
-_LOWEST = 1e-3  # cosine of the lowest directions that are looked at
+_TINY = 1e-30  # value [1/sr] below which exponentials of large numbers carry too few digits
+_LOWEST = 1e-3  # cosine of the lowest directions that are examined
 _SEED = 1992
-_NODES = 200  # crossings of nodes on each axis
-_ROW = 64  # long enough that values along it come from a table
+_NODES = 200  # number of crossings of nodes on each axis
+_ROW = 64  # length of a row; its values are then read from the table of the sum
 
 Array = NDArray[np.float64]
 Function = Callable[[Array, Array], Floats]
@@ -44,10 +45,10 @@ _NONE = np.zeros(1)
 
 
 class _Seam(NamedTuple):
-    """Directions on a seam, shape (N, 4), and which of the four angles crosses it.
+    """Directions on a seam, shape (N, 4), and the index of the angle that crosses it.
 
-    The angles are those of light and viewer, theta_i, phi_i, theta_r and phi_r, or of half and difference vector. Past
-    the pole a theta is negative: it looks the other way.
+    The angles are theta_i, phi_i, theta_r and phi_r, or those of half and difference vector. Past the pole a theta is
+    negative: the direction is on the other side of the normal.
     """
 
     name: str
@@ -57,19 +58,19 @@ class _Seam(NamedTuple):
 
 
 class Jump(BaseModel):
-    """How far f_r jumps across a seam, relative to its value there, or to the floor of the error of a table.
+    """The largest jump of f_r across a seam, relative to its value there, or to the floor of the error of a table.
 
-    It is the crossing that jumps most for what is allowed there. A slope is no jump: the value on either side is that
-    of the line through two points next to the seam.
+    The largest jump is the one with the largest ratio to its tolerance. A slope is no jump: the value on either side is
+    extrapolated from two points next to the seam.
     """
 
     model_config = STRICT
 
-    seam: str = Field(description="what is crossed")
+    seam: str = Field(description="name of the seam")
     crossings: int
     largest: float
-    where: str = Field(description="of the largest: the directions in degrees, and the wavelength")
-    tolerance: float = Field(description="there; of a table the error that it states of the band of theta_i")
+    where: str = Field(description="directions [degree] and wavelength of the largest jump")
+    tolerance: float = Field(description="allowed jump there; for a table the stated error of the band of theta_i")
 
 
 class Smoothness(Finding):
@@ -80,8 +81,8 @@ class Smoothness(Finding):
     title = "Smoothness"
     columns = ("smoothness",)
     explanation = (
-        "How far f_r jumps where the model changes its formula, and where the table may jump: at its nodes, at the "
-        "poles and at both ends of a turn. A table may jump by the error that it states."
+        "The jumps of f_r where the formula of the model changes, and at the seams of the table: its nodes, the poles, "
+        "and both ends of a turn of azimuth. A table may jump by its stated error."
     )
 
     model: list[Jump] = Field(description="empty: the source is not known")
@@ -94,8 +95,8 @@ class Smoothness(Finding):
         return smoothness_of(subject.table, subject.source, subject.pairs)
 
     def sentences(self) -> list[Sentence]:
-        """Return a sentence on the largest jump: of those that are too large, if there are any."""
-        name, jump = max(self._named(), key=lambda each: (each[1].largest > each[1].tolerance, each[1].largest))
+        """Return a sentence on the largest jump, or on the largest of those that are too large."""
+        name, jump = max(self._named(), key=lambda item: (item[1].largest > item[1].tolerance, item[1].largest))
         text = (
             f"the {name} jumps by {number(jump.largest)} of f_r across {jump.seam}, of {number(jump.tolerance)} allowed"
         )
@@ -119,19 +120,18 @@ class Smoothness(Finding):
 
 
 def smoothness_of(table: Table, source: Source | None, pairs: Pairs) -> Smoothness:
-    """Return the jumps of the model, if it is known, at all wavelengths of a table, and of the table.
+    """Return the jumps of a table, and of its source if it is known, at all wavelengths of the table.
 
-    A table may jump by the 99th percentile of the error that it states of the band of theta_i and the wavelength. A
-    seam near the horizon of the viewer is judged by the band of the viewer, as if light and viewer were exchanged.
+    A table may jump by the stated 99th percentile of the error in the band of theta_i at the wavelength. If theta_r is
+    larger than theta_i, the band of theta_r counts, as if light and viewer were exchanged.
     """
     wavelengths = table.wavelength_nm
 
     def looked_up(wi: Array, wr: Array) -> Floats:
         return table.lookup_vectors(wi, wr).reshape(len(wi), wavelengths_of(table))
 
-    floor = (
-        error_measurement.floor_of(pairs.model, pairs.drawn) + _TINY
-    )  # far below it tables may be anything, as they may err
+    # Jumps are relative to the floor of the error where f_r is below it
+    floor = error_measurement.floor_of(pairs.model, pairs.drawn) + _TINY
     of_model = [] if source is None else _jumps_of_model(source, wavelengths, np.full_like(floor, _TINY))
     of_table = [
         _jump(seam, looked_up, wavelengths, floor, partial(_stated, table.error)) for seam in _crossed(_of_table(table))
@@ -184,7 +184,9 @@ def _of_table(table: Table) -> Iterator[_Seam]:
     rng = np.random.default_rng(_SEED)
     columns = _columns(table)
     for axis, (name, nodes) in enumerate(table.axes_deg.items()):
-        on = np.stack([radians(rng.uniform(0.0, each[-1], _NODES)) for each in table.axes_deg.values()], axis=1)
+        on = np.stack(
+            [radians(rng.uniform(0.0, axis_nodes[-1], _NODES)) for axis_nodes in table.axes_deg.values()], axis=1
+        )
         on[:, axis] = radians(rng.choice(nodes, _NODES))
         at = np.zeros((_NODES, 4))
         at[:, columns] = on
@@ -197,7 +199,7 @@ def _of_table(table: Table) -> Iterator[_Seam]:
 
 
 def _columns(table: Table) -> list[int]:
-    """Return the index of the angle of each axis of a grid; phi_i and phi_h of isotropic grids are 0."""
+    """Return the index of the angle of each axis of a grid. Isotropic grids have no phi_i or phi_h."""
     return list(range(4)) if table.anisotropic else [0, 2, 3]
 
 
@@ -214,7 +216,7 @@ def _directions(angles: Array, half_difference: bool) -> tuple[Array, Array]:
 
 
 def _crossed(seams: Iterable[_Seam]) -> Iterator[_Seam]:
-    """Yield seams with their directions above the horizon, if there are any."""
+    """Yield the seams that have directions above the horizon, with these directions only."""
     for seam in seams:
         wi, wr = _directions(seam.at, seam.half_difference)
         above = np.minimum(wi[:, 2], wr[:, 2]) > _LOWEST
@@ -227,7 +229,7 @@ def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: F
     beside[..., seam.moved] += _BESIDE[:, np.newaxis]
     wi, wr = (w.reshape(-1, 3) for w in _directions(beside, seam.half_difference))
     far_below, below, above, far_above = function(wi, wr).reshape(_BESIDE.size, len(seam.at), -1)
-    with np.errstate(invalid="ignore"):  # of what is not finite
+    with np.errstate(invalid="ignore"):  # values that are not finite
         sides = 2.0 * below - far_below, 2.0 * above - far_above
     relative = _relative(*sides, floor)
     at = _directions(seam.at, seam.half_difference)
@@ -235,7 +237,7 @@ def _jump(seam: _Seam, function: Function, wavelength_nm: Array | None, floor: F
 
 
 def _between_methods(source: Source, wavelength_nm: Array | None, floor: Floats) -> Jump:
-    """Return the jump between values along an azimuth, where He-Torrance reads a table, and single values."""
+    """Return the largest difference of rows of values, for which He-Torrance reads a table, from single values."""
     theta_i, theta_r, phi_r = np.meshgrid(_THETA, _THETA, np.linspace(0.0, np.pi, _ROW), indexing="ij")
     rows, single = (
         np.reshape(source.lookup(*angles, wavelength_nm), (theta_i.size, -1))
@@ -247,7 +249,7 @@ def _between_methods(source: Source, wavelength_nm: Array | None, floor: Floats)
 
 
 def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
-    """Return jumps [1] between values (N, L), relative to the larger one or the floor."""
+    """Return the jumps [1] between values (N, L), relative to the larger value or the floor."""
     with np.errstate(invalid="ignore"):  # what is not finite counts as 1
         relative = np.abs(after - before) / np.maximum(np.maximum(np.abs(after), np.abs(before)), floor)
     return np.where(np.isfinite(relative), relative, 1.0)
@@ -256,7 +258,7 @@ def _relative(before: Floats, after: Floats, floor: Floats) -> Floats:
 def _largest(
     seam: str, relative: Floats, at: tuple[Array, Array], wavelength_nm: Array | None, allowed: Floats
 ) -> Jump:
-    """Return the jump that is largest relative to its tolerance."""
+    """Return the jump with the largest ratio to its tolerance."""
     allowed = np.broadcast_to(allowed, relative.shape)
     row, column = np.unravel_index(int(np.argmax(relative / allowed)), relative.shape)
     where = _where(*(w[row] for w in at))

@@ -1,10 +1,10 @@
-"""The error that a table states, held against itself and against the error at directions drawn afresh.
+"""The stated error of a table, checked for contradictions and compared with the error at fresh directions.
 
-Both are samples of one population if the table is the one that was measured. A percentile of the first sample is then
-exceeded by a number of values of the second that follows the beta-binomial distribution, whatever the errors are
-distributed like: the count is too large, or too small, where its probability is below `CHANCE`. A maximum is judged in
-the same way, as the highest order statistic: not by how far it is exceeded, which has no bound, but by how often.
-Ratios of integrals, l1 and the floor, are judged by standard errors.
+If the table is the one that was measured, both errors are samples of one population. The number of fresh values above
+a percentile of the first sample then follows the beta-binomial distribution, for any distribution of the errors. The
+count is too large or too small if its probability is below `CHANCE`. A maximum is the highest order statistic and is
+judged in the same way: the number of larger values counts, their size does not, because it has no bound. Ratios of
+integrals, l1 and the floor, are judged by standard errors.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from brdfdb.tables.stated_error import Error, Overall
 
 Statistic = Literal["l1", "median", "p95", "p99", "max", "floor"]
 
-# Probability of each test to fail a sound table. A table of 41 wavelengths takes 3000 of them: one in 300 000 such
+# Probability that one test fails a sound table. A table of 41 wavelengths takes 3000 tests, so that one in 300 000 such
 # tables fails by chance
 CHANCE = 1e-9
-# Standard errors of the difference of two ratios. A ratio that is too large because few rare directions were drawn has
-# a standard error about as large as itself, so that it takes 49 of them
+# Allowed difference of two ratios, in standard errors. A ratio that a few rare directions make too large has a standard
+# error about as large as itself: it takes 49 such directions to exceed this limit
 STANDARD_ERRORS = 7.0
-# A floor that is stated above this share of the fresh one may rest on a rare direction
+# Smallest ratio of the fresh floor to the stated one. A stated floor that is larger may rest on a rare direction
 SHORT = 0.5
-# A table may state that it is exact: float32 is to 6e-8, and offsets of logarithms take digits
+# Smallest error that is judged [1]. float32 is exact to 6e-8, and offsets of logarithms cost digits
 EXACT = 1e-6
-DIGITS = 1.1e-2  # relative: a statement has three digits, and so has the floor of its relative errors
-LEAST_DIRECTIONS = 500  # of a band: a statement that rests on fewer is judged as if it rested on so many
+DIGITS = 1.1e-2  # relative rounding: stated errors and their floor have three digits
+LEAST_DIRECTIONS = 500  # smallest number of directions of a band with which a statement is judged
 QUANTILES: dict[Statistic, float] = {"median": 0.5, "p95": 0.95, "p99": 0.99, "max": 1.0}
 _WORDS: dict[Statistic, str] = {
     "l1": "mean error",
@@ -55,20 +55,20 @@ Counts = NDArray[np.int64]
 
 
 class Disagreement(BaseModel):
-    """One number of the error that a table states, which chance does not reconcile with fresh directions."""
+    """One number of the stated error that differs from fresh directions by more than chance explains."""
 
     model_config = STRICT
 
     statistic: Statistic
-    theta_i_deg: tuple[float, float] = Field(description="ends of the band; 0 and 90: of all directions")
+    theta_i_deg: tuple[float, float] = Field(description="ends of the band; 0 and 90: all directions")
     wavelength_nm: float | None = Field(description="null: the table is grey")
     stated: float
     fresh: float | None = Field(description="null: not finite")
-    times: float | None = Field(description="the larger over the smaller; null: not finite")
+    times: float | None = Field(description="ratio of the larger number to the smaller; null: not finite")
 
     @property
     def text(self) -> str:
-        """Return both numbers, and their place, in words."""
+        """Both numbers with their band and wavelength, in words."""
         low, high = self.theta_i_deg
         where = "overall" if (low, high) == (0.0, 90.0) else f"at theta_i of {low:g} to {high:g} degrees"
         at = "" if self.wavelength_nm is None else f", {self.wavelength_nm:g} nm"
@@ -77,7 +77,7 @@ class Disagreement(BaseModel):
 
 
 class _Band(NamedTuple):
-    """Directions of a band of theta_i, or of all: fresh ones, and how many the statement rests on."""
+    """Fresh directions of a band of theta_i, or all of them, and the number of directions behind the statement."""
 
     name: tuple[float, float]
     chosen: NDArray[np.bool_]
@@ -86,35 +86,35 @@ class _Band(NamedTuple):
 
 
 def contradictions(error: Error, wavelengths: int) -> list[str]:
-    """Return a sentence for each thing that cannot be true of any table that a statement is about."""
+    """Return a sentence on each contradiction in a stated error."""
     bands = BANDS_DEG.size - 1
     shape = (bands, wavelengths)
     tables = {name: getattr(error, name) for name in NAMES}
     shapes = {name: {len(row) for row in rows} | {-len(rows)} for name, rows in tables.items()}
     if not np.array_equal(error.theta_i_deg, BANDS_DEG) or len(error.floor) != wavelengths:
         return [f"it is not about {bands} bands of theta_i and {wavelengths} wavelengths"]
-    if any(each != {wavelengths, -bands} for each in shapes.values()):
+    if any(shape_of_rows != {wavelengths, -bands} for shape_of_rows in shapes.values()):
         return [f"it is not about {bands} bands of theta_i and {wavelengths} wavelengths"]
     arrays = {name: np.array(rows, dtype=np.float64).reshape(shape) for name, rows in tables.items()}
     overall = {name: float(getattr(error.overall, name)) for name in Overall.model_fields}
     numbers = [*arrays.values(), np.array(error.floor), np.array([*overall.values()])]
-    if not all(np.all(np.isfinite(each) & (each >= 0.0)) for each in numbers):
+    if not all(np.all(np.isfinite(array) & (array >= 0.0)) for array in numbers):
         return ["not all of its numbers are finite and at least 0"]
     if not _whole(error, wavelengths):
-        return ["its limits in places and between wavelengths are not numbers of at least 0 for each of them"]
-    found = []
+        return ["its limits in places and between wavelengths are not all finite and at least 0"]
+    sentences = []
     ordered = [arrays[name] for name in QUANTILES]
     if any(np.any(low > high) for low, high in pairwise(ordered)):
-        found.append("a percentile is above a higher one")
+        sentences.append("a percentile is above a higher one")
     for name, of_bands in arrays.items():
-        # a percentile, or a mean, of all bands is between those of the bands, at each wavelength
+        # At each wavelength, a percentile or a mean of all bands lies between those of the single bands
         high = float(of_bands.max())
         low = high if name == "max" else float(of_bands.min(axis=0).max())
         if not low * (1.0 - DIGITS) <= overall[name] <= high * (1.0 + DIGITS):
-            found.append(
+            sentences.append(
                 f"its overall {name} of {overall[name]:.3g} is not between those of its bands, {low:.3g} to {high:.3g}"
             )
-    return found
+    return sentences
 
 
 def _whole(error: Error, wavelengths: int) -> bool:
@@ -138,12 +138,15 @@ def _whole(error: Error, wavelengths: int) -> bool:
 
 
 def disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> list[Disagreement]:
-    """Return what fresh directions contradict of a statement that does not contradict itself, the worst first."""
+    """Return the numbers of a consistent statement that fresh directions contradict, the worst first."""
     return sorted(_disagreements(error, pairs, wavelength_nm), key=_severity, reverse=True)
 
 
 def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> Iterator[Disagreement]:
-    drawn, floor = pairs.drawn, np.array(error.floor)  # that of another draw would be another by some percent
+    drawn, floor = (
+        pairs.drawn,
+        np.array(error.floor),
+    )  # the stated floor; that of the fresh draw differs by a few percent
     with np.errstate(invalid="ignore"):
         relative = error_measurement.relative(pairs.table, pairs.model, floor)
     nm = [None] * floor.size if wavelength_nm is None else wavelength_nm.tolist()
@@ -158,7 +161,7 @@ def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> It
             of_band = relative[band.chosen]
             above = _exceeding(of_band, np.maximum(stated, EXACT) * (1.0 + DIGITS))
             around = _exceeding(of_band, stated * (1.0 - DIGITS))
-            # the whole is stated at the worst wavelength, and need not be as bad at the others
+            # Overall numbers are those of the worst wavelength. Other wavelengths may be better
             too_good = np.zeros(floor.size, dtype=bool) if whole else (around <= least) & (stated > EXACT)
             for w in np.flatnonzero((above >= most) | too_good):
                 fresh = _percentile(of_band[:, w], quantile)
@@ -185,25 +188,26 @@ def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None])
 
 
 def _bands(error: Error, drawn: Draw) -> Iterator[_Band]:
-    """Yield each band of theta_i, then all of them; every draw has the same share of directions in each."""
+    """Yield each band of theta_i, then all directions. Every draw has the same share of directions in a band."""
     share = error.directions / max(int(np.count_nonzero(drawn.above)), 1)
     for number, name in enumerate(zip(BANDS_DEG[:-1].tolist(), BANDS_DEG[1:].tolist(), strict=True)):
-        here = drawn.band == number
-        chosen = drawn.above & here
+        in_band = drawn.band == number
+        chosen = drawn.above & in_band
         stated = max(int(share * np.count_nonzero(chosen)), LEAST_DIRECTIONS)
-        yield _Band(name, chosen, int(np.count_nonzero(here)), stated)
+        yield _Band(name, chosen, int(np.count_nonzero(in_band)), stated)
     yield _Band((0.0, 90.0), drawn.above, len(drawn.band), max(error.directions, LEAST_DIRECTIONS))
 
 
 def limits(stated: int, fresh: int, quantile: float) -> tuple[int, int]:
-    """Return which counts of `fresh` values above a quantile of `stated` others are too small, and too large.
+    """Return the limits of the number of `fresh` values above a quantile of `stated` others.
 
-    A count of at most the first, -1 if none is, or of at least the second, has a probability below `CHANCE`. The
-    quantile is between two order statistics: each limit is that of the one that makes it wider.
+    A count up to the first limit, or from the second limit on, has a probability below `CHANCE`. The first limit is -1
+    if no count is too small. The quantile lies between two order statistics: each limit takes the one that makes
+    it wider.
     """
     rank = int(quantile * (stated - 1)) + 1
     lower = np.cumsum(_probabilities(stated, fresh, min(rank + 1, stated)))
-    upper = np.cumsum(_probabilities(stated, fresh, rank)[::-1])[::-1]  # of at least so many
+    upper = np.cumsum(_probabilities(stated, fresh, rank)[::-1])[::-1]  # probability of at least so many
     least = int(np.count_nonzero(lower <= CHANCE)) - 1
     return least if quantile < 1.0 else -1, int(np.count_nonzero(upper > CHANCE))
 
@@ -212,7 +216,7 @@ def _probabilities(stated: int, fresh: int, rank: int) -> Floats:
     """Return the probability that 0, 1, ..., `fresh` values are above the `rank`-th smallest of `stated` others."""
     log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1.0, stated + fresh + 1.0)))])
     above = np.arange(fresh + 1)
-    # of all orders in which the values can lie, those with so many of the fresh ones above
+    # Number of orders of all values in which so many of the fresh ones are above
     orders = _choose(log_factorial, fresh - above + rank - 1, rank - 1) + _choose(
         log_factorial, above + stated - rank, stated - rank
     )
@@ -242,10 +246,10 @@ def _ratio(wrong: Floats, whole: Floats, weight: Floats, band: _Band) -> tuple[F
 
 
 def _rare(largest: Floats, whole: Floats, weight: Floats, band: _Band) -> Floats:
-    """Return the share of a stated l1 that directions too rare for the fresh draw can explain.
+    """Return the part of a stated l1 [1] that directions too rare for the fresh draw can explain.
 
-    So many of them that the fresh ones would have missed all with the probability `CHANCE`, each with the largest error
-    that is stated and the largest weight that was met.
+    Their number is such that the fresh draw misses all of them with the probability `CHANCE`. Each of them has the
+    largest stated error and the largest weight of the fresh draw.
     """
     fresh = int(np.count_nonzero(band.chosen))
     if fresh == 0:
@@ -261,8 +265,8 @@ def _percentile(values: Floats, quantile: float) -> float:
     return float(np.percentile(np.where(np.isfinite(values), values, np.inf), 100.0 * quantile, method="lower"))
 
 
-def _severity(each: Disagreement) -> float:
-    return np.inf if each.times is None else each.times
+def _severity(disagreement: Disagreement) -> float:
+    return np.inf if disagreement.times is None else disagreement.times
 
 
 def _disagreement(name: Statistic, band: _Band, nm: float | None, stated: float, fresh: float) -> Disagreement:

@@ -1,4 +1,4 @@
-"""Energy of a table: whether it reflects more than it receives, and whether the error that it states explains it."""
+"""Energy of a table: its directional albedo, and the part of an excess that its stated error explains."""
 
 from __future__ import annotations
 
@@ -19,35 +19,36 @@ from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
 
-# Largest stated error [1] that counts: a table that states more is judged as if it stated this
+# Largest stated error [1] that counts. A table that states more is judged as if it stated this
 MOST_ERROR = 0.5
-_BAND_POINTS = 100  # at which the mean over a band of theta_i is taken, of what is linear there
-_NOT_FINITE, _FINITE = 1e30, 1e20  # what stands for an albedo that is not finite, and what is below any mean of it
+_BAND_POINTS = 100  # number of points of the mean over a band of theta_i
+# Value in place of an albedo that is not finite, and a limit below every mean that includes it
+_NOT_FINITE, _FINITE = 1e30, 1e20
 
 
 class Bands(BaseModel):
-    """Excess over 1 on average over bands of theta_i, by which a table that states its error is judged."""
+    """Mean excess over 1 in bands of theta_i. A table with a stated error is judged by it."""
 
     model_config = STRICT
 
     theta_i_deg: list[float] = Field(description="edges of the bands")
     stated_error: list[list[float]] = Field(
-        description="[band][wavelength], of all but the specular part: integral of abs(error) cos theta_r over that of "
+        description="[band][wavelength], without the specular part: integral of abs(error) cos theta_r over that of "
         "f_r cos theta_r"
     )
     explained: list[list[float | None]] = Field(
-        description="[band][wavelength], by how much that error can raise the mean albedo at most; null: not finite"
+        description="[band][wavelength], largest rise of the mean albedo by that error; null: not finite"
     )
     excess: list[list[float | None]] = Field(
-        description="[band][wavelength], mean of what exceeds 1, specular part included; null: not finite"
+        description="[band][wavelength], mean excess over 1, specular part included; null: not finite"
     )
 
 
 class TableEnergy(BaseModel):
     """Directional albedo of the table, specular part included: the share of the light from theta_i that leaves.
 
-    A table that states its error does so over bands of theta_i. What exceeds 1, or what is known of the material, may
-    be as much of a band as that error explains, and no more.
+    Errors are stated for bands of theta_i. In each band the excess over 1, or over the known excess of the material,
+    may be as large as the stated error explains.
     """
 
     model_config = STRICT
@@ -55,36 +56,34 @@ class TableEnergy(BaseModel):
     theta_i_deg: list[float]
     wavelength_nm: list[float] | None = Field(description="null: the table is grey")
     albedo: list[list[float | None]] = Field(
-        description="[theta_i][wavelength]; over the azimuths of the light the largest, if the table is anisotropic; "
+        description="[theta_i][wavelength]; largest over the azimuths of the light, if the table is anisotropic; "
         "null: not finite"
     )
-    specular: list[list[float | None]] = Field(
-        description="[theta_i][wavelength], the share of the specular part in it"
-    )
+    specular: list[list[float | None]] = Field(description="[theta_i][wavelength], the specular part of the albedo")
     integration_error: float | None = Field(
-        description="of the albedo, the largest estimate; 0: the exact integral of the interpolant; null: not finite"
+        description="largest estimated error of the albedo; 0: the exact integral of the interpolant; null: not finite"
     )
     hemispherical: Numbers = Field(
-        description="[wavelength], of light that is the same from everywhere, albedo taken as linear between theta_i"
+        description="[wavelength], albedo in uniform light; albedos are linear between theta_i"
     )
-    bands: Bands | None = Field(description="null: the table states no error, and is allowed none")
+    bands: Bands | None = Field(description="null: the table states no error, and no excess is explained")
     max_albedo: float | None = Field(description="null: not finite")
     max_at_theta_i_deg: float
     max_at_wavelength_nm: float | None
     exceeds_1_from_theta_i_deg: float | None = Field(description="to 0.001 degrees")
     exceeds_1_beyond_error_from_theta_i_deg: float | None = Field(
-        description="where neither the stated error nor that of the integration explains it"
+        description="angle above which neither the stated error nor that of the integration explains the excess"
     )
     verdict: Verdict
-    reason: str = Field(description="also where a table passes because of the error that it states")
+    reason: str = Field(description="also if a table passes because of its stated error")
 
 
 class _Judge(NamedTuple):
     """Averages of an albedo that are judged, and the excess that the stated error of the table explains.
 
-    `means` (rows, theta_i) holds the weights of averages, `covers`, of that shape, the theta_i that a row is about.
-    `l1` (rows, wavelengths) is the error that a table states. `reflected`, of that shape, is the mean albedo without
-    the specular part that a model may have if that error is true.
+    `means` (rows, theta_i) holds the weights of the averages, `covers` (rows, theta_i) is True for the theta_i of a
+    row. `l1` (rows, wavelengths) is the stated error of the table, `reflected` (rows, wavelengths) the largest mean
+    albedo of the model, without the specular part, that this error allows.
     """
 
     means: Floats
@@ -93,15 +92,15 @@ class _Judge(NamedTuple):
     reflected: Floats
 
     def explained(self, limit: Floats) -> Floats:
-        """Return the mean albedo [1] that the stated error explains: l1 of what the model may reflect."""
+        """Return the mean albedo [1] that the stated error explains: l1 times the albedo that the model may have."""
         return self.l1 * np.minimum(self.reflected, (self.means @ limit)[:, np.newaxis])
 
     def excess(self, albedo: Floats, limit: Floats) -> Floats:
-        """Return the mean albedo [1] above a limit (theta_i,), over rows and wavelengths."""
+        """Return the mean albedo [1] above a limit (theta_i,), shape (rows, wavelengths)."""
         return np.asarray(self.means @ np.maximum(albedo - limit[:, np.newaxis], 0.0))
 
     def unexplained(self, albedo: Floats, limit: Floats) -> NDArray[np.bool_]:
-        """Return a mask over theta_i: True where a limit is exceeded beyond the stated error."""
+        """Return a mask over theta_i, True where the excess over a limit is larger than the stated error explains."""
         rows = self.excess(albedo, limit) > self.explained(limit)
         both = (albedo > limit[:, np.newaxis]) & (self.covers.T.astype(int) @ rows.astype(int) > 0)
         return np.asarray(np.any(both, axis=1))
@@ -112,9 +111,9 @@ def table_energy_of(
     known: KnownExcess | None,
     excused: Literal["known published excess", "accepted excess"] = "known published excess",
 ) -> TableEnergy:
-    """Return the energy of a table; `excused` is the verdict on one that exceeds 1, and its model, as is known."""
-    found = directional_albedo(table)
-    theta_i, integration, diffuse = found.theta_i_deg, found.error, found.albedo.max(axis=1)
+    """Return the energy of a table; `excused` is the verdict on an excess that is not above the known one."""
+    integrated = directional_albedo(table)
+    theta_i, integration, diffuse = integrated.theta_i_deg, integrated.error, integrated.albedo.max(axis=1)
     specular = _specular(table, theta_i, diffuse.shape)
     albedo = diffuse + specular
     finite = np.where(np.isfinite(albedo), albedo, np.inf)
@@ -130,8 +129,8 @@ def table_energy_of(
     reason = f"reflects {_share(largest)} of what arrives at {theta_i[worst_theta]:g} degrees"
     if unexplained.size == 0:
         verdict = "passes"
-        why = "its integration has" if bands is None else "the table states"
-        reason = f"{reason}, within the error that {why}" if first is not None else ""
+        cause = "its integration has" if bands is None else "the table states"
+        reason = f"{reason}, within the error that {cause}" if first is not None else ""
     elif (
         known is not None and np.isfinite(largest) and not np.any(judge.unexplained(certain, limit_of(known, theta_i)))
     ):
@@ -146,7 +145,7 @@ def table_energy_of(
         albedo=rows(albedo, DIGITS),
         specular=rows(specular, DIGITS),
         integration_error=float(f"{integration.max():.2g}") if np.isfinite(integration).all() else None,
-        hemispherical=numbers(hemispherical_albedo(theta_i, found.mean + specular), 4),
+        hemispherical=numbers(hemispherical_albedo(theta_i, integrated.mean + specular), 4),
         bands=bands,
         max_albedo=largest if np.isfinite(largest) else None,
         max_at_theta_i_deg=float(theta_i[worst_theta]),
@@ -159,7 +158,7 @@ def table_energy_of(
 
 
 def _first_above_1(table: Table, theta_i_deg: Axis, excess: Axis) -> float | None:
-    """Return the angle [degree] above which a table reflects more than 1, between angles of known albedo."""
+    """Return the angle [degree] above which the albedo of a table exceeds 1, or None."""
     if not np.any(excess > 0.0):
         return None
     first = int(np.argmax(excess > 0.0))
@@ -179,15 +178,15 @@ def _share(albedo: float) -> str:
 
 
 def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
-    """Return a judge of each theta_i of a table without a stated error; of others, of the mean over bands of theta_i.
+    """Return the averages by which a table is judged: bands of theta_i, or each theta_i if it states no error.
 
-    What is above a limit that the model keeps to is wrong, and no more of a band can be wrong than l1 of what the model
-    reflects there: 1 / (1 - l1) of what the table does, at most.
+    The excess over a limit that the model keeps is an error. The error of a band is at most l1 times the albedo of the
+    model, and the albedo of the model is at most 1 / (1 - l1) times that of the table.
     """
     if table.error is None:
-        each = np.eye(theta_i_deg.size)
+        identity = np.eye(theta_i_deg.size)
         nothing = np.zeros((theta_i_deg.size, 1))
-        return _Judge(each, each.astype(bool), nothing, nothing)
+        return _Judge(identity, identity.astype(bool), nothing, nothing)
     edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
@@ -195,24 +194,24 @@ def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
 
 
 def _bands(error: Error, explained: Floats, excess: Floats) -> Bands:
-    known, above = (rows(np.where(each < _FINITE, each, np.nan), DIGITS) for each in (explained, excess))
+    known, above = (rows(np.where(means < _FINITE, means, np.nan), DIGITS) for means in (explained, excess))
     return Bands(theta_i_deg=error.theta_i_deg, stated_error=error.l1, explained=known, excess=above)
 
 
 def _known(values: Floats) -> Floats:
-    """Return values, with those that are not finite replaced by one that exceeds all others."""
+    """Return values, with a value above all others in place of those that are not finite."""
     return np.where(np.isfinite(values), values, _NOT_FINITE)
 
 
 def _band_means(theta_i_deg: Axis, edges: Axis) -> Floats:
-    """Return weights (bands, theta_i) of the mean over each band, of values that are linear between theta_i."""
+    """Return the weights (bands, theta_i) of the mean over each band of values that are linear between theta_i."""
     share = (np.arange(_BAND_POINTS) + 0.5) / _BAND_POINTS
     inside = edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * share
     return np.stack([np.interp(inside, theta_i_deg, one).mean(axis=1) for one in np.eye(theta_i_deg.size)], axis=1)
 
 
 def _specular(table: Table, theta_i_deg: Axis, shape: tuple[int, ...]) -> Floats:
-    """Return the reflectance [1] of the specular part, over theta_i and wavelength."""
+    """Return the reflectance [1] of the specular part, shape (theta_i, wavelengths)."""
     if table.specular is None:
         return np.zeros(shape)
     if table.specular_theta_deg is None and np.array_equal(theta_i_deg, table.axes_deg["theta_i"]):

@@ -1,4 +1,4 @@
-"""A table less its model: at fresh directions against the error that it states, and over planes of incidence."""
+"""The difference of a table from its model: its size at fresh directions, its stated size, and maps of it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from brdfdb.tables.table import Table
 
 # Tolerance of the specular part, which is stored as float32: measured 6e-8
 SPECULAR_TOLERANCE = 1e-6
-_STEP_DEG = 3.0  # of the maps
+_STEP_DEG = 3.0  # step of the maps
 _LAST_DEG = 89.0
 LEAST, _MOST = 1e-6, 1.0  # smaller errors are drawn as LEAST, because zero has no logarithm; all maps share one scale
 # Azimuth [degree] of viewers at negative theta_r
@@ -28,7 +28,7 @@ _PLANES = {"in the plane of incidence": 0.0, "across the plane of incidence": 90
 
 
 class TableError(Finding):
-    """The table less the model, over planes of incidence, and at fresh directions against what the table states."""
+    """The difference of the table from the model: maps over planes of incidence, and the stated error under test."""
 
     key = "table_error"
     order = 6
@@ -36,38 +36,38 @@ class TableError(Finding):
     columns = ("table error",)
     explanation = (
         "|table − model| over the model, or over a thousandth of the Lambertian of the same albedo where the model "
-        "is less. 99 of 100 values are below the number shown: as measured now at directions drawn afresh, and as "
-        "the table states of itself. Mean, median, 95th and 99th percentile and maximum that it states of each band "
-        "of theta_i and each wavelength are held against the fresh ones, too: one violates that a sound table would "
-        "show with a probability below 10⁻⁹."
+        "is less. 99 of 100 values are below the number shown. The first number is measured at fresh directions, the "
+        "second is the stated error of the table. The stated mean, median, 95th and 99th percentile and maximum of "
+        "each band of theta_i and each wavelength are compared with the fresh ones. A stated number violates if a "
+        "sound table would differ as much with a probability below 10⁻⁹."
     )
 
-    stated_p99: float | None = Field(description="null: the table states no error, and none is asked of it")
+    stated_p99: float | None = Field(description="null: the table states no error, and need not state one")
     fresh_p99: float | None = Field(description="null: not finite")
     specular: float | None = Field(
         description="largest difference of the stored specular part from the model's; null: none, or not finite"
     )
     directions: int
-    contradictions: list[str] = Field(description="what of the statement contradicts itself, a sentence each")
-    disagreements: int = Field(description="numbers of the statement that fresh directions contradict")
-    worst: list[Disagreement] = Field(description="of these, of each statistic the one that is furthest off")
+    contradictions: list[str] = Field(description="a sentence on each contradiction within the stated error")
+    disagreements: int = Field(description="number of stated errors that fresh directions contradict")
+    worst: list[Disagreement] = Field(description="the worst of these for each statistic")
     bias: float | None = Field(
         description="signed: integral of (table - model) cos theta_r over that of the model, mean of all directions at "
-        "the wavelength where it is largest; null: not finite"
+        "the worst wavelength; null: not finite"
     )
-    likeness: str = Field(description="what the table agrees with much better than with its model; empty: nothing")
+    likeness: str = Field(description="changed model with which the table agrees much better; empty: none")
     maps: list[Map] = Field(description="relative error over theta_i and theta_r, negative back towards the light")
     verdict: Verdict
 
     @classmethod
     def judge(cls, subject: Subject) -> Finding:
-        """Hold a table against what it states of its error."""
+        """Compare the error of a table with its stated error."""
         if subject.source is None:
             return subject.not_judged("the error of a table is measured against its source")
-        return table_error_of(subject.table, subject.source, subject.pairs, subject.found[Nodes.key].verdict)
+        return table_error_of(subject.table, subject.source, subject.pairs, subject.findings[Nodes.key].verdict)
 
     def sentences(self) -> list[Sentence]:
-        """Return a sentence on the error, and on each thing that is wrong with what the table states."""
+        """Return a sentence on the error, and on each fault of the stated error."""
         fresh = "its error (p99) is not finite"
         if self.fresh_p99 is not None:
             fresh = f"99 of 100 fresh values are within {number(self.fresh_p99)}"
@@ -76,9 +76,9 @@ class TableError(Finding):
         mirror = ""
         if self.specular is not None:
             mirror = f"; the specular part is off by up to {number(self.specular)}"
-        wrong = [f"its stated error contradicts itself: {each}" for each in self.contradictions]
+        wrong = [f"its stated error contradicts itself: {sentence}" for sentence in self.contradictions]
         if self.worst:
-            worst = "; ".join(each.text for each in self.worst)
+            worst = "; ".join(disagreement.text for disagreement in self.worst)
             wrong.append(f"{self.disagreements} numbers of its stated error are not those of fresh directions: {worst}")
         if self.likeness:
             wrong.append(f"the table agrees with {self.likeness}")
@@ -98,20 +98,20 @@ class TableError(Finding):
 
 
 def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "passes") -> TableError:
-    """Hold a table against what it states of its error, and draw the error at the middle of its wavelengths.
+    """Return the error of a table compared with its stated error, and maps of it at the middle wavelength.
 
-    `nodes` is the verdict on its nodes: what is wrong with a table is looked for where that, or its error, violates.
+    `nodes` is the verdict on its nodes. If it or the error violates, the fault of the table is searched for.
     """
-    with np.errstate(invalid="ignore"):  # of what is not finite
+    with np.errstate(invalid="ignore"):  # values that are not finite
         fresh = error_measurement.compare(pairs.table, pairs.model, pairs.drawn, SEED).overall.p99
-    contradicts: list[str] = []
-    disagree: list[Disagreement] = []
+    contradicting: list[str] = []
+    disagreeing: list[Disagreement] = []
     if table.error is not None:
-        contradicts = contradictions(table.error, wavelengths_of(table))
-        disagree = [] if contradicts else disagreements(table.error, pairs, table.wavelength_nm)
+        contradicting = contradictions(table.error, wavelengths_of(table))
+        disagreeing = [] if contradicting else disagreements(table.error, pairs, table.wavelength_nm)
     specular = _specular_error(table, source)
-    mirrors = specular is None or specular <= SPECULAR_TOLERANCE  # nan is not
-    good = mirrors and not contradicts and not disagree
+    mirrors = specular is None or specular <= SPECULAR_TOLERANCE  # False for nan
+    good = mirrors and not contradicting and not disagreeing
     floor = error_measurement.floor_of(pairs.model, pairs.drawn)
     middle = floor[[floor.size // 2]]
     return TableError(
@@ -119,9 +119,9 @@ def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "pa
         fresh_p99=fresh if np.isfinite(fresh) else None,
         specular=None if specular is None or not np.isfinite(specular) else specular,
         directions=int(np.count_nonzero(pairs.drawn.above)),
-        contradictions=contradicts,
-        disagreements=len(disagree),
-        worst=list({each.statistic: each for each in reversed(disagree)}.values())[::-1],
+        contradictions=contradicting,
+        disagreements=len(disagreeing),
+        worst=list({disagreement.statistic: disagreement for disagreement in reversed(disagreeing)}.values())[::-1],
         bias=bias_of(pairs),
         likeness="" if good and nodes == "passes" else likeness_of(table, source, pairs),
         maps=[_map(table, source, middle, *plane) for plane in _PLANES.items()],
@@ -130,7 +130,7 @@ def table_error_of(table: Table, source: Source, pairs: Pairs, nodes: Word = "pa
 
 
 def _specular_error(table: Table, source: Source) -> float | None:
-    """Return the largest difference [1] of the stored specular part from that of the source; None without one."""
+    """Return the largest difference [1] of the stored specular part from that of the source, or None."""
     if table.specular is None or not source.has_specular:
         return None
     nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
@@ -142,14 +142,14 @@ def _map(table: Table, source: Source, floor: Floats, title: str, delta_phi_deg:
     wavelength = representative_nm(table)
     theta_i_deg = np.append(np.arange(0.0, _LAST_DEG, _STEP_DEG), _LAST_DEG)
     theta_r_deg = np.concatenate([-theta_i_deg[:0:-1], theta_i_deg])
-    # a viewer at -theta looks from the other side of the normal: negative is back towards the light
+    # A viewer at -theta is on the other side of the normal. Negative angles are back towards the light
     wi = unit_vector(radians(theta_i_deg), 0.0)[:, np.newaxis]
     wr = unit_vector(-radians(theta_r_deg), radians(delta_phi_deg))
     wi, wr = (np.reshape(w, (-1, 3)) for w in np.broadcast_arrays(wi, wr))
-    found = table.lookup_vectors(wi, wr, wavelength)
+    values = table.lookup_vectors(wi, wr, wavelength)
     truth = error_measurement.model_values(source, None if wavelength is None else np.array([wavelength]), wi, wr)[:, 0]
     with np.errstate(invalid="ignore"):
-        error = error_measurement.relative(found, truth, floor).reshape(theta_i_deg.size, -1)
+        error = error_measurement.relative(values, truth, floor).reshape(theta_i_deg.size, -1)
     return Map(
         title=f"Error {title}" if wavelength is None else f"Error {title}, {wavelength:g} nm",
         x_label="theta_r [degrees], negative back towards the light",

@@ -1,4 +1,4 @@
-"""The standing of a material in the range that a paper states of its model, in the paper's own words."""
+"""The standing of a material in the limits of validity that a paper states for its model."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ _ORDER: tuple[Standing, ...] = ("inside", "at the edge", "outside")
 
 
 class Limit(BaseModel):
-    """One limit that a paper states of its model, and where a material stands."""
+    """One limit that a paper states for its model, and the standing of a material in it."""
 
     model_config = STRICT
 
     quantity: str
-    value: str = Field(description="of the material")
-    valid: str = Field(description="what was taken as inside and as the edge, where the paper gives no number")
-    standing: Standing = Field(description="unknown: the material does not say")
-    words: str = Field(description="of the paper")
+    value: str = Field(description="value of the quantity for the material")
+    valid: str = Field(description="range that counts as inside and as the edge; assumed if the paper gives no number")
+    standing: Standing = Field(description="unknown: the material does not give the quantity")
+    words: str = Field(description="quotation from the paper")
     where: str
 
 
 class Validity(Finding):
-    """All limits of a model that its paper states. The verdict on the table does not count them."""
+    """All limits that a paper states for its model. They do not count for the verdict on the table."""
 
     key = "validity"
     order = 8
     title = "Validity"
     columns = ("validity",)
     explanation = (
-        "Whether the parameters lie inside what the paper of the model says it is good for. Where it says “gentle” "
-        "or “much less” and no number, a tenth is taken for inside, and 1 for the edge. The verdict on a table does "
-        "not count this: what a paper tabulates is audited as it is."
+        "The standing of the parameters in the limits that the paper states for its model. If the paper says “gentle” "
+        "or “much less” without a number, values up to a tenth are inside, and values up to 1 at the edge. Validity "
+        "does not count for the verdict on a table, because the papers themselves go beyond these limits."
     )
 
     limits: list[Limit]
-    verdict: Standing = Field(description="worst of those that are known; inside: no limit is stated")
+    verdict: Standing = Field(description="worst of the known standings; inside: no limit is stated")
 
     @classmethod
     def judge(cls, subject: Subject) -> Finding:
@@ -49,11 +49,11 @@ class Validity(Finding):
         return validity_of(subject.source, subject.table.wavelength_nm)
 
     def sentences(self) -> list[Sentence]:
-        """Return a sentence on all limits, and one on each in the words of the paper."""
+        """Return a sentence on all limits, and one on each limit with the quotation from the paper."""
         standings = [limit.standing for limit in self.limits]
         kept = ", ".join(f"{standings.count(word)} {word}" for word in dict.fromkeys(standings))
         limits = "1 limit" if len(standings) == 1 else f"{len(standings)} limits"
-        text = f"of {limits} that its paper states {kept}" if kept else "its paper states no limits"
+        text = f"its paper states {limits}: {kept}" if kept else "its paper states no limits"
         return [
             self.sentence(self.verdict, text),
             *(
@@ -69,14 +69,14 @@ class Validity(Finding):
         ]
 
     def cells(self) -> list[Cell]:
-        """Return the number of limits that are not kept well inside."""
+        """Return the number of limits that are at the edge or outside."""
         edges = sum(limit.standing in ("at the edge", "outside") for limit in self.limits)
         return [Cell(self.verdict, f"{edges} of {len(self.limits)} limits" if edges else "", -RANKS[self.verdict])]
 
 
 def validity_of(material: Material, wavelength_nm: Axis | None) -> Validity:
-    """Return the limits of the model, judged at the wavelengths [nm] of the table where they depend on them."""
+    """Return the limits of the model, judged at the wavelengths [nm] of the table."""
     stated = material.spec.limits
-    limits = [] if stated is None else [Limit(**each._asdict()) for each in stated(material.arguments(wavelength_nm))]
+    limits = [] if stated is None else [Limit(**limit._asdict()) for limit in stated(material.arguments(wavelength_nm))]
     known = [limit.standing for limit in limits if limit.standing != "unknown"]
     return Validity(limits=limits, verdict=max(known, key=_ORDER.index, default="inside"))

@@ -1,4 +1,4 @@
-"""The stored values, and f_r looked up between them: finite, and not negative."""
+"""The signs and the finiteness of the stored values and of f_r between them."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from brdfdb.tables.table import Table
 
 
 class Values(Finding):
-    """The stored values themselves, and those of f_r that come of them."""
+    """Counts of stored values and of values of f_r that are negative or not finite."""
 
     key = "values"
     order = 3
     title = "Values"
     columns = ("values",)
     explanation = (
-        "Stored values, and f_r where it is looked up between them, are finite, and f_r is not negative. Nodes "
-        "below the horizon may be: they continue the table, and lookups end at 0."
+        "Stored values and f_r between the nodes are finite, and f_r is not negative. Values at nodes below the "
+        "horizon may be negative: they continue the table, and lookups are clipped at 0."
     )
 
-    count: int = Field(description="of stored values")
-    looked_up: int = Field(description="directions between the nodes where f_r was looked up; 0: linear between nodes")
-    smallest: float | None = Field(description="of f_r at the nodes and where it was looked up; null: none is finite")
-    negative: int = Field(description="of those of f_r, and of the specular part")
-    not_finite: int = Field(description="of those, and of what is stored in place of f_r")
+    count: int = Field(description="number of stored values")
+    looked_up: int = Field(description="number of lookups between the nodes; 0: f_r is linear between nodes")
+    smallest: float | None = Field(description="smallest f_r at the nodes and of the lookups; null: none is finite")
+    negative: int = Field(description="number of negative values of f_r and of the specular part")
+    not_finite: int = Field(description="number of these values, and of the stored ones, that are not finite")
     positivity: Verdict
     finiteness: Verdict
     verdict: Verdict = Field(description="worse of the two")
 
     @classmethod
     def judge(cls, subject: Subject) -> Values:
-        """Count the values of a table that are negative or not finite."""
-        # what is linear between its nodes is no less than they are
+        """Return the counts of values of a table that are negative or not finite."""
+        # A linear interpolant is never below its nodes
         pairs, linear = subject.pairs, linear_in_angles(subject.table)
         return values_of(subject.table, None if linear else pairs.table[pairs.drawn.above])
 
@@ -56,20 +56,20 @@ class Values(Finding):
 
 
 def values_of(table: Table, looked_up: Floats | None) -> Values:
-    """Count values that are negative or not finite: of nodes, and of f_r [1/sr] that was looked up.
+    """Return the counts of values that are negative or not finite, at nodes and in lookups of f_r [1/sr].
 
-    `looked_up` is None of a table that is linear between its nodes. Nodes over half and difference vectors may be
-    negative: those below the horizon continue the table, and lookups end at 0.
+    `looked_up` is None for a table that is linear between its nodes. Nodes over half and difference vectors may be
+    negative: those below the horizon continue the table, and lookups are clipped at 0.
     """
     brdf: list[Floats] = [table.brdf] if looked_up is None else [table.brdf, looked_up]
     judged = [looked_up] if looked_up is not None and table.grid.half_difference else brdf
-    dirac: list[Floats] = [] if table.specular is None else [table.specular]
-    reflected = [*brdf, *dirac]
+    specular: list[Floats] = [] if table.specular is None else [table.specular]
+    reflected = [*brdf, *specular]
     apart: list[Floats] = [array for array in (table.spectra, table.uniform) if array is not None]
     others = apart if table.values_are_brdf else [table.values, *apart]
     not_finite = sum(array.size - int(np.count_nonzero(np.isfinite(array))) for array in (*reflected, *others))
-    # -inf is not finite, and counted as that
-    negative = sum(int(np.count_nonzero((array < 0.0) & np.isfinite(array))) for array in (*judged, *dirac))
+    # -inf counts as not finite, not as negative
+    negative = sum(int(np.count_nonzero((array < 0.0) & np.isfinite(array))) for array in (*judged, *specular))
     smallest = min(float(np.min(array, initial=np.inf, where=np.isfinite(array))) for array in judged)
     return Values(
         count=sum(array.size for array in (table.values, *apart))

@@ -64,7 +64,7 @@ class Option:
 class Exporter(Protocol):
     """A format that tables are written to: a module of `brdfdb.formats`, or another object with these names.
 
-    It is imported whenever the program starts: what is heavy, it imports when it writes.
+    It is imported whenever the program starts, and imports large packages only when it writes.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Exporter(Protocol):
     summary : str
         A few words on what is written.
     kinds : tuple of str
-        Kinds of files that are made of one table, a file each: values of the keyword argument `kind`. Empty where one
+        Kinds of files, one file each, that are made of one table: values of the keyword argument `kind`. Empty if one
         file holds the table.
     options : tuple of Option
         All other keyword arguments.
@@ -89,21 +89,6 @@ class Exporter(Protocol):
     kinds: tuple[str, ...]
     options: tuple[Option, ...]
     write: Callable[..., None]
-
-
-class Importer(Protocol):
-    """A format that is read: a module of `brdfdb.formats`, or another object with these names.
-
-    Attributes
-    ----------
-    suffix : str
-        End of the names of its files, with the dot.
-    read : callable
-        ``read(path)`` returns samples or a table.
-    """
-
-    suffix: str
-    read: Callable[..., Any]
 
 
 def options_of(exporter: Exporter) -> dict[str, Option]:

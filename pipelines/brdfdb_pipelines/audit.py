@@ -54,13 +54,13 @@ def run(
     figures : bool
         Compute the atlas and the gallery, too.
     allow : sequence of str
-        Materials whose models may reflect more than they receive; the report says that this was accepted.
+        Materials whose models may reflect more than they receive. The report records that this was accepted.
 
     Raises
     ------
     StoreError, UnknownMaterialError
-        If the store or a material is missing. Every file is checked against its manifest: what is damaged is an error,
-        too, in the end, when the report has been written of the others.
+        If the store or a material is missing. Every file is checked against its manifest. Damaged tables are an error,
+        too, after the report on the others has been written.
     OSError, ValueError
         If the report cannot be written there.
     """
@@ -89,7 +89,7 @@ def run(
     damaged = [str(done[name]) for name in materials if isinstance(done[name], StoreError)]
     if damaged and not audits:
         raise StoreError("; ".join(damaged))
-    found = report(
+    audit_report = report(
         audits,
         store=str(root),
         when=datetime.now(UTC).replace(microsecond=0),
@@ -97,14 +97,16 @@ def run(
         gallery=[done[f"figure {key}"].subject for key in GALLERY if figures],
         damaged=damaged,
     )
-    report_path.write_text(found.model_dump_json() + "\n", encoding="utf-8")
-    plots = {audit_page.key_of(each.subject): each.plots for each in done.values() if isinstance(each, Section)}
+    report_path.write_text(audit_report.model_dump_json() + "\n", encoding="utf-8")
+    plots = {
+        audit_page.key_of(section.subject): section.plots for section in done.values() if isinstance(section, Section)
+    }
     page_path = report_path.with_suffix(".html")
-    page_path.write_text(audit_page.render(found, plots), encoding="utf-8")
-    _print(root, found, report_path)
+    page_path.write_text(audit_page.render(audit_report, plots), encoding="utf-8")
+    _print(root, audit_report, report_path)
     if damaged:
         raise StoreError("; ".join(damaged))
-    return found
+    return audit_report
 
 
 def _check_path(report_path: Path) -> None:
@@ -142,12 +144,12 @@ def _audited(root: Path, name: str, accept_excess: bool) -> Section | StoreError
     store = brdfdb.open(root)
     try:
         store.verify(name)
-        found = audit(store[name], accept_excess=accept_excess)
+        audited = audit(store[name], accept_excess=accept_excess)
     except StoreError as error:
         return error
-    except (ValueError, KeyError) as error:  # whole files, of something that is no table of ours
+    except (ValueError, KeyError) as error:  # undamaged files that do not hold a table
         return StoreError(f"{name} cannot be audited: {error}")
-    return Section(found, audit_page.plots_of(found))
+    return Section(audited, audit_page.plots_of(audited))
 
 
 def _drawn(key: str) -> Section:
@@ -155,8 +157,8 @@ def _drawn(key: str) -> Section:
     return Section(figure, audit_page.plots_of(figure))
 
 
-def _print(root: Path, found: AuditReport, report_path: Path) -> None:
-    audits, columns = found.materials, audit_page.columns()
+def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
+    audits, columns = audit_report.materials, audit_page.columns()
     terminal.print_table(
         f"Audit of {root}, the tables as interpolated",
         ("material", "verdict", *columns),
@@ -173,10 +175,11 @@ def _print(root: Path, found: AuditReport, report_path: Path) -> None:
             print(sentence)
     known = sum(a.verdict == "known published excess" for a in audits)
     accepted = sum(a.verdict == "accepted excess" for a in audits)
+    violating = len(audit_report.violations)
     allowed = f"{accepted} exceed 1 as --allow accepts, " if accepted else ""
     page_path = report_path.with_suffix(".html")
     print(
-        f"{len(audits)} audited: {len(audits) - known - accepted - len(found.violations)} pass, {known} exceed 1 as "
-        f"their published parameters are known to, {allowed}{len(found.violations)} violate; page {page_path}, "
+        f"{len(audits)} audited: {len(audits) - known - accepted - violating} pass, {known} exceed 1 as "
+        f"their published parameters are known to, {allowed}{violating} violate; page {page_path}, "
         f"data {report_path}"
     )

@@ -1,4 +1,4 @@
-"""The report of an audit as one HTML file that needs nothing else: no network, no other file."""
+"""The report of an audit as one HTML file, which needs neither network nor other files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PAPERS = {
     "orennayar1994": "Oren and Nayar 1994: Generalization of Lambert's reflectance model",
     "he1991": "He, Torrance, Sillion and Greenberg 1991: A comprehensive physical model for light reflection",
 }
-# Mark beside the colour of a word
+# Mark of each word, beside its colour
 _MARKS: dict[Word, str] = {
     **dict.fromkeys(LEVELS, "✓"),
     "loses": "↓",
@@ -44,7 +44,7 @@ class Plot(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A material in the table of all, and what its section shows beside its audit."""
+    """A material in the table of all materials: its audit, its cells, and the tables of its section."""
 
     audit: MaterialAudit
     anchor: str
@@ -58,11 +58,11 @@ def key_of(subject: MaterialAudit | Figure) -> str:
 
 
 def plots_of(subject: MaterialAudit | Figure) -> list[Plot]:
-    """Draw the plots of the section of a material or a figure; most of the time of a page goes into this."""
+    """Return the drawn plots of a material or a figure. This takes most of the time of a page."""
     if isinstance(subject, Figure):
         drawings = subject.panels
     else:
-        drawings = [drawing for found in subject.findings.values() for drawing in found.figures()]
+        drawings = [drawing for finding in subject.findings.values() for drawing in finding.figures()]
     return [
         Plot(drawing.kind, figure_svg.svg(drawing, f"{key_of(subject)}-{n}")) for n, drawing in enumerate(drawings, 1)
     ]
@@ -76,7 +76,7 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
     report : AuditReport
         Findings of a store.
     plots : mapping, optional
-        Of each material and figure the plots of `plots_of`, under its `key_of`; drawn here if it is not given.
+        Plots of each material and figure by `key_of`; by default drawn with `plots_of`.
 
     Returns
     -------
@@ -110,7 +110,7 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
 
 
 def anchor(name: str) -> str:
-    """Return the id of a material's section: its name, where letters that an address cannot hold are numbers."""
+    """Return the id of a material's section: its name, with numbers for letters that an address cannot hold."""
     return "m-" + re.sub(r"[^A-Za-z0-9-]", lambda letter: f"_{ord(letter[0]):x}_", name)
 
 
@@ -121,17 +121,17 @@ def columns() -> tuple[str, ...]:
 
 def cells_of(a: MaterialAudit) -> list[Cell]:
     """Return the cells of all findings on a material, in the order of `columns`."""
-    return [cell for key, found in a.findings.items() for cell in _cells(FINDINGS[key], found)]
+    return [cell for key, finding in a.findings.items() for cell in _cells(FINDINGS[key], finding)]
 
 
-def _cells(kind: type[Finding], found: Finding) -> list[Cell]:
-    if isinstance(found, NotJudged):
-        return [Cell(found.verdict, "–", LAST)] * len(kind.columns)
-    return found.cells()
+def _cells(kind: type[Finding], finding: Finding) -> list[Cell]:
+    if isinstance(finding, NotJudged):
+        return [Cell(finding.verdict, "–", LAST)] * len(kind.columns)
+    return finding.cells()
 
 
 def _tables(a: MaterialAudit) -> list[NumberTable]:
-    return [table for found in a.findings.values() for table in found.tables() if table.rows]
+    return [table for finding in a.findings.values() for table in finding.tables() if table.rows]
 
 
 def _sentence(text: str) -> str:

@@ -130,7 +130,7 @@ def test_what_a_recipe_says_of_an_excess_is_repeated_and_excuses_nothing() -> No
     table = tabulated(material("ward_half_vector", ward, known_excess=claim), ANISOTROPIC)
     found = audit(table)
     assert (found.verdict, found.of(Energy).verdict) == ("violates", "violates")
-    assert found.of(Energy).reason.endswith("; its recipe excuses it, which counts for nothing: I say so")
+    assert found.of(Energy).reason.endswith("; its recipe excuses it, which is not accepted: I say so")
 
 
 def test_what_is_accepted_excuses_nothing_but_the_energy_of_the_model() -> None:

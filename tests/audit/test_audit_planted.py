@@ -166,7 +166,7 @@ def test_limits_in_places_that_are_no_numbers_contradict_themselves(wrong: float
     rows = [[wrong] * len(row) for row in error.places.alongside]
     other = error.model_copy(update={"places": error.places.model_copy(update={"alongside": rows})})
     (said,) = contradictions(other, len(error.floor))
-    assert said.startswith("its limits in places and between wavelengths are not numbers")
+    assert said.startswith("its limits in places and between wavelengths are not all finite")
 
 
 def test_nodes_below_the_horizon_may_be_negative_and_lookups_may_not() -> None:

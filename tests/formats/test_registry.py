@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from brdfdb.errors import ParameterError
-from brdfdb.formats import EXPORTERS, IMPORTERS, Option, options_of, parsed_options
+from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
@@ -74,7 +74,6 @@ def test_a_format_of_fifteen_lines_is_an_address(store: Path) -> None:
 
 def test_modules_of_the_room_are_found() -> None:
     assert list(EXPORTERS) == ["exr"]
-    assert dict(IMPORTERS) == {}
     for exporter in EXPORTERS.values():
         assert exporter.suffix.startswith(".")
         assert "/" in exporter.media_type

@@ -9,10 +9,10 @@ import numpy as np
 
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import Finding, Verdict
-from brdfdb.audit.findings import FINDINGS
 from brdfdb.audit.model_energy import EnergyVerdict, Furnace, ModelEnergy, UniformBound
 from brdfdb.audit.nodes import Nodes
 from brdfdb.audit.reciprocity import Asymmetry, Reciprocity
+from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
 from brdfdb.audit.sampling import Sampling
 from brdfdb.audit.smoothness import Jump, Smoothness

@@ -138,7 +138,7 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
     assert "Sampling: passes. The smallest p of 3 lights is below 0.001." in words
     assert "Table error: passes. 99 of 100 fresh values are within 0.0091, on average off by −0.002 of the" in words
     assert "Alpha: at the edge. 0.2 (at most 0.2). up to about 0.2 section 4" in words
-    assert "Validity: at the edge. Of 2 limits that its paper states 1 inside, 1 at the edge." in words
+    assert "Validity: at the edge. Its paper states 2 limits: 1 inside, 1 at the edge." in words
 
 
 def test_violations_come_first_then_known_excess_then_losses(html: str) -> None:

@@ -133,7 +133,7 @@ def test_white_oren_nayar_violates_whatever_its_recipe_says_and_can_be_accepted(
     (line,) = [line for line in out.splitlines() if line.startswith("white: ")]
     assert line.startswith("white: the model reflects 1.0")
     assert "; this model does so by itself for such parameters: up to 1.0" in line
-    assert line.endswith("; its recipe excuses it, which counts for nothing: Erratum of eqs 27 and 28: Größe") == bool(
+    assert line.endswith("; its recipe excuses it, which is not accepted: Erratum of eqs 27 and 28: Größe") == bool(
         claim
     )
     assert run("audit", "mirror", "white", "--allow", "white", "--jobs", "1", "--store", store) == 0

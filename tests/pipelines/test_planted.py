@@ -202,5 +202,5 @@ def test_a_sampler_that_weighs_too_much_is_named(
 
     monkeypatch.setattr(sampling, "sample", heavier)
     assert audited(sound, "dark", tmp_path / "report.json") == 1
-    said = "dark: samples of the model do not have the density or the albedo that they should; "
+    said = "dark: samples of the model have a wrong density or a wrong albedo; "
     assert said in capsys.readouterr().out

@@ -9,19 +9,20 @@ from pathlib import Path
 
 from brdfdb.audit.finding import Finding, NotJudged
 
-_OTHERS = {"finding", "findings", "report"}  # the interface, this module, and a reader of the registry
+_OTHERS = {"finding", "registry", "report"}  # the interface, this module, and the module that reads the registry
 
 
 def _kinds() -> Iterator[type[Finding]]:
+    """Yield the subclasses of `Finding` in the modules of this room."""
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
         if module.name not in _OTHERS:
             names = vars(importlib.import_module(f"brdfdb.audit.{module.name}"))
-            for each in names.values():
-                if isinstance(each, type) and issubclass(each, Finding) and each not in (Finding, NotJudged):
-                    yield each
+            for value in names.values():
+                if isinstance(value, type) and issubclass(value, Finding) and value not in (Finding, NotJudged):
+                    yield value
 
 
-# In the order in which they are judged and shown; the error of a table looks at the verdict on its nodes
+# The findings are in the order in which they are judged and shown. `TableError` reads the verdict of `Nodes`
 FINDINGS: dict[str, type[Finding]] = {
     kind.key: kind for kind in sorted(set(_kinds()), key=lambda kind: (kind.order, kind.key))
 }
