@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import pkgutil
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
@@ -48,6 +50,34 @@ def test_static_checks_pass(command: list[str]) -> None:
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_file_says_in_its_first_line_what_lives_there(path: Path) -> None:
     assert re.match(r'r?"""\S', path.read_text(encoding="utf-8")), f"{path} has no docstring in its first line"
+
+
+MOST_LINES, MOST_OF_A_FUNCTION, MOST_IN_THE_HALL = 450, 80, 12
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_and_functions_are_short(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert text.count("\n") <= MOST_LINES
+    functions = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+    lengths = {n.name: (n.end_lineno or n.lineno) - n.lineno + 1 for n in functions}
+    assert {name: lines for name, lines in lengths.items() if lines > MOST_OF_A_FUNCTION} == {}
+
+
+def test_the_library_has_few_files_of_its_own_and_the_design_names_every_room() -> None:
+    home = ROOT / "brdfdb"
+    files = [path.name for path in home.glob("*.py")]
+    assert len(files) <= MOST_IN_THE_HALL
+    rooms = [f"{path.parent.name}/" for path in home.glob("*/__init__.py")]
+    inside = (home / "DESIGN.md").read_text(encoding="utf-8").split("## Inside")[1].split("```")[1]
+    named = re.findall(r"^  (\S+)", inside, flags=re.MULTILINE)
+    assert sorted(named) == sorted(files + rooms)
+
+
+def test_the_rooms_stand_in_ten_layers_at_most() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    (layers,) = [each["layers"] for each in settings["contracts"] if each.get("containers") == ["brdfdb"]]
+    assert len(layers) <= 10
 
 
 @pytest.mark.parametrize("name", documents.SCHEMAS)

@@ -7,7 +7,6 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +23,13 @@ from brdfdb.store import reader as module
 from brdfdb.store.pointer import Head
 from brdfdb.store.publication import publish_dataset
 from brdfdb.store.reader import Store
-from brdfdb.store.sealed_json import sealed, unsealed
-from brdfdb.tables.grids import Grid
+from brdfdb.store.sealed_json import sealed
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from brdfdb.tables.xarray_view import plain_attributes
+from tests.store.a_store import GRID, contents, lambert
+from tests.store.published import pointer, publish, rho
 
-GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
 COPPER = {
     "title": "Rakić's copper",
     "model": "he_torrance",
@@ -40,40 +39,8 @@ COPPER = {
 }
 
 
-def lambert(rho: float) -> xr.Dataset:
-    """A table whose values tell which one it is."""
-    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-    return tabulate(Layout(Material.from_table("white", table), GRID))
-
-
 def copper() -> xr.Dataset:
     return tabulate(Layout(Material.from_table("copper", COPPER), GRID, np.array([450.0, 500.0, 700.0])))
-
-
-def publish(root: Path, **tables: xr.Dataset) -> list[str]:
-    """One revision a table; returns the revisions."""
-    return [publish_dataset(root, name, dataset)[0] for name, dataset in tables.items()]
-
-
-def rho(store: Store, name: str = "white") -> float:
-    """What the table that is served says of itself."""
-    return float(np.round(store[name].brdf[0, 0, 0] * np.pi, 6))
-
-
-def contents(directory: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
-
-
-def pointer(root: Path, name: str = "white") -> Path:
-    return root / "materials" / name / "HEAD.json"
-
-
-@pytest.fixture
-def root(tmp_path: Path) -> Path:
-    """A store with one revision of one material, rho = 0.25."""
-    directory = tmp_path / "store"
-    assert publish(directory, white=lambert(0.25)) == ["r000001"]
-    return directory
 
 
 # Revisions
@@ -305,120 +272,6 @@ def test_a_table_of_many_chunks_is_read_back_and_each_of_them_matters(
         with pytest.raises(StoreError, match="is missing"):
             brdfdb.open(root)["copper"]
         chunk.write_bytes(data)
-
-
-# Damage
-
-
-def delete(path: Path) -> None:
-    path.unlink()
-
-
-def truncate(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:-1])
-
-
-def empty(path: Path) -> None:
-    path.write_bytes(b"")
-
-
-def flip(path: Path) -> None:
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 0x10
-    path.write_bytes(data)
-
-
-FILES = ["brdf/c/0/0/0", "theta_i/c/0", "brdf/zarr.json", "zarr.json", "../r000001.MANIFEST.json"]
-
-
-@pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
-@pytest.mark.parametrize("file", FILES)
-def test_a_damaged_file_is_found_and_never_read_as_data(root: Path, file: str, damage: Callable[[Path], None]) -> None:
-    damage(root / "materials" / "white" / "r000001" / file)
-    store = brdfdb.open(root)
-    with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
-        store["white"]
-    assert "\n" not in str(caught.value)
-    with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
-        store.verify("white")
-    if damage is not flip or not file.endswith("MANIFEST.json"):
-        assert Path(file).name in str(caught.value)
-
-
-@pytest.mark.parametrize("damage", [delete, truncate, empty])
-def test_a_damaged_chunk_is_found_before_xarray_reads_nan_in_its_place(
-    root: Path, damage: Callable[[Path], None]
-) -> None:
-    damage(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
-    with pytest.raises(StoreError, match=r"^white r000001 is damaged: brdf/c/0/0/0"):
-        brdfdb.open(root).dataset("white")
-
-
-def test_a_chunk_that_is_damaged_while_a_dataset_is_read_is_named(root: Path) -> None:
-    with brdfdb.open(root).dataset("white") as lazy:
-        flip(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
-        with pytest.raises(StoreError, match=r"^white r000001 is damaged: the content of brdf/c/0/0/0 changed$"):
-            lazy["brdf"].load()
-
-
-def test_a_store_of_a_relative_path_stays_where_it_was_opened(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    other = root.parent / "elsewhere" / root.name
-    publish(other, white=lambert(0.75))
-    monkeypatch.chdir(root.parent)
-    store = brdfdb.open(root.name)
-    monkeypatch.chdir(other.parent)
-    assert (rho(store), store.path("white")) == (0.25, root / "materials" / "white" / "r000001")
-
-
-@pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
-def test_damaged_attributes_are_not_served(root: Path, damage: Callable[[Path], None]) -> None:
-    damage(root / "materials" / "white" / "r000001" / "zarr.json")
-    with pytest.raises(StoreError, match=r"^white r000001 is damaged: .*zarr\.json"):
-        brdfdb.open(root).metadata("white")
-
-
-def test_any_flipped_bit_of_a_chunk_is_found(root: Path) -> None:
-    chunk = root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0"
-    data = chunk.read_bytes()
-    brdfdb.open(root).verify("white")
-    for bit in np.random.default_rng(0).choice(8 * len(data), 100, replace=False):
-        damaged = bytearray(data)
-        damaged[bit // 8] ^= 1 << (bit % 8)
-        chunk.write_bytes(damaged)
-        with pytest.raises(StoreError, match="white r000001 is damaged"):
-            brdfdb.open(root)["white"]
-        with pytest.raises(StoreError, match="the content of brdf/c/0/0/0 changed"):
-            brdfdb.open(root).verify("white")
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"not json",
-        b"\xff\xfe",
-        b"[]",
-        b'"r000001"',
-        b"{}",
-        {"revision": 1},
-        {"revision": "../../../white/r000001", "manifests": {"../../../white/r000001": "0"}},
-        {"revision": "", "manifests": {"": "0"}},
-        {"revision": "r000009"},
-        {"revision": "r000009", "manifests": {"r000009": "0"}},
-        {"manifests": {"r000001": "0"}},
-        {"manifests": {"r000001": None}},
-        {"manifests": None},
-        {"material": "black"},
-    ],
-)
-@pytest.mark.parametrize("ask", [Store.__getitem__, Store.verify, Store.metadata, Store.dataset])
-def test_a_pointer_that_was_changed_is_not_followed(root: Path, content: bytes | dict[str, Any], ask: Any) -> None:
-    """Not even one that was sealed again."""
-    if isinstance(content, dict):
-        content = sealed({**unsealed(pointer(root).read_bytes(), "", ""), **content})
-    pointer(root).write_bytes(content)
-    with pytest.raises(StoreError, match=r"^white .*(is damaged|manifest)"):
-        ask(brdfdb.open(root), "white")
 
 
 # What is no store, and what is not in it

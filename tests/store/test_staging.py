@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -19,55 +17,19 @@ import pytest
 import xarray as xr
 
 import brdfdb
-from brdfdb.errors import BusyError, StoreError
-from brdfdb.materials import Material
+from brdfdb.errors import StoreError
 from brdfdb.store import marker
 from brdfdb.store.lock import Lock
-from brdfdb.store.manifest import check_manifest
-from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset, publish_staged
 from brdfdb.store.sealed_json import unsealed
 from brdfdb.store.staging import planned, prepare, write_block, write_frame
 from brdfdb.tables import layout as layouts
 from brdfdb.tables.error_measurement import measure
-from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout, digest
-from brdfdb.tables.tabulation import tabulate
 from brdfdb.tables.xarray_view import plain_attributes
+from tests.store.a_store import contents, lambert, layout, rho, staged
 
-GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
 REQUEST = {"asked": "for white"}
-
-
-def layout(rho: float) -> Layout:
-    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-    return Layout(Material.from_table("white", table), GRID)
-
-
-def lambert(rho: float) -> xr.Dataset:
-    """A table whose values tell which one it is."""
-    return tabulate(layout(rho))
-
-
-def rho(root: Path, name: str = "white") -> float:
-    """What the table that is served says of itself."""
-    return float(np.round(brdfdb.open(root)[name].brdf[0, 0, 0] * np.pi, 6))
-
-
-def contents(directory: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
-
-
-def staged(root: Path) -> list[str]:
-    return sorted(str(path.relative_to(root / ".staging")) for path in (root / ".staging").rglob("*"))
-
-
-@pytest.fixture
-def root(tmp_path: Path) -> Path:
-    """A store with one revision of one material, rho = 0.25."""
-    directory = tmp_path / "store"
-    assert publish_dataset(directory, "white", lambert(0.25))[0] == "r000001"
-    return directory
 
 
 @pytest.fixture
@@ -350,108 +312,3 @@ def test_a_block_that_cannot_be_written_is_one_sentence(
         [f"white{part}" for part in ("", f"/{where.name}", *(f"/{where.name}/{end}" for end in
          ("blocks", "layout.json", "request.json")))]
     )  # fmt: skip
-
-
-# Locks
-
-
-def test_a_material_has_one_builder_at_a_time_and_leaves_no_lock_behind(root: Path) -> None:
-    with Lock(root, "white") as lock:
-        with pytest.raises(BusyError, match=r"^another build is at work on white$"), Lock(root, "white", wait=False):
-            pytest.fail("entered")
-        with Lock(root, "black", wait=False):
-            assert staged(root) == ["black", "black/lock", "white", "white/lock"]
-        (lock.path.parent / "key").mkdir()
-    assert staged(root) == ["white", "white/key", "white/lock"]
-    (root / ".staging" / "white" / "key").rmdir()
-    with Lock(root, "white", wait=False):
-        pass
-    assert staged(root) == []
-
-
-def test_a_lock_is_never_held_twice(root: Path) -> None:
-    inside, errors = [], []
-
-    def work() -> None:
-        try:
-            for _ in range(200):
-                with Lock(root, "white"):
-                    inside.append(1)
-                    assert len(inside) == 1
-                    inside.pop()
-        except BaseException as error:
-            errors.append(error)
-
-    threads = [threading.Thread(target=work) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not errors
-    assert staged(root) == []
-
-
-def test_stores_that_are_made_at_the_same_moment_are_one(tmp_path: Path) -> None:
-    errors: list[BaseException] = []
-    for attempt in range(20):
-        barrier = threading.Barrier(4)
-
-        def start(root: Path = tmp_path / str(attempt), barrier: threading.Barrier = barrier) -> None:
-            barrier.wait()
-            try:
-                for _ in range(3):
-                    marker.make_store(root)
-            except BaseException as error:
-                errors.append(error)
-
-        threads = [threading.Thread(target=start) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert not errors
-    assert all(len(brdfdb.open(tmp_path / str(attempt))) == 0 for attempt in range(20))
-
-
-PUBLISHER = """
-import sys, time
-from pathlib import Path
-import numpy as np
-import xarray as xr
-from brdfdb.store.publication import publish_dataset
-
-root, me = Path(sys.argv[1]), sys.argv[2]
-value = np.full((2, 2), float(me), dtype=np.float32)
-axes = {"theta_i": [0.0, 80.0], "theta_r": [0.0, 80.0]}
-dataset = xr.Dataset({"brdf": (("theta_i", "theta_r"), value)}, axes, {"by": me})
-root.with_name(me).touch()
-while not (root.with_name("1").exists() and root.with_name("2").exists()):
-    time.sleep(0.001)
-for _ in range(5):
-    print(publish_dataset(root, "white", dataset)[0])
-"""
-
-
-def test_two_processes_write_into_one_new_store_and_none_loses_a_revision(tmp_path: Path) -> None:
-    root = tmp_path / "store"
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-c", PUBLISHER, root, me], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        for me in ("1", "2")
-    ]
-    outputs = [process.communicate(timeout=60) for process in processes]
-    assert [process.returncode for process in processes] == [0, 0], outputs
-    published = [(me, name) for me, (out, _) in zip("12", outputs, strict=True) for name in out.split()]
-    assert sorted(name for _, name in published) == [f"r{number:06d}" for number in range(1, 11)]
-    for me, name in published:
-        group = root / "materials" / "white" / name
-        data = manifest_path(group).read_bytes()
-        check_manifest(group, hashlib.sha256(data).hexdigest(), contents=True)
-        with xr.open_zarr(group) as found:
-            assert found["brdf"].values.tolist() == [[float(me)] * 2] * 2
-            assert found.attrs == {"by": me}
-    store = brdfdb.open(root)
-    store.verify("white")
-    assert store.head("white") == "r000010"
-    assert staged(root) == []

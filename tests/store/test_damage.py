@@ -1,0 +1,130 @@
+"""Damage in a store: it is found, named, and never read as data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb.errors import StoreError
+from brdfdb.store.reader import Store
+from brdfdb.store.sealed_json import sealed, unsealed
+from tests.store.a_store import lambert
+from tests.store.published import pointer, publish, rho
+
+# Damage
+
+
+def delete(path: Path) -> None:
+    path.unlink()
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0x10
+    path.write_bytes(data)
+
+
+FILES = ["brdf/c/0/0/0", "theta_i/c/0", "brdf/zarr.json", "zarr.json", "../r000001.MANIFEST.json"]
+
+
+@pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
+@pytest.mark.parametrize("file", FILES)
+def test_a_damaged_file_is_found_and_never_read_as_data(root: Path, file: str, damage: Callable[[Path], None]) -> None:
+    damage(root / "materials" / "white" / "r000001" / file)
+    store = brdfdb.open(root)
+    with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
+        store["white"]
+    assert "\n" not in str(caught.value)
+    with pytest.raises(StoreError, match=r"^white r000001 is damaged: ") as caught:
+        store.verify("white")
+    if damage is not flip or not file.endswith("MANIFEST.json"):
+        assert Path(file).name in str(caught.value)
+
+
+@pytest.mark.parametrize("damage", [delete, truncate, empty])
+def test_a_damaged_chunk_is_found_before_xarray_reads_nan_in_its_place(
+    root: Path, damage: Callable[[Path], None]
+) -> None:
+    damage(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
+    with pytest.raises(StoreError, match=r"^white r000001 is damaged: brdf/c/0/0/0"):
+        brdfdb.open(root).dataset("white")
+
+
+def test_a_chunk_that_is_damaged_while_a_dataset_is_read_is_named(root: Path) -> None:
+    with brdfdb.open(root).dataset("white") as lazy:
+        flip(root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0")
+        with pytest.raises(StoreError, match=r"^white r000001 is damaged: the content of brdf/c/0/0/0 changed$"):
+            lazy["brdf"].load()
+
+
+def test_a_store_of_a_relative_path_stays_where_it_was_opened(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = root.parent / "elsewhere" / root.name
+    publish(other, white=lambert(0.75))
+    monkeypatch.chdir(root.parent)
+    store = brdfdb.open(root.name)
+    monkeypatch.chdir(other.parent)
+    assert (rho(store), store.path("white")) == (0.25, root / "materials" / "white" / "r000001")
+
+
+@pytest.mark.parametrize("damage", [delete, truncate, empty, flip])
+def test_damaged_attributes_are_not_served(root: Path, damage: Callable[[Path], None]) -> None:
+    damage(root / "materials" / "white" / "r000001" / "zarr.json")
+    with pytest.raises(StoreError, match=r"^white r000001 is damaged: .*zarr\.json"):
+        brdfdb.open(root).metadata("white")
+
+
+def test_any_flipped_bit_of_a_chunk_is_found(root: Path) -> None:
+    chunk = root / "materials" / "white" / "r000001" / "brdf" / "c" / "0" / "0" / "0"
+    data = chunk.read_bytes()
+    brdfdb.open(root).verify("white")
+    for bit in np.random.default_rng(0).choice(8 * len(data), 100, replace=False):
+        damaged = bytearray(data)
+        damaged[bit // 8] ^= 1 << (bit % 8)
+        chunk.write_bytes(damaged)
+        with pytest.raises(StoreError, match="white r000001 is damaged"):
+            brdfdb.open(root)["white"]
+        with pytest.raises(StoreError, match="the content of brdf/c/0/0/0 changed"):
+            brdfdb.open(root).verify("white")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"not json",
+        b"\xff\xfe",
+        b"[]",
+        b'"r000001"',
+        b"{}",
+        {"revision": 1},
+        {"revision": "../../../white/r000001", "manifests": {"../../../white/r000001": "0"}},
+        {"revision": "", "manifests": {"": "0"}},
+        {"revision": "r000009"},
+        {"revision": "r000009", "manifests": {"r000009": "0"}},
+        {"manifests": {"r000001": "0"}},
+        {"manifests": {"r000001": None}},
+        {"manifests": None},
+        {"material": "black"},
+    ],
+)
+@pytest.mark.parametrize("ask", [Store.__getitem__, Store.verify, Store.metadata, Store.dataset])
+def test_a_pointer_that_was_changed_is_not_followed(root: Path, content: bytes | dict[str, Any], ask: Any) -> None:
+    """Not even one that was sealed again."""
+    if isinstance(content, dict):
+        content = sealed({**unsealed(pointer(root).read_bytes(), "", ""), **content})
+    pointer(root).write_bytes(content)
+    with pytest.raises(StoreError, match=r"^white .*(is damaged|manifest)"):
+        ask(brdfdb.open(root), "white")
