@@ -1,7 +1,7 @@
-"""What the inside of kernels is made of: exp, log, sine, arcsin, erfc without branches, so that their loops vectorise.
+"""Elementary functions of kernels: exp, log, sine, arcsin, erfc without branches, so that loops over them vectorise.
 
-libm's do not vectorise without SVML, which pip wheels do not ship. Kernels of any file may call these: `_numba.kernel`
-knows this file, and compiles its callers anew when it changes.
+Those of libm do not vectorise without SVML, which pip wheels do not ship. Kernels of any file may call these functions:
+this file is one of `_numba.SHARED`, so that their callers are compiled again after a change.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import numpy as np
 
 from brdfdb._numba import kernel
 
-COS_HORIZON = 6.123233995736766e-17  # of the float64 nearest pi/2: where a model has a pole, its value there is finite
-BLOCK = 256  # directions that a loop takes at a time: their intermediate values stay in a core's first cache
+COS_HORIZON = 6.123233995736766e-17  # cosine of the float64 nearest pi/2: models with a pole there stay finite
+BLOCK = 256  # directions in a block of a loop: their intermediate values fit into the first cache of a core
 
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH = 0.6931471805598903  # has 20 bits to spare: n times it is exact
 _LN2_LOW = 5.497923018708371e-14
 _ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it leaves the nearest integer in the low bits of the float
-_EXP_UNDERFLOW = -708.0  # below is 0: no subnormal numbers
+_EXP_UNDERFLOW = -708.0  # argument below which exp is 0, so that no number is subnormal
 _TWO_OVER_PI = 0.6366197723675814
 _HALF_PI_HIGH = 1.5707963267341256  # has 20 bits to spare
 _HALF_PI_MIDDLE = 6.077100506303966e-11  # too

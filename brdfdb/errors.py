@@ -11,7 +11,7 @@ _SHOWN = 60  # characters of an unknown name that a sentence repeats
 
 
 class BrdfdbError(Exception):
-    """An error that the user can act on; str() is one sentence that says what was given and what is allowed."""
+    """An error that the user can act on; str() is one sentence with the value and the allowed values."""
 
 
 class ParameterError(BrdfdbError, ValueError):

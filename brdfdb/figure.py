@@ -25,11 +25,13 @@ class Curve(BaseModel):
     label: str
     x: list[float]
     y: Numbers = Field(description="null: a gap")
-    role: Role = Field(default="other", description="which form is drawn; what the same role has looks the same")
+    role: Role = Field(
+        default="other", description="kind of the form that is drawn; curves of the same role look the same"
+    )
 
 
 class Panel(BaseModel):
-    """Curves over common axes; of a polar panel x is the angle from the normal in degrees, -90 to 90, y the radius."""
+    """Curves over common axes. In a polar panel x is the angle from the normal, -90 to 90 degrees, and y the radius."""
 
     model_config = _STRICT
 
@@ -43,7 +45,7 @@ class Panel(BaseModel):
 
 
 class Map(BaseModel):
-    """Values over two axes, as colours."""
+    """Values over two axes, shown as colours."""
 
     model_config = _STRICT
 
@@ -57,9 +59,9 @@ class Map(BaseModel):
     values: list[Numbers] = Field(description="[y][x]; null: none")
     log_x: bool = False
     log_y: bool = False
-    log: bool = Field(default=False, description="whether colours are those of the logarithms")
-    low: float | None = Field(default=None, description="what the darkest colour stands for; null: the smallest value")
-    high: float | None = Field(default=None, description="what the brightest stands for; null: the largest value")
+    log: bool = Field(default=False, description="true: colours show logarithms")
+    low: float | None = Field(default=None, description="value of the darkest colour; null: the smallest value")
+    high: float | None = Field(default=None, description="value of the brightest colour; null: the largest value")
 
 
 class Picture(BaseModel):
@@ -73,13 +75,13 @@ class Picture(BaseModel):
 
 
 class Statement(BaseModel):
-    """A sentence about a figure, and the result of holding our figure against it."""
+    """A sentence about a figure, and the result of the comparison with the computed figure."""
 
     model_config = _STRICT
 
-    says: str = Field(description="what the paper says one sees, or what is known of the form")
-    where: str = Field(description="where it says so")
-    seen: str = Field(description="what was computed, with its numbers")
+    says: str = Field(description="statement of the paper on its figure, or a known fact of the form")
+    where: str = Field(description="place of the statement")
+    seen: str = Field(description="result of the computation, with its numbers")
     holds: bool
     threshold_from: str | None = Field(
         default=None, description="the basis of the threshold, in the form 'BASIS: reason', or null where none is given"
@@ -87,14 +89,14 @@ class Statement(BaseModel):
 
 
 class Figure(BaseModel):
-    """Panels with a caption, and the statements that they are held against."""
+    """Panels with a caption, and the statements that they are compared with."""
 
     model_config = _STRICT
 
     key: str = Field(description="unique, of lower-case letters, digits and hyphens")
     paper: str = Field(description="key in references.bib")
     title: str
-    caption: str = Field(description="what is drawn, with the parameters")
+    caption: str = Field(description="content of the figure, with the parameters")
     panels: list[Panel | Map | Picture]
     statements: list[Statement]
 
@@ -122,7 +124,7 @@ def listed(values: Iterable[float], form: str = ".3g") -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a number for people: 0.0123, 1.2·10⁻⁹; a dash for None."""
+    """Return a number as text: 0.0123, 1.2·10⁻⁹; a dash for None."""
     if value is None:
         return "–"
     value += 0.0  # -0 is 0

@@ -3,7 +3,7 @@
 Directions are unit vectors that point away from the surface; theta is measured from the normal (z), phi
 counter-clockwise from x. Index i is the light, r the viewer. ``delta_phi = phi_r - phi_i``: 0 looks back towards the
 light, pi is the half plane of the mirror direction. Angles are radians in every function; degrees exist only at human
-and file boundaries, and `degrees` / `radians` below are where they are converted.
+and file boundaries, and `degrees` and `radians` below convert them.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from brdfdb.errors import ParameterError
 from brdfdb.parameters import Floats
 
 HALF_PI = np.pi / 2
-PHI_MAX = 1e15  # beyond, neighbouring float64 are more than a tenth of a radian apart
-NO_AZIMUTH = 1e-290  # smaller products of two sines carry too few digits: an azimuth means nothing
-UNIT_LENGTH = 1e-5  # how far from 1 the length of a unit vector may be; float32 is off by 1e-7
+PHI_MAX = 1e15  # largest azimuth: neighbouring float64 beyond it are more than a tenth of a radian apart
+NO_AZIMUTH = 1e-290  # product of two sines below which an azimuth carries too few digits
+UNIT_LENGTH = 1e-5  # largest difference of the length of a unit vector from 1; that of float32 is 1e-7
 
 
 def radians(angle_deg: ArrayLike) -> NDArray[np.float64]:
@@ -36,10 +36,10 @@ def degrees(angle: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_theta(name: str, theta: ArrayLike) -> Floats:
-    """Return a polar angle [rad] as a float array, or raise a ValueError that says what is wrong with it.
+    """Return a polar angle [rad] as a float array, or raise a ValueError.
 
-    Allowed are 0 to pi, and nan, which passes through to the result. An angle past pi/2 is below the horizon and
-    allowed: the BRDF is 0 there.
+    Angles from 0 to pi are allowed. nan passes through to the result. An angle beyond pi/2 is below the horizon: the
+    BRDF is 0 there.
     """
     array = _float_array(name, theta)
     bad = (array < 0.0) | (array > array.dtype.type(np.pi))
@@ -55,7 +55,7 @@ def check_theta(name: str, theta: ArrayLike) -> Floats:
 
 
 def check_phi(name: str, phi: ArrayLike) -> Floats:
-    """Return an azimuth [rad] as a float array; nan passes through, what is not in [-1e15, 1e15] is a ValueError."""
+    """Return an azimuth [rad] as a float array; nan passes through, values outside [-1e15, 1e15] raise."""
     array = _float_array(name, phi)
     bad = np.abs(array) > PHI_MAX
     if np.any(bad):
@@ -77,7 +77,7 @@ def _float_array(name: str, angle: ArrayLike) -> Floats:
 class Angles:
     """Directions of light and viewer by angles [rad], checked: float64, thetas held at the horizon.
 
-    What depends on one angle is computed when a model asks for it, and stays on the axis of that angle.
+    Functions of one angle are computed when a model needs them, and stay on the axis of that angle.
     """
 
     theta_i: NDArray[np.float64]
@@ -182,8 +182,7 @@ def checked_vectors(wi: ArrayLike, wr: ArrayLike) -> Vectors:
     """Check the unit vectors of light and viewer, each of shape (..., 3); nan passes through to the result.
 
     float32 arrays in give float32 out; the arithmetic is float64. Below the horizon, z < 0, every model is 0; at z = 0
-    it has its limit from above. Of long arrays the length is checked for a thousand vectors, evenly spread: the rest
-    is the caller's word.
+    it has its limit from above. In long arrays the length of a thousand vectors, evenly spread, is checked.
 
     Raises
     ------
@@ -224,8 +223,8 @@ def asked_for(*directions: ArrayLike) -> np.dtype[Any]:
 def finished(values: Floats, directions: Directions, *, trailing: int = 0) -> Floats:
     """Broadcast to all directions; 0 below the horizon, nan where a direction is nan, in the dtype asked for.
 
-    `trailing` axes of `values`, such as wavelengths, come after those of the directions. Values that nothing is to be
-    changed of are given back as they are, not copied.
+    `trailing` axes of `values`, such as wavelengths, come after those of the directions. Values that need
+    no change are returned without a copy.
     """
     own = np.shape(values)[np.ndim(values) - trailing :]
 

@@ -46,7 +46,7 @@ class Parameter:
                 self.name, f"{value!r} is not a number in {self.interval}", value, (self.low, self.high)
             )
         array = given.astype(np.float64)
-        bad = ~((array >= self.low) & (array <= self.high))  # nan too
+        bad = ~((array >= self.low) & (array <= self.high))  # True for nan, too
         if np.any(bad):
             first = array[bad].flat[0] if array.ndim else array[()]
             value, interval = f"{first:.16g}", self.interval
@@ -68,14 +68,14 @@ def bytes_of(arguments: Arguments) -> int:
 
 
 class ModelForm(NamedTuple):
-    """One way to get f_r of a model, to be charted: the model itself, an approximation, or what a paper prints.
+    """One form of a model for charts: the model itself, an approximation, or a formula that a paper prints.
 
     Attributes
     ----------
     key : str
         Unique among those of a model: lower-case words joined by hyphens.
     title : str
-        A name for people, with the equation.
+        Title with the equation.
     kind : str
         "exact"; "quadrature", the same by a coarser integral or sum; "closed form"; "approximation"; "customary", usual
         in programs and printed by no paper; "printed" by a paper, where this library holds another form; "other model",
@@ -87,7 +87,7 @@ class ModelForm(NamedTuple):
     bytes : int
         Size of the numbers that an evaluation reads: parameters, spectra, and constants that kernels look up.
     single : bool
-        Whether to chart it with float32 in and out, too.
+        Chart it with float32 in and out, too.
     """
 
     key: str
@@ -102,9 +102,9 @@ class ModelForm(NamedTuple):
 class StatedLimit(NamedTuple):
     """One limit of validity that a paper states of its model, and the standing of some parameters in it.
 
-    `quantity` is what is limited, `value` its value and `valid` its range, in words. `words` is the quotation, `where`
-    its paper and section. Where a paper says "much less" and no number, a tenth is inside, and what is less, but not by
-    that much, at the edge.
+    `quantity` is the limited quantity, `value` its value and `valid` its range, in words. `words` is the quotation,
+    `where` its paper and section. If a paper says "much less" without a number, values up to a tenth are inside, and
+    values between a tenth and 1 at the edge.
     """
 
     quantity: str
@@ -116,7 +116,7 @@ class StatedLimit(NamedTuple):
 
 
 class Diagnostic(NamedTuple):
-    """A number that tells in which regime a model is: its symbol, a title, and a function of the arguments."""
+    """A number that shows the regime of a model: its symbol, a title, and a function of the arguments."""
 
     symbol: str
     title: str
@@ -125,29 +125,29 @@ class Diagnostic(NamedTuple):
 
 @dataclass(frozen=True)
 class ModelSpec:
-    """A model as the rest of the library sees it: nothing outside its own modules knows a model by name.
+    """The specification of a model. No code outside the model's own modules knows a model by name.
 
-    `version` is written into every table and is raised whenever a tabulated value moves. `evaluate` has the call
+    `version` is written into every table and is raised whenever a tabulated value changes. `evaluate` has the call
     shape ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``, `vectors`, its twin, ``f(wi, wr, *, parameters)``;
     `specular`, where there is a specular part, is ``f(theta_i, *, parameters)`` of the parameters named in
     `specular_parameters`. `spectral` models take ``wavelength_nm, n, k`` beside their own parameters.
     `grazing_pole` marks a model that grows without bound as a direction reaches 90 degrees.
-    `excess`, for a model whose equations as published can reflect more than they receive, says why, how much and where:
-    an explanation for audits, which excuses nothing.
-    `lobe_axes` names the two parameters that make the model anisotropic when they differ; `anisotropic`, of models that
-    are so in another way, says of their parameters whether they make it so.
-    `uniform`, if there is one, names the parameter that over pi is a part of the value, the same in all directions.
-    `lobe`, of models that have one, is called as ``lobe(cos_i, **parameters)`` and says where; None: a diffuse model.
-    `lossless` says which parameters to set to what so that nothing is absorbed: light that is then missing, the model
-    itself loses. None where no parameters do that.
+    `excess` explains, for a model whose published equations can reflect more than they receive, the reason, the amount
+    and the directions. Audits quote it, and it excuses nothing.
+    `lobe_axes` names the two parameters that make the model anisotropic if they differ. Models that are anisotropic in
+    another way have `anisotropic`, a function of the parameters that returns True if they make the model so.
+    `uniform` names the parameter that, divided by pi, is the uniform part of f_r; None: there is none.
+    `lobe` returns the lobe of the model as ``lobe(cos_i, **parameters)``; None: a diffuse model.
+    `lossless` returns the parameters to change, with their values, so that nothing is absorbed. Light that is still
+    missing is lost by the model itself. None: no parameters do that.
 
     For charts, `forms` gives the forms of the model at some arguments, the exact one first; None: the model itself.
     `exact_model` names another model of the registry, with its parameters, that this one approximates at some
     parameters, or None: charted tables hold that one. `diagnostic` is shown along the members of a family.
     For audits, `limits` gives the limits that a paper states, judged at some arguments. `slow` marks a model whose
-    values are integrals, of about 30 us each: audits ask for fewer. `uniform_bound_cosine` marks a model whose uniform
-    part is free up to what energy conservation leaves; at some arguments it gives the lowest cos theta_i [1] down to
-    which the largest reflectance is searched.
+    values are integrals, of about 30 us each: audits compute fewer of them. `uniform_bound_cosine` marks a model whose
+    uniform part is limited by energy conservation only. It returns the lowest cos theta_i [1] at which the largest
+    reflectance is searched.
     """
 
     name: str

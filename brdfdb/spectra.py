@@ -75,7 +75,7 @@ def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.f
     record = _optical_constants(entry)
     low, high = record.get_wl_range(unit="nm")
     inside = (wavelength >= low * (1.0 - _RANGE_TOLERANCE)) & (wavelength <= high * (1.0 + _RANGE_TOLERANCE))
-    with np.errstate(all="ignore"):  # what a formula cannot give is reported below
+    with np.errstate(all="ignore"):  # values that a formula cannot give are reported below
         n = np.asarray(record.get_refractive_index(wavelength, unit="nm"), dtype=np.float64)
         try:
             k = np.asarray(record.get_extinction_coefficient(wavelength, unit="nm"), dtype=np.float64)
@@ -139,7 +139,7 @@ def illuminant_spectrum(name: str, wavelength_nm: ArrayLike) -> NDArray[np.float
     return np.asarray(np.interp(np.asarray(wavelength_nm), at, power) / np.interp(560.0, at, power))
 
 
-@lru_cache(maxsize=64)  # wavelengths are of clients, too
+@lru_cache(maxsize=64)  # bounded, because clients choose wavelengths, too
 def xyz_weights(
     wavelengths: tuple[float, ...], illuminant: str = ILLUMINANT, observer: str = OBSERVER
 ) -> NDArray[np.float64]:
@@ -163,7 +163,7 @@ def srgb_weights(
 ) -> NDArray[np.float64]:
     """Return weights (L, 3) that take a reflectance spectrum at `wavelengths` [nm] to linear sRGB: white is (1, 1, 1).
 
-    Of another illuminant than D65, the white of sRGB, colours are adapted to it by Bradford's matrix.
+    With an illuminant other than D65, the white of sRGB, colours are adapted by Bradford's matrix.
     """
     colour = colour_science()
     space = colour.RGB_COLOURSPACES["sRGB"]

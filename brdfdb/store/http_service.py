@@ -161,7 +161,7 @@ class Service:
             why = getattr(error, "strerror", None) or str(error).strip() or type(error).__name__
             raise StoreError(f"no answer from {self.url}: {why}") from error
         except BaseException:
-            connection.close()  # what is left of this answer is not that of the next request
+            connection.close()  # the rest of this answer must not be read as the next one
             raise
 
     def _connection(self) -> http.client.HTTPConnection:

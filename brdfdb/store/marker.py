@@ -20,7 +20,7 @@ FORMAT_VERSION = 2  # 1 had no digests in the first lines
 
 
 class DamagedMarkerError(StoreError):
-    """A brdfdb.json that cannot be believed: `brdfdb build` writes it anew where there are tables beside it."""
+    """A damaged brdfdb.json: `brdfdb build` writes it again if the directory holds tables."""
 
 
 def check_marker(root: Path) -> None:

@@ -1,14 +1,15 @@
-"""Staging: a table while it is being written, so that a build killed at any moment goes on where it was.
+"""Staging: a table while it is written, so that a killed build can be resumed.
 
-ROOT/.staging/NAME/lock              held by the build at work on the material: one at a time
-ROOT/.staging/NAME/KEY/              one request, by the first digits of its digest
-ROOT/.staging/NAME/KEY/request.json  what was asked for
-ROOT/.staging/NAME/KEY/layout.json   what the table is going to be
-ROOT/.staging/NAME/KEY/table/        the zarr group, growing
-ROOT/.staging/NAME/KEY/blocks/       a marker for each block that is whole: size, sha256, and of which layout
+ROOT/.staging/NAME/lock              lock of the material: one build at a time
+ROOT/.staging/NAME/KEY/              one request, named by the first digits of its digest
+ROOT/.staging/NAME/KEY/request.json  the request
+ROOT/.staging/NAME/KEY/layout.json   the layout of the table
+ROOT/.staging/NAME/KEY/table/        the zarr group
+ROOT/.staging/NAME/KEY/blocks/       a marker for each complete block: size, sha256 and layout
 
-Blocks are computed and written by `write_block`, the rest of the table by `write_frame`: functions of plain arguments,
-for threads, processes and other machines alike that see the same file system. Whoever holds the lock publishes.
+`write_block` computes and writes a block, `write_frame` the rest of the table. Their arguments are plain strings and
+numbers, so that threads, processes and other machines with the same file system can call them. The holder of the lock
+publishes.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from brdfdb.tables.stated_error import Error
 
 MANTISSA_BITS = 23  # of a float32 value
 
-# The statements without which nobody can tell what a table is
+# Attributes without which a table cannot be interpreted
 REQUIRED = ("title", "material", "table_version", "model", "model_version", "parameters", "source", "conventions")
 _OF_MODELS = ("model", "model_version", "parameters")
 

@@ -1,4 +1,4 @@
-"""Tabulation: from a layout to a table, an xarray Dataset in memory that says where every number comes from."""
+"""Tabulation: from a layout to a table, an xarray Dataset in memory with its provenance."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class BoundedProtocol(HttpToolsProtocol):
         super().on_body(body)
 
     def shutdown(self) -> None:
-        """Close when what is asked is answered; a request may be under way on a connection that looks idle."""
+        """Close after requests in flight are completed. A connection that looks idle may have one under way."""
         self._stopping = True
         if self.cycle is None or self.cycle.response_complete:
             self.loop.call_later(LAST_S, super().shutdown)

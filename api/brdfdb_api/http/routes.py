@@ -1,4 +1,4 @@
-"""The addresses under /v1/materials: lists, materials and lookups; and those that tell how the service is."""
+"""The addresses under /v1/materials: lists, materials and lookups; and the addresses that report health."""
 
 from __future__ import annotations
 
