@@ -10,8 +10,8 @@ from typing import Any
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
-import brdfdb
 from brdfdb.errors import ParameterError, StoreError
+from brdfdb.store import opening
 from brdfdb.store.http_client import remote_dataset
 from brdfdb.store.paths import METADATA, marker_path, number_of, store_of
 from brdfdb.store.reader import Store
@@ -64,7 +64,7 @@ class BrdfdbBackend(BackendEntrypoint):
         """
         place = os.fspath(filename_or_obj)
         if material is not None:
-            dataset = brdfdb.open(place, snapshot=snapshot).dataset(material, revision)
+            dataset = opening.open(place, snapshot=snapshot).dataset(material, revision)
         elif place.startswith(("http://", "https://")):
             if not number_of(place.rstrip("/").rpartition("/")[2]):
                 raise ParameterError("material", f"{place} is not the address of a revision; name one of its materials")
