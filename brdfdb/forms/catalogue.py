@@ -98,7 +98,7 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
 
     Raises
     ------
-    ValueError
+    ParameterError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the source.
     """
     if tolerances is None:

@@ -67,7 +67,7 @@ def chart(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
     """
     forms = [*catalogue.forms(source, wavelength_nm, tolerances), *also]
@@ -174,7 +174,7 @@ def chart_family(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the materials.
     StoreError
         If a member of `family` was built anew since it was recorded.
