@@ -51,8 +51,8 @@ def test_the_docstring_of_a_twin_names_the_function_that_documents_its_parameter
     angles = [each for each in by_angles if each in ANGLES]
     both = angles == [*ANGLES]
     assert both or angles == ["theta_i"]
-    vectors_of = "`wi` (light) and `wr` (viewer)" if both else "`wi` (light)"
-    first = rf"Return `{original.__name__}` (\[1(/sr)?\] )?for unit vectors {re.escape(vectors_of)} of shape \(\.\.\., 3\)\."
+    arguments = "`wi` (light) and `wr` (viewer)" if both else "`wi` (light)"
+    first = rf"Return `{original.__name__}` (\[1(/sr)?\] )?for unit vectors {re.escape(arguments)} of shape \(..., 3\)"
     assert re.match(first, inspect.getdoc(twin) or "")
     vectors = ["wi", "wr"] if both else ["wi"]
     assert [*by_vectors] == [*vectors, *[*by_angles][len(angles) :]]
