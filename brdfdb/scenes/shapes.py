@@ -174,7 +174,7 @@ class Revolution(Shape):
         return ((c3 * u + c2) * u + m0) * u + r0, ((3.0 * c3 * u + 2.0 * c2) * u + m0) / h
 
     def _rings(self) -> tuple[Array, Array]:
-        """The radii and heights where one cone ends and the next begins."""
+        """Radii and heights where one cone ends and the next begins."""
         height = np.array(self.profile)[:, 1]
         z = np.interp(np.arange((height.size - 1) * _FACETS + 1) / _FACETS, np.arange(height.size), height)
         return self.radius_at(z)[0], z
