@@ -1,4 +1,4 @@
-"""Fresnel reflection at a plane interface: reflectance of unpolarised light, complex amplitudes of s and p."""
+"""Fresnel reflection at a plane interface: reflectance of unpolarised light, and complex amplitudes of s and p."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from brdfdb._numba import elementwise, kernel
 
 @kernel
 def _interface(cos_theta: float, n: float, k: float) -> tuple[float, float, float, float, float]:
-    """Return real and imaginary part of w = (n + ik)^2 - 1, real part of 1 + w, and both of q = sqrt(cos^2 + w).
+    """Return real and imaginary part [1] of w = (n + ik)^2 - 1, real part of 1 + w, and both of q = sqrt(cos^2 + w).
 
-    Of the two roots q has the parts that are not negative: the wave in the substance goes and decays away from the
-    surface, with the time factor exp(-i omega t). The difference that cancels as n -> 1 is taken once, in w.
+    q is the root with parts that are not negative. With the time factor exp(-i omega t) its wave travels and decays
+    away from the surface. The difference that cancels as n -> 1 is taken once, in w.
     """
     cos2 = cos_theta * cos_theta
     sin2 = (1.0 - cos_theta) * (1.0 + cos_theta)
     e_re = (n - k) * (n + k)  # 1 + w, which keeps its digits as n -> 0
-    # n - 1 to 15 decimals: an index is typed as a decimal, and the float64 nearest to 1.000001 is off by 8e-11 of n - 1
+    # n - 1 is rounded to 15 decimals. An index is typed as a decimal, and the float64 nearest to 1.000001 has an error
+    # of 8e-11 of n - 1
     n_less_1: float = np.floor((n - 1.0) * 1e15 + 0.5) * 1e-15
     w_re = n_less_1 * (n_less_1 + 2.0) - k * k
     w_im = 2.0 * n * k
-    # q = a + ib, the root with a, b >= 0; each of the two is formed where it does not cancel
+    # q = a + ib is the root with a, b >= 0. The one of the two that does not cancel gives the other
     q2_re = cos2 + w_re if cos2 < 0.5 else e_re - sin2
     modulus = math.sqrt(q2_re * q2_re + w_im * w_im)
     large = math.sqrt(0.5 * (modulus + abs(q2_re)))
@@ -37,10 +38,10 @@ def _interface(cos_theta: float, n: float, k: float) -> tuple[float, float, floa
 
 @kernel
 def reflectance(cos_theta: float, n: float, k: float) -> float:
-    """Return |F|^2 = (|F_s|^2 + |F_p|^2) / 2 at a vacuum interface of complex index n + ik.
+    """Return |F|^2 = (|F_s|^2 + |F_p|^2) / 2 [1] at an interface from vacuum to the complex index n + ik.
 
-    With w and q of `_interface`, F_s = -w / (cos + q)^2 and F_p = w (cos^2 (1 + w) - sin^2) / ((1 + w) cos + q)^2: the
-    same as the textbook quotients without their cancellation as n -> 1.
+    With w and q of `_interface`, F_s = -w / (cos + q)^2 and F_p = w (cos^2 (1 + w) - sin^2) / ((1 + w) cos + q)^2.
+    These equal the textbook quotients but do not cancel as n -> 1.
     """
     w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
     cos2 = cos_theta * cos_theta
@@ -58,15 +59,15 @@ def reflectance(cos_theta: float, n: float, k: float) -> float:
     d_p = den_re * den_re + den_im * den_im
     d_p2 = d_p * d_p
     both = 0.5 * w_abs2 * (d_p2 + num2 * d_s2) / (d_s2 * d_p2)
-    # n = 1, k = 0 is no interface, and 0 / 0 at grazing; rounding passes 1 by 4e-16 in total reflection
+    # n = 1, k = 0 is no interface, and 0 / 0 at grazing. Rounding exceeds 1 by 4e-16 in total reflection
     return 0.0 if w_abs2 == 0.0 else 1.0 if both > 1.0 else both
 
 
 @kernel
 def _half_sum_and_difference(cos_theta: float, n: float, k: float) -> tuple[complex, complex]:
-    """Return (F_s + F_p) / 2 = T sin^2 and (F_s - F_p) / 2 = T q cos, with T = -w / ((cos + q) ((1 + w) cos + q)).
+    """Return (F_s + F_p) / 2 = T sin^2 and (F_s - F_p) / 2 = T q cos [1], T = -w / ((cos + q) ((1 + w) cos + q)).
 
-    One is 0 at normal incidence, the other at grazing: written like this, neither is a difference that cancels.
+    The first is 0 at normal incidence and the second at grazing. In this form neither is a difference that cancels.
     """
     w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
     if w_re == 0.0 and w_im == 0.0:  # no interface, and 0 / 0 at grazing
@@ -78,7 +79,7 @@ def _half_sum_and_difference(cos_theta: float, n: float, k: float) -> tuple[comp
 
 @kernel
 def _amplitudes(cos_theta: float, n: float, k: float) -> tuple[complex, complex]:
-    """Return F_s and F_p as in `reflectance`."""
+    """Return F_s and F_p [1] as in `reflectance`."""
     w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
     if w_re == 0.0 and w_im == 0.0:  # no interface, and 0 / 0 at grazing
         return complex(0.0, 0.0), complex(0.0, 0.0)
@@ -120,16 +121,16 @@ Complexes = NDArray[np.complexfloating]
 
 
 def amplitudes(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
-    """Return complex F_s and F_p, reflected over incident field, for the index n + ik and the time exp(-i omega t).
+    """Return complex F_s and F_p [1], the ratios of reflected to incident field, for the index n + ik.
 
-    At normal incidence F_p = -F_s = (n + ik - 1) / (n + ik + 1), since p = s x (direction of propagation) turns over
-    on reflection; at grazing both are -1.
+    The time factor is exp(-i omega t). At normal incidence F_p = -F_s = (n + ik - 1) / (n + ik + 1), because reflection
+    reverses p = s x (direction of propagation). At grazing both are -1.
     """
     return _pair(_fill_amplitudes, cos_theta, n, k)
 
 
 def half_sum_and_difference(cos_theta: ArrayLike, n: ArrayLike, k: ArrayLike) -> tuple[Complexes, Complexes]:
-    """Return (F_s + F_p) / 2 and (F_s - F_p) / 2 of `amplitudes`, with all digits where one of them is nearly 0."""
+    """Return (F_s + F_p) / 2 and (F_s - F_p) / 2 [1] of `amplitudes`, with all digits where one of them is nearly 0."""
     return _pair(_fill_half_sum_and_difference, cos_theta, n, k)
 
 

@@ -1,4 +1,4 @@
-"""Lobes: the distribution of facet slopes that samplers, quadratures and audits look for around a mirror direction."""
+"""Lobes: the distribution of facet slopes around a mirror direction, for samplers, quadratures and audits."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating[Any]]
 
-_EXPONENT = 700.0  # beyond this t^2 the Gaussian counts as 0: no half vector is drawn there
+_EXPONENT = 700.0  # largest t^2; beyond, the Gaussian counts as 0 and no half vector is drawn
 
 
 @dataclass(frozen=True)
 class SlopeDistribution:
     """A distribution of the slopes of half vectors, in widths of the lobe.
 
-    The slopes are s = t (alpha_x cos psi, alpha_y sin psi), with psi uniform in the circle. A distribution is that of t
-    alone. Its scale is t = 1: quadratures resolve that, and octaves of t beyond it.
+    The slopes are s = t (alpha_x cos psi, alpha_y sin psi), with psi uniform in the circle. The distribution is that of
+    t alone. Its scale is t = 1: quadratures resolve that scale, and octaves of t beyond it.
 
     Attributes
     ----------
     name : str
-        A word for it.
+        A word for the distribution.
     radius : callable
-        ``radius(u)``: the t that a share u of half vectors exceeds, for u in (0, 1]. Random numbers u in, t out.
+        ``radius(u)`` gives the t [1] that a share u of half vectors exceeds, for random numbers u in (0, 1].
     density : callable
-        ``density(t2)``: probability density [1] of the square of t at t2 >= 0. It integrates to 1 over t2.
+        ``density(t2)`` gives the probability density [1] of the square of t at t2 >= 0. Its integral over t2 is 1.
     """
 
     name: str
@@ -49,14 +49,14 @@ GAUSSIAN = SlopeDistribution("Gaussian", _gaussian_radius, _gaussian_density)
 
 
 class Lobe(NamedTuple):
-    """The lobe of a model: what samplers and quadratures look for, not a part of the model's value.
+    """The lobe of a model: a guide for samplers and quadratures, not a part of f_r.
 
     Attributes
     ----------
     share : array [1]
-        Approximate part of the reflected light that lies in the lobe around the mirror direction, in [0, 1]. The rest
-        is looked for over the whole hemisphere: a model with wider tails than its distribution leaves a tenth to that,
-        or more.
+        Approximate share of the reflected light that lies in the lobe around the mirror direction, in [0, 1]. Samplers
+        spread the rest over the whole hemisphere. A model with wider tails than its distribution leaves a tenth or more
+        to the rest.
     alpha_x, alpha_y : array [1]
         Widths of the slopes of half vectors along x and y.
     distribution : SlopeDistribution

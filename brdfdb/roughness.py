@@ -1,11 +1,12 @@
-"""What each community calls roughness, translated: slopes, angles, Beckmann's alpha, a shader's 0 to 1, microns.
+"""Conversions between measures of roughness: slopes, angles, Beckmann's alpha, a shader's 0 to 1, and heights.
 
-The common coin is alpha, the width of a Gaussian of facet slopes exp(-tan^2(delta) / alpha^2): the alpha of Beckmann,
-of microfacet models and of Ward. It is not the rms slope along one axis, which is alpha / sqrt(2), though Ward calls it
-the "standard deviation of the surface slope": tan(delta) is the slope along its own azimuth; its rms value is alpha.
+The common measure is alpha, the width of a Gaussian of facet slopes exp(-tan^2(delta) / alpha^2). It is the alpha of
+Beckmann, of microfacet models and of Ward. It is not the rms slope along one axis, which is alpha / sqrt(2), although
+Ward calls it the "standard deviation of the surface slope". tan(delta) is the slope along its own azimuth, with an rms
+value of alpha.
 
 ============================  ========================================  =====================================
-who                           what they give                            alpha
+source                        parameter                                 alpha
 ============================  ========================================  =====================================
 Ward 1992                     alpha_x, alpha_y                          the same
 Beckmann, microfacet models   alpha, or m                               the same
@@ -17,10 +18,10 @@ OpenPBR, OSL, MaterialX,      roughness of a specular lobe, 0 to 1      roughnes
 Disney, glTF
 ============================  ========================================  =====================================
 
-The roughness of a *diffuse* lobe is another matter: it is not squared, and widens no lobe. OSL's and MaterialX's
-`oren_nayar_diffuse_bsdf` take it as Oren and Nayar's sigma in radians (1 is 57 degrees) in the qualitative model; with
-energy compensation, and in OpenPBR's `base_diffuse_roughness`, it is the parameter of Fujii's form, 0 to 1, which is no
-angle: the two agree at 0, Lambert, and nowhere else.
+The roughness of a *diffuse* lobe is a different quantity, which is not squared and widens no lobe. The
+`oren_nayar_diffuse_bsdf` of OSL and MaterialX takes it as Oren and Nayar's sigma in radians (1 is 57 degrees) in the
+qualitative model. With energy compensation, and in OpenPBR's `base_diffuse_roughness`, it is the parameter of Fujii's
+form, 0 to 1, which is no angle. The two agree only at 0, Lambert.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1e6, "of a specular lobe; a sh
 
 
 def alpha_from_slope(slope: ArrayLike) -> Floats:
-    """Return the alpha [1] of Ward and Beckmann, sqrt(2) times the rms slope along one axis [1], in [0, 1e12].
+    """Return alpha [1] of Ward and Beckmann, sqrt(2) times the rms slope along one axis [1], in [0, 1e12].
 
     >>> round(float(alpha_from_slope(0.1)), 6)
     0.141421
@@ -60,11 +61,11 @@ def slope_from_alpha(alpha: ArrayLike) -> Floats:
 
 
 def alpha_from_angle(sigma: ArrayLike) -> Floats:
-    """Return alpha [1] of facets whose slope angle has the standard deviation sigma [rad], in [0, pi/2]: sqrt(2) sigma.
+    """Return alpha [1], sqrt(2) sigma, of facets whose slope angle has the standard deviation sigma [rad] in [0, pi/2].
 
-    exp(-delta^2 / (2 sigma^2)), of Torrance-Sparrow and Oren-Nayar, and exp(-tan^2(delta) / alpha^2) have then the same
-    curvature at their peak. They are the same distribution only where sigma is small: at 10 degrees they differ by
-    2 % of the peak, at 30 degrees by 17 %.
+    With it exp(-delta^2 / (2 sigma^2)) of Torrance-Sparrow and Oren-Nayar has the same curvature at its peak as
+    exp(-tan^2(delta) / alpha^2). The distributions are the same only where sigma is small: they differ by 2 % of the
+    peak at 10 degrees, and by 17 % at 30 degrees.
 
     >>> round(float(alpha_from_angle(0.1)), 6)
     0.141421
@@ -73,9 +74,9 @@ def alpha_from_angle(sigma: ArrayLike) -> Floats:
 
 
 def angle_from_alpha(alpha: ArrayLike) -> Floats:
-    """Return the standard deviation of the slope angle [rad] that has the same peak as alpha [1]: alpha / sqrt(2).
+    """Return the standard deviation of the slope angle [rad] with the same peak as alpha [1], alpha / sqrt(2).
 
-    For alpha in [0, 1e12]; what it gives above pi/2 is no angle that Oren-Nayar takes.
+    alpha is in [0, 1e12]. Oren-Nayar does not accept results above pi/2.
 
     >>> round(float(angle_from_alpha(0.1)), 6)
     0.070711
@@ -84,7 +85,7 @@ def angle_from_alpha(alpha: ArrayLike) -> Floats:
 
 
 def alpha_from_degrees(sigma_deg: ArrayLike) -> Floats:
-    """Return `alpha_from_angle` for a standard deviation in degrees, in [0, 90].
+    """Return alpha [1] by `alpha_from_angle` for a standard deviation [degree] in [0, 90].
 
     >>> round(float(alpha_from_degrees(10.0)), 6)
     0.246827
@@ -93,7 +94,7 @@ def alpha_from_degrees(sigma_deg: ArrayLike) -> Floats:
 
 
 def degrees_from_alpha(alpha: ArrayLike) -> Floats:
-    """Return `angle_from_alpha` in degrees.
+    """Return the standard deviation of the slope angle [degree] by `angle_from_alpha`.
 
     >>> round(float(degrees_from_alpha(0.1)), 6)
     4.051423
@@ -102,10 +103,11 @@ def degrees_from_alpha(alpha: ArrayLike) -> Floats:
 
 
 def alpha_from_roughness(roughness: ArrayLike) -> Floats:
-    """Return alpha [1] of a specular lobe with a shading language's roughness [1], 0 to 1 on its slider: roughness^2.
+    """Return alpha [1], roughness^2, of a specular lobe with the roughness [1] of a shading language, in [0, 1e6].
 
-    Burley's square, of Disney, OpenPBR, MaterialX, glTF and OSL's standard surfaces. A closure below them, such as
-    OSL's `dielectric_bsdf` or MaterialX's `roughness_x`, takes alpha itself. Allowed is [0, 1e6].
+    The square is that of Burley, in Disney, OpenPBR, MaterialX, glTF and the standard surfaces of OSL, where a slider
+    goes from 0 to 1. A closure below them, such as OSL's `dielectric_bsdf` or MaterialX's `roughness_x`, takes alpha
+    itself.
 
     >>> float(alpha_from_roughness(0.5))
     0.25
@@ -114,7 +116,7 @@ def alpha_from_roughness(roughness: ArrayLike) -> Floats:
 
 
 def roughness_from_alpha(alpha: ArrayLike) -> Floats:
-    """Return a shading language's roughness [1] of a specular lobe: the square root of alpha [1], in [0, 1e12].
+    """Return the roughness [1] of a shading language, the square root of alpha [1] in [0, 1e12].
 
     >>> float(roughness_from_alpha(0.25))
     0.5
@@ -123,10 +125,10 @@ def roughness_from_alpha(alpha: ArrayLike) -> Floats:
 
 
 def slope_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
-    """Return the rms slope along one axis [1] of He-Torrance's surface: sqrt(2) sigma_0 / tau.
+    """Return the rms slope along one axis [1] of He-Torrance's surface, sqrt(2) sigma_0 / tau.
 
-    Of heights with the rms value sigma_0 [um], in [0, 1e4], and the Gaussian autocorrelation exp(-(r / tau)^2), tau
-    [um] in [1e-6, 1e6]: its curvature at 0, 2 / tau^2, is the variance of the slope over that of the heights.
+    The heights have the rms value sigma_0 [um], in [0, 1e4], and the Gaussian autocorrelation exp(-(r / tau)^2), with
+    tau [um] in [1e-6, 1e6]. Its curvature at 0, 2 / tau^2, is the variance of the slope over that of the heights.
 
     >>> round(float(slope_from_heights(0.18, 3.0)), 6)
     0.084853
@@ -135,7 +137,7 @@ def slope_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
 
 
 def alpha_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
-    """Return alpha [1] of He-Torrance's surface, 2 sigma_0 / tau: the width of its lobe for g >> 1, geometrical optics.
+    """Return alpha [1] of He-Torrance's surface, 2 sigma_0 / tau, the width of its lobe for g >> 1.
 
     Where g is about 1 or less, diffraction sets the width instead: wavelength / (pi tau (cos theta_i + cos theta_r)).
     Ranges as in `slope_from_heights`.
@@ -147,9 +149,9 @@ def alpha_from_heights(sigma_0_um: ArrayLike, tau_um: ArrayLike) -> Floats:
 
 
 def heights_from_alpha(alpha: ArrayLike, tau_um: ArrayLike) -> Floats:
-    """Return the rms roughness sigma_0 [um] that gives He-Torrance's surface of a length tau [um] an alpha [1].
+    """Return the rms roughness sigma_0 [um] of He-Torrance's surface with an alpha [1] and a length tau [um].
 
-    For alpha in [0, 1e12] and tau in [1e-6, 1e6]; what it gives above 1e4 is more than He-Torrance takes.
+    alpha is in [0, 1e12] and tau in [1e-6, 1e6]. He-Torrance does not accept results above 1e4.
 
     >>> round(float(heights_from_alpha(0.12, 3.0)), 6)
     0.18

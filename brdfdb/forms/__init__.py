@@ -1,1 +1,1 @@
-"""Every form of a material, and their speed against their accuracy."""
+"""All forms of a material, with their errors and costs."""

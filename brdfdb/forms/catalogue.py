@@ -1,4 +1,4 @@
-"""Every form of a source: models, approximations, printed forms and tables, as one type."""
+"""All forms of a source as one type: models, approximations, printed forms and tables."""
 
 from __future__ import annotations
 
@@ -29,38 +29,40 @@ Kind = Literal[FormKind, "table"]
 Evaluate = Callable[[Floats, Floats], Floats]
 
 TOLERANCES = (0.1, 0.01, 0.001)
-SPECTRAL_TOLERANCES = (0.1, 0.01)  # a finer one takes ten seconds to plan
-_UNFACTORED = 0.01  # the tolerance of the table that is shown with and without parts
+SPECTRAL_TOLERANCES = (0.1, 0.01)  # tolerances of spectral tables; a finer one takes ten seconds to plan
+_UNFACTORED = 0.01  # tolerance of the table that is offered with and without a factored spectrum
 
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """One way to get f_r of a source at some wavelengths.
+    """One way to evaluate f_r of a source at some wavelengths.
 
     Attributes
     ----------
     key : str
-        Unique among those of a source: lower-case words joined by hyphens.
+        Lower-case words joined by hyphens, unique among the forms of a source.
     title : str
         A name for people, with the equation.
     kind : str
-        That of `brdfdb.parameters.ModelForm`, or "table".
+        A kind of `brdfdb.parameters.ModelForm`, or "table".
     python : str
         The function in Python.
     evaluate : callable
-        ``evaluate(wi, wr)``: f_r [1/sr], shape (N, L), of unit vectors of shape (N, 3) and of the dtype below. The
-        specular part is left out: it is the same for all.
+        ``evaluate(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors of shape (N, 3) and of the dtype below.
+        The specular part is left out, because it is the same for all forms.
     bytes : int
-        Size of the numbers that an evaluation reads: parameters, spectra, and constants that kernels look up, or the
-        nodes of a table; 0 of a function, whose numbers are not known. Memory that it writes first is not counted.
+        Size of the numbers that an evaluation reads: parameters, spectra and constants of kernels, or the values of a
+        table. It is 0 for a function, whose numbers are not known. Memory that an evaluation writes is not counted.
     dtype : float32 or float64
-        That of the vectors to give it, and of the values.
+        Type of the vectors and of the values.
     rounded : bool
-        Whether it is another form but for float32 in and out: as much work, and rounding for an error.
+        True for a form that repeats another one with float32 vectors and values. It takes as much work, and its error
+        is rounding.
     layout : Layout or None
-        The layout of a table that was tabulated here: all that it takes to do so again.
+        The layout of a table that was tabulated here, from which it can be tabulated again.
     copied : callable or None
-        For a table: gives an evaluation that reads a copy of its numbers, as another table of this size would.
+        For a table, a function without arguments. It returns an evaluation that reads a copy of the values, like
+        another table of this size.
     """
 
     key: str
@@ -76,29 +78,29 @@ class Form:
 
 
 def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[float] | None = None) -> list[Form]:
-    """Return every form of a source that the library has; the first one is exact.
+    """Return all forms of a source, the exact form first.
 
     Parameters
     ----------
     source : Source
         A material of any model, or a function.
     wavelength_nm : array_like of shape (L,) [nm], or None
-        For spectral sources, and only for them.
+        Wavelengths of a spectral source, and only of such a source.
     tolerances : sequence of float, optional
-        Relative errors of planned tables, each in [1e-4, 0.5]; by default 0.1, 0.01 and, for a grey source, 0.001.
-        With an empty sequence there are no tables.
+        Relative errors of planned tables, each in [1e-4, 0.5]. The default is 0.1, 0.01 and, for a grey source, 0.001.
+        An empty sequence gives no tables.
 
     Returns
     -------
     list of Form
-        The forms that a material's model names (`ModelSpec.forms`), or the source itself; then tables. Coarser rungs of
-        the exact form follow it: the ladder that an approximation is compared with. Tables hold the exact form where a
-        model of the registry is it (`ModelSpec.exact_model`); they are planned for the material's own model, which is
-        as smooth.
+        The forms that the model of a material names (`ModelSpec.forms`), or the source itself, then tables. Coarser
+        rungs follow the exact form: approximations are compared with this ladder. Tables hold the exact form if it is a
+        model of the registry (`ModelSpec.exact_model`). They are planned for the model of the material, which is as
+        smooth.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the source.
     """
     if tolerances is None:
@@ -114,9 +116,9 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
 
 
 def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> Iterator[Form]:
-    """Yield the forms that the model of a material names, or the model itself; some with float32 in and out, too.
+    """Yield the forms that the model of a material names, or the model itself.
 
-    Their arithmetic is float64 all the same.
+    Some are yielded a second time with float32 vectors and values. Their arithmetic is float64, too.
     """
     spec, arguments = material.spec, material.arguments(wavelength_nm)
     itself = ModelForm(
@@ -137,7 +139,7 @@ def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> 
 
 
 def _single(form: Form) -> Form:
-    """Return a form with float32 in and out."""
+    """Return a form with float32 vectors and values."""
     return replace(
         form,
         key=f"{form.key}-float32",
@@ -152,9 +154,9 @@ def _single(form: Form) -> Form:
 
 
 def _exact(material: Material) -> Material:
-    """Return the material that charted tables hold: of the exact model, where the registry has it as a model.
+    """Return the material whose values charted tables hold, with the exact model if the registry has it.
 
-    What is said of parameters that it lacks is left out.
+    Statements about parameters that the exact model lacks are left out.
     """
     exact = None if material.spec.exact_model is None else material.spec.exact_model(material.parameters)
     if exact is None:
@@ -163,7 +165,7 @@ def _exact(material: Material) -> Material:
     stated = {
         "sources": {name: source for name, source in material.sources.items() if name in parameters},
         "assumed": {name: assumption for name, assumption in material.assumed.items() if name in parameters},
-        "known_excess": None,  # of the other model
+        "known_excess": None,  # the known excess belongs to the other model
     }
     return material.model_copy(update={"model": model, "parameters": parameters, **stated})
 
@@ -175,9 +177,10 @@ def _tables(
     tolerances: Sequence[float],
     table: str,
 ) -> Iterator[Form]:
-    """Yield planned tables, one of them also with its spectra whole, and the two grids that anybody would begin with.
+    """Yield planned tables, one of them also without a factored spectrum, and tables on two plain grids.
 
-    They are planned for one source and hold another, which is as smooth. Without tolerances there are none.
+    They are planned for one source and hold the values of another, which is as smooth. Without tolerances there are no
+    tables.
     """
     if not tolerances:
         return
@@ -202,7 +205,7 @@ def _table(layout: Layout, key: str, title: str) -> Form:
 
 
 def of_family(family: Family) -> Form:
-    """Return lookups in the middle of a family: between the two middle values of each parameter."""
+    """Return the form that looks up a family between the two middle values of each parameter."""
     at: dict[str, Any] = {}
     for name, nodes in family.axes.items():
         cell = (nodes.size - 2) // 2
@@ -219,7 +222,7 @@ def of_family(family: Family) -> Form:
 
 
 def of_table(table: Table, key: str, title: str) -> Form:
-    """Return a table that is in memory, at its own wavelengths."""
+    """Return the form of a table in memory, at its own wavelengths."""
     count = 1 if table.wavelength_nm is None else table.wavelength_nm.size
 
     def evaluate(wi: Floats, wr: Floats) -> Floats:
@@ -234,10 +237,10 @@ def of_table(table: Table, key: str, title: str) -> Form:
 
 
 def _plain_grid(source: Source, *, halves: bool) -> Grid:
-    """Return a grid that nobody planned: even angles, or half vectors crowded at the peak.
+    """Return a plain grid of even angles, or of half vectors crowded at the peak.
 
     Angles have a node every 5 degrees, or every 10 for an anisotropic source. Half vectors are those of the MERL
-    database: theta_h as the square of an even axis.
+    database, with theta_h as the square of an even axis.
     """
     anisotropic = source.anisotropic
     turn = 90.0 if source.elliptical else 360.0

@@ -1,4 +1,4 @@
-"""Efficiency of samplers: the variance of Monte Carlo estimates, times the time that a sample takes."""
+"""Efficiency of samplers: the variance of Monte Carlo estimates and the time per sample."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ SAMPLERS = {
     "cosine": "cosine of the polar angle",
     "uniform": "uniform over the hemisphere",
 }
-THETA_DEG = 60.0  # of the light, where the albedo is estimated
-SAMPLES = 1 << 15  # of an estimate in a round
+THETA_DEG = 60.0  # polar angle of the light for which the albedo is estimated
+SAMPLES = 1 << 15  # samples per estimate and round
 ROUNDS = 9
-PER_POINT = 4  # samples of a point of the sphere: their variance is the noise, not what differs from point to point
+PER_POINT = 4  # samples per point of the sphere; the noise is their variance, not the difference between points
 SEED = 1994
 
-# Light on the sphere, radiance: a sky that brightens upwards, and a lamp about 20 degrees wide, ahead and to the right
+# Radiance of the light on the sphere: a sky that brightens upwards, and a lamp about 20 degrees wide on the right
 _SKY, _LAMP, _SHARPNESS = 0.2, 5.0, 20.0
 _LAMP_AT = np.array([0.6, 0.4, np.sqrt(1.0 - 0.6**2 - 0.4**2)])
 
@@ -34,10 +34,10 @@ Draw = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 
 class Work(NamedTuple):
-    """Noise and time of a sampler, a number for each round: shape (rounds,).
+    """Noise and time of a sampler, arrays of shape (rounds,).
 
-    `mean` is the estimate, `variance` [1] that of one sample over the square of the mean, `seconds` the time of one
-    sample on the processor.
+    `mean` is the estimate, `variance` [1] the variance of one sample over the square of the mean, and `seconds` the
+    processor time per sample.
     """
 
     mean: Array
@@ -58,20 +58,20 @@ def works(
     samples: int = SAMPLES,
     clock: Callable[[], float] = time.process_time,
 ) -> dict[str, tuple[Work, Work]]:
-    """Measure what samplers need for an estimate of the directional albedo, and of the picture of a lit sphere.
+    """Measure noise and time of samplers for the directional albedo and for the picture of a lit sphere.
 
     Parameters
     ----------
     source : Source
         A material or a function. It is sampled without the specular part.
     wavelength_nm : float [nm] or None
-        For a spectral source.
+        Wavelength of a spectral source.
     rounds : int
-        Each has random numbers of its own, which all samplers share.
+        Number of rounds. All samplers share the random numbers of a round.
     samples : int
-        Of an estimate in a round.
+        Samples per estimate and round.
     clock : callable
-        Gives seconds.
+        A function without arguments that gives the time in seconds.
 
     Returns
     -------
@@ -80,9 +80,9 @@ def works(
 
     Notes
     -----
-    The albedo is that of light from `THETA_DEG`. The sphere is seen from afar under a sky and a lamp; the variance is
-    the mean over its points of that of a point. Random numbers are drawn before the clock starts. Seeds are fixed:
-    means and variances are the same in every run.
+    The light comes from `THETA_DEG` for the albedo. The sphere is seen from afar under a sky and a lamp. Its variance
+    is the mean over points of the variance at a point. Random numbers are drawn before the clock starts. Seeds are
+    fixed, so that means and variances are the same in every run.
     """
     draws = _draws(source, None if wavelength_nm is None else np.array([wavelength_nm]))
     numbers = np.empty((len(draws), 2, 3, rounds))
@@ -91,7 +91,7 @@ def works(
             u = np.random.default_rng([SEED, row]).random((4, samples))
             for number, draw in enumerate(draws.values()):
                 if row == 0:
-                    estimate(draw, u[:, :256])  # compile
+                    estimate(draw, u[:, :256])  # compile the kernels before the clock starts
                 start = clock()
                 estimates = estimate(draw, u)
                 seconds = (clock() - start) / samples
@@ -102,7 +102,7 @@ def works(
 
 
 def _draws(source: Source, wavelength_nm: NDArray[np.float64] | None) -> dict[str, Draw]:
-    """Return, for each sampler, a function of u1, u2 and directions of light: new directions, f_r cos over density."""
+    """Return for each sampler a function of u1, u2 and lights that gives viewers and f_r cos / density [1]."""
     brdf = source.brdf_at(wavelength_nm)
 
     def of_source(u1: Array, u2: Array, wi: Array) -> tuple[Array, Array]:
@@ -139,7 +139,7 @@ def _sphere(draw: Draw, u: Array) -> Array:
     points = u.shape[1] // PER_POINT
     radius, angle = np.sqrt(u[2, :points]), 2.0 * np.pi * u[3, :points]
     n = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.sqrt(1.0 - radius**2)], axis=-1)
-    # the tangent runs level around the sphere
+    # The tangent is horizontal around the sphere
     level = np.hypot(n[:, 0], n[:, 2])
     t = np.stack([n[:, 2] / level, np.zeros(points), -n[:, 0] / level], axis=-1)
     b = np.cross(n, t)

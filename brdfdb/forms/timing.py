@@ -1,4 +1,4 @@
-"""Cost of forms: their times, taken in turns, warm or with many materials in turn; and the front worth having."""
+"""Cost of forms: times of one material or of many in turn, and the front of forms worth having."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from numpy.typing import NDArray
 from brdfdb.forms.catalogue import Form
 from brdfdb.parameters import Floats
 
-BATCH = 100_000  # directions at once, of forms that are fast enough
+BATCH = 100_000  # directions per call, for forms that are fast enough
 RUN_S = 0.125  # longest turn of a form [s]; slower forms get fewer directions
 ROUNDS = 7
 MIXED_ROUNDS = 5
-CHEAPER = 1.25  # times as cheap is clearly cheaper, in three of four rounds
-ALIKE = 1.1  # times the error is about the same error
-# Directions at once: steps so wide that a form, however busy the machine, is timed at the same one every time
+CHEAPER = 1.25  # ratio of costs, in three of four rounds, from which on a form is clearly cheaper
+ALIKE = 1.1  # ratio of errors up to which two errors are about the same
+# Choices of directions per call. The steps are so wide that a form gets the same number even on a busy machine
 _STEPS = (256, 2048, 16384, BATCH)
-_VALUES = 1_000_000  # at once, at most
-_TRIES = 5  # how often a form is asked what one direction more costs
-_LEAST_S = 3e-4  # of a turn of few directions, which are repeated: the clock of the processor takes a microsecond
-MATERIALS = 64  # that take turns, of as many tables as `_COPIES_BYTES` hold
-FEW = 32  # directions of a material at once, where materials take turns
-_COPIES_BYTES = 128_000_000
+_VALUES = 1_000_000  # largest number of values per call
+_TRIES = 5  # measurements of the time per direction; the shortest one counts
+_LEAST_S = 3e-4  # shortest turn [s]; calls with few directions are repeated, because the clock takes a microsecond
+MATERIALS = 64  # materials that take turns, or as many tables as `_COPIES_BYTES` hold
+FEW = 32  # directions per call where materials take turns
+_COPIES_BYTES = 128_000_000  # most memory of the copies of a table
 _SEED = 1992
-_CACHE_BYTES = 48_000_000  # written between rounds: more than the last cache of one processor holds
+_CACHE_BYTES = 48_000_000  # memory written between rounds: more than the last cache of one processor holds
 
 
 class Times(NamedTuple):
-    """How long an evaluation takes: seconds a value of f_r, shape (rounds,), and at how many directions at once."""
+    """Time of an evaluation: seconds per value of f_r, shape (rounds,), and the number of directions per call."""
 
     seconds: NDArray[np.float64]
     directions: int
 
     @property
     def quartiles_ns(self) -> tuple[float, float, float]:
-        """Lower quartile, median and upper quartile [ns a value]."""
+        """Lower quartile, median and upper quartile [ns per value]."""
         low, middle, high = np.percentile(1e9 * self.seconds, [25.0, 50.0, 75.0]).tolist()
         return low, middle, high
 
@@ -53,24 +53,26 @@ def times(
     clock: Callable[[], float] = time.process_time,
     tick: Callable[[], None] = lambda: None,
 ) -> list[Times]:
-    """Time forms in turns: what slows the machine down slows all of them down, and ratios within a round keep.
+    """Measure the times of forms in turns, so that a busy machine slows all of them and ratios in a round stay right.
 
-    Times are those of the processor, which other programs on the machine do not lengthen. Few directions are evaluated
-    again and again, so that a turn lasts long enough for the clock.
+    Times are processor times, which other programs on the machine do not lengthen. A call with few directions is
+    repeated, so that a turn lasts long enough for the clock.
 
     Parameters
     ----------
     forms : sequence of Form
-        What to time, on one thread.
+        The forms to time, on one thread.
     wi, wr : arrays of shape (N, 3)
         Unit vectors to evaluate at, repeated or cut off as needed.
     most : int
-        Directions at once; fewer where they take longer than `RUN_S` or are a million values. 1 for single evaluations
-        from Python.
+        Largest number of directions per call. It is smaller where a call takes longer than `RUN_S` or gives more than a
+        million values. 1 times single evaluations from Python.
     rounds : int
-        How often each form has its turn.
-    clock, tick : callables
-        Gives seconds; is called after every round.
+        Number of turns of each form.
+    clock : callable
+        A function without arguments that gives the time in seconds.
+    tick : callable
+        A function that is called after every round.
 
     Returns
     -------
@@ -80,7 +82,7 @@ def times(
     runs = []
     for form, count in zip(forms, _counts(forms, wi, wr, most, clock), strict=True):
         light, viewer = _directions(form, wi, wr, count)
-        values = form.evaluate(light, viewer).size  # compiled, and its memory at hand
+        values = form.evaluate(light, viewer).size  # the first call compiles kernels and allocates memory
         start = clock()
         form.evaluate(light, viewer)
         repeats = int(min(max(_LEAST_S / max(clock() - start, 1e-9), 1.0), 100.0))
@@ -105,29 +107,29 @@ def mixed_times(
     rounds: int = MIXED_ROUNDS,
     clock: Callable[[], float] = time.process_time,
 ) -> list[Times]:
-    """Time forms as a renderer with many materials uses them: few directions of one, then of another, nothing cached.
+    """Measure the times of forms with many materials in turn, a few directions of each, with nothing cached.
 
     Parameters
     ----------
     forms : sequence of Form
-        To time, on one thread.
+        The forms to time, on one thread.
     wi, wr : arrays of shape (N, 3)
         Unit vectors to evaluate at, repeated or cut off as needed.
     rounds : int
         Number of turns of each form.
     clock : callable
-        Gives seconds.
+        A function without arguments that gives the time in seconds.
 
     Returns
     -------
     list of Times
-        In the order of the forms, of `FEW` directions a call.
+        In the order of the forms, for `FEW` directions per call.
 
     Notes
     -----
-    In a turn, `MATERIALS` materials of the form are evaluated once each, in an order that is drawn anew. Tables are
-    copies with memory of their own, of large ones fewer than `MATERIALS`. Before a turn, more memory is written than
-    the caches hold, so that each table is read from memory.
+    A renderer with many materials uses forms in this way. In a turn, `MATERIALS` materials of the form are evaluated
+    once each, in a random order. Tables are copies with memory of their own. Large tables have fewer copies than
+    `MATERIALS`. Before a turn, more memory is written than the caches hold, so that each table is read from memory.
     """
     rng = np.random.default_rng(_SEED)
     evict = np.zeros(_CACHE_BYTES // 8)
@@ -161,14 +163,14 @@ def _counts(forms: Sequence[Form], wi: Floats, wr: Floats, most: int, clock: Cal
     few, more = _STEPS[0], 4 * _STEPS[0]
     wavelengths = [0] * len(forms)
     shortest = np.full((len(forms), 2), np.inf)
-    for _ in range(_TRIES):  # in turns, too: one busy moment makes no form slow
+    for _ in range(_TRIES):  # forms take turns, so that a busy moment of the machine slows no single form
         for number, form in enumerate(forms):
             for which, count in enumerate((few, more)):
                 light, viewer = _directions(form, wi, wr, count)
                 start = clock()
                 wavelengths[number] = form.evaluate(light, viewer).size // count
                 shortest[number, which] = min(shortest[number, which], clock() - start)
-    another = (shortest[:, 1] - shortest[:, 0]) / (more - few)  # of few, most may be the call
+    another = (shortest[:, 1] - shortest[:, 0]) / (more - few)  # a difference, since the call itself takes time
     return [
         min(most, max((s for s in _STEPS if s * seconds <= RUN_S and s * values <= _VALUES), default=few))
         for seconds, values in zip(another.tolist(), wavelengths, strict=True)
@@ -176,7 +178,7 @@ def _counts(forms: Sequence[Form], wi: Floats, wr: Floats, most: int, clock: Cal
 
 
 def clearly_cheaper(costs: Floats, one: int, other: int) -> bool:
-    """Return whether one form is `CHEAPER` times as cheap as another in three of four rounds.
+    """Return True if one form is `CHEAPER` times as cheap as another in three of four rounds.
 
     `costs` has the shape (rounds, forms).
     """
@@ -189,16 +191,16 @@ def front(errors: Sequence[float], costs: Floats) -> list[int]:
     Parameters
     ----------
     errors : sequence of float
-        Of each form.
+        Error of each form.
     costs : array of shape (rounds, forms)
-        Of each form in each round; one round of costs that do not scatter.
+        Cost of each form in each round. Costs without scatter have one round.
 
     Returns
     -------
     list of int
-        Indices. What is less accurate has to be `CHEAPER` times as cheap in three of four rounds. Of two neighbours
-        whose errors are within `ALIKE` of each other, the cheaper one stays. So neither the noise of a clock nor a
-        hair's breadth of error decides who is on the front; of equals it is the one given first.
+        Indices of the forms. A less accurate form must be `CHEAPER` times as cheap in three of four rounds. If the
+        errors of two neighbours are within `ALIKE` of each other, the cheaper one stays. So neither the noise of a
+        clock nor a tiny difference of errors decides. Of equal forms the first one given is on the front.
     """
     chosen: list[int] = []
     for one in sorted(range(len(errors)), key=lambda index: errors[index]):

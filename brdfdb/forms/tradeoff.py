@@ -1,4 +1,4 @@
-"""Speed against accuracy: every form of a material, or along a family, its error, its cost, the best."""
+"""Speed against accuracy: error and cost of all forms of a material or of a family, and the front."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from brdfdb.parameters import Floats
 from brdfdb.store.family import Family, Sweep
 from brdfdb.tables import error_measurement
 
-DIRECTIONS = 1000  # of each band of theta_i
+DIRECTIONS = 1000  # directions per band of theta_i
 SEED = 1992
-BLOCK = 256  # directions of a call between one and many
-SINGLES = 21  # rounds of calls of one direction, and of `BLOCK`
-TIMED = timing.ROUNDS + 2 * SINGLES  # steps of timing, as `tick` counts them
-STEPS = 4 + TIMED  # of a chart
-SHARE, CONFIDENCE = 0.99, 0.95  # the percentile that is charted, and the confidence of its interval
+BLOCK = 256  # directions of a call of medium size
+SINGLES = 21  # rounds of calls with one direction, and with `BLOCK` directions
+TIMED = timing.ROUNDS + 2 * SINGLES  # calls of `tick` during the timing
+STEPS = 4 + TIMED  # calls of `tick` for a chart
+SHARE, CONFIDENCE = 0.99, 0.95  # percentile that is charted, and the confidence of its interval
 
 
 def chart(
@@ -45,29 +45,29 @@ def chart(
     also: Sequence[Form] = (),
     tick: Callable[[], None] = lambda: None,
 ) -> Chart:
-    """Measure error and cost of every form of a source.
+    """Measure error and cost of all forms of a source.
 
     Parameters
     ----------
     source : Source
         A material of any model, or a function.
     wavelength_nm : array of shape (L,) [nm], or None
-        For spectral sources, and only for them.
+        Wavelengths of a spectral source, and only of such a source.
     tolerances : sequence of float, optional
-        Of planned tables, as `catalogue.forms` takes them.
+        Tolerances of planned tables, as in `catalogue.forms`.
     also : sequence of Form
-        More of them, at the same wavelengths: a table of a store.
+        More forms at the same wavelengths, such as a table of a store.
     tick : callable
-        Called `STEPS` times.
+        A function that is called `STEPS` times.
 
     Returns
     -------
     Chart
-        Errors are those that tables state, at directions of their own: see `brdfdb.tables.error_measurement`.
+        Errors are measured as stated errors are, at other directions: see `brdfdb.tables.error_measurement`.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the material.
     """
     forms = [*catalogue.forms(source, wavelength_nm, tolerances), *also]
@@ -124,7 +124,7 @@ def _against(
     seconds: Floats,
     forms: Sequence[Form],
 ) -> dict[str, Any]:
-    """Return the cheapest rung that is as accurate as a form, and the ratio of their times: fields of a `Point`."""
+    """Return fields of a `Point`: the cheapest rung that is as accurate as a form, and the ratio of their times."""
     if forms[number].kind in ("exact", "quadrature"):
         return {"rung": None, "saving": None}
     own = errors[number]
@@ -150,34 +150,34 @@ def chart_family(
     family: Family | None = None,
     tick: Callable[[], None] = lambda: None,
 ) -> FamilyChart:
-    """Measure the error of every form at every member of a family, and the cost of each at one of them.
+    """Measure the errors of all forms at all members of a family, and the cost of each form at one member.
 
     Parameters
     ----------
     sweep : Sweep
         The family.
     materials : sequence of Material
-        Its members, in order.
+        The members of the family, in order.
     wavelength_nm : array of shape (L,) [nm], or None
-        For spectral materials, and only for them.
+        Wavelengths of spectral materials, and only of such materials.
     tolerances : sequence of float, optional
-        Of planned tables, as `catalogue.forms` takes them; by default 0.1 and 0.01.
+        Tolerances of planned tables, as in `catalogue.forms`. The default is 0.1 and 0.01.
     family : Family, optional
-        As the store has it: its lookups between members are measured, too.
+        The family in a store, whose lookups between members are measured, too.
     tick : callable
-        Called once for each member, and `TIMED` times.
+        A function that is called once for each member, and `TIMED` times.
 
     Returns
     -------
     FamilyChart
-        Errors of members as `chart` measures them.
+        Errors of members are measured as in `chart`.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If a tolerance is outside its range or takes too many values, or the wavelengths do not suit the materials.
     StoreError
-        If a member of `family` was built anew since it was recorded.
+        If a member of `family` was built again since it was recorded.
     """
     tolerances = SPECTRAL_TOLERANCES if tolerances is None else tolerances
     kept, errors = _forms_of_members(materials, wavelength_nm, tolerances, tick)
@@ -226,7 +226,7 @@ def _forms_of_members(
     tolerances: Sequence[float],
     tick: Callable[[], None],
 ) -> tuple[dict[str, tuple[int, Form]], list[dict[str, dict[str, Any]]]]:
-    """Return by key the form of the member next to the middle and its number; and by key the errors of each member."""
+    """Return by key the form of the member nearest the middle and its number, and by key the errors of all members."""
     middle = len(materials) // 2
     kept: dict[str, tuple[int, Form]] = {}
     errors: list[dict[str, dict[str, Any]]] = []
@@ -242,7 +242,7 @@ def _forms_of_members(
 
 
 def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64] | None) -> Diagnostic | None:
-    """Return what the model of a family names as its diagnostic, for each member; None if it names none."""
+    """Return the diagnostic that the model of a family names, for each member; None if it names none."""
     diagnostic = materials[0].spec.diagnostic
     if diagnostic is None:
         return None
@@ -254,8 +254,9 @@ def _diagnostic(materials: Sequence[Material], wavelength_nm: NDArray[np.float64
 def _timed(
     forms: Sequence[Form], drawn: error_measurement.Draw, tick: Callable[[], None]
 ) -> tuple[list[timing.Times], list[timing.Times], list[timing.Times]]:
-    """Return the costs of calls with many directions, with a block of them, and with one."""
-    mixed = np.random.default_rng(SEED).permutation(np.flatnonzero(drawn.above))  # few of them are as mixed as all
+    """Return the times of calls with many directions, with a block of them, and with one."""
+    # Directions are shuffled, so that a few of them are as varied as all
+    mixed = np.random.default_rng(SEED).permutation(np.flatnonzero(drawn.above))
     wi, wr = drawn.wi[mixed], drawn.wr[mixed]
     batch = timing.times(forms, wi, wr, rounds=timing.ROUNDS, tick=tick)
     block, single = (timing.times(forms, wi, wr, most=most, rounds=SINGLES, tick=tick) for most in (BLOCK, 1))
@@ -263,8 +264,8 @@ def _timed(
 
 
 def _front(forms: Sequence[Form], l1: Sequence[float], costs: Floats) -> list[str]:
-    """Return keys of the forms worth having, of which costs has a column each."""
-    # black is free, and has an l1 of 1
+    """Return keys of the forms worth having. `costs` has one column per form."""
+    # A black surface costs nothing and has an l1 of 1, so a form with a larger error is not worth having
     rivals = [
         index
         for index, (form, error) in enumerate(zip(forms, l1, strict=True))
@@ -289,7 +290,7 @@ def _described(form: Form, batch: timing.Times, block: timing.Times, single: tim
 
 
 def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[str, Any]]:
-    """Return the errors of each form against the first one, as a `Point` has them, to three digits."""
+    """Return the errors of each form against the first one, fields of a `Point` with three digits."""
     truth = forms[0].evaluate(drawn.wi, drawn.wr)
     classes = error_measurement.classes(drawn)
     rows = []
@@ -309,9 +310,10 @@ def _errors(forms: Sequence[Form], drawn: error_measurement.Draw) -> list[dict[s
 
 
 def _tail(errors: Floats) -> tuple[float, float | None]:
-    """Return confidence interval of the 99th percentile of errors (N, L), at the worst wavelength: two of the errors.
+    """Return the confidence interval of the 99th percentile of errors (N, L), at the worst wavelength.
 
-    Directions count as independent. They are stratified in theta_i, which makes the interval wider than it need be.
+    Its ends are two of the errors. Directions count as independent. They are stratified in theta_i, so that the
+    interval is wider than necessary.
     """
     worst = np.sort(errors[:, int(np.argmax(np.percentile(errors, 100.0 * SHARE, axis=0)))])
     low, high = ranks(len(worst), SHARE, CONFIDENCE)
@@ -320,21 +322,21 @@ def _tail(errors: Floats) -> tuple[float, float | None]:
 
 
 def ranks(count: int, share: float, confidence: float) -> tuple[int, int]:
-    """Return ranks, from 1, of the order statistics that enclose a quantile with a confidence, by the binomial law.
+    """Return the ranks, from 1, of the order statistics that enclose a quantile with a confidence (binomial law).
 
     Parameters
     ----------
     count : int
         Number of independent draws.
     share : float [1]
-        Of the distribution below the quantile, in (0, 1).
+        Share of the distribution below the quantile, in (0, 1).
     confidence : float [1]
-        At least, in (0, 1).
+        Least confidence, in (0, 1).
 
     Returns
     -------
     tuple of int
-        Rank 0 stands for no lower bound, and count + 1 for no upper one.
+        Lower and upper rank. Rank 0 stands for no lower bound, and count + 1 for no upper bound.
     """
     k = np.arange(count + 1)
     log_factorial = np.concatenate([[0.0], np.cumsum(np.log(np.arange(1, count + 1)))])

@@ -1,4 +1,4 @@
-"""Charts of speed against accuracy as data: forms, their errors and costs, fronts, ladders and samplers."""
+"""Types of the documents of charts: forms with their errors and costs, fronts, ladders and samplers."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
 class Cost(BaseModel):
-    """Time of an evaluation on a processor of the machine of the chart, on one thread."""
+    """Time of an evaluation on one thread of the machine that made the chart."""
 
     model_config = _STRICT
 
-    ns: float = Field(description="median over all rounds, of a value of f_r: one direction, one wavelength")
+    ns: float = Field(description="median over all rounds of the time of a value of f_r: one direction, one wavelength")
     low: float = Field(description="lower quartile")
     high: float = Field(description="upper quartile")
-    directions: int = Field(description="evaluated at once")
+    directions: int = Field(description="number of directions evaluated at once")
 
 
 class Form(BaseModel):
-    """A form, and what it costs."""
+    """A form and its costs."""
 
     model_config = _STRICT
 
     key: str
     title: str
     kind: Kind
-    python: str = Field(description="what it is called in Python")
+    python: str = Field(description="name in Python")
     dtype: Literal["float64", "float32"]
-    bytes: int = Field(description="of the numbers that an evaluation reads")
-    batch: Cost = Field(description="of 100 000 directions at once, fewer of slow forms")
-    block: Cost = Field(description="of 256 directions at once")
-    single: Cost = Field(description="of one direction")
+    bytes: int = Field(description="size of the numbers that an evaluation reads")
+    batch: Cost = Field(description="cost with 100 000 directions at once; slow forms get fewer")
+    block: Cost = Field(description="cost with 256 directions at once")
+    single: Cost = Field(description="cost with one direction")
 
 
 class Saving(BaseModel):
@@ -51,20 +51,20 @@ class Saving(BaseModel):
 
 
 class Point(Form):
-    """A form: errors are relative to the truth, at the worst wavelength."""
+    """A form with its errors, which are relative to the truth, at the worst wavelength."""
 
-    l1: float = Field(description="mean of abs(f_r - truth) over that of the truth, weighted with the cosine")
+    l1: float = Field(description="mean of abs(f_r - truth) over the mean of the truth, weighted with the cosine")
     p99: float = Field(description="99th percentile of abs(f_r - truth) / max(truth, floor)")
     p99_low: float = Field(description="lower end of the 95 % confidence interval of p99, an order statistic")
-    p99_high: float | None = Field(description="upper end; null where the directions are too few to give one")
-    forward: float = Field(description="l1 of viewers within 45 degrees of the azimuth of the mirror direction")
-    back: float = Field(description="l1 of viewers within 45 degrees of the azimuth of the light")
+    p99_high: float | None = Field(description="upper end; null if there are too few directions")
+    forward: float = Field(description="l1 for viewers within 45 degrees of the azimuth of the mirror direction")
+    back: float = Field(description="l1 for viewers within 45 degrees of the azimuth of the light")
     grazing: float = Field(description="l1 where light or viewer is beyond 75 degrees")
     mixed: Cost = Field(
-        description="of 64 materials in turn, 32 directions of each, read from memory and not from caches"
+        description="cost with 64 materials in turn, 32 directions of each, read from memory and not from caches"
     )
     rung: str | None = Field(
-        description="key of the cheapest rung of the truth as accurate in l1 and p99; null of the truth and its rungs"
+        description="key of the cheapest rung of the truth as accurate in l1 and p99; null for the truth and its rungs"
     )
     saving: Saving | None = Field(description="time of that rung over the time of this form, in batches")
 
@@ -74,9 +74,9 @@ class Work(BaseModel):
 
     model_config = _STRICT
 
-    variance: float = Field(description="of one sample, over the square of the mean; median over rounds")
-    ns: float = Field(description="of one sample; median over rounds")
-    low_ms: float = Field(description="to a standard deviation of 1 %, variance times time: lower quartile over rounds")
+    variance: float = Field(description="variance of one sample over the square of the mean; median over rounds")
+    ns: float = Field(description="time of one sample; median over rounds")
+    low_ms: float = Field(description="time to a standard deviation of 1 %: lower quartile over rounds")
     ms: float = Field(description="median")
     high_ms: float = Field(description="upper quartile")
 
@@ -88,14 +88,14 @@ class Sampler(BaseModel):
 
     key: str
     title: str
-    albedo: Work = Field(description="of the directional albedo of light from 60 degrees")
-    sphere: Work = Field(description="of the picture of a sphere under a sky and a lamp about 20 degrees wide")
+    albedo: Work = Field(description="work for the directional albedo of light from 60 degrees")
+    sphere: Work = Field(description="work for the picture of a sphere under a sky and a lamp about 20 degrees wide")
 
 
 class Fronts(BaseModel):
     """Keys of the points worth having, the most accurate (l1) first, each clearly cheaper than the one before.
 
-    Models that are meant to differ are not among them, nor what is further off than black would be.
+    Models that are meant to differ are left out, and so are forms with a larger error than black.
     """
 
     model_config = _STRICT
@@ -115,7 +115,7 @@ class Chart(BaseModel):
     model: str
     parameters: dict[str, Number] = Field(description="angles in degrees, under names that end in _deg")
     wavelength_nm: list[float] | None
-    directions: int = Field(description="that errors are measured at")
+    directions: int = Field(description="number of directions at which errors are measured")
     truth: str = Field(description="key of the point that the others are compared with")
     points: list[Point]
     ladder: list[str] = Field(description="keys of the truth and of its rungs, the most accurate (l1) first")
@@ -124,32 +124,32 @@ class Chart(BaseModel):
 
 
 class Curve(Form):
-    """A form along a family: errors as those of a point, bytes and cost those of one member."""
+    """A form along a family. Errors are those of a point, and bytes and costs are those of one member."""
 
-    timed: str = Field(description="the member: of those that have this form, the one next to the middle of the family")
-    l1: list[float | None] = Field(description="of each member; null where there is no such form")
+    timed: str = Field(description="timed member: the one with this form that is nearest the middle of the family")
+    l1: list[float | None] = Field(description="l1 of each member; null where there is no such form")
     p99: list[float | None]
 
 
 class Between(Form):
     """Lookups between the members of a family in a store, timed in its middle."""
 
-    l1: float = Field(description="as the family states it, over all its parameters")
+    l1: float = Field(description="l1 that the family states, over all its parameters")
     p99: float
 
 
 class Diagnostic(BaseModel):
-    """A number that tells in which regime the model of a member is, at the middle wavelength."""
+    """A number that shows the regime of the model of a member, at the middle wavelength."""
 
     model_config = _STRICT
 
     symbol: str
     title: str
-    values: list[float] = Field(description="of each member")
+    values: list[float] = Field(description="value of each member")
 
 
 class FamilyChart(BaseModel):
-    """A family: which form is right where in it."""
+    """A family: the forms worth having at each of its members."""
 
     model_config = _STRICT
 
@@ -164,12 +164,12 @@ class FamilyChart(BaseModel):
     curves: list[Curve]
     between: Between | None = Field(description="null unless the family is in the store")
     fronts: list[list[str]] = Field(
-        description="of each member, keys of the curves worth having in bulk: as of a chart, with the costs above"
+        description="for each member, keys of the curves worth having in bulk, as in a chart, with the costs above"
     )
 
 
 class Charts(BaseModel):
-    """Charts of materials and families, made in one go; a file holds one of them."""
+    """Charts of materials and families from one run. A file holds one of them."""
 
     model_config = _STRICT
 

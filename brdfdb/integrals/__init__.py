@@ -1,1 +1,1 @@
-"""Integrals over the hemisphere: directional albedo, importance sampling, the bound on a uniform part."""
+"""Integrals over the hemisphere: directional albedo, importance sampling, and the bound on a uniform part."""

@@ -18,7 +18,7 @@ from brdfdb.parameters import Floats, ModelSpec
 Array = NDArray[np.float64]
 Integrand = Callable[[Array, Array], Array]
 
-# Gauss's rule of 7 nodes and Kronrod's of 15 that extends it, on [-1, 1]: the nodes from 0 on, with their weights
+# Nodes and weights, from 0 on, of Gauss's rule of 7 nodes on [-1, 1] and of Kronrod's rule of 15 that extends it
 _NODES = np.array(
     [
         0.0,
@@ -59,13 +59,14 @@ _X = np.concatenate([-_NODES[:0:-1], _NODES])
 _W_KRONROD = np.concatenate([_KRONROD[:0:-1], _KRONROD])
 _W_GAUSS = np.concatenate([_GAUSS[:0:-1], _GAUSS])
 
-_SAFETY = 4.0  # an edge inside a panel may hide from the difference of two rules: up to 1.6 times that was measured
-_BATCH = 2000  # panels that are evaluated at a time, of 225 points each; fewer where a point has several values
-MOST_PANELS = 40_000  # where the quadrature gives up, with the error that it has
+# Safety factor on the difference of two rules, which an edge inside a panel makes too small. 1.6 was measured
+_SAFETY = 4.0
+_BATCH = 2000  # panels evaluated at a time, of 225 points each; fewer where a point has several values
+MOST_PANELS = 40_000  # number of panels at which the quadrature stops, whatever its error
 
 
 class Albedo(NamedTuple):
-    """Directional albedo [1] and estimate of its absolute error: four times what two rules differ on all panels."""
+    """Directional albedo [1] and an estimate of its absolute error, four times the difference of two rules."""
 
     albedo: Floats
     error: Floats
@@ -80,40 +81,41 @@ def directional_albedo(
     specular: bool = False,
     **parameters: ArrayLike,
 ) -> Albedo:
-    """Return the directional albedo [1] of a model: f_r cos theta_r integrated over all viewers.
+    """Return the directional albedo [1] of a model, the integral of f_r cos theta_r over all viewers.
 
     Parameters
     ----------
     model : ModelSpec or str
         A model, or its name in `brdfdb.models.MODELS`.
     theta_i, phi_i : array_like [rad]
-        Direction of the light; theta in [0, pi], 0 reflected below the horizon. phi matters to anisotropic models.
+        Direction of the light, theta in [0, pi]; below the horizon the albedo is 0. phi matters to anisotropic models.
     tolerance : float
-        The absolute error to stay below, in [1e-13, 1].
+        Absolute error to stay below, in [1e-13, 1].
     specular : bool
-        Add the reflectance of the specular part (a Dirac delta), for models that have one.
+        True to add the reflectance of the specular part (a Dirac delta), for models that have one.
     **parameters : array_like
-        Those of the model; they broadcast with the angles.
+        Parameters of the model, which broadcast with the angles.
 
     Returns
     -------
     Albedo
-        (albedo, error), each in the broadcast shape of all arguments. The error is above the tolerance only where
-        the quadrature gave up, as at 90 degrees exactly of a model with a pole.
+        (albedo, error), each in the broadcast shape of all arguments. The error is above the tolerance only where the
+        quadrature stopped early, for instance at exactly 90 degrees for a model with a pole.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range, or there is no such model.
 
     Notes
     -----
-    Models without a lobe are integrated over (theta_r, phi_r), from which Oren and Nayar's edges, at theta_r = theta_i
-    and 90 degrees from the light, are left out. Those with a lobe are integrated over the slopes of the half vector, on
-    ellipses t (alpha_x cos psi, alpha_y sin psi): the lobe is a function of t, and viewers are above the horizon up to
-    one t for each psi. t is stretched, so that near t = 0 the unit is the lobe and beyond it the octave. Panels of
+    Models without a lobe are integrated over (theta_r, phi_r). Panels end at the edges of Oren and Nayar's model, at
+    theta_r = theta_i and 90 degrees from the light. Models with a lobe are integrated over the slopes of the half
+    vector, on ellipses t (alpha_x cos psi, alpha_y sin psi). The lobe is a function of t, and viewers are above the
+    horizon up to one t for each psi. t is stretched: near t = 0 its unit is the lobe, and beyond the octave. Panels of
     15 x 15 nodes of Gauss and Kronrod are halved until their errors add up to less than the tolerance. Ward's models at
-    89.9 degrees take about 20 ms with an alpha of 0.01, and 1 s with 1e-6, where directions themselves are too coarse.
+    89.9 degrees take about 20 ms with an alpha of 0.01. They take 1 s with 1e-6, where directions themselves are too
+    coarse.
 
     Examples
     --------
@@ -142,7 +144,7 @@ def _check_tolerance(tolerance: float) -> None:
 
 
 def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters of a model with its defaults; TypeError as the model itself would raise it."""
+    """Return the parameters of a model with its defaults; TypeError for a missing or unknown one."""
     try:
         bound = inspect.signature(spec.vectors).bind(None, None, **parameters)
     except TypeError as error:
@@ -152,7 +154,7 @@ def named(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def spec_of(model: ModelSpec | str) -> ModelSpec:
-    """Return a model by its name, or itself."""
+    """Return the model of a name, or the model itself; ParameterError for an unknown name."""
     return model if isinstance(model, ModelSpec) else MODELS[model]
 
 
@@ -166,8 +168,8 @@ def _albedo(
         return 0.0, 0.0
 
     def reflected(wr: Array) -> Array:
-        with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            f_r = spec.vectors(wi, wr.reshape(-1, 3), **parameters).reshape(wr.shape[:-1])  # in one row: faster
+        with np.errstate(all="ignore"):  # extreme nodes may raise flags; the values themselves are tested
+            f_r = spec.vectors(wi, wr.reshape(-1, 3), **parameters).reshape(wr.shape[:-1])  # one row is faster
         return np.asarray(f_r * np.maximum(wr[..., 2], 0.0), dtype=np.float64)[..., np.newaxis]
 
     lobe = None if spec.lobe is None else spec.lobe(wi[2], **parameters)
@@ -187,7 +189,7 @@ def reflected_share(
     width: int = 1,
     mirrored: bool = False,
 ) -> Albedo:
-    """Return the directional albedo of any function of unit vectors that gives several values of f_r at once.
+    """Return the directional albedo [1] of a function of unit vectors that gives several values of f_r at once.
 
     Parameters
     ----------
@@ -196,21 +198,21 @@ def reflected_share(
     theta_i, phi_i : float [rad]
         Direction of the light, theta up to pi/2.
     lobe : Lobe or None
-        Of one light; where to look for what all values have in common, None if for nothing.
+        Lobe that all values share for this light; None if they share none.
     tolerance : float
-        The absolute error to stay below, for the worst of the values.
+        Absolute error to stay below, for the worst of the values.
     most_panels : int
-        Where to give up.
+        Number of panels at which the quadrature stops.
     width : int
-        How many values brdf gives.
+        Number of values that brdf gives for a pair of directions.
     mirrored : bool
-        Whether f_r is the same on both sides of the plane of incidence: half of it is then integrated.
+        True if f_r is the same on both sides of the plane of incidence. Only one side is then integrated.
 
     Returns
     -------
     Albedo
-        Albedo of shape (width,), and one estimate of the error for all of them: not below the tolerance where the
-        quadrature gave up.
+        Albedo of shape (width,), and one estimate of the error for all of them. It is above the tolerance where the
+        quadrature stopped early.
     """
     wi = unit_vector(theta_i, phi_i)
 
@@ -232,7 +234,7 @@ def spectral_albedo(
     most_panels: int = MOST_PANELS,
     mirrored: bool = False,
 ) -> Albedo:
-    """Return the directional albedo of a model for several sets of parameters at once, as those of wavelengths are.
+    """Return the directional albedo [1] of a model for several sets of parameters at once, such as wavelengths.
 
     Parameters
     ----------
@@ -241,18 +243,18 @@ def spectral_albedo(
     theta_i, phi_i : float [rad]
         Direction of the light, theta up to pi/2.
     parameters : mapping
-        All parameters of the model; numbers, and arrays of one shape (L,).
+        All parameters of the model: numbers, or arrays of one shape (L,).
     tolerance, most_panels, mirrored
         As in `reflected_share`.
 
     Returns
     -------
     Albedo
-        As of `reflected_share`, width L, or 1 where all parameters are numbers; without the specular part.
+        As from `reflected_share`, of width L, or 1 where all parameters are numbers. The specular part is left out.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If a parameter is outside its range, or the tolerance outside [1e-13, 1].
     """
     _check_tolerance(tolerance)
@@ -260,8 +262,8 @@ def spectral_albedo(
     sets = [{name: np.ravel(value)[w % np.size(value)] for name, value in parameters.items()} for w in range(width)]
 
     def brdf(wi: Array, wr: Array) -> Floats:
-        with np.errstate(all="ignore"):  # nodes lie in every corner; what is finite is tested, not flagged
-            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in sets]  # in one row: models are faster so
+        with np.errstate(all="ignore"):  # extreme nodes may raise flags; the values themselves are tested
+            values = [spec.vectors(wi, wr.reshape(-1, 3), **one) for one in sets]  # one row is faster
         return np.stack(values, axis=-1).reshape(*wr.shape[:-1], width)
 
     lobe = narrowest(spec, float(np.cos(theta_i)), parameters)
@@ -278,7 +280,7 @@ def spectral_albedo(
 
 
 def narrowest(spec: ModelSpec, cos_i: float, parameters: Mapping[str, Any]) -> Lobe | None:
-    """Return the lobe of a model where parameters make it narrowest: panels that resolve it resolve the others."""
+    """Return the narrowest lobe of a model over its parameters. Panels that resolve it resolve the others."""
     if spec.lobe is None:
         return None
     lobe = spec.lobe(np.asarray(cos_i), **parameters)
@@ -294,7 +296,7 @@ def _panels_of(
     lobe: Lobe | None,
     mirrored: bool = False,
 ) -> tuple[Integrand, Array]:
-    """Return the integrand and its first panels; for a mirrored f_r those on one side of the plane of incidence."""
+    """Return the integrand and its first panels, only on one side of the plane of incidence if f_r is mirrored."""
     if lobe is None:
         integrand, panels = _over_the_hemisphere(reflected, theta_i, phi_i)
         begin = phi_i
@@ -307,7 +309,7 @@ def _panels_of(
 
 
 def _over_the_hemisphere(reflected: Callable[[Array], Array], theta_i: float, phi_i: float) -> tuple[Integrand, Array]:
-    """Return the integrand over theta_r and phi_r, and panels with edges where Oren and Nayar's model has its own."""
+    """Return the integrand over theta_r and phi_r, and panels that end at the edges of Oren and Nayar's model."""
 
     def integrand(theta: Array, phi: Array) -> Array:
         return reflected(unit_vector(theta, phi)) * np.sin(theta)[..., np.newaxis]
@@ -317,16 +319,17 @@ def _over_the_hemisphere(reflected: Callable[[Array], Array], theta_i: float, ph
 
 
 def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe) -> tuple[Integrand, Array, float]:
-    """Return the integrand over x in [0, 1], how far out on a ray, and psi, the azimuth on the ellipse of the lobe.
+    """Return the integrand over the slopes of the lobe, its panels, and the psi where one side of incidence begins.
 
-    Last, where one side of the plane of incidence begins, of a lobe that is round.
+    The integrand is a function of x in [0, 1], the position on a ray, and psi, the azimuth on the ellipse of the lobe.
+    The last result, a psi at the plane of incidence, is meant for a round lobe.
     """
     x_i, y_i, cos_i = wi
     sin2_i = x_i**2 + y_i**2
     alpha_x, alpha_y = (float(np.clip(alpha, 1e-9, 10.0)) for alpha in (lobe.alpha_x, lobe.alpha_y))
 
     def integrand(x: Array, psi: Array) -> Array:
-        s_x, s_y = alpha_x * np.cos(psi), alpha_y * np.sin(psi)  # the slopes of the half vector, over t
+        s_x, s_y = alpha_x * np.cos(psi), alpha_y * np.sin(psi)  # slopes of the half vector, divided by t
         s2 = s_x**2 + s_y**2
         # cos theta_r = 0 at cos_i s2 t^2 - 2 p t - cos_i = 0
         p = x_i * s_x + y_i * s_y
@@ -344,13 +347,13 @@ def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe)
         measure = 4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian
         return np.asarray(reflected(wr) * measure[..., np.newaxis])
 
-    # a quarter turn away from the light, at grazing, the horizon leaps: an edge of panels
+    # At grazing the horizon leaps a quarter turn away from the light, so panels end there
     across = np.arctan2(alpha_x * x_i, -alpha_y * y_i) if sin2_i > 0.0 else HALF_PI  # p = 0
     return integrand, _panels(np.linspace(0.0, 1.0, 5), across + HALF_PI * np.arange(5)), float(across) + HALF_PI
 
 
 def _panels(first: Floats, second: Floats) -> Array:
-    """Return rectangles between edges, as rows: the centre, then half the width, in the first and second variable."""
+    """Return rectangles between edges as rows: the centre, then half the width, in the first and second variable."""
     centres = [(edges[:-1] + edges[1:]) / 2.0 for edges in (first, second)]
     halves = [np.diff(edges) / 2.0 for edges in (first, second)]
     return np.stack(
@@ -365,11 +368,11 @@ def _panels(first: Floats, second: Floats) -> Array:
 def _adaptive(
     integrand: Integrand, panels: Array, tolerance: float, most_panels: int = MOST_PANELS, width: int = 1
 ) -> tuple[Array, float]:
-    """Return the integrals (width,) over rectangles, which are halved where the error is large."""
+    """Return the integrals (width,) over rectangles, and their error. Rectangles with large errors are halved."""
     values, errors = _rules(integrand, panels, width)
     done = 0
     while errors.sum() > tolerance and done < most_panels:
-        # the largest errors, as many as stand for all but a part of the tolerance
+        # The panels with the largest errors are halved. The others add up to a part of the tolerance
         total = errors.sum(axis=1)
         order = np.argsort(total)[::-1]
         rest = total.sum() - np.cumsum(total[order])
@@ -396,9 +399,9 @@ def _halved(panels: Array, errors: Array) -> Array:
 
 
 def _rules(integrand: Integrand, panels: Array, width: int) -> tuple[Array, Array]:
-    """Return integrals over each panel, and the change of the worst with Gauss's rule in the first or second variable.
+    """Return integrals over each panel, and their largest change with Gauss's rule in the first or second variable.
 
-    The integrand gives `width` values a point, in a last axis.
+    The integrand gives `width` values per point, in a last axis.
     """
     values, errors = np.empty((len(panels), width)), np.empty((len(panels), 2))
     step = max(1, _BATCH // width)
@@ -406,7 +409,7 @@ def _rules(integrand: Integrand, panels: Array, width: int) -> tuple[Array, Arra
         batch = slice(start, start + step)
         c_1, c_2, h_1, h_2 = (column[:, np.newaxis, np.newaxis] for column in panels[batch].T)
         f = integrand(*np.broadcast_arrays(c_1 + h_1 * _X[:, np.newaxis], c_2 + h_2 * _X))
-        by_first = _W_KRONROD @ f  # over the second variable: (panels, 15, width)
+        by_first = _W_KRONROD @ f  # integral over the second variable, (panels, 15, width)
         by_second = (_W_KRONROD @ f.reshape(*f.shape[:2], -1)).reshape(by_first.shape)
         area = (h_1 * h_2)[:, 0]
         values[batch] = area * (_W_KRONROD @ by_first)

@@ -1,4 +1,4 @@
-"""Importance sampling of every model: directions that follow its lobe, their density, and the weights that make up."""
+"""Importance sampling of every model: directions that follow its lobe, their density, and their weights."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from brdfdb.parameters import Floats, ModelSpec
 
 Array = NDArray[np.float64]
 
-_TINY = 1e-300  # u of 0 is read as this: its logarithm is finite
+_TINY = 1e-300  # least u, so that its logarithm is finite
 DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
 
 
 class Sample(NamedTuple):
     """Directions drawn for a light.
 
-    `wr` are unit vectors of shape (..., 3), some below the horizon; `pdf` [1/sr] is their density over the sphere;
-    `weight` [1] is f_r cos theta_r / pdf, 0 below the horizon: its mean is the albedo.
+    `wr` holds unit vectors of shape (..., 3), some below the horizon. `pdf` [1/sr] is their density over the sphere.
+    `weight` [1] is f_r cos theta_r / pdf, and 0 below the horizon. Its mean is the albedo.
     """
 
     wr: Array
@@ -33,38 +33,38 @@ class Sample(NamedTuple):
 
 
 def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, **parameters: ArrayLike) -> Sample:
-    """Draw a viewer (or, what reciprocity makes the same, the next light of a path) for each light `wi`.
+    """Draw a viewer for each light `wi`. By reciprocity it is also the next light of a path.
 
     Parameters
     ----------
     model : ModelSpec or str
         A model, or its name in `brdfdb.models.MODELS`.
     u1, u2 : array_like
-        Uniform random numbers in [0, 1]; points that are stratified give directions that are.
+        Uniform random numbers in [0, 1]. Stratified numbers give stratified directions.
     wi : array_like
         Unit vectors of the light, of shape (..., 3).
     **parameters : array_like
-        Those of the model; they broadcast with u1, u2 and the vectors.
+        Parameters of the model, which broadcast with u1, u2 and the vectors.
 
     Returns
     -------
     Sample
-        (wr, pdf, weight), float64, in the broadcast shape of all arguments. nan where an argument is; the weight of a
-        light below the horizon is 0.
+        (wr, pdf, weight), float64, in the broadcast shape of all arguments. They are nan where an argument is nan. The
+        weight of a light below the horizon is 0.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    With the probability that the model's `lobe` gives, a half vector is drawn from a Gaussian of slopes, Ward's eq. 7
-    with tan(delta) in (7a), which is printed without its arctan, and the light is mirrored in it; else a direction
-    with a density of cos theta_r / pi. u1 chooses, and is stretched to serve again. Directions that a lobe throws below
-    the horizon are kept, with a weight of 0: they are a part of the density. Ward's samples are not "uniformly
-    weighted": the weights are those of `Sample`.
-    The specular part of a model is not drawn: add `spec.specular` in the mirror direction.
+    The `lobe` of the model gives the probability of a half vector from a Gaussian of slopes, in which the light is
+    mirrored. It follows Ward's eq. 7 with tan(delta) in (7a), which is printed without its arctan. Otherwise the
+    direction has a density of cos theta_r / pi. u1 selects the component, then is rescaled to [0, 1] and reused.
+    Directions of a lobe that fall below the horizon are kept with a weight of 0, because they are a part of the
+    density. Ward's samples are not "uniformly weighted": the weights are those of `Sample`. The specular part of a
+    model is not drawn: add `spec.specular` in the mirror direction.
 
     References
     ----------
@@ -82,13 +82,13 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     i = checked_vectors(wi, wi).w_i.astype(np.float64)
     lobe = lobe_of(spec, i, parameters)
     wr = directions(lobe, v1, v2, i)
-    with np.errstate(all="ignore"):  # samples reach every corner; what is finite is tested, not flagged
+    with np.errstate(all="ignore"):  # extreme samples may raise flags; the values themselves are tested
         f_r = spec.vectors(i, wr, **parameters)
-    wr = np.broadcast_to(wr, (*np.shape(f_r), 3)).copy()  # a lobe or none: parameters shape the result
+    wr = np.broadcast_to(wr, (*np.shape(f_r), 3)).copy()  # parameters shape the result even without a lobe
     wr[np.isnan(f_r)] = np.nan
     density = mixture_density(lobe, i, wr)
     reflected = f_r * np.maximum(wr[..., 2], 0.0)
-    # a density that has vanished leaves a direction that nothing draws
+    # A direction with a density of 0 is never drawn, so its weight is 0
     weight = np.divide(reflected, density, where=density != 0.0, out=np.zeros(np.shape(density)))
     return Sample(wr, density[()], weight[()])
 
@@ -101,18 +101,18 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
     model : ModelSpec or str
         A model, or its name in `brdfdb.models.MODELS`.
     wi, wr : array_like
-        Unit vectors, of shape (..., 3), `wr` anywhere on the sphere.
+        Unit vectors of shape (..., 3), `wr` anywhere on the sphere.
     **parameters : array_like
-        Those of the model; they broadcast with the vectors.
+        Parameters of the model, which broadcast with the vectors.
 
     Returns
     -------
     array [1/sr]
-        In the broadcast shape of all arguments; over the sphere it integrates to 1.
+        In the broadcast shape of all arguments. Its integral over the sphere is 1.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Examples
@@ -124,13 +124,13 @@ def pdf(model: ModelSpec | str, wi: ArrayLike, wr: ArrayLike, **parameters: Arra
     i, r = vectors.w_i.astype(np.float64), vectors.w_r.astype(np.float64)
     spec = spec_of(model)
     parameters = named(spec, parameters)
-    density = mixture_density(lobe_of(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan goes through
+    density = mixture_density(lobe_of(spec, i, parameters), i, r) + 0.0 * (i + r).sum(axis=-1)  # nan is passed on
     shape = np.broadcast_shapes(density.shape, *(np.shape(value) for value in parameters.values()))
     return np.broadcast_to(density, shape).copy()[()]
 
 
 def lobe_of(spec: ModelSpec, i: Array, parameters: Mapping[str, ArrayLike]) -> Lobe:
-    """Return the lobe of a model for lights `i`; for a diffuse model, a lobe that has no share."""
+    """Return the lobe of a model for lights `i`. A diffuse model gets a lobe with a share of 0."""
     for parameter in spec.parameters:
         if parameter.name in parameters:
             parameter.check(parameters[parameter.name])
@@ -149,9 +149,12 @@ def _uniform(name: str, u: ArrayLike) -> Array:
 
 
 def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
-    """Return directions (..., 3) with the density `mixture_density`: u1 selects lobe or cosine, and is rescaled."""
+    """Return directions (..., 3) with the density `mixture_density`.
+
+    u1 selects the component, lobe or cosine, then is rescaled to [0, 1] and reused.
+    """
     in_lobe = (u1 < lobe.share) | (lobe.share >= 1.0)
-    with np.errstate(divide="ignore", invalid="ignore"):  # of the component that is not taken
+    with np.errstate(divide="ignore", invalid="ignore"):  # the component that is not taken may divide by zero
         stretched = np.where(in_lobe, u1 / lobe.share, (u1 - lobe.share) / (1.0 - lobe.share))
     angle = 2.0 * np.pi * u2
     mirrored = mirrored_in_lobe(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
@@ -175,16 +178,16 @@ def _cosine_weighted(u1: Array, angle: Array) -> Array:
 
 
 def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
-    """Return density [1/sr] of the mixture over the whole sphere."""
+    """Return the density [1/sr] of lobe and cosine together, over the whole sphere."""
     cosine = np.maximum(r[..., 2], 0.0) / np.pi
     if not np.any(lobe.share):
         return np.asarray(cosine + 0.0 * i[..., 2])
-    # h = i + r not normalised: h.i = length / 2, cos(delta) = h_z / length
+    # For h = i + r, not normalised, h.i = length / 2 and cos(delta) = h_z / length
     x, y, z = (i[..., axis] + r[..., axis] for axis in range(3))
     length2 = x * x + y * y + z * z
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t2 = ((x / lobe.alpha_x) ** 2 + (y / lobe.alpha_y) ** 2) / (z * z)
         slopes = lobe.distribution.density(t2)
         mirrored = slopes * length2 / (2.0 * np.pi * lobe.alpha_x * lobe.alpha_y * np.abs(z) ** 3)
-    mirrored = np.where(np.abs(z) < 1e-100, 0.0, mirrored)  # no half vector is drawn there
+    mirrored = np.where(np.abs(z) < 1e-100, 0.0, mirrored)  # no half vector is drawn at the horizon
     return np.asarray(lobe.share * mirrored + (1.0 - lobe.share) * cosine)

@@ -1,4 +1,4 @@
-"""The bound that energy conservation puts on the uniform part of a model, where the model leaves it free."""
+"""The bound that energy conservation sets on the uniform part of a model that leaves it free."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from brdfdb.parameters import Floats, ModelSpec
 
 Array = NDArray[np.float64]
 
-# Angles of the first search, even in arcsinh(tan theta_i), which is theta_i near 0 and -ln(cos theta_i) near grazing:
-# there the reflectance peaks where shadowing begins
+# Angles of the first search are even in arcsinh(tan theta_i), which is theta_i near 0 and -ln(cos theta_i) near
+# grazing. The reflectance near grazing has its peak where shadowing begins
 _ANGLES = 40
-_ROUNDS = 12  # rounds of the search around the largest of them, each of which halves the step: four are often enough
+_ROUNDS = 12  # rounds of the search around the largest value; each halves the step, and four are often enough
 
 
 def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parameters: ArrayLike) -> Floats:
@@ -28,15 +28,15 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
     model : ModelSpec or str
         An isotropic model that leaves its uniform part free (`ModelSpec.uniform_bound_cosine`), or its name.
     tolerance : float
-        Absolute error of the directional albedo that is allowed, in [1e-13, 1].
+        Absolute error of the directional albedo, in [1e-13, 1].
     **parameters : array_like
-        Those of the model but the uniform part; they broadcast, and are integrated together.
+        Parameters of the model except the uniform part. They broadcast, and are integrated together.
 
     Returns
     -------
     array [1]
-        1 less the largest directional-hemispherical reflectance, specular and directional diffuse, of all angles of
-        incidence from 0 to 90 degrees; 0 where that is above 1.
+        1 less the largest directional-hemispherical reflectance, specular and directional diffuse, over all angles of
+        incidence from 0 to 90 degrees. It is 0 where that reflectance is above 1.
 
     Raises
     ------
@@ -46,8 +46,8 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
     Notes
     -----
     He et al. 1991, section 3.2.3: a(lambda) is "a constrained, but otherwise free, parameter. The constraint is based
-    on energy conservation and gives an upper bound." A smooth surface reflects everything at grazing: its bound is 0,
-    and any a > 0 breaks it.
+    on energy conservation and gives an upper bound." A smooth surface reflects everything at grazing. Its bound is 0,
+    and any a > 0 violates it.
 
     References
     ----------
@@ -64,7 +64,7 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
         raise ParameterError("model", f"{spec.name!r} has no uniform part that only energy conservation bounds")
     given = named(spec, dict(**parameters, **{spec.uniform: 0.0}))
     normal = np.array([0.0, 0.0, 1.0])
-    spec.vectors(normal, normal, **given)  # checks them
+    spec.vectors(normal, normal, **given)  # checks the parameters
     del given[spec.uniform]
     arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given.values()))
     surfaces = {name: np.ravel(array) for name, array in zip(given, arrays, strict=True)}
@@ -77,25 +77,27 @@ def largest_uniform(model: ModelSpec | str, *, tolerance: float = 1e-6, **parame
 def largest_uniform_beside(
     spec: ModelSpec, theta_i: Array, reflectance: Floats, surfaces: Mapping[str, ArrayLike], tolerance: float
 ) -> Array:
-    """Return `largest_uniform` [1] of surfaces whose reflectance is known at some angles; others are searched.
+    """Return `largest_uniform` [1] of surfaces whose reflectance is known at some angles.
+
+    Angles between the known ones are searched for a larger reflectance.
 
     Parameters
     ----------
     spec : ModelSpec
         The model.
     theta_i : array (angles,) [rad]
-        Increasing, up to 90 degrees.
+        Increasing angles of incidence up to 90 degrees.
     reflectance : array (angles, surfaces) [1]
-        Specular and directional diffuse.
+        Reflectance, specular and directional diffuse.
     surfaces : mapping
-        Arguments of the model but the uniform part; numbers, or arrays of one shape (surfaces,).
+        Arguments of the model except the uniform part: numbers, or arrays of one shape (surfaces,).
     tolerance : float
         As in `largest_uniform`.
 
     Returns
     -------
     array (surfaces,) [1]
-        1 less the largest reflectance, at these angles or between them; 0 where that is above 1.
+        1 less the largest reflectance, at these angles or between them. It is 0 where that reflectance is above 1.
     """
     below = theta_i < HALF_PI
     peak = _peak(
@@ -118,10 +120,10 @@ def _reflectance(spec: ModelSpec, theta_i: float, surfaces: Mapping[str, ArrayLi
 
 
 def _peak(x: Array, y: Floats, f: Callable[[float], Array], tolerance: float) -> Array:
-    """Return the largest value of each of several functions known at increasing x, as y of shape (x, functions).
+    """Return the largest value of each function, whose values y (x, functions) are known at increasing x.
 
-    The steps around the largest value of a function are halved until the top of the parabola through the highest three
-    stays where it is.
+    The steps around the largest value of a function are halved until the top of the parabola through the three highest
+    values no longer moves.
     """
     top = _tops(x, y)
     moving = np.ones(top.size, dtype=bool)
@@ -139,13 +141,13 @@ def _peak(x: Array, y: Floats, f: Callable[[float], Array], tolerance: float) ->
 
 
 def _tops(x: Array, y: Floats) -> Array:
-    """Return the highest points of the parabolas through the largest values and their neighbours, not beyond these."""
+    """Return the tops of the parabolas through the largest values and their neighbours, between these neighbours."""
     middle = np.clip(np.argmax(y, axis=0), 1, x.size - 2)
     column = np.arange(y.shape[1])
     (x0, x1, x2), (y0, y1, y2) = (x[middle + i] for i in (-1, 0, 1)), (y[middle + i, column] for i in (-1, 0, 1))
     rise, fall = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
     bend = (fall - rise) / (x2 - x0)
-    # of y1 + s (x - x1) + bend (x - x1)^2, with the slope s at x1
+    # The parabola is y1 + s (x - x1) + bend (x - x1)^2, with the slope s at x1
     s = rise + bend * (x1 - x0)
     step = np.divide(-s, 2.0 * bend, out=np.zeros_like(s), where=bend < 0.0)
     inside = np.clip(step, x0 - x1, x2 - x1)

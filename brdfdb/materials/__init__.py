@@ -24,17 +24,22 @@ __all__ = [
 
 
 def source_of(document: Mapping[str, Any]) -> Material | FunctionRecord:
-    """Return the source that a document was written of: a material complete, a function without its callable.
+    """Return the source that a document describes: a complete material, or a function without its callable.
 
     Parameters
     ----------
     document : mapping
-        As `Source.document` makes it; other keys are ignored.
+        A result of `Source.document`. Other keys are ignored.
+
+    Returns
+    -------
+    Material or FunctionRecord
+        The material, or the record of the function.
 
     Raises
     ------
     BrdfdbError
-        If it describes no source, or a material whose model is not installed or has other parameters.
+        If the document describes no source, or a material whose model is not installed or has other parameters.
     """
     try:
         if "material" in document:

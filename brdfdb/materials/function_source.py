@@ -17,11 +17,11 @@ from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Text
 from brdfdb.materials.source import Evaluate, Lossless
 from brdfdb.parameters import Floats
 
-# (wi, wr, wavelength_nm) of shapes (N, 3), (N, 3) and (L,) -> f_r [1/sr] of shape (N, L); of a grey function the
-# wavelengths are None and the shape may be (N,)
+# (wi, wr, wavelength_nm) of shapes (N, 3), (N, 3) and (L,) -> f_r [1/sr] of shape (N, L). A grey function gets None for
+# the wavelengths, and its result may have the shape (N,)
 Function = Callable[[Floats, Floats, NDArray[np.float64] | None], ArrayLike]
 
-_LOBE_SHARE = 0.5  # of the reflected light: a lobe whose share nobody knows is looked for by half of the directions
+_LOBE_SHARE = 0.5  # share of the reflected light in a lobe whose share is unknown; half of the directions follow it
 _CHECKED, _CHECKED_UP_TO_DEG, _SEED = 64, 85.0, 1967  # pairs of directions at which symmetries are checked
 _SAME = 1e-6  # relative difference that rounding may leave between values that a symmetry makes the same
 
@@ -32,7 +32,7 @@ def _two_widths(alpha: Any) -> Any:
 
 
 class FunctionRecord(BaseModel):
-    """All that a table keeps of the function that it was tabulated from: the function itself cannot be stored.
+    """The record of a function in its table, because the function itself cannot be stored.
 
     Attributes
     ----------
@@ -43,16 +43,18 @@ class FunctionRecord(BaseModel):
     provenance : str
         Where the function comes from: a paper, a measurement, a program and its version.
     wavelengths_nm : tuple of float or None
-        Wavelengths [nm] at which it is tabulated, increasing; it holds between the first and the last. None: grey.
+        Increasing wavelengths [nm] at which the function is tabulated. It may be evaluated between the first and the
+        last. None for a grey function.
     anisotropic : bool
-        Set if f_r changes when the surface is turned about its normal.
+        True if f_r changes when the surface is turned about its normal.
     elliptical : bool
-        Set if an anisotropic f_r has the symmetry of an ellipse with axes along x and y: tables are a quarter as large.
+        True if an anisotropic f_r has the symmetry of an ellipse with axes along x and y. Its tables are a quarter as
+        large.
     grazing_pole : bool
-        Set if f_r grows without bound as a direction reaches 90 degrees.
+        True if f_r grows without bound as a direction reaches 90 degrees.
     alpha : (float, float) or None
         Widths [1] of the lobe around the mirror direction, along x and y: root mean square slopes of its half vectors,
-        times the square root of 2. One number stands for both. None: no lobe.
+        times the square root of 2. One number stands for both. None if there is no lobe.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -92,7 +94,7 @@ class FunctionRecord(BaseModel):
         return self.wavelengths_nm is not None
 
     def lobe(self, cos_i: Floats, _wavelength_nm: NDArray[np.float64] | None = None) -> Lobe | None:
-        """Return the lobe of lights with a cosine, which is the same for all; None without one."""
+        """Return the lobe for lights with the cosine cos_i, which is the same for all; None without a lobe."""
         if self.alpha is None:
             return None
         share, alpha_x, alpha_y = (np.full(np.shape(cos_i), value) for value in (_LOBE_SHARE, *self.alpha))
@@ -104,24 +106,24 @@ class FunctionRecord(BaseModel):
 
 
 class FunctionSource(FunctionRecord):
-    """A function of the user as a source: it is tabulated, audited, charted and rendered like a material.
+    """A function of the user as a source, which is tabulated, audited, charted and rendered like a material.
 
     Parameters
     ----------
     brdf : callable
         ``brdf(wi, wr, wavelength_nm)`` gives f_r [1/sr] without the cosine, finite and not below 0. `wi` and `wr` are
         float64 arrays of shape (N, 3): unit vectors of light and viewer, above the horizon. `wavelength_nm` is an
-        array of shape (L,) [nm], and the result has the shape (N, L); for a grey function it is None, and the result
-        has the shape (N,) or (N, 1).
+        array of shape (L,) [nm], and the result has the shape (N, L). For a grey function `wavelength_nm` is None, and
+        the result has the shape (N,) or (N, 1).
     **record
-        As in `FunctionRecord`: name, title and provenance, and what is known of the function.
+        The attributes of `FunctionRecord`: name, title, provenance, and properties of the function.
 
     Raises
     ------
     ParameterError
-        If a value of the record is not allowed; if the function gives another shape or a value that is negative or not
-        finite; if it is not reciprocal, or lacks a symmetry that tables make use of. It is called at 64 pairs of
-        directions to find out.
+        If a value of the record is not allowed. If the function gives another shape, or a value that is negative or not
+        finite. If it is not reciprocal, or lacks a symmetry that tables use. The function is called at 64 pairs of
+        directions to check this.
 
     Examples
     --------
@@ -150,21 +152,21 @@ class FunctionSource(FunctionRecord):
 
     @property
     def has_specular(self) -> bool:
-        """Return False: a specular part is no function of two directions."""
+        """Return False, because a specular part is no function of two directions."""
         return False
 
     @property
     def uniform(self) -> None:
-        """Return None: no part is known to be the same in all directions."""
+        """Return None, because the uniform part of a function is unknown."""
         return None
 
     @property
     def lossless(self) -> Lossless | None:
-        """Return None: it is not known what absorbs."""
+        """Return None, because the absorption of a function is unknown."""
         return None
 
     def without_uniform(self) -> FunctionSource:
-        """Return the function as it is."""
+        """Return the function unchanged."""
         return self
 
     def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -190,14 +192,14 @@ class FunctionSource(FunctionRecord):
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
     ) -> Floats:
-        """Return f_r [1/sr] of the function itself, as `brdfdb.tables.table.Table.lookup` gives that of its table.
+        """Return f_r [1/sr] of the function itself, with the arguments of `brdfdb.tables.table.Table.lookup`.
 
         Parameters
         ----------
         theta_i, phi_i, theta_r, phi_r : array_like [rad]
-            Directions of light and viewer; they broadcast.
+            Directions of light and viewer, which broadcast.
         wavelength_nm : float or array_like (M,) [nm], optional
-            Within the range of the function; by default its wavelengths. Grey functions take any.
+            Wavelengths within the range of the function. The default is its wavelengths. Grey functions take any.
 
         Returns
         -------
@@ -207,7 +209,7 @@ class FunctionSource(FunctionRecord):
         Raises
         ------
         ParameterError
-            If an angle or a wavelength is outside its range, or the function gives what no f_r can be.
+            If an angle or a wavelength is outside its range, or a value of the function is negative or not finite.
         """
         angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
         light, viewer = unit_vector(angles.theta_i, angles.phi_i), unit_vector(angles.theta_r, angles.phi_r)
@@ -232,7 +234,7 @@ class FunctionSource(FunctionRecord):
         return {"title": self.title, "material": self.name, "source": self.provenance}
 
     def _wavelengths(self, wavelength_nm: ArrayLike | None) -> NDArray[np.float64] | None:
-        """Return wavelengths as an array of one axis, or none; ParameterError if the function does not hold there."""
+        """Return wavelengths [nm] as an array (L,), or None; ParameterError if one is outside the function's range."""
         if self.wavelengths_nm is None:
             return None
         at = np.asarray(self.wavelengths_nm if wavelength_nm is None else wavelength_nm, dtype=np.float64).reshape(-1)
@@ -255,7 +257,7 @@ class FunctionSource(FunctionRecord):
         return values if self.spectral else np.repeat(values, np.size(wavelength_nm), axis=-1)
 
     def _values(self, given: Directions, light: Floats, viewer: Floats, at: NDArray[np.float64] | None) -> Floats:
-        """Return f_r (..., L) at unit vectors that broadcast, 0 below the horizon; ParameterError if one is no f_r."""
+        """Return f_r (..., L) [1/sr] at unit vectors that broadcast, 0 below the horizon; ParameterError if invalid."""
         light, viewer = np.broadcast_arrays(light, viewer)
         wi, wr = (np.array(w.reshape(-1, 3), dtype=np.float64) for w in (light, viewer))
         whole = ~np.isnan(wi + wr).any(axis=1)
@@ -287,7 +289,7 @@ class FunctionSource(FunctionRecord):
         return finished(values.reshape(*light.shape[:-1], count), given, trailing=1)
 
     def _check_function(self) -> None:
-        """Raise a ParameterError if the function is not reciprocal, or lacks a symmetry that tables make use of."""
+        """Raise a ParameterError if the function is not reciprocal, or lacks a symmetry that tables use."""
         rng = np.random.default_rng(_SEED)
         least = np.cos(radians(_CHECKED_UP_TO_DEG))
         theta = np.arccos(rng.uniform(least, 1.0, (2, _CHECKED)))

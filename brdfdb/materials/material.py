@@ -29,11 +29,11 @@ from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec
 from brdfdb.spectra import refractive_index
 
-_SOURCED = ("refractive_index", "wavelengths_nm")  # fields that may have a source of their own, besides parameters
+_SOURCED = ("refractive_index", "wavelengths_nm")  # fields besides parameters that may have an entry in `sources`
 
-# Number of directions above which a call for each wavelength is faster than one call for all: each is one row of the
-# kernel then. Measured for copper at 8 wavelengths, one call and separate calls: 278 and 637 ns a value at 256
-# directions, 293 and 204 ns at 16384
+# Number of directions above which a call for each wavelength is faster than one call for all, because each call is then
+# one row of the kernel. One call and separate calls for copper at 8 wavelengths take 278 and 637 ns per value at 256
+# directions, and 293 and 204 ns at 16384
 _MANY = 2000
 
 
@@ -47,25 +47,26 @@ class Material(BaseModel):
     model : str
         Key of `brdfdb.models.MODELS`.
     parameters : dict
-        All parameters of the model in its units (angles in radians), those left out filled in by their defaults.
+        All parameters of the model in its units (angles in radians), with defaults for missing ones.
     source : str
         Paper and table, figure or section of every value that is not in `sources`.
     sources : dict
-        Where single values come from, where that is another place.
+        Provenance of single values that come from another place than `source`.
     assumed : dict of str to Assumption
-        Values that the paper does not print, by parameter: why ours was chosen, and what the alternatives would give.
+        Values that the paper does not print, by parameter: the reason for the value, and the results of alternatives.
     refractive_index : str or None
         ``shelf/book/page`` for `brdfdb.spectra.refractive_index`; spectral models have one, no other model has.
     wavelengths_nm : tuple of float or None
-        The wavelengths [nm] that the paper's parameters are stated for; None if the model may be used at any.
+        Wavelengths [nm] for which the paper states the parameters; None if the model may be used at any wavelength.
     known_excess : KnownExcess or None
-        Set where the published parameters are known to break energy conservation.
+        The published excess, if the published parameters are known to violate energy conservation.
 
     Raises
     ------
-    ValueError
-        For an unknown model, a missing, unknown or out-of-range parameter, a source or an assumption about a value
-        that the material does not have, a known excess that rests on an assumption.
+    ParameterError
+        If the model is unknown, if a parameter is missing, unknown or out of range, if a source or an assumption is
+        about a value that the material does not have, or if a known excess rests on an assumption. pydantic reports it
+        in its ValidationError; both are ValueErrors.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -82,14 +83,14 @@ class Material(BaseModel):
     wavelengths_nm: Annotated[tuple[float, ...], Field(fail_fast=True)] | None = Field(default=None, min_length=1)
     known_excess: KnownExcess | None = None
 
-    # Arguments of the model that stand for those of the material: of its lossless form, and without its uniform part
+    # Arguments of the model that replace those of the material: for its lossless form, or without its uniform part
     _changed: dict[str, float] = PrivateAttr(default_factory=dict)
 
     @classmethod
     def from_table(cls, name: str, table: Mapping[str, Any]) -> Material:
-        """Return the material that a table of a TOML file describes; MaterialError if it describes none.
+        """Return the material that a TOML table describes; MaterialError if it describes none.
 
-        Parameters, and their names in sources and assumed, are read as `file_parameters` writes them: angles in
+        Parameters, and their names in sources and assumed, are read as `file_parameters` writes them: angles are in
         degrees, under names that end in ``_deg``.
         """
         fields = {**table, "name": name}
@@ -214,7 +215,7 @@ class Material(BaseModel):
 
     @property
     def uniform(self) -> float | None:
-        """Return the part of f_r [1/sr] that is the same in all directions; None of a model that names no such part."""
+        """Return the uniform part of f_r [1/sr]; None if the model names no uniform part."""
         return None if self.spec.uniform is None else self.parameters[self.spec.uniform] / np.pi
 
     def without_uniform(self) -> Material:
@@ -223,7 +224,7 @@ class Material(BaseModel):
 
     @property
     def lossless(self) -> Lossless | None:
-        """Return the material with nothing absorbed; None of a model that no parameters make so."""
+        """Return the material with nothing absorbed; None if no parameters of the model do that."""
         if self.spec.lossless is None:
             return None
         changes = self.spec.lossless(self.parameters)
@@ -237,7 +238,7 @@ class Material(BaseModel):
     def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return the wavelengths [nm] at which a picture at some wavelengths evaluates the material; None if grey.
 
-        One whose parameters are stated for some wavelengths, which make no colour, is evaluated at the first of them.
+        A material that is stated for a few wavelengths, too few for a colour, is evaluated at the first of them.
         """
         if not self.spectral:
             return None
@@ -249,19 +250,19 @@ class Material(BaseModel):
         Parameters
         ----------
         wavelength_nm : array_like [nm], optional
-            Wavelengths for a spectral model; by default those that the parameters are stated for. Other models
-            do without.
+            Wavelengths for a spectral model. The default is the wavelengths for which the parameters are stated. Other
+            models ignore them.
 
         Returns
         -------
         dict
-            The parameters; for a spectral model also ``wavelength_nm`` [nm], ``n`` and ``k`` [1], float64 arrays of
-            one shape.
+            The parameters. A spectral model also has ``wavelength_nm`` [nm], ``n`` and ``k`` [1], float64 arrays of one
+            shape.
 
         Raises
         ------
-        ValueError
-            If a spectral model is left without wavelengths, or its refractive index is not known at one of them.
+        ParameterError
+            If a spectral model has no wavelengths, or its refractive index is not known at one of them.
         """
         if self.refractive_index is None:
             return {**self.parameters, **self._changed}
@@ -276,23 +277,24 @@ class Material(BaseModel):
     def brdf_at(
         self, wavelength_nm: NDArray[np.float64] | None, vectors: Callable[..., Floats] | None = None
     ) -> Evaluate:
-        """Return f_r of the model as a function of directions alone, with the spectra looked up once.
+        """Return f_r [1/sr] of the model as a function of directions alone, with the refractive index looked up once.
 
         Parameters
         ----------
         wavelength_nm : array of shape (L,) [nm], or None
-            For spectral models, and only for them.
+            Wavelengths of a spectral model, and only of such a model.
         vectors : callable, optional
-            Takes the arguments of the model and stands for it, such as an approximation.
+            A function with the arguments of the model that replaces it, such as an approximation.
 
         Returns
         -------
         callable
-            ``brdf(wi, wr)``: f_r [1/sr], shape (N, L), L = 1 of a grey material, of unit vectors of shape (N, 3).
+            ``brdf(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors of shape (N, 3). L is 1 for a grey
+            material.
 
         Raises
         ------
-        ValueError
+        ParameterError
             If the refractive index is not known at one of the wavelengths.
         """
         f_r, together = vectors or self.spec.vectors, self.arguments(wavelength_nm)
@@ -315,14 +317,14 @@ class Material(BaseModel):
         phi_r: ArrayLike,
         wavelength_nm: ArrayLike | None = None,
     ) -> Floats:
-        """Return f_r of the model itself, as `brdfdb.tables.table.Table.lookup` gives that of its table.
+        """Return f_r [1/sr] of the model itself, with the arguments of `brdfdb.tables.table.Table.lookup`.
 
         Parameters
         ----------
         theta_i, phi_i, theta_r, phi_r : array_like [rad]
-            Directions of light and viewer; they broadcast.
+            Directions of light and viewer, which broadcast.
         wavelength_nm : float or array_like (M,) [nm], optional
-            As in `arguments`. Models that are not spectral take any.
+            As in `arguments`. Models that are not spectral take any wavelength.
 
         Returns
         -------
@@ -331,8 +333,8 @@ class Material(BaseModel):
 
         Raises
         ------
-        ValueError
-            As the model and `arguments` do.
+        ParameterError
+            If an angle is outside its range, or the wavelengths do not suit the material.
         """
         return self._spectrum(self.spec.evaluate, (theta_i, phi_i, theta_r, phi_r), wavelength_nm, None)
 
@@ -354,7 +356,7 @@ class Material(BaseModel):
         wavelength_nm: ArrayLike | None,
         names: tuple[str, ...] | None,
     ) -> Floats:
-        """Evaluate a function of angles and parameters (`names` of them, or all); wavelengths are the last axis."""
+        """Evaluate a function of angles and parameters (all, or those in `names`). Wavelengths are the last axis."""
         if not self.spectral:
             value = function(*angles, **self.arguments())
             if wavelength_nm is None or np.ndim(wavelength_nm) == 0:
@@ -367,29 +369,29 @@ class Material(BaseModel):
         return np.stack([function(*angles, **arguments) for arguments in _each(used)], axis=-1)
 
     def lobe(self, cos_i: Floats, wavelength_nm: NDArray[np.float64] | None) -> Lobe | None:
-        """Return the lobe of lights with a cosine, at wavelengths [nm] that broadcast with it; None if diffuse."""
+        """Return the lobe for lights with the cosine cos_i, which broadcasts with wavelengths [nm]; None if diffuse."""
         return None if self.spec.lobe is None else self.spec.lobe(cos_i, **self.arguments(wavelength_nm))
 
     def refractive_indices(
         self, wavelength_nm: NDArray[np.float64] | None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return n and k [1] at wavelengths [nm], as used; None of a model that is not spectral."""
+        """Return n and k [1] at wavelengths [nm]; None if the model is not spectral."""
         if self.refractive_index is None:
             return None
         arguments = self.arguments(wavelength_nm)
         return arguments["n"], arguments["k"]
 
     def file_parameters(self) -> dict[str, Number]:
-        """Return the parameters as a human reads and writes them: angles in degrees, under names ending in ``_deg``."""
+        """Return the parameters as files write them: angles in degrees, under names ending in ``_deg``."""
         return {
-            # twelve digits: degrees to radians and back moves the last one
+            # Twelve digits, because the conversion from degrees to radians and back changes the last ones
             written_name(parameter): float(f"{degrees(value):.12g}") if parameter.unit == "rad" else value
             for parameter in self.spec.parameters
             for value in [self.parameters[parameter.name]]
         }
 
     def attributes(self) -> dict[str, Any]:
-        """Return the attributes that a table has of the material, for people: angles in degrees."""
+        """Return the attributes of the material in its table, with angles in degrees."""
         spec, written = self.spec, {p.name: written_name(p) for p in self.spec.parameters}
         return {
             "title": self.title,
@@ -422,7 +424,7 @@ def _each(arguments: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _field_and_sentence(error: ErrorDetails) -> tuple[str, str]:
-    """Return the field that pydantic finds fault with, and the sentence; our own errors name the field themselves."""
+    """Return the field and the sentence of an error of pydantic. A ParameterError names the field itself."""
     ours = error["ctx"]["error"] if error["type"] == "value_error" else error["msg"]
     if isinstance(ours, ParameterError):
         return ours.parameter, ours.sentence

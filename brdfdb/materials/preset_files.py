@@ -1,6 +1,6 @@
 """The materials of the papers: their published parameters, each with the table, figure or section it comes from.
 
-One TOML file a paper, one table a material, as `brdfdb.materials.written_parameters` says.
+Each paper has a TOML file, and each material a table in it. `brdfdb.materials.written_parameters` states the units.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from brdfdb.materials.material import Material
 def presets() -> dict[str, Material]:
     """Return all materials of the papers by name, in the order of the files and of the tables in them.
 
-    The files are read and checked once a process; the dict is the caller's own.
+    The files are read and checked once per process. The dict is a copy.
     """
     return dict(_presets())
 

@@ -9,14 +9,14 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from brdfdb.errors import ParameterError
 
-MOST_NAME = 128  # characters of a name: file systems take 255 bytes
+MOST_NAME = 128  # longest name [characters]; file systems allow 255 bytes
 NAME_PATTERN = r"^[a-z0-9]+(-[a-z0-9]+)*$"  # lower-case words joined by hyphens
 
 _CONTROLS = ("Cc", "Cf", "Cs")
 
 
 def _printable(text: str) -> str:
-    """Return a text without control characters; a terminal would obey them."""
+    """Return the text; ValueError if it holds a control character, which a terminal would obey."""
     wrong = next(
         (letter for letter in text if unicodedata.category(letter) in _CONTROLS and letter not in "\n\t"), None
     )
@@ -31,11 +31,10 @@ Number = float | bool
 
 
 class KnownExcess(BaseModel):
-    """A published set of constants that reflects more than it receives, with the place that says so.
+    """A published set of constants that reflects more than it receives, with the place of publication.
 
-    `max_albedo` is the largest directional albedo that the published parameters give, specular part included;
-    `from_theta_i_deg` [degree] is the angle of incidence above which it exceeds 1. Audits believe the built-in
-    materials alone.
+    `max_albedo` [1] is the largest directional albedo that the published parameters give, specular part included.
+    `from_theta_i_deg` [degree] is the angle of incidence above which it exceeds 1. Audits accept it only from presets.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -46,7 +45,7 @@ class KnownExcess(BaseModel):
 
 
 class Alternative(BaseModel):
-    """Other values that the paper allows for an assumption, and the largest directional albedo [1] that they give."""
+    """Other values that the paper allows for an assumption, with the largest directional albedo [1] that they give."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -55,10 +54,10 @@ class Alternative(BaseModel):
 
 
 class Assumption(BaseModel):
-    """A value that the paper does not print: why it was chosen, and what depends on the choice.
+    """A value that the paper does not print, with the reason for it and the results of alternatives.
 
-    `max_albedo` [1] is the largest directional albedo of the material as it is, specular part included. It is given
-    where `alternatives` are: the two together say how far the verdict on energy rests on the choice.
+    `max_albedo` [1] is the largest directional albedo of the material with this value, specular part included. It is
+    given together with `alternatives`. Both show how far the verdict on energy depends on the assumption.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -75,7 +74,7 @@ class Assumption(BaseModel):
 
     @property
     def decides(self) -> bool | None:
-        """Return True if an alternative moves the largest albedo across 1; None where no alternative is recorded."""
+        """Return True if an alternative moves the largest albedo across 1; None if no alternative is recorded."""
         if self.max_albedo is None:
             return None
         return any((other.max_albedo > 1.0) != (self.max_albedo > 1.0) for other in self.alternatives)

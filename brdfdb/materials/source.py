@@ -1,4 +1,4 @@
-"""The protocol of a source: all that layouts, tabulation, planner, error measurement and scenes know of f_r."""
+"""The protocol of a source: its interface for layouts, tabulation, planner, error measurement and scenes."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.lobes import Lobe
 from brdfdb.parameters import Floats
 
-# Function of unit vectors (N, 3) of light and viewer that gives f_r [1/sr], shape (N, L)
+# Function of unit vectors (N, 3) of light and viewer that gives f_r [1/sr] of shape (N, L)
 Evaluate = Callable[[Floats, Floats], Floats]
 
 
 class Lossless(NamedTuple):
-    """A source with nothing absorbed, and the values of its parameters that were changed for it, by name."""
+    """A source with nothing absorbed, and the parameters that were changed for it, by name."""
 
     source: Source
     changes: dict[str, float]
 
 
 class Source(Protocol):
-    """A thing that gives f_r: a material with a model, or a function.
+    """A source of f_r: a material with a model, or a function.
 
     Directions are unit vectors that point away from the surface, or angles [rad]. f_r is without the cosine [1/sr]
     and without the specular part. `wavelength_nm` is None for a grey source in `brdf_at` and `lobe`.
@@ -35,9 +35,9 @@ class Source(Protocol):
     title : str
         A line for people.
     provenance : str
-        Where the values come from, in words.
+        Origin of the values, in words.
     wavelengths_nm : tuple of float or None
-        Wavelengths [nm] that the source is stated for; None if it may be evaluated at any.
+        Wavelengths [nm] for which the source is stated; None if it may be evaluated at any wavelength.
     """
 
     @property
@@ -78,11 +78,11 @@ class Source(Protocol):
 
     @property
     def uniform(self) -> float | None:
-        """Return the known part of f_r [1/sr] that is the same in all directions; None without one."""
+        """Return the uniform part of f_r [1/sr]; None if none is known."""
 
     @property
     def lossless(self) -> Lossless | None:
-        """Return the source with nothing absorbed; None where it is not known how."""
+        """Return the source with nothing absorbed; None if it has no such form."""
 
     def without_uniform(self) -> Source:
         """Return the source without its uniform part."""
@@ -116,15 +116,15 @@ class Source(Protocol):
         """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""
 
     def lobe(self, cos_i: Floats, wavelength_nm: NDArray[np.float64] | None) -> Lobe | None:
-        """Return the lobe of lights with a cosine, at wavelengths [nm] that broadcast with it; None if diffuse."""
+        """Return the lobe for lights with the cosine cos_i, which broadcasts with wavelengths [nm]; None if diffuse."""
 
     def refractive_indices(
         self, wavelength_nm: NDArray[np.float64] | None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return n and k [1] at wavelengths [nm], as used; None if f_r is not made from them."""
+        """Return n and k [1] at wavelengths [nm]; None if f_r does not depend on them."""
 
     def attributes(self) -> dict[str, Any]:
-        """Return the attributes that a table has of its source, for people: JSON, angles in degrees."""
+        """Return the attributes of the source in its table, as JSON with angles in degrees."""
 
     def document(self) -> dict[str, Any]:
-        """Return all that can be written of the source, as JSON: `brdfdb.materials.source_of` reads it."""
+        """Return the document of the source as JSON, which `brdfdb.materials.source_of` reads."""

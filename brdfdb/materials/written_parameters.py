@@ -13,12 +13,12 @@ from brdfdb.parameters import ModelSpec, Parameter
 
 
 def written_name(parameter: Parameter) -> str:
-    """Return the name of a parameter in files: that of an angle, which they give in degrees, ends in ``_deg``."""
+    """Return the name of a parameter in files. The name of an angle ends in ``_deg``, because files use degrees."""
     return f"{parameter.name}_deg" if parameter.unit == "rad" else parameter.name
 
 
 def _as_written(parameter: Parameter) -> Parameter:
-    """Return a parameter as it appears in files: an angle in degrees, under a name that ends in ``_deg``."""
+    """Return a parameter as files write it: an angle is in degrees, under a name that ends in ``_deg``."""
     if parameter.unit != "rad":
         return parameter
     return replace(
@@ -32,7 +32,7 @@ def _as_written(parameter: Parameter) -> Parameter:
 
 
 def from_file(spec: ModelSpec, written: Mapping[str, Any]) -> dict[str, Number]:
-    """Return parameters in the units of the model, from those in a file; ValueError for one that is not allowed."""
+    """Return the parameters of a file in the units of the model; ParameterError if one is not allowed."""
     file_spec = replace(spec, parameters=tuple(_as_written(parameter) for parameter in spec.parameters))
     values = completed(file_spec, written).values()
     return {
@@ -42,7 +42,7 @@ def from_file(spec: ModelSpec, written: Mapping[str, Any]) -> dict[str, Number]:
 
 
 def completed(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Number]:
-    """Return checked parameters in the order of the model, defaults filled in."""
+    """Return checked parameters in the order of the model, with defaults; ParameterError if one is not allowed."""
     names = [parameter.name for parameter in spec.parameters]
     for name, value in parameters.items():
         if name not in names:

@@ -1,4 +1,4 @@
-"""The type of an entry, and what the entries of the three papers share."""
+"""The type of an entry, and functions that the entries of the three papers share."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ ORENNAYAR, HE, WARD = "orennayar1994", "he1991", "ward1992"  # keys of reference
 
 @dataclass(frozen=True)
 class Misprint:
-    """One misprint, ambiguity or unsafe form of a paper: in words, and as two functions of the same arguments.
+    """One misprint, ambiguity or unsafe form of a paper, in words and as two functions of the same arguments.
 
-    `kind` says whose fault the first function is: "printed", the formula that the paper prints; "customary", a formula
-    or method that is common in its place; "words", the formula is right, and the first function does what the words or
-    names beside it say.
+    `kind` states the origin of the first function. "printed" is the formula that the paper prints. "customary" is a
+    formula or method that is common in its place. With "words" the formula of the paper is right, and the first
+    function follows the words or names beside it.
     """
 
     key: str

@@ -17,8 +17,8 @@ from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991 import checked_surface, directional_diffuse
 
-TERMS = 10  # of eq. 78 of He et al., a customary number
-STEPS = 50  # of Newton's iteration, far more than one that converges takes
+TERMS = 10  # customary number of terms of eq. 78 of He et al.
+STEPS = 50  # steps of Newton's iteration, far more than it takes to converge
 
 _erfc = np.vectorize(math.erfc, otypes=[np.float64])
 
@@ -217,7 +217,7 @@ def _sum_of_ten(g: float, V: float) -> float:
     return total
 
 
-_sums_of_ten = elementwise(_sum_of_ten)  # compiled: its cost is charted, too
+_sums_of_ten = elementwise(_sum_of_ten)  # compiled, because charts show its cost, too
 
 
 def _ten_terms(g: Any, V: Any) -> Any:

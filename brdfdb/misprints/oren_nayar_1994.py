@@ -127,7 +127,7 @@ def _surface_radiance(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, sig
 
 
 _TOWEL: dict[str, Any] = {"rho": 0.75, "sigma": radians(42.0), "interreflection": False}
-_K_S = 0.085  # of k_b
+_K_S = 0.085  # k_s / k_b of the cotton towel, sample E
 
 
 def _towel_without_e_0(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, e_0: Any) -> Any:
@@ -139,7 +139,7 @@ def _towel_without_e_0(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, *, e_
 
 
 def _towel(theta_i: Any, phi_i: Any, theta_r: Any, phi_r: Any, **_: Any) -> Any:
-    """Return f_r of sample E as its preset has it: with the unit of k_s chosen, a BRDF has no irradiance in it."""
+    """Return f_r [1/sr] of sample E with the parameters of its preset, which does not depend on an irradiance."""
     return models.oren_nayar_body_surface(theta_i, phi_i, theta_r, phi_r, **_TOWEL, k_s=_K_S, e_0=np.pi)
 
 

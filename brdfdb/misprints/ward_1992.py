@@ -14,7 +14,7 @@ from brdfdb.misprints._entry import WARD, Form, Misprint, at
 
 
 def _sample(u1: Any, u2: Any, wi: Any = (0.0, 0.0, 1.0), *, rho_s: Any = 1.0, alpha_x: Any, alpha_y: Any) -> Sample:
-    """Draw from the lobe of Ward's model alone, by eq. 7 with its misprint put right."""
+    """Draw a sample from the lobe of Ward's model alone, by eq. 7 with its misprint corrected."""
     return sample("ward", u1, u2, wi, rho_d=0.0, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
 
 
@@ -41,9 +41,9 @@ def _deviation_as_named(*, alpha_x: Any, **_: Any) -> Any:
 
 
 def _deviation_of_samples(*, alpha_x: Any, alpha_y: Any) -> Any:
-    """Return root mean square of the slope along x of the half vectors that eq. 7 draws for light along the normal.
+    """Return the rms slope along x [1] of the half vectors that eq. 7 draws for light along the normal.
 
-    Gauss and Laguerre in -log(u1) and eight azimuths: exact for a square of the slope.
+    The quadrature of Gauss and Laguerre in -log(u1) and eight azimuths is exact for a square of the slope.
     """
     x, weights = np.polynomial.laguerre.laggauss(4)
     wr = _sample(

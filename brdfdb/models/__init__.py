@@ -1,13 +1,13 @@
-"""The reflectance models: public functions, one module a paper, and the MODELS registry.
+"""The reflectance models: public functions, one module per paper, and the MODELS registry.
 
-Every function has the call shape ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``: radians in, f_r in 1/sr out,
-broadcasting over angles and parameters, the cosine never folded in.
+Every function has the signature ``f(theta_i, phi_i, theta_r, phi_r, *, parameters)``. Angles are in radians and f_r is
+in 1/sr, without the cosine. Angles and parameters broadcast.
 
 MODELS also holds models of other people. An installed package names its `brdfdb.parameters.ModelSpec`, or an iterable
-of them, as an entry point of the group ``brdfdb.models``. A Python file that defines some is named by the environment
+of them, as an entry point of the group ``brdfdb.models``. A Python file that defines models is named by the environment
 variable ``BRDFDB_MODELS`` (paths separated as in PATH), by the option ``--models`` of the command line, which sets that
-variable, or by ``MODELS.add_files``. Processes that are started later inherit the variable; a dask worker on another
-machine has its own environment, and needs the package installed or the variable set there.
+variable, or by ``MODELS.add_files``. Processes that are started later inherit the variable. A dask worker on another
+machine has its own environment: the package must be installed there, or the variable set.
 """
 
 from brdfdb.models import (

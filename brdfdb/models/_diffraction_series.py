@@ -1,4 +1,4 @@
-"""The sum over m of He et al. 1991, eq. 78, in logarithms: stable and of bounded cost for every g and V."""
+"""The sum over m of He et al. 1991, eq. 78, in logarithms. It is stable and of bounded cost for every g and V."""
 
 from __future__ import annotations
 
@@ -12,30 +12,35 @@ from brdfdb._elementary import BLOCK, exp, log, summand_exp
 from brdfdb._numba import kernel, loop
 from brdfdb.parameters import Floats
 
-ROWS_OF_WORK, GROUPS = 13, 5  # of BLOCK numbers each, for `log_series`
+ROWS_OF_WORK, GROUPS = 13, 5  # rows of the two work arrays of `log_series`, of BLOCK numbers each
 
-_SUM_BELOW = 40.0  # a summand that peaks at smaller m is summed term by term, at larger m by the trapezoid rule
-_TERMS = 96  # at most: m* + 7.2 sqrt(m*) + 7
+# Position of the peak that separates two methods: below, the sum is taken term by term, above, by the trapezoid rule
+_SUM_BELOW = 40.0
+_TERMS = 96  # largest number of terms, m* + 7.2 sqrt(m*) + 7
 _LOG_FACTORIAL_TIMES_M = np.array([0.0] + [math.lgamma(m + 1.0) + math.log(m) for m in range(1, _TERMS)])
-CONSTANTS_BYTES = _LOG_FACTORIAL_TIMES_M.nbytes  # that `log_series` reads
-_G_MIN, _V_MIN, _V_MAX = 1e-290, 1e-300, 1e30  # beyond, the sum is its limit: the first term, V = 0, or 0
-# The trapezoid rule in ln(m): nodes _STEP standard deviations of the summand apart, less where the summand is skew, as
-# it is for small m*; they reach _REACH deviations to both sides of the peak, more into the left tail
+CONSTANTS_BYTES = _LOG_FACTORIAL_TIMES_M.nbytes  # size of the constants that `log_series` reads
+# Range of g and V. Beyond it the sum equals its limit: the first term, the sum at V = 0, or 0
+_G_MIN, _V_MIN, _V_MAX = 1e-290, 1e-300, 1e30
+# The trapezoid rule in ln(m). Its nodes are _STEP standard deviations of the summand apart, less where the summand is
+# skew, as it is for small m*. They reach _REACH deviations to both sides of the peak, and further into the left tail
 _STEP, _STEP_SKEW, _REACH, _LEFT_SKEW = 0.8, 2.0, 7.2, 52.0
-_TAYLOR_ABOVE = 1e6  # nodes of larger m* lie so close together that a short series is exact
+_TAYLOR_ABOVE = 1e6  # m* above which the nodes lie so close together that a short series is exact
 _SQRT_TWO_PI = 2.5066282746310002
 
 
 @kernel
 def roughly_lambert_w(y: float, log_y: float) -> float:
-    """Return W_0(y), the root of w e^w = y, to about a percent, for y > 1e-4 (Iacono and Boyd)."""
-    log_1p_y = log_y if log_y > 40.0 else log(1.0 + (0.0 if log_y > 40.0 else y))  # log_y says enough of inf
+    """Return W_0(y) [1], the root of w e^w = y, to about a percent, for y > 1e-4 (Iacono and Boyd)."""
+    log_1p_y = log_y if log_y > 40.0 else log(1.0 + (0.0 if log_y > 40.0 else y))  # y may be inf where log_y is finite
     return log_1p_y * (1.0 - log(1.0 + log_1p_y) / (2.0 + log_1p_y))
 
 
 @kernel
 def nearer_lambert_w(w: float, log_y: float) -> float:
-    """Return W_0(y) after a step of fourth order (Fritsch, Shafer, Crowley): 3e-9 after one, rounding after two."""
+    """Return W_0(y) [1] after a step of fourth order (Fritsch, Shafer, Crowley).
+
+    The error is 3e-9 after one step, and rounding after two.
+    """
     z = log_y - log(w) - w
     v = 1.0 + w
     q = 2.0 * v * (v + z * (2.0 / 3.0))
@@ -44,7 +49,7 @@ def nearer_lambert_w(w: float, log_y: float) -> float:
 
 @kernel
 def _peak(g: float, log_g: float, V: float) -> float:
-    """Return u = W_0(2 V / g^2): the summand peaks at m* = g e^(u / 2), where ln(g / m) + V / m^2 = 0."""
+    """Return u = W_0(2 V / g^2) [1]. The summand peaks at m* = g e^(u / 2), where ln(g / m) + V / m^2 = 0."""
     y = 2.0 * V / g / g
     log_y = log(2.0 * V) - 2.0 * log_g
     log_y = -9.0 if log_y < -9.0 else log_y
@@ -54,8 +59,8 @@ def _peak(g: float, log_g: float, V: float) -> float:
 
 @kernel
 def _exponent_at_peak(u: float) -> float:
-    """Return e^(u / 2) (1 - u) - 1 with all its digits."""
-    # Its Taylor series, coefficients 2^-k / k! - 2^(1 - k) / (k - 1)!
+    """Return e^(u / 2) (1 - u) - 1 [1] with all its digits."""
+    # The Taylor series has the coefficients 2^-k / k! - 2^(1 - k) / (k - 1)!
     p = -4.900831249030034e-13
     p = p * u - 1.172278834767984e-11
     p = p * u - 2.5688197074915823e-10
@@ -81,11 +86,11 @@ def log_series(
     work: NDArray[np.float64],
     index: NDArray[np.int64],
 ) -> None:
-    """Fill log_sum with ln of `diffraction_series` of g and V, of at most BLOCK values each.
+    """Fill log_sum with the logarithm of `diffraction_series` for at most BLOCK values of g and V.
 
-    reach, in (0, 1], is the share of the distance from the peak up to which terms are summed; the steps of the
-    trapezoid rule are as much wider, so that the number of its nodes goes with the square. 1 is the model. work, of
-    shape (ROWS_OF_WORK, BLOCK), and index, (GROUPS, BLOCK), are written over.
+    reach, in (0, 1], is the share of the distance from the peak up to which terms are summed; 1 is the model. The steps
+    of the trapezoid rule grow as 1 / reach, so that its number of nodes falls as the square of reach. work, of shape
+    (ROWS_OF_WORK, BLOCK), and index, of shape (GROUPS, BLOCK), are overwritten.
     """
     count = log_sum.shape[0]
     log_g, u, m_star = work[0], work[1], work[2]
@@ -94,10 +99,10 @@ def log_series(
         log_g[i] = log(g_i)
         u[i] = _peak(g_i, log_g[i], min(max(V[i], _V_MIN), _V_MAX))
         m_star[i] = g_i * exp(0.5 * u[i])
-    # Alike values together: a group takes as many terms as the neediest of it
+    # Similar values form a group, because all values of a group take as many terms as the one that needs most
     numbers = np.zeros(GROUPS, np.int64)
     for i in range(count):
-        m = m_star[i]  # nan falls to the trapezoid rule
+        m = m_star[i]  # nan goes to the trapezoid rule
         group = 0 if m < 6.0 else 1 if m < 16.0 else 2 if m < _SUM_BELOW else 4 if m > _TAYLOR_ABOVE else 3
         index[group, numbers[group]] = i
         numbers[group] += 1
@@ -133,7 +138,7 @@ def _term_by_term(
         deviation = reach * math.sqrt(m / (1.0 + u[at]))
         lowest, highest = min(lowest, m - 7.0 * deviation), max(highest, m + 7.2 * deviation + 7.0 * reach)
         V[i], log_g[i] = min(all_V[at], _V_MAX), all_log_g[at]
-        # The largest term, roughly: it is taken out of the exponentials, which then neither overflow nor underflow
+        # The largest term, roughly, is taken out of the exponentials, so that they neither overflow nor underflow
         near = max(1.0, np.floor(m + 0.5))
         shift[i] = (near - 1.0) * log_g[i] - _LOG_FACTORIAL_TIMES_M[int(near)] - V[i] / near
         total[i] = 0.0
@@ -158,10 +163,12 @@ def _trapezoid(
     log_sum: NDArray[np.float64],
     work: NDArray[np.float64],
 ) -> None:
-    """Sum by the trapezoid rule in t, m = m* e^t: by Stirling m^(-3/2) exp(m* phi(t) - stirling_error(m)).
+    """Sum by the trapezoid rule in t, where m = m* e^t.
 
-    phi(t) = e^t (1 - t) - 1 - u / 2 (e^t + e^-t - 2) - miss (e^-t - 1); miss = V / m*^2 - u / 2 is what `_peak` left.
-    Nodes are equally far apart in t, so that e^t needs no exponential; d = e^t - 1 keeps its digits next to the peak.
+    By Stirling's formula the summand is m^(-3/2) exp(m* phi(t) - stirling_error(m)) with
+    phi(t) = e^t (1 - t) - 1 - u / 2 (e^t + e^-t - 2) - miss (e^-t - 1), where miss = V / m*^2 - u / 2 is the error of
+    `_peak`. Nodes are equally far apart in t, so that e^t needs no exponential. d = e^t - 1 keeps its digits next to
+    the peak.
     """
     m_star, a, b, step, m_inverse = work[0], work[1], work[2], work[3], work[4]
     ratio, ratio_inverse, d, inverse, total = work[5], work[6], work[7], work[8], work[9]
@@ -184,7 +191,7 @@ def _trapezoid(
         nodes = int(right if side == 0 else left) + 2
         for i in range(count):
             t = sign * step[i]
-            # e^t - 1, abs(t) < 0.12
+            # e^t - 1 by its Taylor series, for abs(t) < 0.12
             p = t * (1 / 720 + t * (1 / 5040 + t * (1 / 40320)))
             ratio[i] = t * (1 + t * (1 / 2 + t * (1 / 6 + t * (1 / 24 + t * (1 / 120 + p)))))
             ratio_inverse[i] = 1.0 / (1.0 + ratio[i])
@@ -229,7 +236,9 @@ def _series(g: NDArray[np.float64], V: NDArray[np.float64], log_sum: NDArray[np.
 
 
 def diffraction_series(g: Floats, V: Floats) -> Floats:
-    """Return the sum of eq. 78 over g, finite at g = 0: over m >= 1 of g^(m - 1) e^-g / (m! m) exp(-V / m).
+    """Return the sum [1] of eq. 78 divided by g, which is finite at g = 0.
+
+    The sum runs over m >= 1 of g^(m - 1) e^-g / (m! m) exp(-V / m).
 
     Parameters
     ----------
@@ -241,13 +250,15 @@ def diffraction_series(g: Floats, V: Floats) -> Floats:
     Returns
     -------
     array [1]
-        In the broadcast shape; relative error below 1e-11 where the value is a normal float64, 0 where it underflows.
+        In the broadcast shape. The relative error is below 1e-11 where the value is a normal float64. A value that
+        underflows is 0.
 
     Notes
     -----
-    The weight sits near the m* of `_peak`, not near g when V >> g. Small m* are summed term by term; beyond, the
-    summand is smooth over its own width and the trapezoid rule converges exponentially, so the cost does not grow
-    with g. Values are taken in blocks, the index of the term outermost, so that the exponentials vectorise.
+    The largest terms lie near the m* of `_peak`, and not near g where V >> g. Sums with a small m* are taken term by
+    term. For a larger m* the summand is smooth over its own width and the trapezoid rule converges exponentially, so
+    the cost does not grow with g. The loop over terms is outermost in each block of values, so that the exponentials
+    vectorise.
 
     References
     ----------
@@ -259,21 +270,22 @@ def diffraction_series(g: Floats, V: Floats) -> Floats:
     return np.exp(total, out=total).reshape(g_all.shape)[()]
 
 
-# The logarithm of the sum as a table in p = ln(g) and q = ln(1 + V / (5 + g)): for each patch the Chebyshev series in p
-# of polynomials in q. It serves rows that share g.
-G_LOW, G_HIGH = 1e-3, 1e7  # a smaller g makes the logarithm too sharply bent, and takes few terms anyway
+# The logarithm of the sum is tabulated in p = ln(g) and q = ln(1 + V / (5 + g)). Each patch holds the Chebyshev series
+# in p of polynomials in q. The table serves rows that share g.
+G_LOW, G_HIGH = 1e-3, 1e7  # range of g in the table; below, the logarithm bends too sharply and the sum is short anyway
 _LOG_G_LOW = math.log(G_LOW)
-_Q_HIGH = 8.7  # beyond, the sum is below the normal float64
-_P_SIZE, _Q_SIZE = 0.8, 0.17  # of a patch
+_Q_HIGH = 8.7  # largest q; beyond, the sum is smaller than a normal float64
+_P_SIZE, _Q_SIZE = 0.8, 0.17  # size of a patch
 _P_PATCHES, Q_PATCHES = math.ceil(math.log(G_HIGH / G_LOW) / _P_SIZE), math.ceil(_Q_HIGH / _Q_SIZE)
-TERMS, TERMS_OF_FLOAT32 = 16, 8  # of the series in p, and in q: whole vectors of the processor
+TERMS, TERMS_OF_FLOAT32 = 16, 8  # terms of the series in p, and in q: whole vectors of the processor
 
 
 @functools.cache
 def series_table(terms: int) -> NDArray[np.float64]:
-    """Return the table, of shape (patches in p, terms, patches in q, terms): at most 3 MB, made in 30 ms.
+    """Return the table [1] of the logarithm of the sum, of shape (patches in p, terms, patches in q, terms).
 
-    With TERMS the error of the logarithm is below 1e-11, with TERMS_OF_FLOAT32 below 2e-6.
+    It takes at most 3 MB, and 30 ms to make. The error of the logarithm is below 1e-11 with TERMS, and below 2e-6 with
+    TERMS_OF_FLOAT32.
     """
     x = np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
     to_series = np.polynomial.chebyshev.chebvander(x, terms - 1).T * (2.0 / TERMS)
@@ -299,9 +311,9 @@ def log_series_of_row(
     log_sum: NDArray[np.float64],
     row: NDArray[np.float64],
 ) -> None:
-    """Fill log_sum for one g, G_LOW <= g < G_HIGH, from the table, for V within [V_low, V_high].
+    """Fill log_sum from the table, for one g with G_LOW <= g < G_HIGH and for V within [V_low, V_high].
 
-    row, of shape (Q_PATCHES, terms), is written over.
+    row, of shape (Q_PATCHES, terms), is overwritten.
     """
     terms = row.shape[1]
     p = (log(g) - _LOG_G_LOW) * (1.0 / _P_SIZE)
@@ -310,7 +322,7 @@ def log_series_of_row(
     inverse = 1.0 / (5.0 + g)
     first = min(max(int(log(1.0 + V_low * inverse) * (1.0 / _Q_SIZE)), 0), Q_PATCHES - 1)
     last = min(max(int(log(1.0 + V_high * inverse) * (1.0 / _Q_SIZE)), first), Q_PATCHES - 1)
-    # The polynomials in q at this g: those of neighbouring patches lie side by side
+    # The polynomials in q at this g. Those of neighbouring patches lie side by side
     begin, end = first * terms, (last + 1) * terms
     polynomials = row.reshape(-1)[begin:end]
     coefficients = table[patch, 0].reshape(-1)[begin:end]
@@ -326,7 +338,7 @@ def log_series_of_row(
         log_sum[j] = log(1.0 + V[j] * inverse) * (1.0 / _Q_SIZE)
     for j in range(V.shape[0]):
         q = log_sum[j]
-        i = min(max(int(q), first), last)  # the ends may round across the edge of a patch
+        i = min(max(int(q), first), last)  # q at an end may round across the edge of a patch
         y = 2.0 * (q - i) - 1.0
         along = row[i]
         value = along[terms - 1]

@@ -23,24 +23,24 @@ from brdfdb.models._diffraction_series import (
 )
 from brdfdb.parameters import Floats
 
-_X_MAX = 30.0  # where erfc(x) and exp(-x^2) have long been 0
+_X_MAX = 30.0  # largest x; erfc(x) and exp(-x^2) are 0 in float64 well below it
 _INVERSE_SQRT_PI = 0.5641895835477563
-WORTH_THE_TABLE = 16  # values in a row
+WORTH_THE_TABLE = 16  # values in a row from which on the table of the series is faster than the sum
 
-# How the sum of eq. 78 is computed: whole, its limit for g -> infinity, that with the first term beyond it, or, where
-# the number is positive, so many of its first terms
+# The ways to compute the sum of eq. 78: whole, as its limit for g -> infinity, or as that limit with the next term. A
+# positive number stands for as many first terms
 WHOLE, LIMIT, CORRECTED_LIMIT = 0, -1, -2
 
 
 @kernel
 def _shadowing_and_hidden(sin_theta: float, cos_theta: float, slope: float) -> tuple[float, float]:
-    """Return S_1(theta) / cos theta of eqs 23-25, and K of eqs 82-83, the part of the valleys that is not reached.
+    """Return S_1(theta) / cos theta [1] of eqs 23-25, and K [1] of eqs 82-83, the part of the valleys out of reach.
 
-    slope is sigma_0 / tau; the first is finite up to and including 90 degrees.
+    slope is sigma_0 / tau. The first result is finite up to and including 90 degrees.
     """
     valley = 2.0 * slope * sin_theta
     x = cos_theta / (valley if valley > 0.0 else 1.0)
-    x = _X_MAX if valley == 0.0 or x > _X_MAX else x  # there both exponentials are 0
+    x = _X_MAX if valley == 0.0 or x > _X_MAX else x  # both exponentials are 0 from here on
     gaussian = exp(-x * x)
     erfc = gaussian * erfcx(x)
     Q = 1.0 - 0.5 * erfc
@@ -59,14 +59,14 @@ def _hidden_slope(sin_theta: float, cos_theta: float, slope: float) -> float:
 
 @kernel
 def _difference_of_sines(sin_i: float, cos_i: float, sin_r: float, cos_r: float) -> float:
-    """Return sin(theta_i) - sin(theta_r), without the difference of numbers near 1."""
+    """Return sin(theta_i) - sin(theta_r) [1] without a difference of numbers near 1."""
     sines, cosines = sin_i + sin_r, cos_i + cos_r
     return sin_i - sin_r if sines < cosines else (cos_r - cos_i) * cosines / sines
 
 
 @kernel
 def _effective_variance(K: float) -> float:
-    """Return (sigma / sigma_0)^2 of eqs 80-81 for K = K_i + K_r: z_0^2 / sigma_0^2 = W_0(K^2 / (8 pi))."""
+    """Return (sigma / sigma_0)^2 [1] of eqs 80-81 for K = K_i + K_r, where z_0^2 / sigma_0^2 = W_0(K^2 / (8 pi))."""
     y = K * K * (0.125 / np.pi)
     series = y * (1.0 - y * (1.0 - y * (1.5 - y * (8.0 / 3.0))))
     large = 1e-4 if y < 1e-4 else y
@@ -88,7 +88,7 @@ def _roughness(
     g_over_vz2: NDArray[np.float64],
     shadow: NDArray[np.float64],
 ) -> None:
-    """Fill in g / v_z^2, and S / (cos theta_i cos theta_r): what eq. 71 needs of a pair of polar angles."""
+    """Fill in g / v_z^2 [1] and S / (cos theta_i cos theta_r) [1], the factors of eq. 71 set by the polar angles."""
     sin_i, cos_i, sin_r, cos_r = geometry[0], geometry[1], geometry[2], geometry[3]
     wave, slope = surface[0], surface[2]
     count = shadow.shape[0]
@@ -107,7 +107,7 @@ def _roughness(
 def _first_terms(
     terms: int, g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64], power: NDArray[np.float64]
 ) -> None:
-    """Add the first terms of the sum of eq. 78 over g, m outermost; power is written over."""
+    """Add the first terms of the sum of eq. 78 divided by g. power is overwritten."""
     count = total.shape[0]
     for j in range(count):
         total[j] = 0.0
@@ -121,9 +121,10 @@ def _first_terms(
 
 @loop
 def _limit(corrected: bool, g: NDArray[np.float64], V: NDArray[np.float64], total: NDArray[np.float64]) -> None:
-    """Fill in the sum of eq. 78 over g for g -> infinity, e^-b / g^2, b = V / g; corrected: to first order in 1/g.
+    """Fill in the limit of the sum of eq. 78 divided by g for g -> infinity, e^-b / g^2 with b = V / g.
 
-    The correction is held above 0: it belongs to large g.
+    `corrected` adds the first order in 1/g. The corrected factor is held above 0, since the expansion is meant for
+    large g.
     """
     for j in range(total.shape[0]):
         inverse = 1.0 / g[j]
@@ -142,7 +143,7 @@ def _evaluate(
     work: NDArray[np.float64],
     index: NDArray[np.int64],
 ) -> None:
-    """Evaluate f_r of at most BLOCK pairs of directions, with the sum of eq. 78 that `series` names.
+    """Evaluate f_r [1/sr] at no more than BLOCK pairs of directions, with the sum of eq. 78 that `series` selects.
 
     reach is that of `log_series`, for the whole sum. geometry and surface hold the rows named below.
     """
@@ -192,7 +193,10 @@ def specular_rows(scalars: NDArray[np.float64], rho_s: NDArray[np.float64]) -> N
 def scattered(
     features: NDArray[np.float64], surface: NDArray[np.float64], series: int, reach: float, f_r: NDArray[np.float64]
 ) -> None:
-    """Evaluate pairs of directions one by one: features (5, N) as in `_evaluate`, surface (6, 1) or (6, N)."""
+    """Evaluate f_r [1/sr] of scattered pairs of directions.
+
+    features has the shape (5, N) and the rows of `_evaluate`, surface the shape (6, 1) or (6, N).
+    """
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, geometry, width = np.empty((6, BLOCK)), np.empty((5, BLOCK)), surface.shape[1]
     for start in range(0, f_r.shape[0], BLOCK):
@@ -208,7 +212,7 @@ def scattered(
 
 @loop
 def _vectors(w_i: Floats, w_r: Floats, surface: NDArray[np.float64], series: int, reach: float, f_r: Floats) -> None:
-    """Evaluate as `scattered` does, for unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
+    """Evaluate f_r [1/sr] as `scattered` does, for unit vectors of shape (N, 3) and a surface of shape (6, 1)."""
     work, index = np.empty((4 + ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, values, geometry = np.empty((6, BLOCK)), np.empty(BLOCK), np.empty((5, BLOCK))
     for column in range(6):
@@ -247,7 +251,7 @@ def angle_rows(
     scalars: NDArray[np.float64],
     f_r: Floats,
 ) -> None:
-    """Evaluate rows along the azimuth, which share polar angles and surface, and what eq. 71 needs of these."""
+    """Evaluate rows of f_r [1/sr] along the azimuth. A row shares polar angles and surface."""
     length = f_r.shape[1]
     work, index = np.empty((ROWS_OF_WORK, BLOCK)), np.empty((GROUPS, BLOCK), np.int64)
     lanes, g_over_vz2, shadow = np.empty((10, BLOCK)), np.empty(BLOCK), np.empty(BLOCK)
@@ -257,7 +261,7 @@ def angle_rows(
     for row in range(f_r.shape[0]):
         if row < one_plus_cos.shape[0]:
             least, most = 2.0, 0.0
-            for j in range(length):  # past nan
+            for j in range(length):  # the comparisons skip nan
                 turn = one_plus_cos[row, j]
                 least, most = turn if turn < least else least, turn if turn > most else most
         lane = row % BLOCK

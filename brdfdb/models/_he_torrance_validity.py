@@ -1,4 +1,4 @@
-"""Limits of validity of He, Torrance, Sillion and Greenberg 1991, in the paper's own words; and the g of eq. 79."""
+"""Limits of validity of He, Torrance, Sillion and Greenberg 1991, in the words of the paper, and the g of eq. 79."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from brdfdb.models._limits import MUCH, ORDER, standing
 from brdfdb.parameters import Arguments, Diagnostic, Standing, StatedLimit
 
-_OPAQUE = 1.0 / (4.0 * math.pi)  # k of what absorbs within a wavelength
+_OPAQUE = 1.0 / (4.0 * math.pi)  # least k of a substance that absorbs light within a wavelength
 _GENTLE = "Simplifications result by making the local tangent-plane approximation and assuming gentle roughness slopes."
 _CHALLENGED = "the large ratio of σ_0/τ challenges the gentle slope assumption of the model"
 
 
 def _g(arguments: Arguments) -> float:
-    """Return g [1] of eq. 79 along the normal, where nothing is hidden and sigma is sigma_0."""
+    """Return g [1] of eq. 79 along the normal, where nothing is hidden and sigma equals sigma_0."""
     return float((4.0 * np.pi * arguments["sigma_0_um"] / (1e-3 * float(arguments["wavelength_nm"]))) ** 2)
 
 
@@ -23,20 +23,20 @@ G_ALONG_NORMAL = Diagnostic("g", "g along the normal, eq. 79", _g)
 
 
 def lowest_cosine(arguments: Arguments) -> float:
-    """Return the lowest cos theta_i [1] down to which the largest reflectance of the surfaces is searched.
+    """Return the lowest cos theta_i [1] at which the largest reflectance of the surfaces is searched.
 
-    It is a hundredth of sigma_0 / tau: there shadowing has taken the specular part away.
+    It is a hundredth of sigma_0 / tau, within [1e-9, 1e-3]. At that angle shadowing has removed the specular part.
     """
     slope = np.min(np.asarray(arguments["sigma_0_um"]) / np.asarray(arguments["tau_um"]))
     return float(np.clip(1e-2 * slope, 1e-9, 1e-3))
 
 
 def limits(arguments: Arguments) -> list[StatedLimit]:
-    """Return the limits of validity of He et al. 1991, judged at the wavelengths of the arguments."""
+    """Return the limits of validity of He et al. 1991, with the standing of the arguments at their wavelengths."""
     sigma, tau, a = (float(arguments[name]) for name in ("sigma_0_um", "tau_um", "a"))
     longest = float(np.max(arguments["wavelength_nm"])) / 1000.0
     slope, k = sigma / tau, float(np.min(arguments["k"]))
-    # Of Gaussian heights with eq. 48 the second derivative along a line has the variance 12 sigma_0^2 / tau^4
+    # The second derivative along a line of Gaussian heights with eq. 48 has the variance 12 sigma_0^2 / tau^4
     radius = math.inf if sigma == 0.0 else tau * tau / (math.sqrt(12.0) * sigma)
     phase = (4.0 * math.pi * sigma / longest) ** 2
     gentle = standing(slope, 1.0 / MUCH, 1.0)

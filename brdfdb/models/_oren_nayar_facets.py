@@ -1,10 +1,10 @@
-"""What the facets of Oren and Nayar 1994 reflect, one V-cavity at a time (eqs 10-22), and its mean over slopes (eq. 8).
+"""Reflection of the facets of Oren and Nayar 1994 in a V-cavity (eqs 10-22), and its mean over slopes (eq. 8).
 
-A facet of slope theta_a is met by the light at p = sin(theta_a) tan(theta_i) cos(phi_a - phi_i), by the viewer at q =
-sin(theta_a) tan(theta_r) cos(phi_a - phi_r): with S = sin(theta_a) and C = cos(theta_a) that is <s,a> = cos(theta_i)
-(C + p) and <v,a> = cos(theta_r) (C + q), and the facet on the other side of the cavity has -p and -q. A facet is partly
-shadowed where p > C, partly masked where q > C. All values are radiances over rho E_0 cos(theta_i) / pi, those of the
-second bounce over rho^2 E_0 cos(theta_i) / pi.
+A facet of slope theta_a has, for the light, p = sin(theta_a) tan(theta_i) cos(phi_a - phi_i) and, for the viewer,
+q = sin(theta_a) tan(theta_r) cos(phi_a - phi_r). With S = sin(theta_a) and C = cos(theta_a) the scalar products are
+<s,a> = cos(theta_i) (C + p) and <v,a> = cos(theta_r) (C + q). The facet on the other side of the cavity has -p and -q.
+A facet is partly shadowed where p > C, and partly masked where q > C. All values are radiances divided by
+rho E_0 cos(theta_i) / pi, those of the second bounce divided by rho^2 E_0 cos(theta_i) / pi.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from brdfdb._elementary import arcsin, exp
 from brdfdb._numba import elementwise, kernel
 from brdfdb.parameters import Floats
 
-_TINY = 1e-300  # guards 0 / 0 and nothing else: what it is added to or compared with is 0 or above 1e-40
-_SMOOTH = 1e-30  # [rad] smaller deviations of the slope change nothing, at 90 degrees either
-_X_MAX = 6.0  # theta_a / sigma: of the weight exp(-x^2 / 2) x, beyond is 1.5e-8
+_TINY = 1e-300  # guard against 0 / 0 only: the numbers that it is added to or compared with are 0 or above 1e-40
+_SMOOTH = 1e-30  # deviation of the slope [rad] below which f_r does not change, not even at 90 degrees
+_X_MAX = 6.0  # largest theta_a / sigma; the weight exp(-x^2 / 2) x beyond it is 1.5e-8 of the whole
 
-NODES = 16  # of Gauss-Legendre quadrature, for pieces of a ray of slopes and for panels of azimuths; at most
-_PANEL = 1.6  # in units of arsinh(azimuth / distance to the nearest singularity)
-_PANELS = 24  # of a piece of azimuths: enough for tan(theta) = 1.6e16
+NODES = 16  # largest number of Gauss-Legendre nodes in a piece of a ray of slopes and in a panel of azimuths
+_PANEL = 1.6  # width of a panel, in units of arsinh(azimuth / distance to the nearest singularity)
+_PANELS = 24  # largest number of panels in a piece of azimuths: enough for tan(theta) = 1.6e16
 _RAYS = 4 * _PANELS * NODES
 
 
 @functools.cache
 def _gauss_legendre(nodes: int) -> NDArray[np.float64]:
-    """Return nodes and weights [1] of Gauss-Legendre quadrature on [0, 1], shape (2, nodes)."""
+    """Return nodes and weights [1] of Gauss-Legendre quadrature on [0, 1], an array of shape (2, nodes)."""
     x, w = np.polynomial.legendre.leggauss(nodes)
     return np.stack([(x + 1.0) / 2.0, w / 2.0])
 
 
 @kernel
 def _direct(p: float, q: float, C: float) -> float:
-    """Return eqs (10) and (11): one facet by direct light."""
-    s_a, v_a = C + p, C + q  # over cos(theta_i), cos(theta_r)
+    """Return the direct light [1] of one facet, eqs (10) and (11)."""
+    s_a, v_a = C + p, C + q  # <s,a> / cos(theta_i) and <v,a> / cos(theta_r)
     if s_a <= 0.0 or v_a <= 0.0:
         return 0.0
     # Eq. (11), with the smaller of the two
@@ -48,26 +48,26 @@ def _direct(p: float, q: float, C: float) -> float:
     return s_a * v_a / C * GAF
 
 
-# Eqs (18) to (20) with the widths of eqs (15) and (16) inserted, for the light on the adjacent facet, p for it, and
-# the viewer on this one, q: they are symmetric in p and q. Multiplied out, with R(q) = sqrt(q^2 + S^2) for d(1, m_v),
-# the four terms of eq. (19) are free of differences that cancel, up to 90 degrees.
+# The next three functions are eqs (18) to (20) with the widths of eqs (15) and (16) inserted. p belongs to the light on
+# the adjacent facet and q to the viewer on this one. The equations are symmetric in p and q. Multiplied out, with
+# R(q) = sqrt(q^2 + S^2) for d(1, m_v), the four terms of eq. (19) have no differences that cancel, up to 90 degrees.
 
 
 @kernel
 def _bounce_open(p: float, q: float, S: float, C: float) -> float:
-    """Return the second bounce where nothing is hidden: IF = pi (1 - cos(theta_a))."""
+    """Return the second bounce [1] where nothing is hidden, with IF = pi (1 - cos(theta_a))."""
     return S * S * (C + p) * (C + q) / (C * (1.0 + C))
 
 
 @kernel
 def _bounce_one_hidden(p: float, q: float, S: float, C: float) -> float:
-    """Return the second bounce where one facet is partly hidden, p > C >= q."""
+    """Return the second bounce [1] where one facet is partly hidden, p > C >= q."""
     return S * S * (C + q) * (1.0 / (p + math.sqrt(p * p + S * S)) + 1.0 / (1.0 + C))
 
 
 @kernel
 def _bounce_both_hidden(p: float, q: float, S: float, C: float) -> float:
-    """Return the second bounce where both facets are partly hidden, p >= q > C."""
+    """Return the second bounce [1] where both facets are partly hidden, p >= q > C."""
     R_p, R_q = math.sqrt(p * p + S * S), math.sqrt(q * q + S * S)
     along, across = p * q - C * C, p - q
     # d(m_s, m_v)
@@ -78,7 +78,7 @@ def _bounce_both_hidden(p: float, q: float, S: float, C: float) -> float:
 
 @kernel
 def _bounce(p: float, q: float, S: float, C: float) -> float:
-    """Return eq. (18): light that met the adjacent facet at p, from the facet that meets the viewer at q."""
+    """Return the second bounce [1] of eq. (18), from the adjacent facet with p to the facet with q."""
     low, high = min(p, q), max(p, q)
     if low <= -C:
         return 0.0
@@ -109,7 +109,10 @@ bounce_of_cavity = elementwise(_bounce_of_cavity)
 
 @kernel
 def _sin_cos(x: float) -> tuple[float, float]:
-    """Return sine and cosine on [0, pi/2], within 3e-16 absolute, the sine also relative: series, no branches."""
+    """Return sine and cosine [1] on [0, pi/2] by series without branches.
+
+    The absolute error is at most 3e-16, and so is the relative error of the sine.
+    """
     u = x * x
     s = u / 51090942171709440000.0 - 1.0 / 121645100408832000.0
     s = s * u + 1.0 / 355687428096000.0
@@ -136,7 +139,7 @@ def _sin_cos(x: float) -> tuple[float, float]:
 
 @kernel
 def _critical(slope: float, sigma: float, x_max: float) -> float:
-    """Return the slope over sigma from which facets are partly hidden, eq. (39): cot(theta_a) = slope."""
+    """Return theta_a / sigma [1] above which facets are partly hidden, eq. (39) with cot(theta_a) = slope."""
     hypotenuse = 1.0 / math.sqrt(1.0 + slope * slope)
     steep = slope > 1.0
     angle = arcsin(hypotenuse if steep else slope * hypotenuse)
@@ -158,12 +161,13 @@ def _add_azimuths(
     rays: NDArray[np.float64],
     count: int,
 ) -> int:
-    """Add the nodes of one half of a piece of azimuths to `rays`, after the first `count`; return the new count.
+    """Add the nodes of one half of a piece of azimuths to `rays`, after the first `count`, and return the new count.
 
-    Across a piece, the direction of tangent `t_low` has the smaller slope abs(tan(theta) cos(phi_a - phi)): 0 where the
-    piece begins, as large as the other one where it ends, at the tie. `beyond` the tie the other slope is 0 in turn,
-    and `rest` is what is left from there to half a turn. Nodes crowd, as sinh does, towards the end that is looked at,
-    as closely as the nearest singularity of the integrand lies: a zero of a slope, blurred by 1 / (sigma tan(theta)).
+    In a piece, the direction with the tangent `t_low` has the smaller slope abs(tan(theta) cos(phi_a - phi)). That
+    slope is 0 where the piece begins. Where the piece ends, at the tie, it equals the other slope. The other slope is 0
+    at the azimuth `beyond` after the tie, and `rest` is the azimuth from there to half a turn. Nodes crowd as sinh does
+    towards one end of the piece, in proportion to the distance of the nearest singularity of the integrand. That is a
+    zero of a slope, blurred by 1 / (sigma tan(theta)).
     """
     low_zero, high_zero = (width, beyond) if at_tie else (0.0, width + beyond)
     blur = 1.0 / min(sigma, 1.0)
@@ -191,7 +195,7 @@ def _add_azimuths(
 
 @kernel
 def _weight(x: float, S: float) -> float:
-    """Return eq. (26) with the sine of eq. (8), for x = theta_a / sigma; not normalised."""
+    """Return the weight [1] of eq. (26) times the sine of eq. (8), for x = theta_a / sigma, not normalised."""
     return exp(-0.5 * x * x) * S
 
 
@@ -207,12 +211,12 @@ def _add_slopes(
     rays: NDArray[np.float64],
     count: int,
 ) -> tuple[float, float]:
-    """Return light of all slopes along the first `count` of `rays`, weighted: direct if `lit`, reflected twice if
-    `bounce`; 0 of what is not asked for.
+    """Return the weighted direct and twice reflected light [1] of all slopes along the first `count` of `rays`.
 
-    A ray holds both facets of every cavity at one azimuth, and is cut where one of them, then both begin to be hidden.
-    `sign` is that of slope_i slope_r: whether the facet that faces the light faces the viewer, too. All rays take a
-    step together, so that the loops vectorise.
+    The direct light is 0 without `lit`, and the other 0 without `bounce`. A ray holds both facets of every cavity at
+    one azimuth. It is cut where one facet begins to be hidden, and again where both are. `sign` is the sign of
+    slope_i slope_r: it is positive if the facet that faces the light also faces the viewer. The loop over rays is
+    innermost, so that it vectorises.
     """
     low, high, first, second = rays[0], rays[1], rays[2], rays[3]
     direct, bounced = rays[5], rays[6]
@@ -220,7 +224,7 @@ def _add_slopes(
     bounced[:count] = 0.0
     for node in range(nodes.shape[0]):
         g, w = nodes[node], weights[node]
-        # nothing hidden: both facets are lit and seen whole, or face away
+        # First piece: nothing is hidden, and each facet is lit and seen whole
         for j in range(count):
             x = g * first[j]
             S, C = _sin_cos(sigma * x)
@@ -230,7 +234,7 @@ def _add_slopes(
                 direct[j] += weight * 2.0 * (C + p * q / C)
             if bounce:
                 bounced[j] += weight * (_bounce_open(-p, q, S, C) + _bounce_open(p, -q, S, C))
-        # one hidden: of the two facets one is half lit and the other half seen, or one both
+        # Second piece: light or viewer, the one with the larger slope, reaches one facet in part and the other not
         for j in range(count):
             x = first[j] + g * (second[j] - first[j])
             S, C = _sin_cos(sigma * x)
@@ -241,14 +245,15 @@ def _add_slopes(
             if bounce:
                 bounced[j] += weight * _bounce_one_hidden(p, -q, S, C)
         if sign > 0.0 and lit:
-            # one facet half lit and half seen, the other in the dark
+            # Third piece, same side: one facet is partly lit and partly seen, and the other is dark
             for j in range(count):
                 x = second[j] + g * (x_max - second[j])
                 S, C = _sin_cos(sigma * x)
                 weight = _weight(x, S) * w * (x_max - second[j])
                 direct[j] += weight * 2.0 * (C + S * low[j])
         if sign < 0.0 and bounce:
-            # one facet half lit, the other half seen; nodes crowd as g^2 to the end where R of eq. (19) may be 0
+            # Third piece, opposite sides: one facet is partly lit, and the other is partly seen. Nodes crowd as g^2
+            # towards the end where R of eq. (19) may be 0
             for j in range(count):
                 x = second[j] + g * g * (x_max - second[j])
                 S, C = _sin_cos(sigma * x)
@@ -263,7 +268,7 @@ def _add_slopes(
 
 @kernel
 def _normalisation(sigma: float, x_max: float, nodes: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
-    """Return 1 / c of eq. (26), over slope alone."""
+    """Return 1 / c [1] of eq. (26), integrated over the slope alone."""
     total = 0.0
     for panel in range(2):
         for node in range(nodes.shape[0]):
@@ -286,7 +291,7 @@ def _gaussian(
     bounce: bool,
     rays: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Return eq. (8) with eqs (10) to (20) for the tangents of the polar angles: direct and twice reflected light.
+    """Return direct and twice reflected light [1] of eq. (8) with eqs (10) to (20), from the tangents of polar angles.
 
     The weight of eq. (26) is not normalised. x and w are the nodes and weights of the quadrature.
     """
@@ -294,15 +299,16 @@ def _gaussian(
         return math.nan, math.nan
     t_small, t_large, sin_dphi = min(t_i, t_r), max(t_i, t_r), abs(sin_dphi)
     direct = bounced = 0.0
-    # half a turn of azimuths, which a cavity's other facet completes: where the two slopes have the same sign, and the
-    # opposite one; in each the slopes are t sin(azimuth from one end) and t sin(azimuth from the other)
+    # Half a turn of azimuths is enough, since a cavity has two facets. It is split into the azimuths where the two
+    # slopes have the same sign and those where they have opposite signs. The slopes are t sin(azimuth from one end) and
+    # t sin(azimuth from the other end)
     for sign in (1.0, -1.0):
         cos = -sign * cos_dphi
         span, rest = math.atan2(sin_dphi, cos), math.atan2(sin_dphi, -cos)
-        # the tie: t_large sin(azimuth) = t_small sin(span - azimuth)
+        # At the tie t_large sin(azimuth) = t_small sin(span - azimuth)
         near = math.atan2(t_small * sin_dphi, t_large + t_small * cos)
         far = span - near
-        count = int(np.int64(0))  # of the literal 0 all that takes it would be compiled once more
+        count = int(np.int64(0))  # a literal 0 has a type of its own, for which numba would compile callees once more
         for at_tie in (False, True):
             if far > 0.0:
                 count = _add_azimuths(t_small, t_large, far, near, rest, at_tie, sigma, x_max, x, w, rays, count)
@@ -334,7 +340,7 @@ def _gaussian_loop(
             scale = 0.5 / (np.pi * _normalisation(sigma, x_max, finest[0], finest[1]))
             last = sigma
         if sigma < _SMOOTH:
-            nothing = 0.0 * (f[0] + f[1] + f[2] + f[3])  # nan goes through
+            nothing = 0.0 * (f[0] + f[1] + f[2] + f[3])  # 0, or nan if a feature is nan
             direct[j], bounced[j] = 1.0 + nothing, nothing
             continue
         one, two = _gaussian(f[0], f[1], f[2], f[3], sigma, x_max, quadrature[0], quadrature[1], lit, bounce, rays)
@@ -342,23 +348,28 @@ def _gaussian_loop(
 
 
 def gaussian(*features: Floats, lit: bool = True, bounce: bool = True, nodes: int = NODES) -> tuple[Floats, Floats]:
-    """Return direct and twice reflected light [1] of facets with Gaussian slopes, as radiances over those of the head.
+    """Return direct and twice reflected light [1] of facets with Gaussian slopes, in the units of this module.
 
     Parameters
     ----------
     *features : arrays
         tan(theta_i), tan(theta_r), cosine and sine of the difference of azimuths, and sigma [rad]; they broadcast.
     lit, bounce : bool
-        Whether direct light, and light reflected twice, is computed.
+        True to compute direct light, and light reflected twice.
     nodes : int
-        Of the quadrature in each piece of a ray of slopes and each panel of azimuths, in [1, NODES]. NODES is the
-        model; fewer make a coarser and faster integral of the same integrand.
+        Number of nodes in each piece of a ray of slopes and in each panel of azimuths, in [1, NODES]. NODES is the
+        model; fewer nodes make a coarser and faster integral of the same integrand.
+
+    Returns
+    -------
+    tuple of array [1]
+        Direct and twice reflected light, each in the broadcast shape.
     """
     shape = np.broadcast_shapes(*(np.shape(feature) for feature in features))
     columns = np.empty((len(features), int(np.prod(shape))))
     for column, feature in zip(columns, features, strict=True):
         column[:] = np.broadcast_to(feature, shape).ravel()
     direct, bounced = np.empty(columns.shape[1]), np.empty(columns.shape[1])
-    with np.errstate(all="ignore"):  # as `elementwise`: nan goes through
+    with np.errstate(all="ignore"):  # as in `elementwise`, nan is passed on
         _gaussian_loop(columns, _gauss_legendre(nodes), _gauss_legendre(NODES), lit, bounce, direct, bounced)
     return direct.reshape(shape), bounced.reshape(shape)

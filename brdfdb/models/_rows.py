@@ -1,4 +1,4 @@
-"""How arguments fall into rows: scalars that a row shares, columns that vary along it. One loop serves all shapes."""
+"""Rows of arguments: a row shares its scalars and varies its columns, so that one loop serves all shapes."""
 
 from __future__ import annotations
 
@@ -15,19 +15,18 @@ Loop = Callable[..., None]
 
 
 def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dtype: DTypeLike = np.float64) -> Floats:
-    """Broadcast, and call ``loop(*columns, scalars, values)``.
+    """Broadcast the arguments, call ``loop(*columns, scalars, values)`` and return the values.
 
     Parameters
     ----------
     loop : kernel
-        Of columns of shape (rows, length), or (1, length) where all rows share them; scalars of shape (rows, count) in
-        the order given; and values of shape (rows, length), which it fills.
+        It takes columns of shape (rows, length), or (1, length) where all rows share them, scalars of shape
+        (rows, count) in the order given, and values of shape (rows, length), which it fills.
     columns, scalars : sequences of arrays
-        They broadcast together. A row runs along the last axis if no scalar varies along it; if one does, each value
-        is a row of its own: slower, never wrong.
-
-    dtype
-        Of the values.
+        They broadcast together. A row runs along the last axis if no scalar varies along it. If one does, each value
+        is a row by itself, which is slower and equally right.
+    dtype : dtype
+        The dtype of the values.
 
     Returns
     -------
@@ -45,7 +44,7 @@ def by_rows(loop: Loop, columns: Sequence[Floats], scalars: Sequence[Floats], dt
 def by_rows_of_vectors(loop: Loop, directions: Vectors, scalars: Sequence[Floats]) -> Floats:
     """Call ``loop(w_i, w_r, scalars, values)`` as `by_rows` does, with unit vectors of shape (rows or 1, length, 3).
 
-    The loop itself writes 0 below the horizon and nan where a vector is nan; values have the dtype asked for.
+    The loop itself writes 0 below the horizon and nan where a vector is nan. Values have the dtype of the directions.
     """
     w_i, w_r = directions.w_i, directions.w_r
     shape = np.broadcast_shapes(w_i.shape[:-1], w_r.shape[:-1], *(np.shape(array) for array in scalars))
@@ -57,7 +56,7 @@ def by_rows_of_vectors(loop: Loop, directions: Vectors, scalars: Sequence[Floats
 
 
 def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int, tuple[int, ...]]:
-    """Return rows, their length, and the shape that scalars broadcast to."""
+    """Return the number of rows, their length, and the shape that scalars broadcast to."""
     along = bool(shape) and all(np.ndim(array) == 0 or np.shape(array)[-1] == 1 for array in scalars)
     leading = (*shape[:-1], 1) if along else shape
     length = shape[-1] if along else 1
@@ -65,7 +64,7 @@ def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int,
 
 
 def _column(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> NDArray[np.float64]:
-    if np.ndim(array) and np.size(array) == np.shape(array)[-1] == length:  # along the row only: the same for all rows
+    if np.ndim(array) and np.size(array) == np.shape(array)[-1] == length:  # all rows share it
         return np.ascontiguousarray(array, dtype=np.float64).reshape(1, length)
     return np.ascontiguousarray(np.broadcast_to(array, shape), dtype=np.float64).reshape(rows, length)
 

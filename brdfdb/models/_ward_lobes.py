@@ -1,4 +1,4 @@
-"""The Gaussian lobe of Ward 1992 and its later forms: one loop over rows, four formulas for the same slopes."""
+"""The Gaussian lobe of Ward 1992 and its later forms: four formulas over the same distribution of slopes."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ Rows = NDArray[np.float64]
 
 ELLIPTICAL, HALF_VECTOR, DUER, BOUNDED = range(4)
 
-_LARGEST = 1e38  # [1/sr] a pole of second order stops here: float32 holds it, and only exact grazing gets there
-_WIDE_SHARE = 0.8  # of the samples at most, where the lobe is wider than the Gaussian of slopes
+_LARGEST = 1e38  # largest f_r [1/sr] at a pole of second order: float32 holds it, and only exact grazing reaches it
+_WIDE_SHARE = 0.8  # largest share of samples in a lobe that is wider than the Gaussian of slopes
 
 
 @kernel
@@ -35,10 +35,13 @@ def _constants(rho_d: float, rho_s: float, alpha_x: float, alpha_y: float) -> tu
 
 @kernel
 def _lobe(form: int, h_x: float, h_y: float, h_z: float, cos_cos: float, peak: float, u_x: float, u_y: float) -> float:
-    """Return the lobe for h = d_r + d_i, not normalised, u = 1 / alpha and peak = rho_s / (4 pi alpha_x alpha_y)."""
+    """Return f_r [1/sr] of the lobe for h = d_r + d_i, not normalised.
+
+    u is 1 / alpha, and peak is rho_s / (4 pi alpha_x alpha_y).
+    """
     h_z2 = h_z * h_z
     h_xy2 = (h_x * u_x) ** 2 + (h_y * u_y) ** 2
-    # each takes one inverse of a product: a division takes as long as half of the rest
+    # Each formula takes a single inverse of a product, because a division takes as long as half of the rest
     if form == ELLIPTICAL:
         root = math.sqrt(cos_cos)
         inverse = 1.0 / (h_z2 * root)
@@ -49,7 +52,7 @@ def _lobe(form: int, h_x: float, h_y: float, h_z: float, cos_cos: float, peak: f
         length = math.sqrt(h_x * h_x + h_y * h_y + h_z2)
         squared = length * (length + h_z)
         inverse = 1.0 / (squared * root)
-        # Eq. (5b): 2 (..) / (1 + h.n) of h / length
+        # Eq. (5b), 2 (..) / (1 + h.n) with h / length as the unit vector
         return peak * (exp(-2.0 * h_xy2 * (inverse * root)) * (inverse * squared))
     if form == DUER:
         inverse = 1.0 / (h_z2 * cos_cos)
@@ -90,7 +93,8 @@ def _vector_rows(form: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
             f[j] = (uniform + lobe) * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
 
 
-# A loop for each form: with the form known there is no branch in it, and it vectorises. Compiled when first called.
+# Each form has a loop of its own: where the form is known there is no branch, and the loop vectorises. Each is compiled
+# when it is first called.
 
 
 @kernel
@@ -145,7 +149,7 @@ def by_angles(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Floats:
-    """Return f_r [1/sr] of one form for theta_i, phi_i, theta_r, phi_r [rad] and parameters, all of which it checks."""
+    """Return f_r [1/sr] of one form for angles (theta_i, phi_i, theta_r, phi_r) [rad]. All arguments are checked."""
     checked = checked_angles(*angles)
     light = (checked.x_i, checked.y_i, checked.cos_i)
     parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
@@ -163,7 +167,7 @@ def by_vectors(
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Floats:
-    """Return f_r [1/sr] of one form for unit vectors and parameters, all of which it checks."""
+    """Return f_r [1/sr] of one form for unit vectors. All arguments are checked."""
     parameters = _checked(rho_d, rho_s, alpha_x, alpha_y)
     return by_rows_of_vectors(_VECTOR_LOOPS[form], checked_vectors(wi, wr), parameters)
 
@@ -173,14 +177,14 @@ def _checked(rho_d: ArrayLike, rho_s: ArrayLike, alpha_x: ArrayLike, alpha_y: Ar
 
 
 def lobe(
-    cos_i: Floats,  # noqa: ARG001  # every model's lobe takes it
+    cos_i: Floats,  # noqa: ARG001  # the lobe function of every model takes it
     *,
     rho_d: ArrayLike,
     rho_s: ArrayLike,
     alpha_x: ArrayLike,
     alpha_y: ArrayLike,
 ) -> Lobe:
-    """Return the lobe of these models: its share by reflectance, its slopes by the alphas."""
+    """Return the lobe of these models. Its share follows from the reflectances, and its widths are the alphas."""
     diffuse, specular = np.asarray(rho_d, dtype=np.float64), np.asarray(rho_s, dtype=np.float64)
     total = diffuse + specular
     share = np.divide(specular, total, where=total > 0.0, out=np.zeros(np.shape(total)))
@@ -188,13 +192,13 @@ def lobe(
 
 
 def lossless(parameters: Mapping[str, float]) -> dict[str, float]:
-    """Return both reflectances scaled to a sum of 1; of a black surface the diffuse one is 1."""
+    """Return both reflectances [1] scaled to a sum of 1. A black surface gets a diffuse reflectance of 1."""
     rho_d, rho_s = parameters["rho_d"], parameters["rho_s"]
     total = rho_d + rho_s
     return {"rho_d": rho_d / total, "rho_s": rho_s / total} if total > 0.0 else {"rho_d": 1.0, "rho_s": 0.0}
 
 
 def wide_lobe(cos_i: Floats, **parameters: ArrayLike) -> Lobe:
-    """Return `lobe` for eq. (5b), which falls off more slowly than the Gaussian; the rest goes to the hemisphere."""
+    """Return `lobe` for eq. (5b) with a smaller share, because eq. (5b) falls off more slowly than the Gaussian."""
     narrow = lobe(cos_i, **parameters)
     return narrow._replace(share=np.minimum(narrow.share, _WIDE_SHARE))

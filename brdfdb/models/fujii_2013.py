@@ -22,7 +22,7 @@ def _fujii(cos_i: float, cos_r: float, s: float, rho: float, sigma: float) -> fl
     A = 1.0 / (np.pi + (np.pi / 2.0 - 2.0 / 3.0) * sigma)
     B = sigma * A
     f_r = rho * (A + B * s / t)
-    return 0.0 if f_r < 0.0 else f_r  # rounding, at sigma = 1 and grazing
+    return 0.0 if f_r < 0.0 else f_r  # rounding falls below 0 at sigma = 1 and grazing
 
 
 _evaluate = elementwise(_fujii)
@@ -58,7 +58,7 @@ def oren_nayar_fujii(
     rho : array_like [1]
         Scale, in [0, 1].
     sigma : array_like [1]
-        B / A, in [0, 1]: a mixing ratio, not the deviation of a slope. 0 is Lambert.
+        The mixing ratio B / A, in [0, 1], which is not the deviation of a slope. 0 is Lambert.
 
     Returns
     -------
@@ -67,15 +67,15 @@ def oren_nayar_fujii(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    The article's proposed normalisation, A = 1 / (pi + (pi/2 - 2/3) sigma), under which light at grazing is reflected
-    to the share rho, and all other light to less. s is sin(theta_i) sin(theta_r) cos(phi_r - phi_i), t the larger
-    cosine where s is positive and 1 elsewhere: unlike eq. 30 of Oren and Nayar, the model stays rough in the mirror
-    half plane. Towards exact backscatter at grazing it grows as 1 / cos; at 90 degrees it is the finite value at the
+    The normalisation is the one that the article proposes, A = 1 / (pi + (pi/2 - 2/3) sigma). With it the directional
+    albedo is rho at grazing and less elsewhere. s is sin(theta_i) sin(theta_r) cos(phi_r - phi_i), and t is the larger
+    cosine where s is positive and 1 elsewhere. Unlike eq. 30 of Oren and Nayar, the model stays rough in the mirror
+    half plane. f_r grows as 1 / cos towards exact backscatter at grazing. At 90 degrees it is the finite value at the
     float64 nearest pi/2.
 
     References
@@ -93,7 +93,7 @@ def oren_nayar_fujii(
 
 
 def oren_nayar_fujii_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Floats:
-    """`oren_nayar_fujii` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar_fujii` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     parameters = RHO.check(rho), SIGMA.check(sigma)
     return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), parameters)
 

@@ -35,14 +35,14 @@ N = Parameter("n", "n", "1", 1e-3, 100.0, "refractive index")
 K = Parameter("k", "k", "1", 0.0, 1e4, "extinction coefficient")
 A = Parameter("a", "a", "1", 0.0, 1.0, "albedo of the uniform diffuse part", default=0.0)
 
-_STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # what `lobe` says is held in here
+_STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # least cosine and range of alpha in `lobe`
 
-# Coarser sums of eq. 78 that charts show: up to these shares of the distance from its peak. The number of terms is the
-# square of the share
+# Reach of the coarser sums of eq. 78 that charts show, as a share of the distance from the peak. The number of terms
+# goes with the square of the share
 _REACHES = (0.7, 0.5, 0.4, 0.3)
-_TERMS = 10  # customary in programs
+_TERMS = 10  # number of terms that programs customarily take
 
-_NO_FRESNEL = np.zeros(())  # as refractive index: |F|^2 is left out
+_NO_FRESNEL = np.zeros(())  # refractive index that stands for |F|^2 = 1
 
 
 class Surface(NamedTuple):
@@ -56,12 +56,12 @@ class Surface(NamedTuple):
 
     @property
     def slope(self) -> Floats:
-        """sigma_0 / tau."""
+        """The ratio sigma_0 / tau [1]."""
         return self.sigma_0 / self.tau
 
     @property
     def features(self) -> tuple[Floats, Floats, Floats]:
-        """Of g over v_z^2 and (sigma / sigma_0)^2, of V over v_xy^2, and sigma_0 / tau."""
+        """The factors g / (v_z^2 (sigma / sigma_0)^2) and V / v_xy^2, and the ratio sigma_0 / tau, all [1]."""
         correlation = (np.pi * self.tau / self.wavelength_um) ** 2
         return (2.0 * np.pi * self.sigma_0 / self.wavelength_um) ** 2, correlation, self.slope
 
@@ -69,6 +69,7 @@ class Surface(NamedTuple):
 def checked_surface(
     wavelength_nm: ArrayLike, sigma_0_um: ArrayLike, tau_um: ArrayLike, n: ArrayLike, k: ArrayLike
 ) -> Surface:
+    """Return the surface and its light; ParameterError if a value is outside its range."""
     return Surface(
         WAVELENGTH_NM.check(wavelength_nm) / 1000.0,
         SIGMA_0_UM.check(sigma_0_um),
@@ -115,18 +116,21 @@ def he_torrance(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
     Eq. (71) with (75)-(84), and (72). In order: `shadowing` of `_he_torrance_kernels` is S_1 / cos of eqs 23-25 per
     direction, `variance` eqs 80-83, `fresnel.unpolarised` eq. 75 at the bisecting angle, `diffraction_series` the
-    sum of eq. 78. Departures from the paper: (72) reads a / pi; Smith's Lambda in (25) has its Gaussian; v_xy in
-    (78) carries the wave number, v in (76) does not; the dot products of (76) cancel exactly, so that
-    G = (|v|^2 / v_z)^2; (75) has moduli; (57) and (58) have lambda^2 in place of (2 pi lambda)^2, and (66) has S, as
-    (6) and (7) need; (81) is solved by Lambert's W. v_z^2 is taken from G into the sum: g / v_z^2 is finite.
-    Gentle slopes (sigma_0 / tau well below 1) or (v_z sigma)^2 well above 1 are the model's range of validity.
+    sum of eq. 78. v_z^2 is moved from G into the sum, because g / v_z^2 is finite.
+
+    Departures from the paper: (72) reads a / pi. Smith's Lambda in (25) has its Gaussian. v_xy in (78) carries the wave
+    number, v in (76) does not. The dot products of (76) cancel exactly, so that G = (|v|^2 / v_z)^2. (75) has moduli.
+    (57) and (58) have lambda^2 in place of (2 pi lambda)^2, and (66) has S, as (6) and (7) need. (81) is solved by
+    Lambert's W.
+
+    The model is valid for gentle slopes (sigma_0 / tau well below 1) or for (v_z sigma)^2 well above 1.
 
     References
     ----------
@@ -153,7 +157,7 @@ def he_torrance_vectors(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Floats:
-    """`he_torrance` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `he_torrance` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     return _f_r(checked_vectors(wi, wr), surface, A.check(a))
 
@@ -175,22 +179,23 @@ def with_sum(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Floats:
-    """Return f_r [1/sr] of `he_torrance_vectors` with another sum in eq. 78: see `evaluated`."""
+    """Return f_r [1/sr] of `he_torrance_vectors` with another sum in eq. 78; `evaluated` describes the arguments."""
     surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     features = (*surface.features, surface.n, surface.k, A.check(a) / np.pi)
     return evaluated(checked_vectors(wi, wr), features, series, reach)
 
 
 def directional_diffuse(directions: Directions, surface: Surface) -> Floats:
-    """Return f_r [1/sr] of the directional diffuse part, eq. 71, over |F|^2: the same in any polarisation."""
+    """Return f_r / |F|^2 [1/sr] of the directional diffuse part, eq. 71. It is the same in any polarisation."""
     return evaluated(directions, (*surface.features, _NO_FRESNEL, _NO_FRESNEL, _NO_FRESNEL))
 
 
 def evaluated(directions: Directions, surface: Sequence[Floats], series: int = WHOLE, reach: float = 1.0) -> Floats:
-    """Return f_r [1/sr] of eqs 71 and 72, with the sum of eq. 78 as `series` of `_he_torrance_kernels` says.
+    """Return f_r [1/sr] of eqs 71 and 72, with the sum of eq. 78 that `series` selects.
 
-    `reach`, in (0, 1], is that of `log_series`: less than 1 is a coarser sum. `surface` holds `Surface.features`, n, k
-    and the uniform part [1/sr]; they broadcast with the directions.
+    The values of `series` are those of `_he_torrance_kernels`. `reach`, in (0, 1], is that of `log_series`: below 1 the
+    sum is coarser. `surface` holds `Surface.features`, n, k and the uniform part [1/sr], which broadcast with the
+    directions.
     """
     uniform = all(np.size(feature) == 1 for feature in surface)
     if isinstance(directions, Vectors) and uniform:
@@ -226,14 +231,14 @@ def evaluated(directions: Directions, surface: Sequence[Floats], series: int = W
 
 
 def cos_bisecting(directions: Directions) -> Floats:
-    """Return the cosine of half the angle between light and viewer: the incidence on a facet between them."""
+    """Return the cosine [1] of half the angle between light and viewer, the angle of incidence on their facet."""
     v_xy2, v_z2 = v_squared(directions)
     cos: Floats = np.minimum(0.5 * np.sqrt(v_xy2 + v_z2), 1.0)
     return cos
 
 
 def v_squared(directions: Directions) -> tuple[Floats, Floats]:
-    """Return v_xy^2 and v_z^2 of eq. 84, k_r - k_i; v_xy^2 keeps its digits near the mirror direction."""
+    """Return v_xy^2 and v_z^2 [1] of v = k_r - k_i, eq. 84. v_xy^2 keeps its digits near the mirror direction."""
     v_z = directions.cos_i + directions.cos_r
     across = difference_of_sines(directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r)
     return across**2 + (2.0 * directions.sin_i * directions.sin_r) * directions.one_plus_cos_dphi, v_z**2
@@ -248,7 +253,7 @@ def he_torrance_specular(
     n: ArrayLike,
     k: ArrayLike,
 ) -> Floats:
-    """Return reflectance of the specular part: the share of the light that leaves in the exact mirror direction.
+    """Return the specular reflectance [1], the share of the light that leaves in the exact mirror direction.
 
     Parameters
     ----------
@@ -264,7 +269,7 @@ def he_torrance_specular(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
@@ -288,13 +293,13 @@ def he_torrance_specular(
 def he_torrance_specular_vectors(
     wi: ArrayLike, *, wavelength_nm: ArrayLike, sigma_0_um: ArrayLike, tau_um: ArrayLike, n: ArrayLike, k: ArrayLike
 ) -> Floats:
-    """`he_torrance_specular` for unit vectors `wi` of the light, of shape (..., 3)."""
+    """Return `he_torrance_specular` [1] for unit vectors `wi` (light) of shape (..., 3)."""
     vectors = checked_vectors(wi, wi)
     return finished(rho_s(vectors, checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)), vectors)
 
 
 def rho_s(directions: Directions, surface: Surface) -> Floats:
-    """Return reflectance [1] of the specular part, eq. 73, for the direction of the light."""
+    """Return the specular reflectance [1], eq. 73, for the direction of the light."""
     wave, _, slope = surface.features
     return by_rows(specular_rows, (), (directions.sin_i, directions.cos_i, wave, slope, surface.n, surface.k))
 
@@ -309,10 +314,11 @@ def lobe(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Lobe:
-    """Return the lobe of the directional diffuse part: as wide as the term of eq. 78 that is largest at the mirror.
+    """Return the lobe of the directional diffuse part.
 
-    The slope of the half vector is v_xy / v_z, and the term m is exp(-(pi tau v_xy / lambda)^2 / m). Terms of larger m
-    are wider: a tenth of the directional diffuse part is left to be found anywhere.
+    Its width is that of the term of eq. 78 that is largest in the mirror direction. The slope of the half vector is
+    v_xy / v_z, and the term m is exp(-(pi tau v_xy / lambda)^2 / m). Terms of larger m are wider, so the share of the
+    lobe is only nine tenths of the directional diffuse part.
     """
     surface = checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     v_z = 2.0 * np.maximum(cos_i, _STEEPEST)
@@ -326,18 +332,18 @@ def lobe(
 
 
 def lossless(_: Mapping[str, Any]) -> dict[str, float]:
-    """Return the index of a metal that absorbs next to nothing, and no uniform part: what is left is single scattering.
+    """Return the n and k of a metal that absorbs next to nothing, and an `a` of 0, which leaves single scattering.
 
-    1 - |F|^2 is about 2 (cos + 1 / cos) n / k^2, and nowhere more than n / k: 4e-11 at normal incidence, 1e-8 at 89.9
-    degrees.
+    1 - |F|^2 is about 2 (cos + 1 / cos) n / k^2, and nowhere more than n / k. It is 4e-11 at normal incidence and 1e-8
+    at 89.9 degrees.
     """
     return {"n": N.low, "k": K.high, "a": 0.0}
 
 
 def forms(arguments: Arguments) -> Iterator[ModelForm]:
-    """Yield the forms of the model that charts compare: sums of eq. 78 of more and fewer terms, and its limits."""
+    """Yield the forms of the model that charts compare: eq. 78 with more or fewer terms, and its limits."""
     size = bytes_of(arguments)
-    mirror = arguments["sigma_0_um"] == 0.0  # it has no sum to shorten
+    mirror = arguments["sigma_0_um"] == 0.0  # a mirror has no sum to shorten
     yield ModelForm(
         "sum",
         "the sum of eq. 78, whole",

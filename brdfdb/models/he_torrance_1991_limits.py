@@ -1,4 +1,4 @@
-"""He et al. 1991 in its limits, term by term, and as instruments of finite aperture measure it."""
+"""He et al. 1991: limits of the model, its parts one by one, and its average over finite apertures of an instrument."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from brdfdb.parameters import Floats, Parameter
 SIGMA_0_OVER_TAU = Parameter("sigma_0_over_tau", "σ_0/τ", "1", 1e-6, 1e6, "rms roughness over autocorrelation length")
 INCIDENT = Parameter("incident_solid_angle_sr", "ω_i", "sr", 1e-12, 1.0, "solid angle of the cone of light")
 RECEIVED = Parameter("received_solid_angle_sr", "ω_r", "sr", 1e-12, 1.0, "solid angle of the cone that is received")
-RINGS = 8  # at most, of the nodes in a cone
+RINGS = 8  # largest number of rings of nodes in a cone
 
 
 def he_torrance_very_rough(
@@ -32,15 +32,15 @@ def he_torrance_very_rough(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Floats:
-    """Return the BRDF [1/sr] of a very rough surface: the limit of `he_torrance` for g -> infinity, geometrical optics.
+    """Return the BRDF [1/sr] of a very rough surface: `he_torrance` in the limit g -> infinity, geometrical optics.
 
     Parameters
     ----------
     theta_i, phi_i, theta_r, phi_r : array_like [rad]
         Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi].
     sigma_0_over_tau : array_like [1]
-        Roughness over autocorrelation length, in [1e-6, 1e6]; the rms slope of the surface is sqrt(2) times that. The
-        wavelength enters by way of n and k only.
+        Roughness over autocorrelation length, in [1e-6, 1e6]. The rms slope of the surface is sqrt(2) times that. The
+        wavelength enters only through n and k.
     n, k : array_like [1]
         Complex refractive index n + ik; n in [1e-3, 100], k in [0, 1e4].
     a : array_like [1]
@@ -49,19 +49,20 @@ def he_torrance_very_rough(
     Returns
     -------
     array [1/sr]
-        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan; no specular part.
+        In the broadcast shape of all arguments; 0 below the horizon, nan where an angle is nan. The limit has no
+        specular part.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Section 4: "For very rough surfaces, only the ratio is required"; cylinder (a) of Fig. 13. The sum of eq. (78) tends
-    to e^-b / g with b = v_xy^2 tau^2 / (4 g) (Beckmann and Spizzichino 1963), in which the wave number cancels; the
-    first term left out is the share (b^2 / 2 - 2 b + 1) / g of the whole. Shadowing and effective roughness are those
-    of `he_torrance`. At grazing g falls with cos^2, and the limit is reached later.
+    Section 4: "For very rough surfaces, only the ratio is required". Cylinder (a) of Fig. 13 is an example. The sum of
+    eq. (78) tends to e^-b / g with b = v_xy^2 tau^2 / (4 g) (Beckmann and Spizzichino 1963), in which the wave number
+    cancels. The first term that is left out is the share (b^2 / 2 - 2 b + 1) / g of the whole. Shadowing and effective
+    roughness are those of `he_torrance`. g falls with cos^2 towards grazing, where the limit needs rougher surfaces.
 
     References
     ----------
@@ -81,7 +82,7 @@ def he_torrance_very_rough(
 def he_torrance_very_rough_vectors(
     wi: ArrayLike, wr: ArrayLike, *, sigma_0_over_tau: ArrayLike, n: ArrayLike, k: ArrayLike, a: ArrayLike = 0.0
 ) -> Floats:
-    """`he_torrance_very_rough` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `he_torrance_very_rough` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     directions = checked_vectors(wi, wr)
     return _very_rough(
         directions, SIGMA_0_OVER_TAU.check(sigma_0_over_tau), full.N.check(n), full.K.check(k), full.A.check(a)
@@ -89,7 +90,7 @@ def he_torrance_very_rough_vectors(
 
 
 def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
-    """Return the specular reflectance [1] of a smooth surface: `he_torrance_specular` for sigma_0 / wavelength -> 0.
+    """Return the specular reflectance [1] of a smooth surface: `he_torrance_specular` as sigma_0 / wavelength -> 0.
 
     Parameters
     ----------
@@ -106,12 +107,12 @@ def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Flo
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eq. (10) over its 1 / (cos theta_i d omega_i).
+    Eq. (10) without its factor 1 / (cos theta_i d omega_i).
 
     References
     ----------
@@ -126,12 +127,12 @@ def he_torrance_smooth(theta_i: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Flo
 
 
 def he_torrance_smooth_vectors(wi: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Floats:
-    """`he_torrance_smooth` for unit vectors `wi` of the light, of shape (..., 3)."""
+    """Return `he_torrance_smooth` [1] for unit vectors `wi` (light) of shape (..., 3)."""
     return _smooth(checked_vectors(wi, wi), full.N.check(n), full.K.check(k))
 
 
 class HeTorranceParts(NamedTuple):
-    """The two parts of `he_torrance` that are functions, f_r [1/sr] each; the third is `he_torrance_specular`."""
+    """The two parts of `he_torrance` that are functions, f_r [1/sr] each."""
 
     directional_diffuse: Floats
     uniform_diffuse: Floats
@@ -150,9 +151,9 @@ def he_torrance_parts(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> HeTorranceParts:
-    """Return the directional diffuse and the uniform diffuse part of `he_torrance`, apart.
+    """Return f_r [1/sr] of the directional diffuse and of the uniform diffuse part of `he_torrance`, separately.
 
-    The third part of eq. (5) is a Dirac delta in direction: `he_torrance_specular` gives its reflectance.
+    The third part of eq. (5) is the specular part: `he_torrance_specular` gives its reflectance.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ def he_torrance_parts(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
@@ -202,7 +203,7 @@ def he_torrance_parts_vectors(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> HeTorranceParts:
-    """`he_torrance_parts` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `he_torrance_parts` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     return _parts(checked_vectors(wi, wr), surface, full.A.check(a))
 
@@ -223,20 +224,23 @@ def he_torrance_aperture(
     a: ArrayLike = 0.0,
     rings: int = 2,
 ) -> Floats:
-    """Return BRDF as light from a cone and a receiver of a cone measure it: all three parts, the specular one spread.
+    """Return the BRDF [1/sr] that an instrument with a cone of light and a cone of its receiver measures.
+
+    All three parts are included, with the specular part spread over the cones.
 
     Parameters
     ----------
     theta_i, phi_i, theta_r, phi_r : array_like [rad]
         Axes of the cones of light (i) and of the receiver (r), pointing away from the surface; theta in [0, pi].
     incident_solid_angle_sr, received_solid_angle_sr : array_like [sr]
-        Each in [1e-12, 1]: pi sin^2 of half the angle of the circular cone, the area of a round aperture over the
-        square of the distance to its rim. The paper's experiments have pi / 1024, half an angle of 1.79 degrees.
+        Each in [1e-12, 1]. It is pi sin^2 of half the angle of the circular cone, the area of a round aperture over the
+        square of the distance to its rim. The experiments of the paper have pi / 1024, a half angle of 1.79 degrees.
     wavelength_nm, sigma_0_um, tau_um, n, k, a : array_like
         As in `he_torrance`.
     rings : int
-        How many rings of 4 rings nodes each the diffuse parts are averaged over in each cone, in [0, 8]; 0 takes the
-        axes alone. Work grows with its fourth power; 2 is enough where the diffuse lobe is as wide as the cones.
+        Number of rings in each cone over which the diffuse parts are averaged, in [0, 8]. Each ring has 4 `rings`
+        nodes; 0 takes the axes alone. Work grows with the fourth power. 2 is enough where the diffuse lobe is as wide
+        as the cones.
 
     Returns
     -------
@@ -245,22 +249,22 @@ def he_torrance_aperture(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
     Section 4, on Fig. 7: "The angular width of the measured specular peak is determined by the solid angles of incident
     and received light in the experiments (d omega_i = d omega_r = pi / 1024). To allow comparisons, the theoretical
-    peaks have been averaged over the same solid angles." What is averaged here:
+    peaks have been averaged over the same solid angles." The averages are as follows.
 
     The specular part, eq. (70), is rho_s(theta_i) / (cos theta_i omega_i) times the share of the received cone that the
-    mirror image of the cone of light covers: the area that both have in common on the unit sphere over omega_r. rho_s
-    and cos theta_i are those of the axis of the cone of light, as in eq. (70), which this is for omega_r -> 0. Its
-    integral over all axes of the receiver, weighted by cos theta_r, is rho_s.
+    mirror image of the cone of light covers. That share is the area that both have in common on the unit sphere,
+    divided by omega_r. rho_s and cos theta_i are those of the axis of the cone of light, as in eq. (70), which is the
+    limit for omega_r -> 0. The integral over all axes of the receiver, weighted by cos theta_r, is rho_s.
 
-    The diffuse parts are averaged over both cones, by equal solid angles; a part of a cone below the horizon has 0.
-    The figures show this over its value at theta_r = theta_i, eq. (11).
+    The diffuse parts are averaged over both cones, by equal solid angles. They are 0 in the part of a cone below the
+    horizon. The figures show the result divided by its value at theta_r = theta_i, eq. (11).
 
     References
     ----------
@@ -293,7 +297,7 @@ def he_torrance_aperture_vectors(
     a: ArrayLike = 0.0,
     rings: int = 2,
 ) -> Floats:
-    """`he_torrance_aperture` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `he_torrance_aperture` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     apertures = _checked_apertures(incident_solid_angle_sr, received_solid_angle_sr, rings)
     surface = full.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     return _aperture(checked_vectors(wi, wr), apertures, surface, full.A.check(a))
@@ -305,7 +309,7 @@ def _very_rough(directions: Directions, slope: Floats, n: Floats, k: Floats, alb
     S_over_cos_cos = shadowing(sin_i, cos_i, slope) * shadowing(sin_r, cos_r, slope)
     # Eqs (79)-(83)
     slope2 = slope**2 * variance(hidden(sin_i, cos_i, slope) + hidden(sin_r, cos_r, slope))
-    # Eq. (84): tan^2 of the inclination of the facet
+    # Eq. (84) gives tan^2 of the inclination of the facet
     v_xy2, v_z2 = full.v_squared(directions)
     tan2 = v_xy2 / v_z2
     # Eq. (78) with e^-b / g for its sum, b = tan^2 / (4 slope^2)
@@ -348,7 +352,7 @@ def _checked_apertures(incident: ArrayLike, received: ArrayLike, rings: int) -> 
 def _aperture(directions: Directions, apertures: _Apertures, surface: full.Surface, albedo: Floats) -> Floats:
     # Eq. (70), with the share of the received cone in the cone of reflection for its Delta
     rho_s = full.rho_s(directions, surface)
-    # the angle between the viewer and the mirror image of the light
+    # The angle between the viewer and the mirror image of the light
     chord2 = full.v_squared(directions)[0] + (directions.cos_i - directions.cos_r) ** 2
     apart = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt(chord2), 1.0))
     incident, received = (np.arcsin(np.sqrt(omega / np.pi)) for omega in apertures[:2])
@@ -359,15 +363,16 @@ def _aperture(directions: Directions, apertures: _Apertures, surface: full.Surfa
 def _common_area(first: Floats, second: Floats, apart: Floats) -> Floats:
     """Return the solid angle [sr] common to two circular cones of half angles `first` and `second`, axes `apart` [rad].
 
-    Two sectors, less twice the triangle of both axes and a point where the circles cross: L'Huilier's formula for its
-    area, half-angle formulas for its angles, so that small cones keep their digits.
+    It is the area of two sectors less twice the triangle of both axes and a point where the circles cross. L'Huilier's
+    formula gives the area of the triangle and half-angle formulas give its angles, so that small cones keep their
+    digits.
     """
     half = 0.5 * (first + second + apart)
-    # half less each of the three sides
+    # Half the perimeter less each of the three sides
     to_first = np.maximum(0.5 * ((second - first) + apart), 0.0)
     to_second = np.maximum(0.5 * ((first - second) + apart), 0.0)
     to_apart = np.maximum(0.5 * ((first + second) - apart), 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):  # cones that do not cross: replaced below
+    with np.errstate(divide="ignore", invalid="ignore"):  # cones that do not cross are replaced below
         angle_first = 2.0 * np.arctan(np.sqrt(np.sin(to_first) * np.sin(to_apart) / (np.sin(half) * np.sin(to_second))))
         angle_second = 2.0 * np.arctan(
             np.sqrt(np.sin(to_second) * np.sin(to_apart) / (np.sin(half) * np.sin(to_first)))
@@ -381,7 +386,7 @@ def _common_area(first: Floats, second: Floats, apart: Floats) -> Floats:
 
 
 def _versine(angle: Floats) -> Floats:
-    """Return 1 - cos."""
+    """Return 1 - cos(angle) [1]."""
     versine: Floats = 2.0 * np.sin(0.5 * angle) ** 2
     return versine
 
@@ -411,7 +416,7 @@ def _frame(directions: Directions, which: str) -> tuple[Floats, Floats, Floats]:
     """Return the axis of a cone, and the unit vectors of growing theta and phi there."""
     x, y, z, sin = (getattr(directions, f"{name}_{which}") for name in ("x", "y", "cos", "sin"))
     if isinstance(directions, Vectors):
-        z = getattr(directions, f"w_{which}")[..., 2].astype(np.float64)  # below the horizon cos is not its cosine
+        z = getattr(directions, f"w_{which}")[..., 2].astype(np.float64)  # `cos` is held at 0 below the horizon
         cos_phi, sin_phi = unit_azimuth(x, y, sin)
     else:
         phi = getattr(directions, f"phi_{which}")
@@ -424,11 +429,11 @@ def _frame(directions: Directions, which: str) -> tuple[Floats, Floats, Floats]:
 
 
 def _nodes(frame: tuple[Floats, Floats, Floats], solid_angle: Floats, rings: int) -> tuple[Floats, NDArray[np.float64]]:
-    """Return unit vectors (..., nodes, 3) in a cone, and their weights, which add up to 1."""
+    """Return unit vectors (..., nodes, 3) in a cone and their weights (nodes,) [1], which add up to 1."""
     axis, along, across = (vector[..., None, :] for vector in frame)
     if rings == 0:
         return axis, np.ones(1)
-    # Gauss in the versine, in which solid angle is uniform, and equal steps around: exact up to the degree 4 rings - 1
+    # Gauss's rule in the versine, in which solid angle is uniform, with equal steps around: exact to degree 4 rings - 1
     x, weight = np.polynomial.legendre.leggauss(rings)
     turn = 2.0 * np.pi * np.arange(4 * rings) / (4 * rings)
     versine = _versine(np.arcsin(np.sqrt(solid_angle / np.pi)))[..., None] * np.repeat(0.5 * (1.0 + x), turn.size)

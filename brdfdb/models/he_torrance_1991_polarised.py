@@ -1,21 +1,23 @@
 """He et al. 1991, polarised light: Jones matrices of the facet reflection, eqs 59-65, and Mueller matrices.
 
-The convention, here and nowhere else:
+This docstring is the only statement of the convention:
 
-* Directions w_i (light) and w_r (viewer) point away from the surface; the light travels along k_i = -w_i before and
+* Directions w_i (light) and w_r (viewer) point away from the surface. The light travels along k_i = -w_i before and
   along k_r = w_r after reflection. z is the normal of the mean surface.
-* s = z x w / abs(z x w) for either direction: for the azimuth phi s = (-sin phi, cos phi, 0), which at the pole w = z
-  is its limit along that azimuth. In the twins of unit vectors the azimuth of the pole itself is 0. p = s x k with the
-  direction k in which the light travels, so that (p, s, k) is right-handed: p_i = -(cos theta cos phi,
-  cos theta sin phi, -sin theta) for the light and p_r = +(the same of theta_r, phi_r) for the viewer. The paper's
-  bases (eqs 14, 35) are these, its s_r and p_r with the opposite sign; no Mueller matrix depends on that sign.
-* Fields vary as exp(i k.r - i omega t), the index is n + ik. Complex amplitudes are those of the electric field.
+* s = z x w / abs(z x w) for either direction. For the azimuth phi that is s = (-sin phi, cos phi, 0), which at the pole
+  w = z is its limit along that azimuth. The functions of unit vectors take 0 as the azimuth of the pole itself.
+* p = s x k with the direction k in which the light travels, so that (p, s, k) is right-handed. p_i = -(cos theta
+  cos phi, cos theta sin phi, -sin theta) for the light, and p_r is the same vector of theta_r, phi_r with a plus sign.
+  The bases of the paper (eqs 14, 35) are these, but its s_r and p_r have the opposite sign. No Mueller matrix depends
+  on that sign.
+* Fields vary as exp(i k.r - i omega t), and the index is n + ik. Complex amplitudes are those of the electric field.
 * Stokes vector (I, Q, U, V): I = abs(E_s)^2 + abs(E_p)^2, Q = abs(E_s)^2 - abs(E_p)^2, U + iV = 2 E_s conj(E_p).
-  Q > 0 is s-polarised; U > 0 is linear along s + p; V > 0 has positive helicity, E_s = i E_p: at a fixed point the
-  field turns from p to s, counter-clockwise for whoever looks towards the incoming light.
-* Matrices act on columns from the left: row = reflected, column = incident; index 0 is s and 1 is p.
-* Reciprocity, of light and viewer exchanged: J' = Z J^T Z with Z = diag(1, -1), M' = D M^T D with
-  D = diag(1, 1, -1, 1). The sign comes with p = s x k: the same wave travelling back has the other p.
+  Q > 0 is s-polarised, and U > 0 is linear along s + p. V > 0 has positive helicity, E_s = i E_p: at a fixed point the
+  field turns from p to s, counter-clockwise for an observer who looks towards the incoming light.
+* Matrices act on columns from the left: a row belongs to the reflected, a column to the incident field. Index 0 is s
+  and 1 is p.
+* Reciprocity, when light and viewer are exchanged: J' = Z J^T Z with Z = diag(1, -1), and M' = D M^T D with
+  D = diag(1, 1, -1, 1). The sign comes from p = s x k: the same wave travelling back has the opposite p.
 """
 
 from __future__ import annotations
@@ -55,27 +57,28 @@ def he_torrance_jones(
     -------
     complex array [1]
         In the broadcast shape of all arguments and (2, 2): [row of the reflected, column of the incident field], in the
-        order s, p. 0 below the horizon, nan where an angle is nan. Sum of abs(J)^2 / 2 is the |F|^2 of eq. 75. In the
-        mirror direction it is -diag(F_s, F_p): s and p turn over with the surface between them.
+        order s, p. It is 0 below the horizon and nan where an angle is nan. The sum of abs(J)^2 / 2 is the |F|^2 of
+        eq. 75. In the mirror direction J is -diag(F_s, F_p), because reflection reverses both s and p.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eqs (61)-(64) over |k_r x k_i|^2, which is 0 / 0 at backscatter. With the angles A and B that the great circle from
-    light to viewer makes with the meridians through w_i and w_r, the facet's own s and p are the surface's turned by
-    -A and pi - B, and J = (F_s + F_p) / 2 times a rotation by A - B, plus (F_s - F_p) / 2 times a reflection by A + B.
-    Gauss's and Delambre's formulas give both without a quotient by |k_r x k_i|: A + B where light and viewer coincide
-    (A - B has no limit there, but F_s + F_p is 0) and A - B where they are opposite at grazing (A + B has none, but
-    F_s - F_p is 0). So J is continuous everywhere but at the poles, where s and p themselves turn with phi.
+    Eqs (61)-(64) over |k_r x k_i|^2, which is 0 / 0 at backscatter. A and B are the angles of the great circle from
+    light to viewer with the meridians through w_i and w_r. The s and p of the facet are those of the surface turned by
+    -A and pi - B. J is (F_s + F_p) / 2 times a rotation by A - B, plus (F_s - F_p) / 2 times a reflection by A + B.
+
+    The formulas of Gauss and Delambre give both angles without a quotient by |k_r x k_i|. A - B has no limit where
+    light and viewer coincide, but F_s + F_p is 0 there. A + B has none where they are opposite at grazing, but
+    F_s - F_p is 0 there. So J is continuous everywhere except at the poles, where s and p themselves turn with phi.
 
     Departures from the paper: M_ps of eq. (64) is -(F_s .. - F_p ..), with the sign that M_sp of eq. (62) has. As
     printed, a perfect mirror would reflect light polarised at 45 degrees with a factor between 0 and 2. Intensities
     of incident s, p and unpolarised light are the same either way. The first matrix of eq. (46) is T_in of eq. (39).
-    n of eqs (85) and (86) is the z axis, not the local normal that Table 1 calls so.
+    The n of eqs (85) and (86) is the z axis, not the local normal of that name in Table 1.
 
     References
     ----------
@@ -91,7 +94,7 @@ def he_torrance_jones(
 
 
 def he_torrance_jones_vectors(wi: ArrayLike, wr: ArrayLike, *, n: ArrayLike, k: ArrayLike) -> Complexes:
-    """`he_torrance_jones` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
+    """Return `he_torrance_jones` [1] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3).
 
     At the pole itself s and p are those of phi = 0.
     """
@@ -123,20 +126,21 @@ def he_torrance_mueller(
     Returns
     -------
     array [1/sr]
-        In the broadcast shape of all arguments and (4, 4): Stokes vector (I, Q, U, V) of the reflected radiance from
-        that of the irradiance; Q > 0 is s-polarised, the rest of the convention is in the docstring of the module. 0
-        below the horizon, nan where an angle is nan. Element [0, 0] is `he_torrance`.
+        In the broadcast shape of all arguments and (4, 4). The matrix gives the Stokes vector (I, Q, U, V) of the
+        reflected radiance from that of the irradiance. Q > 0 is s-polarised, and the docstring of the module states the
+        rest of the convention. It is 0 below the horizon and nan where an angle is nan. Element [0, 0] is
+        `he_torrance`.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eqs (7), (59), (60) and (68): the directional diffuse part over |F|^2 times the Mueller matrix of
-    `he_torrance_jones`. The uniform diffuse part, eq. 72, is taken as an ideal depolariser: the paper treats the light
-    that comes from below the surface or from several reflections as uniform, and says nothing of its polarisation.
+    Eqs (7), (59), (60) and (68): the directional diffuse part divided by |F|^2, times the Mueller matrix of
+    `he_torrance_jones`. The uniform diffuse part, eq. 72, is taken as an ideal depolariser. The paper treats light
+    from below the surface or from several reflections as uniform, and does not mention its polarisation.
 
     References
     ----------
@@ -164,7 +168,7 @@ def he_torrance_mueller_vectors(
     k: ArrayLike,
     a: ArrayLike = 0.0,
 ) -> Floats:
-    """`he_torrance_mueller` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
+    """Return `he_torrance_mueller` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3).
 
     At the pole itself s and p are those of phi = 0.
     """
@@ -181,7 +185,7 @@ def he_torrance_specular_mueller(
     n: ArrayLike,
     k: ArrayLike,
 ) -> Floats:
-    """Return the Mueller matrix of the specular part: what leaves in the exact mirror direction.
+    """Return the Mueller matrix [1] of the specular part, which leaves in the exact mirror direction.
 
     Parameters
     ----------
@@ -193,18 +197,18 @@ def he_torrance_specular_mueller(
     Returns
     -------
     array [1]
-        In the broadcast shape of all arguments and (4, 4), between the s and p of the light and those of the mirror
-        direction, at the azimuth phi_i + pi. Element [0, 0] is `he_torrance_specular`. 0 below the horizon, nan where
-        theta_i is nan.
+        In the broadcast shape of all arguments and (4, 4), from the s and p of the light to those of the mirror
+        direction, at the azimuth phi_i + pi. Element [0, 0] is `he_torrance_specular`. The matrix is 0 below the
+        horizon and nan where theta_i is nan.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eq. (73) with F_s and F_p in place of |F|^2: roughness and shadowing act on all polarisations alike.
+    Eq. (73) with F_s and F_p in place of |F|^2. Roughness and shadowing are the same for all polarisations.
 
     References
     ----------
@@ -223,7 +227,7 @@ def he_torrance_specular_mueller(
 def he_torrance_specular_mueller_vectors(
     wi: ArrayLike, *, wavelength_nm: ArrayLike, sigma_0_um: ArrayLike, tau_um: ArrayLike, n: ArrayLike, k: ArrayLike
 ) -> Floats:
-    """`he_torrance_specular_mueller` for unit vectors `wi` of the light, of shape (..., 3)."""
+    """Return `he_torrance_specular_mueller` [1] for unit vectors `wi` (light) of shape (..., 3)."""
     surface = unpolarised.checked_surface(wavelength_nm, sigma_0_um, tau_um, n, k)
     return _finished_specular(checked_vectors(wi, wi), surface)
 
@@ -259,26 +263,26 @@ def _finished_mueller(directions: Directions, surface: unpolarised.Surface, albe
 
 
 def _jones(directions: Directions, n: Floats, k: Floats) -> tuple[Complexes, Complexes, Complexes, Complexes]:
-    """Return J_ss, J_sp, J_ps, J_pp in the broadcast shape; A and B as in the notes of `he_torrance_jones`."""
+    """Return J_ss, J_sp, J_ps and J_pp [1] in the broadcast shape, by the notes of `he_torrance_jones`."""
     sin_i, cos_i, sin_r, cos_r = directions.sin_i, directions.cos_i, directions.sin_r, directions.cos_r
     sin_dphi, cos2_half, sin2_half = _azimuth(directions)
-    # cos^2 and sin^2 of (theta_i - theta_r) / 2 and of (theta_i + theta_r) / 2, none by a difference that cancels
+    # cos^2 and sin^2 of (theta_i - theta_r) / 2 and of (theta_i + theta_r) / 2, without differences that cancel
     cos2_minus = 0.5 * (1.0 + cos_i * cos_r + sin_i * sin_r)
     cos2_plus = (cos_i + cos_r) ** 2 / (4.0 * cos2_minus)
     sin2_minus = 0.25 * ((sin_i - sin_r) ** 2 + (cos_i - cos_r) ** 2)
     sin2_plus = 0.25 * ((sin_i + sin_r) ** 2 + (cos_i - cos_r) ** 2)
-    # Gauss and Delambre: cos and sin of pi - (A + B); the denominator is cos^2 of the bisecting angle, never 0
+    # Gauss and Delambre give cos and sin of pi - (A + B). The denominator is cos^2 of the bisecting angle, never 0
     denominator = cos2_minus * cos2_half + cos2_plus * sin2_half
     cos_sum = (cos2_minus * cos2_half - cos2_plus * sin2_half) / denominator
     sin_sum = 0.5 * (cos_i + cos_r) * sin_dphi / denominator
-    # The same of A - B over sin^2 of the bisecting angle: 0 / 0 at backscatter, where F_s + F_p = 0
+    # They give those of A - B over sin^2 of the bisecting angle, which is 0 / 0 at backscatter, where F_s + F_p = 0
     denominator = sin2_plus * sin2_half + sin2_minus * cos2_half
     apart = denominator > 0.0
     safe = np.where(apart, denominator, 1.0)
     cos_difference = np.where(apart, (sin2_plus * sin2_half - sin2_minus * cos2_half) / safe, 1.0)
     sin_difference = 0.5 * (cos_i - cos_r) * sin_dphi / safe
     # Eqs (61)-(64) over |k_r x k_i|^2
-    with np.errstate(all="ignore"):  # of vectors: the branch not taken divides by zero
+    with np.errstate(all="ignore"):  # with vectors, the branch that is not taken divides by zero
         cos_bisecting = unpolarised.cos_bisecting(directions)
     half_sum, half_difference = fresnel.half_sum_and_difference(cos_bisecting, n, k)
     J_ss = half_difference * cos_sum - half_sum * cos_difference
@@ -289,7 +293,7 @@ def _jones(directions: Directions, n: Floats, k: Floats) -> tuple[Complexes, Com
 
 
 def _azimuth(directions: Directions) -> tuple[Floats, Floats, Floats]:
-    """Return sin(delta_phi), cos^2 and sin^2 of delta_phi / 2, the azimuth of a pole taken as 0 for unit vectors."""
+    """Return sin(delta_phi), cos^2 and sin^2 [1] of delta_phi / 2. For unit vectors the azimuth of a pole is 0."""
     if isinstance(directions, Vectors):
         cos_phi_i, sin_phi_i = unit_azimuth(directions.x_i, directions.y_i, directions.sin_i)
         cos_phi_r, sin_phi_r = unit_azimuth(directions.x_r, directions.y_r, directions.sin_r)
@@ -298,14 +302,14 @@ def _azimuth(directions: Directions) -> tuple[Floats, Floats, Floats]:
         cos2_half = np.where(cos_dphi < 0.0, sin_dphi**2 / (2.0 * (1.0 + np.abs(cos_dphi))), 0.5 * (1.0 + cos_dphi))
     else:
         sin_dphi, cos2_half = directions.sin_dphi, 0.5 * directions.one_plus_cos_dphi
-    # the one that is below 1/2 has all its digits
+    # The smaller of cos^2 and sin^2, below 1/2, has all its digits
     sin2_half = np.where(cos2_half > 0.5, sin_dphi**2 / (4.0 * np.maximum(cos2_half, 0.5)), 1.0 - cos2_half)
     return sin_dphi, cos2_half, sin2_half
 
 
 def unit_azimuth(x: Floats, y: Floats, sin_theta: Floats) -> tuple[Floats, Floats]:
-    """Return cos(phi) and sin(phi) of unit vectors; phi = 0 at the pole."""
-    away = sin_theta != 0.0  # nan too
+    """Return cos(phi) and sin(phi) [1] of unit vectors; phi is 0 at the pole."""
+    away = sin_theta != 0.0  # True for nan too
     lift = np.where(sin_theta < 1e-290, 2.0**600, 1.0)  # subnormal numbers carry too few digits
     x, y = lift * x, lift * y
     safe = np.where(away, np.hypot(x, y), 1.0)
@@ -313,7 +317,7 @@ def unit_azimuth(x: Floats, y: Floats, sin_theta: Floats) -> tuple[Floats, Float
 
 
 def _mueller(J_ss: Complexes, J_sp: Complexes, J_ps: Complexes, J_pp: Complexes) -> NDArray[np.float64]:
-    """Return the Mueller matrix of a Jones matrix, (..., 4, 4)."""
+    """Return the Mueller matrix (..., 4, 4) [1] of a Jones matrix."""
     ss, sp, ps, pp = (z.real**2 + z.imag**2 for z in (J_ss, J_sp, J_ps, J_pp))
     rows_s, rows_p = J_ss * J_sp.conj(), J_ps * J_pp.conj()
     columns_s, columns_p = J_ss * J_ps.conj(), J_sp * J_pp.conj()

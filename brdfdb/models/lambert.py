@@ -41,7 +41,7 @@ def lambert(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: Arr
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     References
@@ -58,7 +58,7 @@ def lambert(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: Arr
 
 
 def lambert_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike) -> Floats:
-    """`lambert` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `lambert` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return by_rows_of_vectors(_vector_rows, checked_vectors(wi, wr), (RHO.check(rho),))
 
 

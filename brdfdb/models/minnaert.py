@@ -51,12 +51,12 @@ def minnaert(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    The directional albedo is rho at k = 1 and rho cos(theta_i)^(k - 1) in general: above 1 near grazing.
+    The directional albedo is rho at k = 1 and rho cos(theta_i)^(k - 1) in general, which exceeds 1 near grazing.
 
     References
     ----------
@@ -71,7 +71,7 @@ def minnaert(
 
 
 def minnaert_vectors(wi: ArrayLike, wr: ArrayLike, *, k: ArrayLike, rho: ArrayLike = 1.0) -> Floats:
-    """`minnaert` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `minnaert` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _f_r(checked_vectors(wi, wr), k, rho)
 
 
@@ -79,7 +79,7 @@ def _f_r(directions: Directions, k: ArrayLike, rho: ArrayLike) -> Floats:
     return finished(_evaluate(directions.cos_i, directions.cos_r, K.check(k), RHO.check(rho)), directions)
 
 
-# Of k = 0 and rho = 1 at 89.5 degrees: 1 / cos, 114.6
+# The albedo for k = 0 and rho = 1 at 89.5 degrees is 1 / cos, 114.6
 _EXCESS = (
     "Oren and Nayar 1994, section 1: as printed, Minnaert's law reflects 1 at normal incidence and, for k "
     "below 1, more the further the light is from it, cos(theta_i)^(k - 1), without bound"

@@ -23,19 +23,19 @@ OFFSET = Parameter(
 
 
 class Parts(NamedTuple):
-    """A BRDF [1/sr] of Lambertian facets in its two parts: light that met one facet, and light that met two."""
+    """The two parts of the BRDF [1/sr] of Lambertian facets: light reflected once, and light reflected twice."""
 
     direct: Floats
     interreflected: Floats
 
 
 _HALF_PI_REST = 6.123233995736766e-17  # pi/2 less the float64 nearest to it
-_NO_AZIMUTH = 1e-300  # smaller products of two sines: an azimuth means nothing
+_NO_AZIMUTH = 1e-300  # product of two sines below which an azimuth is undefined
 
 
 @kernel
 def _angle(sin_theta: float, cos_theta: float) -> tuple[float, float]:
-    """Return a polar angle and what is left of it to pi/2, each with all its digits."""
+    """Return a polar angle [rad] and its complement to pi/2 [rad], each with all its digits."""
     steep = sin_theta > cos_theta
     small = arcsin(cos_theta if steep else sin_theta)
     large = HALF_PI - small + _HALF_PI_REST
@@ -65,16 +65,17 @@ def _functional(
     sigma: float,
     interreflection: float,
 ) -> tuple[float, float, float, float]:
-    """Return eq. (29) as f_r = c_0 + c_1 cos(dphi) + c_2 (1 - abs(cos(dphi))): c_0, c_1 backward and forward, c_2.
+    """Return the four coefficients [1/sr] of eq. (29): c_0, c_1 backward, c_1 forward, and c_2.
 
-    beta_rest is pi/2 - beta, versine_rest is 1 - sin(alpha): near the horizon neither may be a difference.
+    f_r is c_0 + c_1 cos(dphi) + c_2 (1 - abs(cos(dphi))). beta_rest is pi/2 - beta, and versine_rest is
+    1 - sin(alpha). Both are arguments because their differences would cancel near the horizon.
     """
     sigma2 = sigma * sigma
     # Eq. (27), coefficients
     C1 = 1.0 - 0.5 * sigma2 / (sigma2 + 0.33)
     ratio = sigma2 / (sigma2 + 0.09)
     C2_backward = 0.45 * ratio * sin_alpha
-    # sin(alpha) - (2 beta / pi)^3: both near 1 at the horizon, where tan(beta) magnifies what is left
+    # sin(alpha) - (2 beta / pi)^3, where both are near 1 at the horizon and tan(beta) magnifies their difference
     x = beta_rest * (2.0 / np.pi)
     C2_forward = 0.45 * ratio * (x * (3.0 - x * (3.0 - x)) - versine_rest)
     C3 = 0.125 * ratio * (alpha * beta * (4.0 / np.pi**2)) ** 2
@@ -165,7 +166,7 @@ def _functional_of_vectors(
 
 @kernel
 def _qualitative(sin_alpha: float, tan_beta: float, rho: float, sigma: float, offset: float) -> tuple[float, float]:
-    """Return eq. (30) as f_r = c_0 + c_1 max(0, cos(dphi)): c_0 and c_1."""
+    """Return the coefficients c_0 and c_1 [1/sr] of eq. (30), f_r = c_0 + c_1 max(0, cos(dphi))."""
     sigma2 = sigma * sigma
     # Eq. (30)
     A = 1.0 - 0.5 * sigma2 / (sigma2 + offset) if sigma2 > 0.0 else 1.0
@@ -189,7 +190,7 @@ def _qualitative_angle_rows(
 def _qualitative_vector_rows(w_i: Floats, w_r: Floats, scalars: NDArray[np.float64], f_r: Floats) -> None:
     for row in range(f_r.shape[0]):
         f = f_r[row]
-        # sin(alpha) tan(beta) cos(dphi) is x_i x_r + y_i y_r over the larger cosine: no angle is left
+        # sin(alpha) tan(beta) cos(dphi) is x_i x_r + y_i y_r over the larger cosine, so no angle is needed
         A, B = _qualitative(1.0, 1.0, scalars[row, 0], scalars[row, 1], scalars[row, 2])
         i, r = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
         for j in range(f.shape[0]):
@@ -209,7 +210,7 @@ def oren_nayar(
     sigma: ArrayLike,
     interreflection: ArrayLike = True,
 ) -> Floats:
-    """Return the BRDF [1/sr] of Lambertian V-cavities with Gaussian slopes, by the paper's functional fit.
+    """Return the BRDF [1/sr] of Lambertian V-cavities with Gaussian slopes, by the functional fit of the paper.
 
     Parameters
     ----------
@@ -220,7 +221,7 @@ def oren_nayar(
     sigma : array_like [rad]
         Standard deviation of the slope angle, in [0, pi/2].
     interreflection : bool
-        Add the second bounce between facing facets (eq. 28) to the direct part (eq. 27).
+        True to add the second bounce between facing facets (eq. 28) to the direct part (eq. 27).
 
     Returns
     -------
@@ -229,16 +230,17 @@ def oren_nayar(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
     Eqs (27) to (29), divided by E_0 cos theta_i. beta is the smaller of the two polar angles, so tan beta grows
-    without bound only where both reach 90 degrees; there the value is the one at the float64 nearest pi/2.
-    Departures from the paper: the fit falls below 0 for rough dark surfaces at grazing angles in the forward
-    direction; there it is 0. Published excess: with rho = 1 the directional albedo reaches 1.05 near grazing, for
-    sigma below 40 degrees.
+    without bound only where both reach 90 degrees. There the value is the one at the float64 nearest pi/2.
+
+    Departures from the paper: f_r is 0 where the fit falls below 0, which happens for rough dark surfaces at grazing
+    angles in the forward direction. Published excess: with rho = 1 the directional albedo reaches 1.05 near grazing,
+    for sigma below 40 degrees.
 
     References
     ----------
@@ -259,10 +261,10 @@ def oren_nayar(
         sin_alpha,
         2.0 * np.sin((HALF_PI - alpha + _HALF_PI_REST) / 2.0) ** 2,
         np.tan(beta),
-        (angles.sin_i + angles.sin_r) / (angles.cos_i + angles.cos_r),  # the mean of two angles would round
+        (angles.sin_i + angles.sin_r) / (angles.cos_i + angles.cos_r),  # tangent of the mean angle, without rounding it
     )
     cos_dphi = angles.cos_dphi
-    one_less_cos = angles.sin_dphi**2 / (1.0 + np.abs(cos_dphi))  # 1 - |cos|: tan_mean magnifies it near grazing
+    one_less_cos = angles.sin_dphi**2 / (1.0 + np.abs(cos_dphi))  # 1 - |cos|, which tan_mean magnifies near grazing
     parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
     return finished(by_rows(_functional_angle_rows, (cos_dphi, one_less_cos), (*pair, *parameters)), angles)
 
@@ -270,7 +272,7 @@ def oren_nayar(
 def oren_nayar_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, interreflection: ArrayLike = True
 ) -> Floats:
-    """`oren_nayar` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     parameters = RHO.check(rho), SIGMA.check(sigma), INTERREFLECTION.check(interreflection)
     return by_rows_of_vectors(_functional_vector_rows, checked_vectors(wi, wr), parameters)
 
@@ -284,7 +286,7 @@ def oren_nayar_parts(
     rho: ArrayLike,
     sigma: ArrayLike,
 ) -> Parts:
-    """Return `oren_nayar` in its parts, direct light (eq. 27) and the second bounce (eq. 28).
+    """Return the parts [1/sr] of `oren_nayar`: direct light (eq. 27) and the second bounce (eq. 28).
 
     Parameters
     ----------
@@ -294,12 +296,12 @@ def oren_nayar_parts(
     Returns
     -------
     Parts [1/sr]
-        The arrays `direct` and `interreflected`, which add up to `oren_nayar`: where eq. (27) falls below 0 the direct
-        part is 0, and what eq. (28) has left over is the other one.
+        The arrays `direct` and `interreflected`, which add up to `oren_nayar`. Where eq. (27) falls below 0, the direct
+        part is 0 and the sum of both equations, if positive, is the other part.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     References
@@ -319,7 +321,7 @@ def oren_nayar_parts(
 
 
 def oren_nayar_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Parts:
-    """`oren_nayar_parts` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar_parts` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     vectors = checked_vectors(wi, wr)
     parameters = {"rho": RHO.check(rho), "sigma": SIGMA.check(sigma)}
     direct, total = (oren_nayar_vectors(wi, wr, **parameters, interreflection=bounce) for bounce in (False, True))
@@ -328,7 +330,7 @@ def oren_nayar_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, si
 
 def _apart(directions: Directions, direct: Floats, total: Floats, rho: Floats, sigma: Floats) -> Parts:
     variance, cos_dphi = sigma**2, directions.cos_dphi
-    # With x = 2 beta / pi: 1 - cos(dphi) x^2, without a difference where both are near 1
+    # 1 - cos(dphi) x^2 with x = 2 beta / pi, without a difference where both are near 1
     rest = _rest(np.minimum(directions.sin_i, directions.sin_r), np.maximum(directions.cos_i, directions.cos_r))
     less = rest * (2.0 / np.pi) * (2.0 - rest * (2.0 / np.pi))  # 1 - x^2
     near_1 = directions.sin_dphi**2 / (1.0 + np.abs(cos_dphi)) + cos_dphi * less
@@ -348,7 +350,7 @@ def oren_nayar_qualitative(
     sigma: ArrayLike,
     offset: ArrayLike = 0.33,
 ) -> Floats:
-    """Return the BRDF [1/sr] of the paper's qualitative model: the fit without its third term and interreflection.
+    """Return the BRDF [1/sr] of the qualitative model: the fit without its third term and without interreflection.
 
     Parameters
     ----------
@@ -368,7 +370,7 @@ def oren_nayar_qualitative(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
@@ -393,6 +395,6 @@ def oren_nayar_qualitative(
 def oren_nayar_qualitative_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, offset: ArrayLike = 0.33
 ) -> Floats:
-    """`oren_nayar_qualitative` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar_qualitative` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     parameters = RHO.check(rho), SIGMA.check(sigma), OFFSET.check(offset)
     return by_rows_of_vectors(_qualitative_vector_rows, checked_vectors(wi, wr), parameters)

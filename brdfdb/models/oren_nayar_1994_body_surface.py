@@ -46,14 +46,14 @@ def oren_nayar_body_surface(
     rho : array_like [1]
         Albedo of a facet of the body, in [0, 1].
     sigma : array_like [rad]
-        Standard deviation of the slope angle, in [0, pi/2]: the same facets for body and surface.
+        Standard deviation of the slope angle, in [0, pi/2]. Body and surface have the same facets.
     k_b, k_s : array_like [1]
         Weights of body and surface, each in [0, 1]. The paper prints k_s / k_b: 0.019 foam, 0.085 cotton towel, 0.043
         wood shavings.
     e_0 : array_like [1]
-        E_0, the irradiance of a facet that faces the light, in the unit of the radiance of eq. 31; in [1, 10].
+        Irradiance E_0 of a facet that faces the light, in the unit of the radiance of eq. 31, in [1, 10].
     interreflection : bool
-        Add the body's second bounce (eq. 28); section 5 of the paper leaves it out.
+        True to add the second bounce of the body (eq. 28), which section 5 of the paper leaves out.
     n, k : array_like [1], optional
         Refractive index n + ik of the surface, n in [1e-3, 100] and k in [0, 1e4]. Without n the Fresnel coefficient is
         1, as in the paper.
@@ -65,16 +65,17 @@ def oren_nayar_body_surface(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range, or k is given without n.
 
     Notes
     -----
-    Eq. (32) with eqs (27) and (31), divided by E_0 cos(theta_i). Weights are fitted, not derived: nothing holds the sum
-    to the light received (see `torrance_sparrow`).
-    Departures from the paper: eq. 27 has the factor E_0, eq. 31 as printed has none. The printed k_s / k_b so carries
-    the unit of a radiance over an irradiance, and the paper does not say which. With e_0 = 1 eq. 31 stands as printed.
-    With e_0 = pi radiances are relative to that of a white Lambertian facet that faces the light.
+    Eq. (32) with eqs (27) and (31), divided by E_0 cos(theta_i). Weights are fitted, not derived: the sum may reflect
+    more than it receives (see `torrance_sparrow`).
+
+    Departures from the paper: eq. 27 has the factor E_0, but eq. 31 as printed does not. The printed k_s / k_b
+    therefore carries the unit of a radiance over an irradiance, which the paper does not state. With e_0 = 1 eq. 31
+    stands as printed. With e_0 = pi radiances are relative to that of a white Lambertian facet that faces the light.
 
     References
     ----------
@@ -104,7 +105,7 @@ def oren_nayar_body_surface_vectors(
     n: ArrayLike | None = None,
     k: ArrayLike | None = None,
 ) -> Floats:
-    """`oren_nayar_body_surface` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar_body_surface` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     directions = checked_vectors(wi, wr)
     w_i, w_r = directions.w_i.astype(np.float64), directions.w_r.astype(np.float64)
     body = oren_nayar_vectors(w_i, w_r, rho=rho, sigma=sigma, interreflection=interreflection)
@@ -114,7 +115,7 @@ def oren_nayar_body_surface_vectors(
 def _sum(
     body: Floats, surface: Floats, k_b: ArrayLike, k_s: ArrayLike, e_0: ArrayLike, directions: Directions
 ) -> Floats:
-    # Eq. (32), of values in float64
+    # Eq. (32), computed in float64
     return finished(K_B.check(k_b) * body + K_S.check(k_s) / E_0.check(e_0) * surface, directions)
 
 
@@ -128,9 +129,9 @@ def lobe(
     e_0: ArrayLike = 1.0,
     **_: ArrayLike,
 ) -> Lobe:
-    """Return the lobe of the surface: its share by the albedos, its slopes by sigma."""
+    """Return the lobe of the surface. Its share follows from the albedos, and its width from sigma."""
     whole = torrance_sparrow_1967.lobe(cos_i, sigma=sigma)
-    surface = np.asarray(k_s) / np.asarray(e_0) * 4.0 * np.pi * whole.alpha_x**2  # albedo of a narrow lobe with F = 1
+    surface = np.asarray(k_s) / np.asarray(e_0) * 4.0 * np.pi * whole.alpha_x**2  # albedo of a narrow lobe for F = 1
     body = np.asarray(k_b) * np.asarray(rho)
     total = surface + body
     return whole._replace(share=np.divide(surface, total, where=total > 0.0, out=np.zeros(np.shape(total))))

@@ -1,4 +1,4 @@
-"""Forms of the models of Oren and Nayar 1994 that charts compare: the facets integrated, and what stands for them."""
+"""Forms of the models of Oren and Nayar 1994 that charts compare: integrated facets and approximations of them."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from brdfdb.models.portsmouth_2025 import oren_nayar_energy_preserving_vectors
 from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow_vectors
 from brdfdb.parameters import Arguments, Floats, FormKind, ModelForm
 
-_NODES = (8, 6, 4, 3, 2)  # of the quadrature of facets, of 16: the rungs below it
-_SLOPES = 24  # of eq. 25 over the closed forms: 2000 change the mean of f_r by 3e-5 and no value by more than 1e-3
-_WIDEST = 6.0  # standard deviations of the slope that are integrated over
+_NODES = (8, 6, 4, 3, 2)  # nodes of the coarser quadratures of the facets; the exact form has 16
+# Slopes of eq. 25 over the closed forms. 2000 slopes change the mean of f_r by 3e-5 and no value by more than 1e-3
+_SLOPES = 24
+_WIDEST = 6.0  # range of the integral over slopes, in standard deviations
 
 
 def forms(arguments: Arguments) -> Iterator[ModelForm]:
-    """Yield the forms at the albedo and sigma of a model; those of the body and surface model have its surface added.
+    """Yield the forms at the albedo and sigma of a model. The surface of the body and surface model is added to each.
 
-    The facets, integrated, come first. Approximations with a bounce stand for facets with one; without it, for facets
-    in direct light.
+    The integrated facets come first. Forms with a bounce approximate facets with a bounce. Forms without it approximate
+    facets in direct light.
     """
     own = {"rho": float(arguments["rho"]), "sigma": float(arguments["sigma"])}
     bounces = bool(arguments.get("interreflection", True))
@@ -95,7 +96,7 @@ def _smooth(wi: Floats, wr: Floats, *, rho: float, **_: float) -> Floats:
 
 
 def _mixed(facets: PartName, other: Callable[..., Floats]) -> Callable[..., Floats]:
-    """Return a function that takes one part from the facets, and the other one from a form of its own."""
+    """Return a function of vectors that takes one part from the facets and the other part from another form."""
 
     def evaluate(wi: Floats, wr: Floats, **own: float) -> Floats:
         return gaussian_part(wi, wr, **own, part=facets) + other(wi, wr, **own)
@@ -104,16 +105,16 @@ def _mixed(facets: PartName, other: Callable[..., Floats]) -> Callable[..., Floa
 
 
 def _over_slopes(wi: Floats, wr: Floats, *, rho: float, sigma: float, lit: bool = True, bounce: bool = True) -> Floats:
-    """Return the closed forms of appendix B.2, eqs 45 and 49, averaged over slopes by the weights of eqs 25 and 26."""
+    """Return f_r [1/sr] of the closed forms, eqs 45 and 49, averaged over slopes by the weights of eqs 25 and 26."""
     theta_a, weight = _slopes(sigma)
     return single_slope_mean(wi, wr, rho=rho, theta_a=theta_a, weight=weight, lit=lit, bounce=bounce)
 
 
 @functools.cache
 def _slopes(sigma: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return slopes [rad] and their weights [1], which add up to 1."""
+    """Return slopes [rad] and their weights [1], which add up to 1, each of shape (_SLOPES,)."""
     x, w = np.polynomial.legendre.leggauss(_SLOPES)
-    deviation = max(sigma, 1e-9)  # a flat surface: all slopes are 0
+    deviation = max(sigma, 1e-9)  # above 0, because all slopes of a flat surface are 0
     theta_a = (x + 1.0) * min(np.pi / 2, _WIDEST * deviation) / 2.0
     weight = w * np.exp(-(theta_a**2) / (2.0 * deviation**2)) * np.sin(theta_a)
     return theta_a, weight / weight.sum()

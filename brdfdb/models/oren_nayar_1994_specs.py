@@ -1,4 +1,4 @@
-"""Specifications of the models of Oren and Nayar 1994: for each, what audits and charts know of it."""
+"""Specifications of the models of Oren and Nayar 1994, with their limits of validity and known excesses."""
 
 from __future__ import annotations
 
@@ -40,28 +40,29 @@ from brdfdb.models.oren_nayar_1994_surfaces import (
 )
 from brdfdb.parameters import Arguments, ModelSpec, StatedLimit, white
 
-_BEYOND, _FAR_BEYOND = 0.01, 0.1  # shares of a Gaussian of slopes that lie beyond 90 degrees
+# Shares of a Gaussian of slopes beyond 90 degrees, up to which a surface is inside the limits or at their edge
+_BEYOND, _FAR_BEYOND = 0.01, 0.1
 
-# Measured at rho = 1 over sigma: the albedo reaches 1.0510 (sigma of 17 degrees) and exceeds 1 from 50 degrees on,
-# the qualitative model 1.015 or, with an offset of 0.57, 1.044
+# The albedo was measured at rho = 1 over sigma. It reaches 1.0510 (sigma of 17 degrees) and exceeds 1 from 50 degrees
+# on. The albedo of the qualitative model reaches 1.015, or 1.044 with an offset of 0.57
 _EXCESS = (
     "Oren and Nayar 1994, eqs 27, 28 and 30: near grazing and with an albedo near 1 the fit reflects up to "
     "5 % more than it receives, for sigma below 40 degrees"
 )
-# Measured at rho = 1 over theta_a: the albedo reaches 1.0625 (theta_a of 41 degrees, theta_i of 89.999) and exceeds 1
-# from 74 degrees on; it is the weights of eq. 44 that do it: the integrals of eqs 23 and 46 stay below 1
+# The albedo was measured at rho = 1 over theta_a. It reaches 1.0625 (theta_a of 41 degrees, theta_i of 89.999) and
+# exceeds 1 from 74 degrees on. The weights of eq. 44 cause this: the integrals of eqs 23 and 46 stay below 1
 _SINGLE_SLOPE_EXCESS = (
     "Oren and Nayar 1994, eqs 44, 45 and 49: near grazing and with an albedo near 1 the closed forms "
     "reflect up to 6 % more than they receive, for slopes below 60 degrees"
 )
-# The sum of those of the two models, at rho = k_b = k_s = e_0 = 1
+# The excess is the sum of those of the two models, at rho = k_b = k_s = e_0 = 1
 _BODY_SURFACE_EXCESS = (
     "Oren and Nayar 1994, eq. 32: a fitted sum of two radiances, of which that of eq. 31 is not normalised"
 )
 
 
 def _facets(_: Arguments) -> list[StatedLimit]:
-    """Return the limit that Oren and Nayar state of all their surfaces."""
+    """Return the limit that Oren and Nayar state for all their surfaces."""
     return [
         StatedLimit(
             quantity="area of facets / wavelength^2",
@@ -76,7 +77,7 @@ def _facets(_: Arguments) -> list[StatedLimit]:
 
 
 def _limits(arguments: Arguments) -> list[StatedLimit]:
-    """Return the limits of validity that Oren and Nayar state, of surfaces with Gaussian slopes."""
+    """Return the limits of validity that Oren and Nayar state for surfaces with Gaussian slopes."""
     sigma = float(arguments["sigma"])
     beyond = 0.0 if sigma == 0.0 else math.erfc(math.pi / 2.0 / (sigma * math.sqrt(2.0)))
     return [
@@ -94,7 +95,7 @@ def _limits(arguments: Arguments) -> list[StatedLimit]:
 
 
 def _integrated(parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any]] | None:
-    """Return the model of facets, integrated, which the fits with a bounce approximate."""
+    """Return the model of integrated facets with its parameters, which the fits with a bounce approximate."""
     if not parameters.get("interreflection", True):
         return None
     return "oren_nayar_gaussian", {"rho": parameters["rho"], "sigma": parameters["sigma"]}

@@ -1,4 +1,4 @@
-"""The surfaces of Oren and Nayar 1994, facet by facet: unidirectional, of a single slope, of Gaussian slopes."""
+"""The surfaces of Oren and Nayar 1994, facet by facet: unidirectional, single slope, and Gaussian slopes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def oren_nayar_unidirectional(
     theta_a: ArrayLike,
     phi_a: ArrayLike,
 ) -> Floats:
-    """Return the BRDF [1/sr] of parallel V-cavities of one slope: exact in direct light and the second bounce.
+    """Return the BRDF [1/sr] of parallel V-cavities of one slope, exact in direct light and the second bounce.
 
     Parameters
     ----------
@@ -49,18 +49,19 @@ def oren_nayar_unidirectional(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eq. (22), the mean over both facets of a cavity of eqs (10) and (11), direct light, and of eqs (15) to (20), light
-    from the opposite facet. Anisotropic, and only for phi_a along an axis its own mirror image. Towards exact
-    backscatter at grazing it grows as 1 / cos; at 90 degrees it is the finite value at the float64 nearest pi/2.
-    Departures from the paper: GAF = Min[1, Max[0, Min[A, B]]] (eq. 33 of the paper asks for it); the shadowed row of
-    Table 1 is over <v,n>, not <s,a>; a facet that faces away from light or viewer adds nothing, but one that faces away
-    from the light alone is lit by its neighbour. Eqs (15) and (16) are as printed: m_v and m_s are the widths that are
-    masked and shadowed, which the paper's words call visible and illuminated.
+    Eq. (22), the mean over both facets of a cavity. Eqs (10) and (11) give direct light, and eqs (15) to (20) the light
+    from the opposite facet. The BRDF is anisotropic, and mirror symmetric only for phi_a along an axis. It grows as
+    1 / cos towards exact backscatter at grazing. At 90 degrees it is the finite value at the float64 nearest pi/2.
+
+    Departures from the paper: GAF = Min[1, Max[0, Min[A, B]]], as eq. 33 of the paper requires. The shadowed row of
+    Table 1 is divided by <v,n>, not <s,a>. A facet that faces away from light or viewer adds no direct light, but one
+    that faces away from the light alone is lit by its neighbour. Eqs (15) and (16) are as printed: m_v and m_s are the
+    masked and shadowed widths, which the text of the paper calls visible and illuminated.
 
     References
     ----------
@@ -77,7 +78,7 @@ def oren_nayar_unidirectional(
 def oren_nayar_unidirectional_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike, phi_a: ArrayLike
 ) -> Floats:
-    """`oren_nayar_unidirectional` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar_unidirectional` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _total(*_unidirectional(checked_vectors(wi, wr), rho, theta_a, phi_a))
 
 
@@ -91,7 +92,7 @@ def oren_nayar_unidirectional_parts(
     theta_a: ArrayLike,
     phi_a: ArrayLike,
 ) -> Parts:
-    """Return `oren_nayar_unidirectional` in its parts, direct light and the second bounce.
+    """Return the parts [1/sr] of `oren_nayar_unidirectional`: direct light and the second bounce.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ def oren_nayar_unidirectional_parts(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     References
@@ -124,7 +125,7 @@ def oren_nayar_unidirectional_parts(
 def oren_nayar_unidirectional_parts_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike, phi_a: ArrayLike
 ) -> Parts:
-    """`oren_nayar_unidirectional_parts` for unit vectors `wi` of the light and `wr` of the viewer, each (..., 3)."""
+    """Return `oren_nayar_unidirectional_parts` for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _parts(*_unidirectional(checked_vectors(wi, wr), rho, theta_a, phi_a))
 
 
@@ -141,7 +142,7 @@ def _unidirectional(
 
 
 def _scaled(direct: Floats, bounce: Floats, rho: Floats, directions: Directions) -> tuple[Floats, Floats, Directions]:
-    """Return the BRDF [1/sr] from radiances over rho E_0 cos(theta_i) / pi, and rho times that."""
+    """Return the two parts of the BRDF [1/sr] from radiances divided by rho E_0 cos(theta_i) / pi, and by rho more."""
     return rho / np.pi * direct, rho * rho / np.pi * bounce, directions
 
 
@@ -167,7 +168,7 @@ def oren_nayar_single_slope(
     rho: ArrayLike,
     theta_a: ArrayLike,
 ) -> Floats:
-    """Return the BRDF [1/sr] of V-cavities of one slope in all azimuths alike, the paper's closed forms.
+    """Return the BRDF [1/sr] of V-cavities of one slope in all azimuths, by the closed forms of the paper.
 
     Parameters
     ----------
@@ -185,14 +186,14 @@ def oren_nayar_single_slope(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eqs (45), which is (24), and (49). Exact for direct light in the plane of incidence and across it; between them
-    weighted by eq. (44). The second bounce has the interreflection factor of eq. (48), not (47). Towards exact
-    backscatter at grazing it grows as 1 / cos; at 90 degrees it is the finite value at the float64 nearest pi/2.
+    Eqs (45), which is (24), and (49). They are exact for direct light in the plane of incidence and across it. Between
+    them eq. (44) weights the two. The second bounce has the interreflection factor of eq. (48), not (47). f_r grows as
+    1 / cos towards exact backscatter at grazing. At 90 degrees it is the finite value at the float64 nearest pi/2.
 
     References
     ----------
@@ -207,7 +208,7 @@ def oren_nayar_single_slope(
 
 
 def oren_nayar_single_slope_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike) -> Floats:
-    """`oren_nayar_single_slope` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar_single_slope` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _total(*_single_slope(checked_vectors(wi, wr), rho, theta_a))
 
 
@@ -220,7 +221,7 @@ def oren_nayar_single_slope_parts(
     rho: ArrayLike,
     theta_a: ArrayLike,
 ) -> Parts:
-    """Return `oren_nayar_single_slope` in its parts, direct light and the second bounce.
+    """Return the parts [1/sr] of `oren_nayar_single_slope`: direct light and the second bounce.
 
     Parameters
     ----------
@@ -234,7 +235,7 @@ def oren_nayar_single_slope_parts(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     References
@@ -251,7 +252,7 @@ def oren_nayar_single_slope_parts(
 
 
 def oren_nayar_single_slope_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, theta_a: ArrayLike) -> Parts:
-    """`oren_nayar_single_slope_parts` for unit vectors `wi` of the light and `wr` of the viewer, each (..., 3)."""
+    """Return `oren_nayar_single_slope_parts` for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _parts(*_single_slope(checked_vectors(wi, wr), rho, theta_a))
 
 
@@ -265,9 +266,10 @@ def single_slope_mean(
     lit: bool = True,
     bounce: bool = True,
 ) -> Floats:
-    """Return the mean f_r [1/sr] of `oren_nayar_single_slope_vectors` over slopes `theta_a` [rad] of these weights.
+    """Return the mean f_r [1/sr] of `oren_nayar_single_slope_vectors` over slopes `theta_a` [rad] with weights.
 
-    Direct light if `lit`, the second bounce if `bounce`. Slopes and weights have the shape (S,), the vectors (N, 3).
+    It includes direct light if `lit`, and the second bounce if `bounce`. Slopes and weights have the shape (S,), and
+    vectors (N, 3).
     """
     directions, albedo = checked_vectors(wi, wr), RHO.check(rho)
     direct, bounced = over_slopes(*_features(directions), theta_a, weight, lit=lit, bounce=bounce)
@@ -275,14 +277,14 @@ def single_slope_mean(
 
 
 def _single_slope(directions: Directions, rho: ArrayLike, theta_a: ArrayLike) -> tuple[Floats, Floats, Directions]:
-    """Return both parts of the closed forms."""
+    """Return both parts [1/sr] of the closed forms, with the directions."""
     albedo, slope = RHO.check(rho), THETA_A.check(theta_a)
     facet = *_features(directions), np.sin(slope), np.cos(slope)
     return _scaled(direct_of_slope(*facet), bounce_of_slope(*facet), albedo, directions)
 
 
 def _features(directions: Directions) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return tan(theta_i), tan(theta_r), cos(phi_r - phi_i) and 1 - abs of that."""
+    """Return tan(theta_i), tan(theta_r), cos(phi_r - phi_i) and 1 - abs(cos(phi_r - phi_i)) [1]."""
     cos_dphi = directions.cos_dphi
     one_less_cos = directions.sin_dphi**2 / (1.0 + np.abs(cos_dphi))
     return directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r, cos_dphi, one_less_cos
@@ -297,7 +299,7 @@ def oren_nayar_gaussian(
     rho: ArrayLike,
     sigma: ArrayLike,
 ) -> Floats:
-    """Return the BRDF [1/sr] of V-cavities with Gaussian slopes, integrated: the fit `oren_nayar` approximates it.
+    """Return the BRDF [1/sr] of V-cavities with Gaussian slopes, integrated, which the fit `oren_nayar` approximates.
 
     Parameters
     ----------
@@ -315,16 +317,17 @@ def oren_nayar_gaussian(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eqs (8) and (26) with eqs (10) to (20) for every facet, and eq. (47) as it stands: neither of the approximations
-    (44) and (48). The weight is normalised to one over the slope. About 30 us a value. Measured against a
-    refined integration, the error stays below 1.1e-6 of the value for any arguments, the horizon included, and below
-    3e-8 of it for sigma from 10 to 40 degrees and random directions. Towards exact backscatter at grazing it grows as
-    1 / cos; at 90 degrees it is the finite value at the float64 nearest pi/2.
+    Eqs (8) and (26) with eqs (10) to (20) for every facet, and eq. (47), without the approximations (44) and (48). The
+    weight is normalised to one over the slope. A value takes about 30 us. The error, measured against a refined
+    integration, is below 1.1e-6 of the value for any arguments, the horizon included. It is below 3e-8 of the value for
+    sigma from 10 to 40 degrees and random directions. f_r grows as 1 / cos towards exact backscatter at grazing. At 90
+    degrees it is the finite value at the float64 nearest pi/2.
+
     Departures from the paper: those of `oren_nayar_unidirectional`.
 
     References
@@ -340,7 +343,7 @@ def oren_nayar_gaussian(
 
 
 def oren_nayar_gaussian_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Floats:
-    """`oren_nayar_gaussian` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar_gaussian` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _total(*_gaussian(checked_vectors(wi, wr), rho, sigma))
 
 
@@ -353,7 +356,7 @@ def oren_nayar_gaussian_parts(
     rho: ArrayLike,
     sigma: ArrayLike,
 ) -> Parts:
-    """Return `oren_nayar_gaussian` in its parts, direct light and the second bounce.
+    """Return the parts [1/sr] of `oren_nayar_gaussian`: direct light and the second bounce.
 
     Parameters
     ----------
@@ -367,7 +370,7 @@ def oren_nayar_gaussian_parts(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     References
@@ -384,12 +387,12 @@ def oren_nayar_gaussian_parts(
 
 
 def oren_nayar_gaussian_parts_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike) -> Parts:
-    """`oren_nayar_gaussian_parts` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `oren_nayar_gaussian_parts` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _parts(*_gaussian(checked_vectors(wi, wr), rho, sigma))
 
 
 def gaussian_part(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, sigma: ArrayLike, part: PartName) -> Floats:
-    """Return one part of `oren_nayar_gaussian_parts_vectors` [1/sr], without the work of the other."""
+    """Return one part [1/sr] of `oren_nayar_gaussian_parts_vectors` without computing the other."""
     return _part(part, *_gaussian(checked_vectors(wi, wr), rho, sigma, part))
 
 
@@ -398,7 +401,7 @@ def gaussian_rung(
 ) -> Floats:
     """Return f_r [1/sr] of `oren_nayar_gaussian_vectors` with a coarser quadrature of `nodes` nodes, in [1, 16].
 
-    Without `bounce`, direct light alone.
+    Without `bounce` it is direct light alone.
     """
     only: PartName | None = None if bounce else "direct"
     direct, bounced, directions = _gaussian(checked_vectors(wi, wr), rho, sigma, only, nodes)
@@ -408,7 +411,7 @@ def gaussian_rung(
 def _gaussian(
     directions: Directions, rho: ArrayLike, sigma: ArrayLike, only: PartName | None = None, nodes: int = NODES
 ) -> tuple[Floats, Floats, Directions]:
-    """Return both parts, or only one; the other then means nothing."""
+    """Return both parts [1/sr] with the directions. A part that is not requested is undefined."""
     albedo, deviation = RHO.check(rho), SIGMA.check(sigma)
     tangents = directions.sin_i / directions.cos_i, directions.sin_r / directions.cos_r
     features = *tangents, directions.cos_dphi, directions.sin_dphi, deviation

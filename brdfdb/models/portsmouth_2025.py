@@ -19,7 +19,7 @@ _C2 = 2.0 / 3.0 - 28.0 / (15.0 * np.pi)  # mean of E_FON = A (1 + C2 r)
 
 @kernel
 def _lost(cos_theta: float, sin_theta: float) -> float:
-    """Return (1 - E_FON) / (A r), the share that a single scattering loses; no difference cancels at the horizon."""
+    """Return (1 - E_FON) / (A r) [1], the loss of a single scattering, without a difference that cancels at grazing."""
     small = arcsin(min(cos_theta, sin_theta))
     rest = small if cos_theta < sin_theta else np.pi / 2 - small  # pi/2 - theta
     versine = cos_theta * cos_theta / (1.0 + sin_theta)  # 1 - sin(theta)
@@ -38,7 +38,7 @@ def _energy_preserving(
     s = sin_i * sin_r * cos_dphi
     t = max(cos_i, cos_r) if s > 0.0 else 1.0
     single = rho / np.pi * A * max(0.0, 1.0 + r * s / t)
-    # f_ms, whose 0 / 0 at r = 0 is cancelled
+    # f_ms, with the 0 / 0 at r = 0 cancelled
     mean_lost = A * r * (_C1 - _C2)
     rho_ms = rho * rho * (1.0 - mean_lost) / (1.0 - rho * mean_lost)
     multiple = rho_ms / np.pi * A * r / (_C1 - _C2) * _lost(cos_i, sin_i) * _lost(cos_r, sin_r)
@@ -57,7 +57,7 @@ def oren_nayar_energy_preserving(
     rho: ArrayLike,
     roughness: ArrayLike,
 ) -> Floats:
-    """Return the BRDF [1/sr] of the energy-preserving Oren-Nayar model (EON): with rho = 1 it reflects all light.
+    """Return the BRDF [1/sr] of the energy-preserving Oren-Nayar model (EON), which reflects all light if rho = 1.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def oren_nayar_energy_preserving(
     rho : array_like [1]
         Albedo of a single scattering, in [0, 1].
     roughness : array_like [1]
-        In [0, 1]; 0 is Lambert. It is the sigma of `oren_nayar_fujii`, not the deviation of a slope.
+        Roughness, in [0, 1]; 0 is Lambert. It is the sigma of `oren_nayar_fujii`, not the deviation of a slope.
 
     Returns
     -------
@@ -75,14 +75,14 @@ def oren_nayar_energy_preserving(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    The sum of Fujii's lobe (FON) and of a lobe that gives back what FON loses at rho = 1,
+    f_r is the sum of Fujii's lobe (FON) and of a lobe that makes up for the loss of FON at rho = 1,
     rho_ms / pi (1 - E_FON(theta_i)) (1 - E_FON(theta_r)) / (1 - mean of E_FON), with the exact E_FON, not its fit.
-    The pole of FON, exact backscatter at grazing, stays.
+    The model keeps the pole of FON at exact backscatter at grazing.
 
     References
     ----------
@@ -99,7 +99,7 @@ def oren_nayar_energy_preserving(
 def oren_nayar_energy_preserving_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike, roughness: ArrayLike
 ) -> Floats:
-    """`oren_nayar_energy_preserving` for unit vectors `wi` of the light and `wr` of the viewer, of shape (..., 3)."""
+    """Return `oren_nayar_energy_preserving` for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _f_r(checked_vectors(wi, wr), rho, roughness)
 
 

@@ -1,4 +1,4 @@
-"""The registry of models: ours, those of installed packages, and those of files that the user names."""
+"""The registry of models: the built-in ones, those of installed packages, and those of files that the user names."""
 
 from __future__ import annotations
 
@@ -14,20 +14,30 @@ from typing import Any
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.parameters import ModelSpec
 
-GROUP = "brdfdb.models"  # of entry points: each gives a ModelSpec, or several
-VARIABLE = "BRDFDB_MODELS"  # paths of Python files, separated as those of PATH are
+GROUP = "brdfdb.models"  # group of entry points, each of which gives a ModelSpec or an iterable of them
+VARIABLE = "BRDFDB_MODELS"  # environment variable with paths of Python files, separated as in PATH
 
 
 class Registry(dict[str, ModelSpec]):
-    """Models by name. A name that it lacks raises `ParameterError`."""
+    """Models by name. An unknown name raises `ParameterError`."""
 
     def __missing__(self, name: str) -> ModelSpec:
         raise ParameterError("model", f"{name!r} is not one of {', '.join(self)}", name, tuple(self))
 
     def add(self, specs: Iterable[ModelSpec], origin: str) -> None:
-        """Add models of somebody else; BrdfdbError if one has a name that is taken, `origin` being its package or file.
+        """Add models: all of them, or none if one cannot be added.
 
-        Either all are added, or none.
+        Parameters
+        ----------
+        specs : iterable of ModelSpec
+            The models to add.
+        origin : str
+            Package or file that defines them, for messages.
+
+        Raises
+        ------
+        BrdfdbError
+            If one is no ModelSpec, or its name is taken.
         """
         new: dict[str, ModelSpec] = {}
         for spec in specs:
@@ -44,7 +54,7 @@ class Registry(dict[str, ModelSpec]):
         Raises
         ------
         BrdfdbError
-            If an entry point cannot be loaded, gives no model, or one whose name is taken.
+            If an entry point cannot be loaded or gives no model, or if the name of a model is taken.
         """
         for entry in importlib.metadata.entry_points(group=GROUP):
             origin = f"entry point {entry.name} = {entry.value}"
@@ -52,7 +62,7 @@ class Registry(dict[str, ModelSpec]):
                 given: Any = entry.load()
                 specs = [given] if isinstance(given, ModelSpec) else list(given)
             except Exception as error:
-                raise BrdfdbError(f"{origin}: {_said(error)}") from error
+                raise BrdfdbError(f"{origin}: {_message(error)}") from error
             self.add(specs, origin)
 
     def add_files(self, paths: Iterable[str | os.PathLike[str]]) -> None:
@@ -61,13 +71,13 @@ class Registry(dict[str, ModelSpec]):
         Parameters
         ----------
         paths : iterable of path
-            Each file is run once. Every `ModelSpec` among its global names is added, but those that it imports from
-            here.
+            Each file is run once. Every `ModelSpec` among its global names is added, except the ones of this registry
+            that it imports.
 
         Raises
         ------
         BrdfdbError
-            If a file does not exist, raises, defines no model, or one whose name is taken.
+            If a file does not exist, raises an error or defines no model, or if the name of a model is taken.
         """
         for path in paths:
             file = Path(path).absolute()
@@ -81,7 +91,7 @@ class Registry(dict[str, ModelSpec]):
         self.add_files([path for path in os.environ.get(VARIABLE, "").split(os.pathsep) if path])
 
     def _add_file(self, file: Path) -> None:
-        # the same name in every process, so that what the file defines can be pickled
+        # The module has the same name in every process, so that objects of the file can be pickled
         name = f"brdfdb_models_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
         if name in sys.modules:
             return
@@ -96,7 +106,7 @@ class Registry(dict[str, ModelSpec]):
             try:
                 description.loader.exec_module(module)
             except Exception as error:
-                raise BrdfdbError(f"{file}: {_said(error)}") from error
+                raise BrdfdbError(f"{file}: {_message(error)}") from error
             ours = {id(spec) for spec in self.values()}
             specs = {id(spec): spec for spec in vars(module).values() if isinstance(spec, ModelSpec)}
             new = [spec for key, spec in specs.items() if key not in ours]
@@ -108,5 +118,6 @@ class Registry(dict[str, ModelSpec]):
             raise
 
 
-def _said(error: Exception) -> str:
+def _message(error: Exception) -> str:
+    """Return the class and the first line of an error."""
     return f"{type(error).__name__}: {error}".partition("\n")[0]

@@ -1,4 +1,4 @@
-"""Torrance and Sparrow 1967: reflection from mirror-like facets in V-cavities, as eq. 31 of Oren and Nayar 1994."""
+"""Torrance and Sparrow 1967: reflection from mirror-like facets in V-cavities, in the form of Oren and Nayar 1994."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from brdfdb.parameters import Floats, ModelSpec, Parameter
 
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
 
-_TINY = 1e-300  # guards 0 / 0 at sigma = 0
+_TINY = 1e-300  # guard against 0 / 0 at sigma = 0
 
 
 @kernel
 def _half(
     cos_i: float, sin_i: float, cos_r: float, sin_r: float, one_plus_cos_dphi: float
 ) -> tuple[float, float, float]:
-    """Return sine and cosine of theta_a, the slope of the half vector, and the cosine of half the angle of s and v."""
+    """Return sine and cosine [1] of theta_a, the slope of the half vector, and the cosine of half the angle s to v."""
     h_z = cos_i + cos_r
-    # sin_i - sin_r, without the difference of numbers near 1
+    # sin_i - sin_r without a difference of numbers near 1
     sum_of_sines = sin_i + sin_r
     across = sin_i - sin_r if sum_of_sines < h_z else (cos_r - cos_i) * h_z / sum_of_sines
     h_xy = math.sqrt(across * across + 2.0 * sin_i * sin_r * one_plus_cos_dphi)
@@ -40,7 +40,7 @@ def _lobe(cos_i: float, sin_i: float, cos_r: float, sin_r: float, one_plus_cos_d
     sin_a, cos_a, s_a = _half(cos_i, sin_i, cos_r, sin_r, one_plus_cos_dphi)
     small = arcsin(min(sin_a, cos_a))
     theta_a = small if sin_a < cos_a else np.pi / 2 - small
-    x = 0.0 if theta_a == 0.0 else theta_a / max(sigma, _TINY)  # sigma = 0: all in the mirror direction
+    x = 0.0 if theta_a == 0.0 else theta_a / max(sigma, _TINY)  # at sigma = 0 only the mirror direction reflects
     # Eq. (11), with the smaller of the two; <s,a> = <v,a>
     GAF = min(1.0, 2.0 * cos_i * cos_a / s_a, 2.0 * cos_r * cos_a / s_a)
     # Eq. (31), over cos(theta_i)
@@ -65,7 +65,7 @@ def torrance_sparrow(
     n: ArrayLike | None = None,
     k: ArrayLike | None = None,
 ) -> Floats:
-    """Return the BRDF [1/sr] of mirror-like facets with Gaussian slopes: a lobe of height 1, not normalised.
+    """Return the BRDF [1/sr] of mirror-like facets with Gaussian slopes, a lobe of height 1 that is not normalised.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def torrance_sparrow(
         Standard deviation of the slope angle, in [0, pi/2].
     n, k : array_like [1], optional
         Refractive index n + ik of the facets, n in [1e-3, 100] and k in [0, 1e4]. Without n the Fresnel coefficient is
-        1, as in section 5 of the paper; without k, but with n, the facets are of a dielectric, k = 0.
+        1, as in section 5 of the paper. With n and without k the facets are dielectric, k = 0.
 
     Returns
     -------
@@ -84,17 +84,18 @@ def torrance_sparrow(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range, or k is given without n.
 
     Notes
     -----
     Eq. (31) of Oren and Nayar 1994 with E_0 = 1, divided by cos(theta_i); theta_a is the slope of the half vector. The
-    paper fits the factor k_s in front of it: by itself the lobe is no share of anything, and with F = 1 its albedo
-    passes 1 for sigma above about 12 degrees. In the mirror direction it grows as 1 / cos^2 towards grazing; at 90
-    degrees it is the finite value at the float64 nearest pi/2.
-    Departures from the paper: GAF = Min[1, Min[A, B]], not Max (eq. 33 of the paper asks for it). No E_0 is
-    printed: the unit of the lobe is left to whoever weights it (see `oren_nayar_body_surface`).
+    paper fits the factor k_s in front of it. The lobe by itself is not normalised: with F = 1 its albedo exceeds 1 for
+    sigma above about 12 degrees. In the mirror direction f_r grows as 1 / cos^2 towards grazing. At 90 degrees it is
+    the finite value at the float64 nearest pi/2.
+
+    Departures from the paper: GAF = Min[1, Min[A, B]], not Max, as eq. 33 of the paper requires. The paper prints no
+    E_0, so the unit of the lobe depends on its weight (see `oren_nayar_body_surface`).
 
     References
     ----------
@@ -113,7 +114,7 @@ def torrance_sparrow(
 def torrance_sparrow_vectors(
     wi: ArrayLike, wr: ArrayLike, *, sigma: ArrayLike, n: ArrayLike | None = None, k: ArrayLike | None = None
 ) -> Floats:
-    """`torrance_sparrow` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `torrance_sparrow` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return _f_r(checked_vectors(wi, wr), sigma, n, k)
 
 
@@ -128,13 +129,13 @@ def _f_r(directions: Directions, sigma: ArrayLike, n: ArrayLike | None, k: Array
 
 
 def lobe(cos_i: Floats, *, sigma: ArrayLike, **_: ArrayLike) -> Lobe:
-    """Return the lobe of this model: slopes by sigma, and a fifth of it in the wider tails."""
+    """Return the lobe of this model. Its width follows from sigma, and a fifth of the light lies in wider tails."""
     alpha = np.maximum(np.sqrt(2.0) * np.asarray(sigma, dtype=np.float64), 1e-6)
     return Lobe(np.full(np.broadcast_shapes(np.shape(cos_i), alpha.shape), 0.8), alpha, alpha)
 
 
-# Measured with F = 1 over sigma and theta_i: 20.14 at sigma of 90 degrees and theta_i of 89.99; above 1, near normal
-# incidence too, from sigma of 12 degrees on
+# The albedo was measured with F = 1 over sigma and theta_i. It reaches 20.14 at a sigma of 90 degrees and a theta_i of
+# 89.99. It exceeds 1 from a sigma of 12 degrees on, near normal incidence too
 _EXCESS = (
     "Oren and Nayar 1994, eq. 31: the lobe has the height 1 at any sigma and is not normalised; the factor "
     "k_s of eq. 32 is fitted"

@@ -46,8 +46,8 @@ def ward(
     rho_d, rho_s : array_like [1]
         Diffuse and specular reflectance, each in [0, 1].
     alpha_x, alpha_y : array_like [1]
-        Widths of the slopes along x and y, exp(-(slope / alpha)^2), in [1e-6, 2]; the paper holds the model good to
-        0.2. It calls them standard deviations, which are alpha / sqrt(2): see `brdfdb.roughness`.
+        Widths of the slopes along x and y, exp(-(slope / alpha)^2), in [1e-6, 2]. The paper considers the model
+        accurate up to 0.2. It calls the widths standard deviations, which are alpha / sqrt(2): see `brdfdb.roughness`.
 
     Returns
     -------
@@ -56,15 +56,15 @@ def ward(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eq. (5a); with alpha_x equal to alpha_y it is eq. (4). The lobe grows as 1 / sqrt(cos) towards grazing; at 90
-    degrees it is the finite value at the float64 nearest pi/2. The normalisation 1 / (4 pi alpha_x alpha_y) holds near
-    normal incidence only: the albedo of the lobe is about cos(theta_i) for small alpha. `ward_duer` and
-    `ward_bounded` keep what it loses.
+    Eq. (5a), which is eq. (4) if alpha_x equals alpha_y. The lobe grows as 1 / sqrt(cos) towards grazing. At 90 degrees
+    it is the finite value at the float64 nearest pi/2. The normalisation 1 / (4 pi alpha_x alpha_y) holds near normal
+    incidence only: the albedo of the lobe is about cos(theta_i) for small alpha. `ward_duer` and `ward_bounded` avoid
+    that loss.
 
     References
     ----------
@@ -82,7 +82,7 @@ def ward(
 def ward_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho_d: ArrayLike, rho_s: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike
 ) -> Floats:
-    """`ward` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `ward` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return by_vectors(ELLIPTICAL, wi, wr, rho_d, rho_s, alpha_x, alpha_y)
 
 
@@ -111,15 +111,15 @@ def ward_half_vector(
 
     Raises
     ------
-    ValueError
+    ParameterError
         If an argument is outside its range.
 
     Notes
     -----
-    Eq. (5b), which the paper offers as an approximation of (5a). It is `ward` at the peak and another lobe away from
-    it: the exponent is -2 (..) / (1 + h.n) of the normalised half vector, where (5a) has -(..) / (h.n)^2, so that
-    it falls off as exp(-4 sin^2(delta / 2) / alpha^2) instead of exp(-tan^2(delta) / alpha^2). The same pole at
-    grazing: at 90 degrees it is the finite value at the float64 nearest pi/2.
+    Eq. (5b), which the paper offers as an approximation of (5a). It equals `ward` at the peak and differs away from it.
+    The exponent is -2 (..) / (1 + h.n) of the normalised half vector, where (5a) has -(..) / (h.n)^2. The lobe falls
+    off as exp(-4 sin^2(delta / 2) / alpha^2) instead of exp(-tan^2(delta) / alpha^2). The pole at grazing is that of
+    `ward`: at 90 degrees f_r is the finite value at the float64 nearest pi/2.
 
     References
     ----------
@@ -137,15 +137,15 @@ def ward_half_vector(
 def ward_half_vector_vectors(
     wi: ArrayLike, wr: ArrayLike, *, rho_d: ArrayLike, rho_s: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike
 ) -> Floats:
-    """`ward_half_vector` for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3)."""
+    """Return `ward_half_vector` [1/sr] for unit vectors `wi` (light) and `wr` (viewer) of shape (..., 3)."""
     return by_vectors(HALF_VECTOR, wi, wr, rho_d, rho_s, alpha_x, alpha_y)
 
 
-_WARD_ALPHA, _MUCH_GREATER = 0.2, 2.0  # "not much greater" is less than twice
+_WARD_ALPHA, _MUCH_GREATER = 0.2, 2.0  # limit of alpha, and ratio that counts as "much greater"
 
 
 def limits(arguments: Arguments) -> list[StatedLimit]:
-    """Return the limits of validity that Ward 1992 states, of eq. 4 and of eq. 5."""
+    """Return the limits of validity that Ward 1992 states for eq. 4 and eq. 5."""
     values = {name: float(value) for name, value in arguments.items()}
     alpha, total = max(values["alpha_x"], values["alpha_y"]), values["rho_d"] + values["rho_s"]
     return [
@@ -199,8 +199,9 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
     yield ModelForm("lambert", "Lambert, rho_d + rho_s", "approximation", "models.lambert", flat, 8)
 
 
-# Measured at 89.5 degrees for rho_s = 1 over both alphas: 1.073 (0.001 and 1.07), and 2.07 of eq. (5b), which exceeds 1
-# from 87.6 degrees on. Both grow as 1 / sqrt(cos(theta_i)). Up to an alpha of 0.2 neither reaches 1 there.
+# The albedo was measured at 89.5 degrees for rho_s = 1 over both alphas. It reaches 1.073 (0.001 and 1.07), and 2.07
+# for eq. (5b), which exceeds 1 from 87.6 degrees on. Both grow as 1 / sqrt(cos(theta_i)). Neither reaches 1 at that
+# angle up to an alpha of 0.2.
 _GRAZING = (
     "Ward 1992, section 4.2: the normalisation holds for alpha up to about 0.2; rougher lobes reflect more than they "
 )

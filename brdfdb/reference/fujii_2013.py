@@ -6,8 +6,7 @@ from brdfdb.reference import Number, mp
 def fujii(theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, sigma: Number) -> Number:
     """Return f_r [1/sr] for the albedo `rho` and roughness `sigma` [1], from 0 (Lambert) to 1; not a slope deviation.
 
-    `sigma` is the ratio of the amplitudes B and A, which are normalised where a surface seen along its normal reflects
-    most. The article does not number its equations.
+    `sigma` is the ratio of the amplitudes B and A. The article does not number its equations.
     """
     theta_i, theta_r = mp.mpf(theta_i), mp.mpf(theta_r)
     rho, sigma = mp.mpf(rho), mp.mpf(sigma)

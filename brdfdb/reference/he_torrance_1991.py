@@ -1,6 +1,6 @@
 """He, Torrance, Sillion and Greenberg 1991 at 40 digits: three parts, polarisation, two limits.
 
-Our directions point away from the surface; the paper's k_i travels towards it, so k_i = -(direction of the light).
+Directions point away from the surface. The k_i of the paper points towards it, so that k_i = -(direction of the light).
 Lengths of the surface are micrometres, wavelengths nanometres. Departures from print: Eq. (25) has the Gaussian of
 Smith 1967, v in Eq. (78) carries the wave number, Eq. (76) is written without its factor that is exactly 1, the root of
 Eq. (81) is taken by Lambert's W, Eq. (72) is a/pi, and M_ps of Eq. (64) has the minus sign that M_sp of Eq. (62) has.
@@ -112,7 +112,7 @@ def very_rough(theta_i: Number, theta_r: Number, delta_phi: Number, slope: Numbe
 
 
 def smooth(theta_i: Number, n: Number, k: Number) -> Number:
-    """Return the specular reflectivity [1] of a smooth surface, the factor |F|^2 of Eq. (10)."""
+    """Return the specular reflectance [1] of a smooth surface, the factor |F|^2 of Eq. (10)."""
     # Eq. (10)
     return fresnel_unpolarised(mp.cos(mp.mpf(theta_i)), n, k)
 
@@ -120,7 +120,7 @@ def smooth(theta_i: Number, n: Number, k: Number) -> Number:
 def specular_reflectance(
     theta_i: Number, wavelength_nm: Number, sigma_0_um: Number, tau_um: Number, n: Number, k: Number
 ) -> Number:
-    """Return the specular reflectivity rho_s [1] of Eq. (73), in the mirror direction theta_r = theta_i."""
+    """Return the specular reflectance rho_s [1] of Eq. (73), in the mirror direction theta_r = theta_i."""
     theta_i = mp.mpf(theta_i)
     wavelength = mp.mpf(wavelength_nm) / 1000
     sigma_0, tau = mp.mpf(sigma_0_um), mp.mpf(tau_um)
@@ -186,8 +186,8 @@ def lateral_phase(theta_i: Number, theta_r: Number, delta_phi: Number, wavelengt
 def series(g: Number, V: Number) -> Number:
     """Return the sum [1] of Eq. (78), g^m e^-g / (m! m) exp(-V/m) over m from 1 on, with V = v_xy^2 tau^2 / 4.
 
-    Term by term, up and down from the largest one until a term is below 1e-50 of the sum: thousands of terms, about a
-    second at g = 1e6.
+    Terms are added up and down from the largest one until a term is below 1e-50 of the sum. At g = 1e6 these are
+    thousands of terms, which take about a second.
     """
     with mp.workdps(mp.dps + 20):  # log(largest term) is a difference of numbers near g ln g
         g, V = mp.mpf(g), mp.mpf(V)

@@ -77,7 +77,7 @@ def aperture_diffuse(
 
 
 def _common_area(first: Number, second: Number, apart: Number) -> Number:
-    """Return area common to two circles of the radii `first` and `second` on the unit sphere, their centres `apart`."""
+    """Return the area [sr] common to two circles of radii `first` and `second` [rad], centres `apart` [rad]."""
     if apart >= first + second:
         return mp.zero
     if apart <= abs(first - second):

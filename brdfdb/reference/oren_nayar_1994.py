@@ -98,7 +98,7 @@ def single_slope_integral(
     """Return direct (Eq. 23) and interreflected (Eq. 46, with the factor of Eq. 47) part of f_r [1/sr], integrated.
 
     `unidirectional` averaged over the azimuth of the cavities by the tanh-sinh rule, in pieces between the azimuths
-    where shadowing or masking begins, ends or takes over from the other. About a second a value.
+    where shadowing or masking begins, ends or takes over from the other. A value takes about a second.
     """
     theta_i, theta_r, delta_phi = mp.mpf(theta_i), mp.mpf(theta_r), mp.mpf(delta_phi)
 
@@ -126,7 +126,7 @@ def gaussian(theta_i: Number, theta_r: Number, delta_phi: Number, rho: Number, s
     The weight is P sin(theta_a) = exp(-theta_a^2 / (2 sigma^2)) sin(theta_a), normalised to one over theta_a from 0 to
     pi/2, and phi_a is averaged. Float64, not 40 digits: the tanh-sinh rule in both angles, in pieces between the kinks,
     refined until a doubling of the nodes moves neither part by 1e-11 of itself (for sigma below 0.01, by 1e-15 /
-    sigma^2: the interreflection is lost in rounding there). About half a second a value.
+    sigma^2, because the interreflection is lost in rounding there). A value takes about half a second.
     """
     theta_i, theta_r, delta_phi = float(theta_i), float(theta_r), float(delta_phi)
     rho, sigma = float(rho), float(sigma)

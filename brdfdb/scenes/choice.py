@@ -1,4 +1,4 @@
-"""The cheapest form of each material that a scene cannot tell from the truth."""
+"""The choice for a scene: the cheapest form of each material within the tolerance of the picture."""
 
 from __future__ import annotations
 
@@ -22,36 +22,38 @@ from brdfdb.scenes.renderer import Reflector, composed, radiance
 from brdfdb.scenes.scene import Scene, Tolerance
 from brdfdb.scenes.shapes import Array
 
-GRAZING_DEG = 89.99  # up to where errors count: nearer to the horizon models have poles, and a sphere shows 3e-8 of it
-# Of a statement from samples, over all rounds of checks that might be the last: a round has fresh places, which its
-# choices were not fitted to, and the one numbered j spends 1 / (j (j + 1)) of what may go wrong
+# Largest angle from the normal at which errors count. Nearer to the horizon models have poles, and a sphere shows only
+# 3e-8 of its area there
+GRAZING_DEG = 89.99
+# Confidence of a statement from samples, over all rounds of checks. A round has fresh places, to which its choices were
+# not fitted. Round j takes 1 / (j (j + 1)) of the probability of error
 CONFIDENCE = 0.95
-DARK = 1e-3  # exposed radiance: relative errors of what is darker are relative to this
-FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # integrals over facets are known to 1e-6
+DARK = 1e-3  # exposed radiance below which errors are relative to this value
+FINEST = {"relative": 1e-6, "CIEDE2000": 1e-4}  # least tolerances, because integrals over facets are known to 1e-6
 
 
 class InfeasibleError(ParameterError):
-    """A tolerance that is finer than the truth is known."""
+    """A tolerance smaller than the error of the truth."""
 
 
 class Left(NamedTuple):
-    """The error that is left over the places of a material: at the percentile of the tolerance, and the largest."""
+    """The error over the places of a material: at the percentile of the tolerance, and the largest."""
 
     counted: float
     most: float
 
 
 class Pick(NamedTuple):
-    """The form that is chosen for a material and the best of what is clearly cheaper, if any, as indices."""
+    """The chosen form of a material and the best of the clearly cheaper forms, if any, as indices."""
 
     chosen: int
     cheaper: int | None
 
 
 class Sample(NamedTuple):
-    """A sample of the places of a material: how many, and how far the choices are off there.
+    """A sample of the places of a material: their number, and the errors of the choices there.
 
-    `share` is the upper bound, at `CONFIDENCE`, of the share of all places so drawn that are beyond the tolerance.
+    `share` is the upper bound, at `CONFIDENCE`, of the share of all such places that exceed the tolerance.
     """
 
     places: int
@@ -60,22 +62,22 @@ class Sample(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """The choice for a material: the error that it leaves by itself, and with all other choices.
+    """The choice for a material, with its error by itself and together with all other choices.
 
     Attributes
     ----------
     pick : Pick
-        Form that is chosen.
+        The chosen form.
     left : Left
-        By itself, where forms are compared.
+        Error of the choice by itself, at the places where forms are compared.
     cheaper_left : Left or None
-        How the next cheaper breaks the tolerance.
+        Error of the next cheaper form, which exceeds the tolerance.
     refused : bool
-        Whether the next cheaper does so only where choices are checked.
+        True if the next cheaper form exceeds the tolerance only at the places where choices are checked.
     whole : Left
-        With all other choices, at every pixel of the picture, and at fresh places.
+        Error together with all other choices, at every pixel of the picture and at fresh places.
     even, edges : Sample or None
-        Fresh places: evenly spread over the picture, and at edges; None of a recorded scene.
+        Fresh places, evenly spread over the picture and at edges. None for a recorded scene.
     """
 
     pick: Pick
@@ -93,11 +95,11 @@ class Seen:
     Parameters
     ----------
     scene : Scene
-        Scene that is seen.
+        The scene.
     view : View
-        Its points.
+        The points of the view.
     truths : mapping
-        By the name of each material, the form that the others are compared with.
+        By the name of each material, the form with which the others are compared.
     materials : mapping
         The result of `brdfdb.scenes.renderer.reflectors`: mirror and albedo, which are the same for all forms.
 
@@ -116,7 +118,7 @@ class Seen:
         self.truth = composed(scene, view, self._lists, materials)
 
     def _radiances(self, forms: Mapping[str, OfferedForm]) -> list[Floats]:
-        """Return the radiance of each list of points: by its form, or else the truth."""
+        """Return the radiance of each list of points, by its form if it has one, else by the truth."""
         return [
             radiance(self.scene, points, self._materials[points.material], forms[points.material].brdf)
             if points.material in forms
@@ -147,7 +149,7 @@ class Seen:
     def differences(self, picture: Array) -> Array:
         """Return the difference of each pixel (height, width) from the truth, in the unit of the tolerance.
 
-        Relative errors are those of spectral radiance at the worst wavelength.
+        Relative differences are those of spectral radiance at the worst wavelength.
         """
         return _differences(self.scene, self.truth, picture)
 
@@ -164,25 +166,25 @@ def _differences(scene: Scene, truth: Array, picture: Array) -> Array:
 
 
 def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick:
-    """Pick the cheapest form that keeps to a tolerance; of those that cost about the same, the most accurate.
+    """Pick the cheapest form within a tolerance. Of forms with about the same cost, pick the most accurate one.
 
     Parameters
     ----------
     costs : array of shape (rounds, forms)
-        Of each form in each round of timing, in one unit; one round of costs that do not scatter.
+        Cost of each form in each round of timing, in one unit. Costs without scatter have one round.
     error : callable
-        Of the form with an index, 0 of the truth; asked in the order of median costs, and of nothing clearly
-        costlier than need be.
+        ``error(index)`` gives the error of a form, which is 0 for the truth. It is called in the order of median costs,
+        and not for forms that are clearly costlier than necessary.
     tolerance : float
-        Of the error.
+        Largest error.
 
     Returns
     -------
     Pick
-        The cost is about the same where neither is clearly cheaper (`brdfdb.forms.timing.clearly_cheaper`), as in a
-        chart; the error, where it is less than `brdfdb.forms.timing.ALIKE` times as large. Of forms alike in both
-        it is the one given first. The next cheaper is the most accurate of those that are clearly cheaper than the
-        choice, all of which break the tolerance.
+        Two costs are about the same if neither is clearly cheaper (`brdfdb.forms.timing.clearly_cheaper`), as in a
+        chart. Two errors are about the same if their ratio is less than `brdfdb.forms.timing.ALIKE`. Of forms alike in
+        both, the first one given is picked. The next cheaper form is the most accurate of the forms that are clearly
+        cheaper than the choice, all of which exceed the tolerance.
     """
     errors: dict[int, float] = {}
     least: int | None = None
@@ -199,7 +201,7 @@ def pick(costs: Floats, error: Callable[[int], float], tolerance: float) -> Pick
 
 
 def check_feasible(tolerance: Tolerance) -> None:
-    """Raise an InfeasibleError if a tolerance is finer than the truth is known."""
+    """Raise an InfeasibleError if a tolerance is smaller than the error of the truth."""
     value, unit = tolerance.value, tolerance.unit
     if value < FINEST[unit]:
         raise InfeasibleError(
@@ -208,13 +210,13 @@ def check_feasible(tolerance: Tolerance) -> None:
 
 
 class Look(NamedTuple):
-    """A scene at places that are spread evenly, as the pixels of a picture are, and at places near edges, if any."""
+    """A scene at evenly spread places, such as the pixels of a picture, and at places near edges, if any."""
 
     even: Seen
     edges: Seen | None
 
     def errors(self, names: Iterable[str], forms: Mapping[str, OfferedForm]) -> dict[str, list[Array]]:
-        """Return the errors of materials with forms for some, all at once: at even places, and at edges."""
+        """Return the errors of materials at even places and at edges, with forms for some of them at once."""
         seen = [self.even] if self.edges is None else [self.even, self.edges]
         pictures = [view.picture(forms) for view in seen]
         return {
@@ -223,7 +225,7 @@ class Look(NamedTuple):
 
 
 def _left(errors: Sequence[Array], percentile: float) -> Left:
-    """Return what is left of errors at even places, and at edges, which count where all places do."""
+    """Return the error at even places and at edges. Edges count if the tolerance is for all places."""
     most = max(float(values.max(initial=0.0)) for values in errors)
     if percentile == 100.0 or not errors[0].size:
         return Left(most, most)
@@ -231,7 +233,7 @@ def _left(errors: Sequence[Array], percentile: float) -> Left:
 
 
 def _sample(errors: Array, tolerance: float, confidence: float) -> Sample:
-    """Return a sample with Clopper and Pearson's upper bound; where nothing was drawn, anything may be beyond."""
+    """Return a sample with the upper bound of Clopper and Pearson. The bound of an empty sample is 1."""
     beyond, places = int(np.count_nonzero(errors > tolerance)), errors.size
     share = 1.0 if beyond == places else float(stats.beta.ppf(confidence, beyond + 1, places - beyond))
     return Sample(places, float(errors.max(initial=0.0)), share)
@@ -249,27 +251,28 @@ def choose(
     Parameters
     ----------
     planned : Look
-        Picture, and places near edges, where each form is compared with a picture that is true otherwise.
+        Picture, and places near edges, where each form is compared with the truth, all other materials at their truth.
     check : callable
-        Gives the scene at fresh places for a round from 1 on, to check all choices at once; None if it has no others.
+        ``check(round)`` gives the scene at fresh places for a round from 1 on, to check all choices at once. It gives
+        None if the scene has no other places.
     offered : mapping
         Forms of each material by its name, the truth first.
     costs : mapping
         Costs of the forms of each material, of shape (rounds, forms).
     tick : callable
-        Called for each material, and for each round of checks.
+        A function that is called for each material, and for each round of checks.
 
     Returns
     -------
     dict
-        A decision for each material. Where the whole breaks the tolerance, the choices that do so by themselves are
-        refused, or, if only all of them together do, the one that leaves the most; the truth is never refused. Then the
-        next round looks at other places.
+        A decision for each material. If all choices together exceed the tolerance, the choices that exceed it by
+        themselves are refused. If none does, the choice with the largest error is refused. The truth is never refused.
+        Then the next round checks other places.
 
     Raises
     ------
     InfeasibleError
-        If the tolerance is finer than the truth is known.
+        If the tolerance is smaller than the error of the truth.
     """
     check_feasible(planned.even.scene.tolerance)
     tolerance, percentile = planned.even.scene.tolerance.value, planned.even.scene.tolerance.percentile
@@ -320,6 +323,6 @@ def choose(
 
 
 def _broken(own: Mapping[str, Left], whole: Left, tolerance: float) -> dict[str, Left]:
-    """Return the choices that break the tolerance by themselves, or else the one that leaves the most, and how far."""
+    """Return the errors of choices that exceed the tolerance by themselves, else of the one with the largest error."""
     broke = {name: left for name, left in own.items() if left.counted > tolerance}
     return broke or {max(own, key=lambda name: own[name]): whole}

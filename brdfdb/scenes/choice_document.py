@@ -15,7 +15,7 @@ from brdfdb.scenes.choice import CONFIDENCE, GRAZING_DEG, Decision, Left, Sample
 from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb.scenes.scene import Scene, Tolerance
 
-THIRD = 1.0 / 3.0  # of the truth: what a choice is expected to cost at most
+THIRD = 1.0 / 3.0  # largest expected cost of a choice, as a share of the truth's cost
 
 Weigh = Literal["time", "bytes", "both"]
 
@@ -23,7 +23,7 @@ _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
 class Price(NamedTuple):
-    """The price of a form: time [ns] of a pair of directions, and what is weighed in each round of timing."""
+    """The price of a form: time [ns] of a pair of directions, and the weighed cost in each round of timing."""
 
     ns: float
     costs: Floats
@@ -39,19 +39,19 @@ class Residue(BaseModel):
 
     model_config = _STRICT
 
-    counted: float = Field(description="at the percentile of the tolerance: what keeps to it")
+    counted: float = Field(description="error at the percentile of the tolerance, which must keep to it")
     most: float = Field(description="largest")
 
 
 class Sampled(BaseModel):
-    """A sample of the places that show a material, which played no part in the choice."""
+    """A sample of the places that show a material. They were not used to choose."""
 
     model_config = _STRICT
 
-    places: int = Field(description="looked at")
-    most: float = Field(description="largest error at them")
+    places: int = Field(description="number of places")
+    most: float = Field(description="largest error at these places")
     one_in: int = Field(
-        description="fewer than 1 in so many of all places so drawn is beyond the tolerance, with the confidence stated"
+        description="fewer than 1 in so many of all such places exceeds the tolerance, with the stated confidence"
     )
 
 
@@ -63,39 +63,41 @@ class Option(BaseModel):
     key: str
     title: str
     kind: Kind
-    python: str = Field(description="what it is called in Python")
+    python: str = Field(description="name in Python")
     dtype: Literal["float64", "float32"]
-    wavelengths_nm: list[float] | None = Field(description="that it is evaluated at; null of a grey form")
-    bytes: int = Field(description="of the numbers that an evaluation reads")
-    ns: float = Field(description="of a pair of directions at all wavelengths of the scene, on one thread")
-    share: float = Field(description="of what the truth costs, as it is weighed")
+    wavelengths_nm: list[float] | None = Field(description="wavelengths of its evaluation; null for a grey form")
+    bytes: int = Field(description="size of the numbers that an evaluation reads")
+    ns: float = Field(description="time of a pair of directions at all wavelengths of the scene, on one thread")
+    share: float = Field(description="weighed cost as a share of the truth's cost")
     error: Residue
 
 
 class Material(BaseModel):
-    """What is chosen for a material, and why."""
+    """The choice for a material, and its reason."""
 
     model_config = _STRICT
 
     material: str
     title: str
-    pixels: int = Field(description="of the picture that show it, directly or in a mirror")
+    pixels: int = Field(description="number of pixels that show it, directly or in a mirror")
     truth: Option
     choice: Option
-    next_cheaper: Option | None = Field(description="the most accurate of what is cheaper; null without any")
-    refused: bool = Field(description="whether the next cheaper breaks it only where choices are checked")
-    whole: Residue = Field(description="of the choices all at once: at all pixels of the picture, and all samples")
+    next_cheaper: Option | None = Field(description="the most accurate of the cheaper forms; null if there are none")
+    refused: bool = Field(
+        description="true if the next cheaper form exceeds the tolerance only where choices are checked"
+    )
+    whole: Residue = Field(description="error of all choices at once: at all pixels of the picture, and all samples")
     even: Sampled | None = Field(description="places anywhere in the picture, equally likely; null if recorded")
     edges: Sampled | None = Field(
         description="places beside limbs, terminators and edges of shadows: each power of ten of the distance, from a "
         "pixel's width down to a hundred millionth of it, is equally likely; null if recorded"
     )
     reason: str
-    revision: str | None = Field(description="of the table in the store, if a store was named and a table chosen")
+    revision: str | None = Field(description="revision of the table, if a store was named and a table chosen")
 
 
 class Choice(BaseModel):
-    """The cheapest form of each material that a scene cannot tell from the truth."""
+    """The cheapest form of each material within the tolerance of the picture of a scene."""
 
     model_config = _STRICT
 
@@ -106,23 +108,23 @@ class Choice(BaseModel):
     tolerance: Tolerance
     weigh: Weigh
     picture: tuple[int, int] = Field(
-        description="pixels across and down: the choices keep to the tolerance at each of them, seen through its middle"
+        description="pixels across and down; the choices keep to the tolerance at each of them, seen through its middle"
     )
-    confidence: float = Field(description="of statements on samples, for each material and each kind of sample")
+    confidence: float = Field(description="confidence of statements on samples, for each material and kind of sample")
     grazing_deg: float = Field(description="angle from the normal up to which errors count; nothing is stated beyond")
-    statement: str = Field(description="what is proven, and what is sampled, in a few sentences")
+    statement: str = Field(description="proven and sampled results in a few sentences")
     materials: list[Material]
 
 
 def within(tolerance: Tolerance) -> str:
-    """Return in words how far a picture may be off."""
+    """Return a tolerance of a picture in words."""
     share = tolerance.percentile
     where = "" if share == 100.0 else f" at {share:g} % of the places of each material"
     return f"within {tolerance.value:g} ({tolerance.unit}){where}"
 
 
 def statement(tolerance: Tolerance, picture: tuple[int, int], materials: Sequence[Material]) -> str:
-    """Return in words what is proven of choices, and what follows from samples, with which confidence."""
+    """Return the proven results for the choices and the results of samples, with their confidence, in words."""
     value = f"{tolerance.value:g}"
     size, share = f"{picture[0]} x {picture[1]}", tolerance.percentile
     proven = f"Proven: each of the {size} pixels, seen through its middle, is within {value}."
@@ -152,7 +154,7 @@ def describe(
     pixels: Mapping[str, int],
     revisions: Mapping[str, str],
 ) -> list[Material]:
-    """Return the choice for each material of a scene: costs to three digits, and reasons."""
+    """Return the choice for each material of a scene, with costs to three digits and reasons."""
 
     def option(name: str, index: int, left: Left) -> Option:
         one, price = offered[name][index], prices[name][index]
@@ -197,7 +199,7 @@ def describe(
 
 
 def _reason(choice: Option, cheaper: Option | None, decision: Decision, tolerance: float) -> str:
-    """Return the reason for a choice, and a remark if it costs more than a third of the truth."""
+    """Return the reason for a choice, with a remark if it costs more than a third of the truth."""
     clause = "is the truth itself" if decision.pick.chosen == 0 else f"leaves {choice.error.counted:.2g}"
     if decision.pick.chosen != 0 and choice.share > THIRD:
         clause += f" at {choice.share:.2g} of the truth's cost, more than a third"
@@ -209,7 +211,7 @@ def _reason(choice: Option, cheaper: Option | None, decision: Decision, toleranc
 
 
 def _above(tolerance: float, error: float) -> str:
-    """Return an error with as many digits as show that it is above the tolerance, two at least."""
+    """Return an error as text, with at least two digits and enough to show that it is above the tolerance."""
     return next(text for digits in range(2, 18) if float(text := f"{error:.{digits}g}") > tolerance)
 
 
@@ -218,7 +220,7 @@ def _residue(left: Left) -> Residue:
 
 
 def _sampled(sample: Sample | None) -> Sampled | None:
-    """Return a sample as it is written: bounds are rounded so that they hold."""
+    """Return the record of a sample, with bounds rounded so that they remain true."""
     if sample is None:
         return None
     return Sampled(places=sample.places, most=sample.most, one_in=int(1.0 / sample.share))

@@ -1,4 +1,4 @@
-"""Light from all around: radiance over the sphere, and directions towards it drawn from the lobe of a material."""
+"""Environments: radiance over the sphere, and directions towards it drawn from the lobe of a material."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from brdfdb.lobes import Lobe
 from brdfdb.materials import Source
 from brdfdb.scenes.shapes import STRICT, Array
 
-# Of the directions, how many a lobe gets at least, or few would carry all of a faint gloss, and at most, which bounds
-# f_r cos / pdf in its tails, and for every other f_r that is evaluated at the same directions
+# Least and largest share of directions that follow a lobe. With fewer, a few directions would carry all of a faint
+# gloss. The largest share bounds f_r cos / pdf in the tails, also for other forms at the same directions
 _LEAST, _MOST = 0.25, 0.9
 _TURN = (np.sqrt(5.0) - 1.0) / 2.0  # the golden section
-_LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}  # of linear sRGB
+_LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}  # luminance of the primaries of linear sRGB
 
 
 class Environment(BaseModel):
-    """Radiance from every direction, far away, as multiples of the scene's illuminant: it has no colour of its own.
+    """Radiance from far away in every direction, in multiples of the scene's illuminant, without a colour of its own.
 
-    Rows of numbers, all equally long, are a picture in latitude and longitude as one sees it from inside. The first
-    row is around the zenith (+z), the last around the nadir. From left to right the azimuth falls from 180 to -180
-    degrees: the middle of the picture is towards +x, its left quarter towards +y, both edges towards -x. Numbers stand
-    for the middles of their pixels, and are joined bilinearly, across both edges, too; from the middles of the first
-    and the last row on to the poles they stay the same.
+    Rows of numbers, all equally long, are a picture in latitude and longitude, seen from inside. The first row is
+    around the zenith (+z), and the last around the nadir. The azimuth falls from 180 degrees on the left to -180
+    degrees on the right: the middle of the picture is towards +x, its left quarter towards +y, and both edges towards
+    -x. A number is the radiance at the middle of its pixel. Interpolation is bilinear, also across both edges. It is
+    constant from the middles of the first and the last row to the poles.
 
     `file`, in place of rows, is an EXR (its channel ``Y``, or else the luminance of ``R``, ``G``, ``B``), an .npz with
-    an array ``radiance``, or a .npy. Where an object stands in the light the environment is dark: what that object
-    sends on is not traced. The lights of the scene are no part of the picture, or they would count twice.
+    an array ``radiance``, or a .npy. The environment is dark where an object stands in its light, because the light of
+    that object is not traced. The lights of the scene are not in the picture, or they would count twice.
     """
 
     model_config = STRICT
@@ -44,7 +44,7 @@ class Environment(BaseModel):
     rows: list[list[float]] | None = Field(default=None, description="from the zenith to the nadir")
     file: str | None = Field(default=None, min_length=1, description="EXR, .npz or .npy; lies beside the scene")
     samples: int = Field(default=32, ge=1, le=4096, description="directions for each point, drawn from its lobe")
-    seed: int = Field(default=0, ge=0, description="of what these directions are turned by, from point to point")
+    seed: int = Field(default=0, ge=0, description="seed of the random turns of these directions from point to point")
 
     @field_validator("rows")
     @classmethod
@@ -67,12 +67,12 @@ class Environment(BaseModel):
 
     @property
     def picture(self) -> Array:
-        """Radiance (rows, columns).
+        """The radiance (rows, columns), in multiples of the illuminant.
 
         Raises
         ------
-        ValueError
-            If the file is not there, not readable, or holds no picture; if radiance is negative, not finite, or
+        ParameterError
+            If the file does not exist, is not readable, or holds no picture. If radiance is negative, not finite, or
             nowhere above 0.
         """
         if self.file is None:
@@ -99,32 +99,33 @@ class Environment(BaseModel):
         return np.asarray((1.0 - down) * along(upper) + down * along(lower))
 
     def drawn(self, source: Source, wavelength_nm: Array, wr: Array, stream: tuple[int, ...]) -> Drawn:
-        """Draw directions for points of a source, from its lobe around the mirror direction and from all above.
+        """Draw directions for points of a source, from its lobe around the mirror direction and from the hemisphere.
 
         Parameters
         ----------
         source : Source
             The source of f_r at the points.
         wavelength_nm : array (L,) [nm]
-            Those of the scene: the lobe is as wide as at the wavelength where it is widest.
+            Wavelengths of the scene. The lobe is that of the wavelength where it is widest.
         wr : array (N, 3)
             Unit vectors towards the viewer in the frame of the surface.
         stream : tuple of int
-            Which points these are: others are turned independently.
+            Numbers that identify the points. The turns of other points are independent.
 
         Returns
         -------
         Drawn
-            `samples` directions for each point, the same whenever they are drawn.
+            `samples` directions for each point, the same in every call.
 
         Notes
         -----
-        By reciprocity the lobe around the viewer's mirror direction is that of the light. Half vectors follow eq. (7)
-        of Ward 1992 (``ward1992``), with its misprint put right and weights in place of "uniformly weighted" ones.
+        By reciprocity the lobe around the mirror direction of the viewer equals that of the light. Half vectors follow
+        eq. (7) of Ward 1992 (``ward1992``), with its misprint corrected and weights in place of "uniformly weighted"
+        samples.
         """
         turns = np.random.default_rng([self.seed, *stream]).random((2, 1, len(wr)))
         number = np.arange(self.samples)[:, np.newaxis]
-        # Even over the unit square for any number of samples, and turned: even for each point, independent between them
+        # The numbers are even over the unit square for any number of samples. Random turns make points independent
         u1, u2 = (number / self.samples + turns[0]) % 1.0, (number * _TURN + turns[1]) % 1.0
         lobe = _widest(source, wavelength_nm, wr)
         wi = directions(lobe, u1, u2, wr)
@@ -133,10 +134,10 @@ class Environment(BaseModel):
 
 
 class Drawn(NamedTuple):
-    """Unit vectors (samples, N, 3) in the frame of the surface, and the solid angles [sr] that they stand for.
+    """Unit vectors (samples, N, 3) in the frame of the surface, and their solid angles (samples, N) [sr].
 
-    Summed over the samples, f_r times radiance times cosine times solid angle is an unbiased estimate of what is
-    reflected. Solid angles (samples, N) are 0 below the horizon.
+    The sum over samples of f_r times radiance times cosine times solid angle is an unbiased estimate of the reflected
+    radiance. Solid angles are 0 below the horizon.
     """
 
     wi: Array
@@ -171,7 +172,7 @@ def _checked(name: str, picture: Array) -> Array:
 
 @functools.lru_cache(maxsize=4)
 def _read(path: Path, _written: int) -> Array:
-    """Return the picture of a file, kept until it is written anew: every list of points asks for it."""
+    """Return the picture of a file. It is kept in memory until the file changes, because all lists of points use it."""
     picture = _from_exr(path) if path.suffix == ".exr" else _from_numpy(path)
     if picture.ndim != 2 or picture.dtype.kind not in "iuf" or not picture.size:
         raise ParameterError("environment.file", f"{path}: must hold numbers of shape (rows, columns)")

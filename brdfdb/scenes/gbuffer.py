@@ -1,4 +1,4 @@
-"""What a camera sees of a scene: for each object the visible points, with viewer and lights in the surface's frame."""
+"""The view of a camera: the visible points of each object, with viewer and lights in the frame of the surface."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.scene import Camera, Object, Scene
 from brdfdb.scenes.shapes import Array, Plane, unit
 
-# How far off their surface shadow and mirror rays begin: of the height that the picture has there, and of coordinates,
-# which are rounded
+# Distance of the origins of shadow and mirror rays from their surface, as a share of the height of the picture there,
+# and as a share of coordinates, which are rounded
 _LIFT, _ROUNDED = 1e-4, 1e-14
-_BATCH = 40_000  # shadow rays at a time: fewer are slow for the calls, twice as many leave the cache
-_BEHIND = -0.1  # cosine: the smooth normals of cones turn away by half a degree at limbs, backs of surfaces by more
-_WIDEST, _MOST = 8192, 16384  # pixels on either side of a picture, and rays: a spectral one of 8192 x 6144 takes 16 GB
-_LENGTH_OFF = 0.05  # how far from 1 a recorded vector may be, which is then made 1 long: EXR with 16 bits is at 5e-4
+_BATCH = 40_000  # shadow rays at a time; fewer are slow because of the calls, and twice as many leave the cache
+# Cosine that separates limbs from backs of surfaces. The smooth normals of cones turn away by half a degree at limbs
+_BEHIND = -0.1
+_WIDEST, _MOST = 8192, 16384  # most pixels and most rays on a side; a spectral picture of 8192 x 6144 takes 16 GB
+_LENGTH_OFF = 0.05  # largest error of the length of a recorded vector; it is 5e-4 in an EXR with 16 bits
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """The points of one object that a camera sees, or that another object shows in its mirror.
+    """The points of one object that a camera sees, directly or in the mirror of another object.
 
     Attributes
     ----------
@@ -35,18 +36,18 @@ class Points:
     wr : array (N, 3)
         Unit vectors towards the viewer in the frame of the surface: x along the grain, z the normal.
     wi : array (E, N, 3)
-        The same towards each sample of each light, and then in each direction that is drawn of the environment.
+        Unit vectors towards each sample of each light, then towards each drawn direction of the environment.
     irradiance : array (E, N)
-        Irradiance of the surface by that sample, cosine included; 0 in shadow. pi for a light of strength 1 that the
-        surface faces; for spectral irradiance, times the illuminant. Of the environment, radiance times cosine times
-        the solid angle that the direction stands for.
+        Irradiance of the surface by that sample, cosine included; 0 in shadow. It is pi for a light of strength 1 that
+        the surface faces, and is multiplied with the illuminant for spectral irradiance. For the environment, it is
+        radiance times cosine times the solid angle of the direction.
     beyond : array (N,)
-        Radiance that arrives from the mirror direction: of a light with a solid angle, ambient, and the environment; 0
+        Radiance from the mirror direction: that of a light with a solid angle, ambient radiance, and the environment. 0
         where an object of the list stands there.
     via : int or None
-        In the mirror of which points of the list these are seen; None if the camera sees them.
+        Number of the points of the list in whose mirror these are seen; None if the camera sees them.
     at : int array (N,)
-        The pixel of each point, counted row by row from the top; or its index among the points of `via`.
+        The pixel of each point, counted row by row from the top, or its index among the points of `via`.
     """
 
     name: str
@@ -60,10 +61,10 @@ class Points:
 
 
 class View(NamedTuple):
-    """What a camera sees: points, those seen in mirrors after those that they are seen in.
+    """The view of a camera: lists of points. Points seen in a mirror come after the points of the mirror.
 
-    `samples` are the rays of each of width x height pixels; where fewer points are, the rest of the pixel sees none.
-    `background` (width * height,) is the radiance of the environment along these, summed over the rays of each pixel.
+    `samples` is the number of rays of each of width x height pixels. Rays without a point meet no object.
+    `background` (width * height,) is the radiance of the environment along those, summed over the rays of each pixel.
     """
 
     points: list[Points]
@@ -79,11 +80,11 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
     Parameters
     ----------
     scene : Scene
-        What is seen. One that is recorded has the size of its file.
+        The scene. A recorded scene has the size of its file.
     width : int
-        Pixels across the picture; the aspect of the camera says how many down. 8192 on either side at most.
+        Pixels across the picture. The aspect of the camera gives the pixels down. Either side has 8192 at most.
     across : int
-        Rays across each pixel and down: `across` squared are averaged. 16384 rays on either side at most.
+        Rays across each pixel and down, so that `across` squared are averaged. Either side has 16384 rays at most.
 
     Returns
     -------
@@ -92,14 +93,14 @@ def gather(scene: Scene, width: int, *, across: int = 1) -> View:
 
     Raises
     ------
-    ValueError
-        If a side has too many pixels or rays; if no ray meets an object, or the camera is inside one, or a light shines
-        on nothing that is seen; if a recorded file holds no directions, or that of an environment no picture.
+    ParameterError
+        If a side has too many pixels or rays. If no ray meets an object, the camera is inside one, or a light shines on
+        nothing visible. If a recorded file holds no directions, or the file of an environment no picture.
 
     Notes
     -----
-    Mirrors are surfaces whose model has a specular part, and show one reflection, as in section 5 of He et al. 1991
-    (``he1991``). The ambient radiance is not shadowed; the environment is, by objects that send nothing on themselves.
+    Mirrors are surfaces whose model has a specular part. They show one reflection, as in section 5 of He et al. 1991
+    (``he1991``). Objects shadow the environment, and their own light is not traced. Ambient radiance has no shadows.
     """
     first = scene.objects[0]
     if isinstance(first.shape, Recorded):
@@ -124,9 +125,9 @@ def gather_at(scene: Scene, places: Array) -> View:
     Parameters
     ----------
     scene : Scene
-        What is seen; not one that is recorded, which has no rays.
+        The scene, which must not be recorded, because a recorded scene has no rays.
     places : array of shape (N, 2)
-        As `brdfdb.scenes.scene.Camera.through` takes them.
+        Places in the picture, as in `brdfdb.scenes.scene.Camera.through`.
 
     Returns
     -------
@@ -151,7 +152,7 @@ def _traced(
 class _Surface(NamedTuple):
     """Points (N, 3), frames with tangent, across and normal as rows (N, 3, 3), and viewers (N, 3), all in the scene.
 
-    `away` (N,) is how far the camera is, by way of the mirror.
+    `away` (N,) is the distance to the camera, by way of the mirror.
     """
 
     position: Array
@@ -170,7 +171,7 @@ def _seen(
 ) -> tuple[list[Points], list[_Surface], NDArray[np.int64]]:
     """Return points of each object that rays meet first, the surfaces that they lie on, and the rays that meet none.
 
-    `before` is how far the origins are from the camera.
+    `before` is the distance of the origins from the camera.
     """
     distance, nearest = _trace(scene, origins, directions)
     away = before + distance
@@ -190,13 +191,13 @@ def _seen(
 
 
 def _mirrored(scene: Scene, points: list[Points], number: int, surface: _Surface) -> list[Points]:
-    """Return the points that the mirror of some points shows, and make 0 what would lie beyond."""
+    """Return the points that the mirror of some points shows, and set `beyond` to 0 where the mirror shows one."""
     facing = np.flatnonzero(points[number].wr[:, 2] > 0.0)
     origins, directions = _lifted(scene.camera, surface)[facing], _mirror(surface)[facing]
     reflected, surfaces, _ = _seen(scene, origins, directions, facing, number, surface.away[facing])
     for seen, shown in zip(reflected, surfaces, strict=True):
         points[number].beyond[seen.at] = 0.0
-        if scene.materials[seen.material].has_specular:  # what its mirror would show is not traced
+        if scene.materials[seen.material].has_specular:  # the mirror of a mirrored point is not traced
             seen.beyond[np.isfinite(_trace(scene, _lifted(scene.camera, shown), _mirror(shown))[0])] = 0.0
     return reflected
 
@@ -210,7 +211,7 @@ def _trace(scene: Scene, origins: Array, directions: Array) -> tuple[Array, NDAr
 
 
 def _lit(scene: Scene, item: Object, surface: _Surface, wr: Array, stream: tuple[int, int]) -> tuple[Array, Array]:
-    """Return directions of all samples of all light in the frame of the surface, and irradiances; 0 in shadow."""
+    """Return the directions of all samples of all lights in the frame of the surface, and irradiances, 0 in shadow."""
     lights = [(light.towards(), light.intensity) for light in scene.lights]
     towards = np.concatenate([np.zeros((0, 3)), *(samples for samples, _ in lights)])
     weight = np.concatenate([np.zeros(0), *(np.full(len(samples), total / len(samples)) for samples, total in lights)])
@@ -227,7 +228,7 @@ def _lit(scene: Scene, item: Object, surface: _Surface, wr: Array, stream: tuple
 
 
 def _shadow(scene: Scene, surface: _Surface, towards: Array, irradiance: Array) -> None:
-    """Make irradiance (E, N) 0 where an object stands in its direction (E, N, 3), in the frame of the scene."""
+    """Set irradiance (E, N) to 0 where an object stands in its direction (E, N, 3), in the frame of the scene."""
     if not scene.shadows:
         return
     origins = _lifted(scene.camera, surface)
@@ -238,7 +239,7 @@ def _shadow(scene: Scene, surface: _Surface, towards: Array, irradiance: Array) 
 
 
 def _from_afar(scene: Scene, directions: Array) -> Array:
-    """Radiance that comes along directions from beyond all objects: of lights, ambient, and of the environment."""
+    """Return the radiance from beyond all objects along directions: of lights, ambient, and of the environment."""
     radiance = np.full(len(directions), scene.ambient)
     if scene.environment is not None:
         radiance += scene.environment.radiance(directions)
@@ -248,7 +249,7 @@ def _from_afar(scene: Scene, directions: Array) -> Array:
 
 
 def _background(scene: Scene, directions: Array, at: NDArray[np.int64], pixels: int) -> Array:
-    """Radiance of the environment along rays that meet no object, summed over those of each pixel."""
+    """Return the radiance of the environment along rays that meet no object, summed over the rays of each pixel."""
     background = np.zeros(pixels)
     if scene.environment is not None:
         np.add.at(background, at, scene.environment.radiance(directions))
@@ -256,7 +257,7 @@ def _background(scene: Scene, directions: Array, at: NDArray[np.int64], pixels: 
 
 
 def _lifted(camera: Camera, surface: _Surface) -> Array:
-    """Return the origins of rays from a surface: outside it, but by no more than a small part of a pixel."""
+    """Return the origins of rays from a surface, outside it by a small part of a pixel."""
     lift = _LIFT * camera.covered(surface.away) + _ROUNDED * np.abs(surface.position).max(axis=1)
     return np.asarray(surface.position + lift[:, np.newaxis] * surface.frame[:, 2])
 
@@ -268,14 +269,14 @@ def _mirror(surface: _Surface) -> Array:
 
 
 def _turned(frame: Array, grain_deg: float) -> Array:
-    """Frames turned about their normals."""
+    """Return frames turned about their normals."""
     turn = float(radians(grain_deg))
     along = np.cos(turn) * frame[:, 0] + np.sin(turn) * frame[:, 1]
     return np.stack([along, np.cross(frame[:, 2], along), frame[:, 2]], axis=1)
 
 
 def _viewed(surface: _Surface) -> Array:
-    """Viewers in the frames of their points, 1 long to the last digit."""
+    """Return viewers in the frames of their points, unit vectors to the last digit."""
     return unit(np.einsum("nij,nj->ni", surface.frame, surface.viewer))
 
 
@@ -292,7 +293,7 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
     flat = {name: unit(array.reshape(-1, height * width, 3)[:, at]) for name, array in arrays.items()}
     if "normal" in flat:
         surface = _frames(flat, scene.camera, width, height, at, item.grain_deg)
-        # far apart, and no shadows: a file knows no positions
+        # A file holds no positions, so its points are far apart and have no shadows
         wr, beyond = _viewed(surface), _from_afar(scene, _mirror(surface))
         wi, irradiance = _lit(scene.model_copy(update={"shadows": False}), item, surface, wr, (0, 0))
     else:
@@ -317,7 +318,7 @@ def _recorded(scene: Scene, item: Object, shape: Recorded) -> View:
 def _frames(
     flat: dict[str, Array], camera: Camera, width: int, height: int, at: NDArray[np.int64], grain_deg: float
 ) -> _Surface:
-    """Surfaces of recorded normals and tangents; without tangents these are horizontal."""
+    """Return the surface of recorded normals and tangents. Missing tangents are horizontal."""
     normal = flat["normal"][0]
     rough = flat["tangent"][0] if "tangent" in flat else np.cross([0.0, 0.0, 1.0], normal)
     tangent = rough - np.sum(rough * normal, axis=1, keepdims=True) * normal
@@ -335,7 +336,7 @@ def _is_unit(vectors: Array) -> NDArray[np.bool_]:
 
 
 def _height(camera: Camera, width: int, across: int) -> int:
-    """Pixels from the top of a picture to its bottom; ValueError if there are too many, or none."""
+    """Return the pixels from the top of a picture to its bottom; ParameterError if there are too many or none."""
     for name, value in (("width", width), ("across", across)):
         if value < 1:
             raise ParameterError(name, f"{value} must be at least 1", value)
@@ -355,7 +356,7 @@ def _height(camera: Camera, width: int, across: int) -> int:
 
 
 def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
-    """Raise a ParameterError if the camera is inside an object: it sees black backs alone; a plane has a back, too."""
+    """Raise a ParameterError if the camera is inside an object, or behind a plane, and sees only black backs."""
     shapes = {item.name: item.shape for item in scene.objects}
     for seen in points:
         if not isinstance(shapes[seen.name], Plane) and np.median(seen.wr[:, 2]) < _BEHIND:
@@ -363,7 +364,7 @@ def _check_outside(scene: Scene, points: Sequence[Points]) -> None:
 
 
 def _check_lights(scene: Scene, points: Sequence[Points]) -> None:
-    """Raise a ParameterError if a light falls on nothing that is seen."""
+    """Raise a ParameterError if a light falls on nothing visible."""
     start = 0
     for number, light in enumerate(scene.lights):
         stop = start + len(light.towards())

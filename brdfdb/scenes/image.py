@@ -18,28 +18,28 @@ Array = NDArray[np.float64]
 
 
 def xyz(scene: Scene, radiance: ArrayLike) -> Array:
-    """Exposed X, Y, Z (..., 3) of spectral radiances (..., L), multiples of the illuminant; Y = 1 is white."""
+    """Return exposed X, Y, Z (..., 3) of spectral radiances (..., L), multiples of the illuminant; white has Y = 1."""
     return np.asarray(scene.exposure * (np.asarray(radiance) @ _weights(scene)))
 
 
 def srgb(scene: Scene, radiance: ArrayLike) -> Array:
-    """sRGB (..., 3) in [0, 1] with its transfer curve, as a screen shows it; what is brighter than white is clipped.
+    """Return sRGB (..., 3) in [0, 1] with its transfer curve, for a screen. Radiance brighter than white is clipped.
 
-    The illuminant of the scene is white on the screen, too: adapted to D65 by Bradford's matrix.
+    The illuminant of the scene is white on the screen, too: Bradford's matrix adapts it to D65.
     """
     return np.asarray(colour_science().cctf_encoding(np.clip(linear_srgb(scene, radiance), 0.0, 1.0), function="sRGB"))
 
 
 def linear_srgb(scene: Scene, radiance: ArrayLike) -> Array:
-    """sRGB (..., 3) without its transfer curve, not clipped: (1, 1, 1) is white under the illuminant of the scene."""
+    """Return sRGB (..., 3) without its transfer curve, not clipped. White under the scene's illuminant is (1, 1, 1)."""
     weights = srgb_weights(tuple(scene.wavelengths_nm), scene.illuminant, scene.observer)
     return np.asarray(scene.exposure * (np.asarray(radiance) @ weights))
 
 
 def difference(scene: Scene, radiance: ArrayLike, other: ArrayLike) -> Array:
-    """CIEDE2000 between two spectral pictures (..., L), pixel by pixel: about 1 is just noticeable.
+    """Return the CIEDE2000 difference of two spectral pictures (..., L), pixel by pixel. About 1 is just noticeable.
 
-    White is that of the scene's illuminant at a radiance of 1 over the exposure. Radiances below 0 count as 0.
+    White is the scene's illuminant at a radiance of 1 over the exposure. Radiances below 0 count as 0.
     """
     colour = colour_science()
     white = colour.XYZ_to_xy(_weights(scene).sum(axis=0))
@@ -60,11 +60,11 @@ def write_exr(path: str | os.PathLike[str], scene: Scene, radiance: ArrayLike) -
     Parameters
     ----------
     path : path
-        The file; one that is there is replaced.
+        The file. An existing file is replaced.
     scene : Scene
-        Its illuminant, wavelengths and exposure.
+        The scene, for its illuminant, wavelengths and exposure.
     radiance : array_like (height, width, L)
-        Spectral radiance as multiples of the illuminant.
+        Spectral radiance in multiples of the illuminant.
 
     Raises
     ------
@@ -73,9 +73,9 @@ def write_exr(path: str | os.PathLike[str], scene: Scene, radiance: ArrayLike) -
 
     Notes
     -----
-    R, G, B are linear sRGB, exposed, as `linear_srgb` gives them. Channels such as ``S0.550,0nm``, the emissive layout
-    of Fichet et al. (2021, ``fichet2021``), are spectral radiance: the multiples times the illuminant, which is 1 at
-    560 nm, not exposed.
+    R, G, B are linear sRGB, exposed, by `linear_srgb`. Channels such as ``S0.550,0nm``, the emissive layout of Fichet
+    et al. (2021, ``fichet2021``), are spectral radiance: the multiples times the illuminant, which is 1 at 560 nm, not
+    exposed.
     """
     values = np.asarray(radiance)
     rgb = linear_srgb(scene, values)
@@ -101,7 +101,7 @@ def write_channels(
     import OpenEXR
 
     whole = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}
-    # OpenEXR reads a strided array as if it were contiguous: wrong pixels and no error.
+    # OpenEXR reads a strided array as if it were contiguous, which gives wrong pixels and no error
     arrays = {name: np.ascontiguousarray(array, dtype=np.float32) for name, array in channels.items()}
     try:
         OpenEXR.File(whole, arrays).write(str(path))

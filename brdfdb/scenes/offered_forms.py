@@ -1,4 +1,4 @@
-"""Forms offered for a material of a scene: at all wavelengths or fewer, with the truth at limbs or without."""
+"""Forms offered for a material of a scene, at all wavelengths or fewer, with or without the truth at limbs."""
 
 from __future__ import annotations
 
@@ -15,25 +15,27 @@ from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.scenes.shapes import Array
 
-GREY_TOLERANCES = (0.1, 0.01, 0.0005)  # of planned tables; 0.001, as in charts, leaves 1.05 at 84 degrees
-SAMPLINGS = (3, 8)  # wavelengths, evenly over those of the scene, that a form may be evaluated at in place of all
-LIMB_DEG = 85.0  # from where a table may leave directions to the truth: its last nodes but one are there
+# Tolerances of planned tables of grey materials. The 0.001 of charts leaves an error of 1.05 at 84 degrees
+GREY_TOLERANCES = (0.1, 0.01, 0.0005)
+SAMPLINGS = (3, 8)  # numbers of wavelengths, evenly over those of the scene, for forms that are not evaluated at all
+LIMB_DEG = 85.0  # angle from which on a table may leave directions to the truth: its last node but one
 
-_ROWS = 512  # of products at a time: larger ones BLAS gives to threads, which wait for each other on a busy machine
+# Rows of a product at a time. BLAS gives larger products to threads, which wait for one another on a busy machine
+_ROWS = 512
 
 
 @dataclass(frozen=True, eq=False)
 class OfferedForm:
-    """A form of a material, whose f_r is that of all wavelengths of the scene, and where it is evaluated itself.
+    """A form of a material with f_r at all wavelengths of the scene, and the wavelengths of its evaluation.
 
-    `wavelength_nm` is None of a grey form; between its wavelengths f_r is interpolated on straight lines.
+    `wavelength_nm` is None for a grey form. f_r is interpolated linearly between these wavelengths.
     """
 
     form: Form
     wavelength_nm: NDArray[np.float64] | None
 
     def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
-        """Return f_r [1/sr], as `render` takes it."""
+        """Return f_r [1/sr] with the arguments that `render` passes."""
         dtype = self.form.dtype
         return self.form.evaluate(wi.astype(dtype, copy=False), wr.astype(dtype, copy=False)).astype(np.float64)
 
@@ -41,26 +43,26 @@ class OfferedForm:
 def offered_forms(
     source: Source, wavelength_nm: NDArray[np.float64] | None, tolerances: Sequence[float] | None = None
 ) -> list[OfferedForm]:
-    """Return forms to choose from, the truth first: at all wavelengths, and of spectral sources at fewer.
+    """Return the forms to choose from, the truth first, at all wavelengths and for spectral sources also at fewer.
 
     Parameters
     ----------
     source : Source
         Material, or table of a store.
     wavelength_nm : array of shape (L,) [nm], or None
-        Those of the scene, for spectral materials, and only for them.
+        Wavelengths of the scene for spectral materials, and only for such materials.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.forms.catalogue`. By default `GREY_TOLERANCES` of grey materials.
+        Tolerances of planned tables: see `brdfdb.forms.catalogue`. The default for grey materials is `GREY_TOLERANCES`.
 
     Returns
     -------
     list of OfferedForm
-        Without models that are meant to differ, and forms that differ from another in rounding alone.
+        The forms, without models that are meant to differ and without forms that differ only in rounding.
 
     Raises
     ------
-    ValueError
-        As `brdfdb.forms.catalogue.forms` does.
+    ParameterError
+        As in `brdfdb.forms.catalogue.forms`.
     """
     if tolerances is None and wavelength_nm is None:
         tolerances = GREY_TOLERANCES

@@ -1,4 +1,4 @@
-"""Directions that a renderer wrote, pixel by pixel: normals, or viewer and lights in the frame of the surface."""
+"""Directions recorded by a renderer for each pixel: normals, or viewer and lights in the frame of the surface."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ WANTED = "neither `normal`, nor `wr` and `wi`, of shape (height, width, 3)"
 
 
 class Recorded(BaseModel):
-    """What a picture of directions shows, in place of a shape; `file` is an EXR or .npz.
+    """A picture of directions in place of a shape. `file` is an EXR or .npz.
 
-    It has either ``normal`` and, if the material is anisotropic, ``tangent``, vectors in the frame of the scene; or
-    ``wr`` and ``wi``, towards the viewer and towards each light of the scene in the frame of the surface (x the
-    tangent, z the normal), for lights without a solid angle. In an .npz these are arrays (height, width, 3), ``wi``
-    (lights, height, width, 3). In an EXR they are channels such as ``normal.X``, ``normal.Y`` and ``normal.Z``, those
-    of the lights ``wi0.X``, ``wi1.X`` and on. Pixels where a vector is 0 or not finite show nothing. Nothing casts a
-    shadow.
+    The file holds one of two sets of vectors. The first is ``normal`` and, if the material is anisotropic, ``tangent``,
+    in the frame of the scene. The second is ``wr`` and ``wi``, towards the viewer and towards each light of the scene
+    in the frame of the surface (x the tangent, z the normal), for lights without a solid angle. An .npz has arrays of
+    shape (height, width, 3), and ``wi`` of shape (lights, height, width, 3). An EXR has channels such as ``normal.X``,
+    ``normal.Y`` and ``normal.Z``, and ``wi0.X``, ``wi1.X`` and so on for lights. Pixels where a vector is 0 or not
+    finite show nothing. Nothing casts a shadow.
     """
 
     model_config = STRICT
@@ -43,8 +43,8 @@ class Recorded(BaseModel):
 
         Raises
         ------
-        ValueError
-            If the file is not there, not readable, or holds no directions.
+        ParameterError
+            If the file does not exist, is not readable, or holds no directions.
         """
         path = Path(self.file)
         if not path.is_file():

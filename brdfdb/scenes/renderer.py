@@ -1,4 +1,4 @@
-"""Radiance of what a camera sees, by the shading of the papers, with any function as the BRDF."""
+"""Radiance of the points that a camera sees, by the shading of the papers, with any function as the BRDF."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
 from brdfdb.tables.albedo import source_albedo
 
-# (wi, wr, wavelengths [nm]) of shapes (N, 3), (N, 3), (L,) -> f_r [1/sr], (N, L), or (N, 1) where it has no colour
+# (wi, wr, wavelengths [nm]) of shapes (N, 3), (N, 3), (L,) -> f_r [1/sr] of shape (N, L), or (N, 1) without colour
 Brdf = Callable[[Array, Array, Array], Floats]
 
-# Albedos are polynomials of theta_r, through as many angles from 0 to the last, and as at the last beyond: that makes
-# 4e-3 at most of the papers' metals, 3e-2 where 17 angles are joined by lines
+# Albedos are polynomials of theta_r through this number of angles from 0 to the last, and constant beyond. The error is
+# at most 4e-3 for the metals of the papers. Lines through 17 angles would have an error of 3e-2
 _DEGREE, _LAST = 20, float(radians(89.5))
-# Between the azimuths of anisotropic materials; the other half turn is the same: lobes are ellipses, grooves straight
+# Azimuths of anisotropic materials. The other half turn is the same, because lobes are ellipses and grooves straight
 _PHI = np.pi / 6.0
-_TOLERANCE = 1e-3  # absolute, of the albedos that these go through
-_VISIBLE_NM = (380.0, 780.0)  # where a material may be stated whose picture is grey
-_BATCH = 20_000  # pairs of viewer and light at a time: calls cost little beside them, and their spectra are 7 MB
+_TOLERANCE = 1e-3  # absolute error of these albedos
+_VISIBLE_NM = (380.0, 780.0)  # allowed wavelengths of a material whose picture is grey
+_BATCH = 20_000  # pairs of viewer and light at a time; the calls cost little, and their spectra take 7 MB
 
 
 class Reflector:
-    """The reflection of a source in a scene: f_r, the albedo that ambient light meets, and the mirror.
+    """The reflection of a source in a scene: f_r, the albedo for ambient light, and the mirror.
 
     Attributes
     ----------
     source : Source
         Material, or table of a store.
     wavelength_nm : array (L,) [nm] or None
-        Wavelengths at which it is evaluated: those of the scene, or one of a source that is stated for some wavelengths
-        only, which do not make a colour. None of a grey source.
+        Wavelengths of its evaluation: those of the scene, or the first of a source that is stated for too few
+        wavelengths for a colour. None for a grey source.
 
     Raises
     ------
     ParameterError
-        If the source is stated for light that nobody sees, or does not hold at the wavelengths of the scene.
+        If the source is stated for invisible light, or is not known at the wavelengths of the scene.
     """
 
     def __init__(self, source: Source, wavelength_nm: Array) -> None:
@@ -61,7 +61,7 @@ class Reflector:
         self._brdf = source.brdf_at(self.wavelength_nm)
 
     def brdf(self, wi: Array, wr: Array, _wavelength_nm: Array | None = None) -> Floats:
-        """Return f_r [1/sr]: (N, L), or (N, 1) where it has no colour."""
+        """Return f_r [1/sr] of shape (N, L), or (N, 1) without colour."""
         return self._brdf(wi, wr)
 
     def mirror(self, wr: Array) -> Floats:
@@ -85,7 +85,7 @@ class Reflector:
 
     @functools.cached_property
     def _albedos(self) -> Array:
-        """Polynomials of directional albedo, (coefficients, azimuths, L): by reciprocity, of viewers as of lights."""
+        """Polynomials of directional albedo, (coefficients, azimuths, L), for viewers and by reciprocity for lights."""
         anisotropic = self.source.anisotropic
         nodes = np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
         phis = np.arange(0.0, np.pi - 1e-9, _PHI) if anisotropic else np.zeros(1)
@@ -107,14 +107,14 @@ def reflectors(scene: Scene) -> dict[str, Reflector]:
 
 
 def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | None = None) -> Floats:
-    """Return the spectral radiance of points, as multiples of the illuminant: 1 is white.
+    """Return the spectral radiance of points in multiples of the illuminant; white has 1.
 
     Parameters
     ----------
     scene : Scene
-        Its wavelengths and ambient light.
+        The scene, for its wavelengths and ambient light.
     points : Points
-        What is seen.
+        The visible points.
     reflector : Reflector
         The material of the points.
     brdf : callable, optional
@@ -123,19 +123,20 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
     Returns
     -------
     array (N, L)
-        Without what the mirror shows of other objects, which `render` adds.
+        Radiance without the mirror images of other objects, which `render` adds.
 
     Raises
     ------
-    ValueError
+    ParameterError
         If `brdf` returns another shape.
 
     Notes
     -----
-    Eq. (6) of Ward 1992 (``ward1992``): lights are deterministic, the environment is sampled. Eq. (12) of He et al.
-    1991 (``he1991``): mirror, lights, and rho_hd times ambient light, where rho_hd is the directional albedo of the
-    same model for the direction of the viewer, not a constant. The mirror has a light only where the disc of the light
-    holds the mirror direction. Albedo and mirror are those of the material whichever BRDF is given.
+    The radiance follows eq. (6) of Ward 1992 (``ward1992``): lights are deterministic and the environment is sampled.
+    It also follows eq. (12) of He et al. 1991 (``he1991``): mirror, lights, and rho_hd times ambient light. rho_hd is
+    the directional albedo of the same model for the direction of the viewer, not a constant. The mirror shows a light
+    only where the mirror direction is within the disc of the light. Albedo and mirror are those of the material for any
+    `brdf`.
     """
     wavelength = np.array(scene.wavelengths_nm)
     f_r = reflector.brdf if brdf is None else brdf
@@ -176,27 +177,27 @@ def render(
     Parameters
     ----------
     scene : Scene
-        What is seen.
+        The scene.
     view : View
-        Its points, by `brdfdb.scenes.gbuffer.gather`.
+        The points of the view, from `brdfdb.scenes.gbuffer.gather`.
     brdfs : mapping, optional
-        By the name of a material, what is evaluated in place of its model.
+        By the name of a material, a function that replaces its model.
     materials : mapping, optional
-        The result of `reflectors`, which holds albedos: for callers that render a scene more than once.
+        The result of `reflectors`, with its albedos, for callers that render a scene more than once.
     progress : callable, optional
-        Called after each list of points.
+        A function that is called after each list of points.
 
     Returns
     -------
     array (height, width, L)
-        Spectral radiance as multiples of the illuminant, averaged over each pixel; ambient radiance and environment
-        where there is no object.
+        Spectral radiance in multiples of the illuminant, averaged over each pixel. It is ambient radiance and
+        environment where there is no object.
 
     Raises
     ------
-    ValueError
-        If `brdfs` has a key that is no material of the scene, or one of them returns a wrong shape; if a material is
-        stated for light that nobody sees.
+    ParameterError
+        If `brdfs` has a key that is no material of the scene, or one of them returns a wrong shape. If a material is
+        stated for invisible light.
     """
     known = reflectors(scene) if materials is None else materials
     replaced = {} if brdfs is None else brdfs
@@ -223,7 +224,7 @@ def composed(
     known, lists = materials, [values.copy() for values in lists]
     pixels = np.zeros((view.height * view.width, len(scene.wavelengths_nm)))
     free = np.full(len(pixels), float(view.samples))
-    # what mirrors show comes after them in the list
+    # Points seen in a mirror come after the points of the mirror in the list
     for points, values in zip(view.points[::-1], lists[::-1], strict=True):
         if points.via is None:
             np.add.at(pixels, points.at, values)

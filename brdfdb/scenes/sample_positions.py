@@ -1,4 +1,4 @@
-"""Positions in a picture to look at: spread evenly over it, and crowded at limbs, terminators and edges of shadows."""
+"""Sample positions in a picture: spread evenly over it, and crowded at limbs, terminators and edges of shadows."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from brdfdb.scenes.gbuffer import gather_at
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
 
-# How near to an edge positions lie, in powers of ten below the width of a pixel: there a limb as wide as a pixel is
-# seen at 89.99 degrees
+# Least distance of a position from an edge, in powers of ten below the width of a pixel. A limb as wide as a pixel is
+# seen at 89.99 degrees there
 DECADES = 8
-_HALVINGS = 32  # of a pixel, which leave less than the nearest position
-_TRIES = 4  # each draws twice as many positions as are wanted: the edge may leave the pixel
+_HALVINGS = 32  # halvings of a pixel that locate an edge more precisely than the nearest position
+_TRIES = 4  # draws of positions; each draws twice the wanted number, because the edge may leave the pixel
 _PRIME = np.uint64(1_000_003)
 
 
 def even(width: int, height: int, rng: np.random.Generator) -> Array:
-    """Return places (height * width, 2), one anywhere in each pixel of a picture, row by row from the top.
+    """Return places (height * width, 2), a random one in each pixel of a picture, row by row from the top.
 
     Places are those of `brdfdb.scenes.scene.Camera.through`.
     """
@@ -30,32 +30,34 @@ def even(width: int, height: int, rng: np.random.Generator) -> Array:
 
 
 def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.Generator) -> Array:
-    """Return places near edges, whose distances from these are spread evenly in their logarithm.
+    """Return places near edges, with distances from the edges that are even in their logarithm.
 
     Parameters
     ----------
     scene : Scene
-        What is seen; not one that is recorded.
+        The scene, which must not be recorded.
     width, height : int
-        Pixels of the picture. Edges are looked for between places a pixel apart.
+        Pixels of the picture. Edges are searched between places that are a pixel apart.
     count : int
-        How many places to return, if the scene shows edges.
+        Number of places to return, if the scene shows edges.
     rng : numpy.random.Generator
-        What they are drawn with.
+        Source of random numbers.
 
     Returns
     -------
     array of shape (N, 2)
-        N is `count`, or less where edges are few. As `brdfdb.scenes.scene.Camera.through` takes them.
+        Places, as in `brdfdb.scenes.scene.Camera.through`. N is `count`, or less if there are few edges.
 
     Notes
     -----
-    Each place is drawn by itself: an edge between two neighbours of a grid, across or down, anywhere along it; one of
-    its two sides; a distance along the grid, from a pixel's width down to `DECADES` powers of ten less.
+    Each place is drawn independently. The draw selects a point on an edge between two neighbours of a grid, across or
+    down, then one of its two sides, and then a distance along the grid. The distance is between the width of a pixel
+    and `DECADES` powers of ten less.
 
-    An edge is where rays begin to meet another object, directly or in a mirror, or its back, or another light: limbs
-    and outlines, terminators and the edges of shadows. At a distance d from its limb a sphere of radius R is seen at
-    sqrt(2 d / R) from grazing, so that even logarithms cover all grazing angles alike.
+    Rays on the two sides of an edge meet different objects, directly or in a mirror, different faces of an object, or
+    different lights. Edges are limbs and outlines, terminators and the edges of shadows. At a distance d from its limb
+    a sphere of radius R is seen at sqrt(2 d / R) from grazing, so that even logarithms cover all grazing angles
+    equally.
     """
     hard = scene.model_copy(
         update={
@@ -77,7 +79,7 @@ def at_edges(scene: Scene, width: int, height: int, count: int, rng: np.random.G
         chosen = rng.integers(len(corners), size=2 * left)
         near, axis = corners[chosen], axes[chosen]
         rows = np.arange(len(near))
-        near[rows, 1 - axis] += rng.random(len(near)) - 0.5  # anywhere along the edge, in this pixel
+        near[rows, 1 - axis] += rng.random(len(near)) - 0.5  # a random point along the edge in this pixel
         far = near + np.eye(2)[axis]
         first = met(near)
         differs = first != met(far)

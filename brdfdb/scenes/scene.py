@@ -1,4 +1,4 @@
-"""Scenes: objects of one material each, lights far away, a camera, and how much of an error the picture may show."""
+"""Scenes: objects of one material each, lights far away, a camera, and the tolerance of the picture."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from brdfdb.spectra import ILLUMINANT, OBSERVER, check_illuminant, check_observe
 from brdfdb.store.reader import Store
 from brdfdb.tables.table_source import source_of_table
 
-STORED = "store:"  # what the name of a material begins with that is read from the store of the scene
+STORED = "store:"  # prefix of the name of a material that is read from the store of the scene
 WAVELENGTHS_NM = [float(wavelength) for wavelength in range(380, 781, 10)]
 
 
 class Light(BaseModel):
-    """A light far away: the same from everywhere in the scene.
+    """A light far away, the same from everywhere in the scene.
 
-    `strength` [1] is its irradiance over pi, that of a surface which faces it: the radiance that a white Lambertian
-    surface has there, whatever the solid angle. With one the light is a round disc that glossy surfaces blur and
-    mirrors show; without one mirrors miss it.
+    `strength` [1] is the irradiance over pi of a surface that faces the light. A white Lambertian surface has that
+    radiance there, whatever the solid angle. With a solid angle the light is a round disc that glossy surfaces blur and
+    mirrors show. Without it, mirrors do not show the light.
     """
 
     model_config = STRICT
@@ -48,26 +48,26 @@ class Light(BaseModel):
 
     @property
     def cos_radius(self) -> float:
-        """Cosine of the angle from the middle of the disc to its edge."""
+        """The cosine of the angle from the middle of the disc to its edge."""
         return 1.0 - self.solid_angle_sr / (2.0 * np.pi)
 
     @property
     def intensity(self) -> float:
-        """Radiance times solid angle: pi times the strength over the mean cosine, on a surface that faces the disc."""
+        """Radiance times solid angle: pi times the strength over the mean cosine for a surface that faces the disc."""
         return np.pi * self.strength / ((1.0 + self.cos_radius) / 2.0)
 
     @property
     def radiance(self) -> float:
-        """Radiance of the disc; 0 if the light has no solid angle."""
+        """The radiance of the disc; 0 if the light has no solid angle."""
         return self.intensity / self.solid_angle_sr if self.solid_angle_sr else 0.0
 
     def towards(self) -> Array:
-        """Unit vectors (samples, 3) towards the disc, each of which stands for the same solid angle."""
+        """Unit vectors (samples, 3) towards the disc, of equal solid angles."""
         z = unit(np.asarray(self.direction))
         if self.solid_angle_sr == 0.0:
             return z[np.newaxis]
         x = unit(np.cross(z, np.eye(3)[np.argmin(np.abs(z))]))
-        # A spiral of golden angles: even over the disc for any number of samples
+        # A spiral of golden angles is even over the disc for any number of samples
         number = np.arange(self.samples)
         cos = 1.0 - (1.0 - self.cos_radius) * (number + 0.5) / self.samples
         turn = number * np.pi * (3.0 - np.sqrt(5.0))
@@ -139,9 +139,9 @@ class Object(BaseModel):
 
 
 class Tolerance(BaseModel):
-    """How far the picture may be from the true one: relative in radiance, or in CIEDE2000. One of the two.
+    """The largest error of the picture, either relative in radiance or in CIEDE2000.
 
-    All places that are looked at keep to it, or a percentile of those of each material if isolated ones do not matter.
+    All checked places keep to it, or a percentile of the places of each material if isolated ones do not matter.
     """
 
     model_config = STRICT
@@ -165,12 +165,12 @@ class Tolerance(BaseModel):
     def value(self) -> float:
         """The largest error, in `unit`."""
         value = self.ciede2000 if self.relative is None else self.relative
-        assert value is not None  # as `_check` saw
+        assert value is not None  # `_check` has made sure of this
         return value
 
 
 class Scene(BaseModel):
-    """A scene. Radiance 1 is that of a white Lambertian surface that faces a light of strength 1.
+    """A scene. A white Lambertian surface that faces a light of strength 1 has the radiance 1.
 
     Raises
     ------
@@ -181,14 +181,14 @@ class Scene(BaseModel):
     model_config = STRICT
 
     title: str = ""
-    source: str = Field(default="", description="the picture that it is after")
+    source: str = Field(default="", description="source of the scene, such as a picture of a paper")
     objects: list[Object] = Field(min_length=1)
     lights: list[Light] = []
-    ambient: float = Field(default=0.0, ge=0.0, description="radiance that comes from everywhere, unshadowed")
+    ambient: float = Field(default=0.0, ge=0.0, description="radiance from all directions, without shadows")
     environment: Environment | None = Field(default=None, description="radiance that differs with the direction")
-    shadows: bool = Field(default=True, description="whether objects stand in each other's light, and in their own")
+    shadows: bool = Field(default=True, description="true if objects cast shadows on one another and on themselves")
     camera: Camera
-    exposure: float = Field(default=1.0, gt=0.0, description="what radiance is multiplied with to be 1 for white")
+    exposure: float = Field(default=1.0, gt=0.0, description="factor of radiance that makes white 1")
     illuminant: str = Field(default=ILLUMINANT, description="spectrum of all light: a name of colour-science")
     observer: str = Field(default=OBSERVER, description="a name of colour-science")
     wavelengths_nm: list[float] = WAVELENGTHS_NM
@@ -235,7 +235,7 @@ class Scene(BaseModel):
 
     @property
     def materials(self) -> dict[str, Source]:
-        """The sources of the objects by the names that the objects give them, each once.
+        """The sources of the objects by name, each once.
 
         Raises
         ------
@@ -244,7 +244,7 @@ class Scene(BaseModel):
         """
         sources = _materials(self)
         for name in self.stored:
-            assert self.store is not None  # as `_materials` saw
+            assert self.store is not None  # `_materials` has made sure of this
             sources[name] = _stored(self.store, name)
         return sources
 
@@ -254,7 +254,7 @@ class Scene(BaseModel):
         return list(dict.fromkeys(item.material for item in self.objects if item.material.startswith(STORED)))
 
     def resolved(self, folder: Path) -> Scene:
-        """Return the scene with the names of files that it reads relative to a folder."""
+        """Return the scene with its file names relative to a folder."""
         objects = [
             item.model_copy(update={"shape": item.shape.resolved(folder)}) if isinstance(item.shape, Recorded) else item
             for item in self.objects
@@ -266,7 +266,7 @@ class Scene(BaseModel):
 
 @functools.lru_cache(maxsize=64)
 def _stored(root: str, name: str) -> Source:
-    """Return a material of a store, kept: a scene asks for it at every list of points."""
+    """Return a material of a store. It is kept in memory, because a scene needs it at every list of points."""
     try:
         return source_of_table(Store(root)[name.removeprefix(STORED)])
     except BrdfdbError as error:
@@ -274,7 +274,7 @@ def _stored(root: str, name: str) -> Source:
 
 
 def _materials(scene: Scene) -> dict[str, Source]:
-    """Return the sources of the objects by name, but for those of a store; ParameterError for an unknown name."""
+    """Return the sources of the objects by name, except those of a store; ParameterError for an unknown name."""
     known: dict[str, Material] = presets()
     for name, table in scene.define.items():
         if name in known:

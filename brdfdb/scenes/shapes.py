@@ -1,4 +1,4 @@
-"""Shapes that rays hit, plane, sphere, cylinder, box and surface of revolution: how far away, and the frame there."""
+"""Shapes: plane, sphere, cylinder, box and surface of revolution, with distances along rays and frames at points."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ Pair = Annotated[tuple[float, float], Field(strict=False)]
 Length = Annotated[float, Field(gt=0.0)]
 
 STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
-_FACETS = 24  # cones between two points of a profile: the contour turns by less than a degree from one to the next
+_FACETS = 24  # cones between two points of a profile; the contour turns by less than a degree from one to the next
 
 
 def unit(vectors: Array) -> Array:
-    """Vectors (..., 3) made 1 long."""
+    """Return vectors (..., 3) divided by their length."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def check_direction(name: str, vector: Vector) -> Vector:
-    """Return a vector; ParameterError if it points nowhere."""
+    """Return the vector; ParameterError if its length is below 1e-6 or nan."""
     if not np.linalg.norm(vector) > 1e-6:
         raise ParameterError(name, f"{list(vector)} points nowhere", list(vector))
     return vector
 
 
 class Shape(BaseModel, ABC):
-    """Where a shape stands: its own origin is at `position`, its own z axis along `axis`, and it is turned about that.
+    """A shape with its own origin at `position` and its own z axis along `axis`, turned about that axis.
 
     Rays and points are arrays (N, 3) in the frame of the scene, whose z axis points up.
     """
@@ -61,19 +61,19 @@ class Shape(BaseModel, ABC):
         return np.stack([np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x, z])
 
     def hit(self, origins: Array, directions: Array) -> Array:
-        """Return the distance along each ray, in units of its direction, to the first hit: (N,), inf without one."""
+        """Return the distance (N,) along each ray to the first hit, in units of its direction; inf without a hit."""
         own = self._own
         return self._hit((origins - np.asarray(self.position)) @ own.T, directions @ own.T)
 
     def frame(self, points: Array) -> Array:
-        """Return tangent, the one across it, and normal, which points outwards, as the rows of (N, 3, 3)."""
+        """Return tangent, bitangent and outward normal at points as the rows of (N, 3, 3)."""
         own = self._own
         tangent, normal = self._tangent_and_normal((points - np.asarray(self.position)) @ own.T)
         return np.stack([tangent, np.cross(normal, tangent), normal], axis=1) @ own
 
     @abstractmethod
     def _hit(self, o: Array, d: Array) -> Array:
-        """Return distances as by `hit`, in the shape's own axes."""
+        """Return the distances of `hit`, in the shape's own axes."""
 
     @abstractmethod
     def _tangent_and_normal(self, p: Array) -> tuple[Array, Array]:
@@ -158,18 +158,18 @@ class Revolution(Shape):
         return self
 
     def radius_at(self, z: Array) -> tuple[Array, Array]:
-        """Radius of the smooth profile at a height, and its slope dr/dz."""
+        """Return the radius of the smooth profile at a height, and its slope dr/dz."""
         radius, height = np.array(self.profile).T
         secant = np.diff(radius) / np.diff(height)
         before, after = secant[[0, *range(secant.size)]], secant[[*range(secant.size), -1]]
-        # Fritsch and Butland's slopes, 0 where the secants change sign: what is straight stays straight
+        # Fritsch and Butland's slopes, 0 where the secants change sign, keep straight profiles straight
         turns = before * after <= 0.0
         slope = np.where(turns, 0.0, 2.0 * before * after / np.where(turns, 1.0, before + after))
         at = np.clip(np.searchsorted(height, z) - 1, 0, height.size - 2)
         h = height[at + 1] - height[at]
         u = np.clip((z - height[at]) / h, 0.0, 1.0)
         r0, r1, m0, m1 = radius[at], radius[at + 1], h * slope[at], h * slope[at + 1]
-        # Hermite's cubic, and its derivative
+        # Hermite's cubic and its derivative
         c2, c3 = 3.0 * (r1 - r0) - 2.0 * m0 - m1, 2.0 * (r0 - r1) + m0 + m1
         return ((c3 * u + c2) * u + m0) * u + r0, ((3.0 * c3 * u + 2.0 * c2) * u + m0) / h
 
@@ -182,7 +182,7 @@ class Revolution(Shape):
     def _hit(self, o: Array, d: Array) -> Array:
         radius, z = self._rings()
         t = np.minimum(*(_disc(o, d, radius[end], z[end]) for end in (0, -1)))
-        # only rays that meet the cylinder around all cones, and of these those that meet the one around some of them
+        # Only rays that meet the cylinder around all cones, and then the cylinder around some of them, are traced
         whole = np.flatnonzero(np.isfinite(_cone(o, d, radius.max(), radius.max(), z[0], z[-1])))
         for start in range(0, len(z) - 1, _FACETS):
             r_part, z_part = radius[start : start + _FACETS + 1], z[start : start + _FACETS + 1]
@@ -207,7 +207,7 @@ class Revolution(Shape):
 
 
 class Cylinder(Shape):
-    """A cylinder that stands on the origin, closed; its tangent runs around the axis, at the ends it is its own x."""
+    """A closed cylinder that stands on the origin. Its tangent runs around the axis, and is its own x at the ends."""
 
     kind: Literal["cylinder"]
     radius: Length
@@ -229,19 +229,19 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _roots(a: Array, half_b: Array, c: Array) -> tuple[Array, Array]:
-    """Roots of a t^2 + 2 half_b t + c, nan where there are none, without cancellation."""
+    """Return the roots of a t^2 + 2 half_b t + c without cancellation, nan where there are none."""
     with np.errstate(divide="ignore", invalid="ignore"):
         q = -(half_b + np.copysign(np.sqrt(half_b * half_b - a * c), half_b))
         return np.asarray(q / a), np.asarray(c / q)
 
 
 def _nearest(*ts: Array) -> Array:
-    """Return the smallest of the distances in front of each ray; inf where there is none."""
-    return np.asarray(np.min([np.where(t > 0.0, t, np.inf) for t in ts], axis=0))  # nan is not
+    """Return the smallest positive distance of each ray; inf where there is none."""
+    return np.asarray(np.min([np.where(t > 0.0, t, np.inf) for t in ts], axis=0))  # nan > 0 is False
 
 
 def _cone(o: Array, d: Array, r0: float, r1: float, z0: float, z1: float, open_ends: bool = False) -> Array:
-    """Distance to a cone about the z axis between two heights; closed by discs unless it has open ends."""
+    """Return the distance to a cone about the z axis between two heights, closed by discs unless it has open ends."""
     s = (r1 - r0) / (z1 - z0)
     w = r0 + s * (o[:, 2] - z0)
     dz = s * d[:, 2]
@@ -259,7 +259,7 @@ def _cone(o: Array, d: Array, r0: float, r1: float, z0: float, z1: float, open_e
 
 
 def _disc(o: Array, d: Array, radius: float, z: float) -> Array:
-    """Distance to a disc about the z axis."""
+    """Return the distance to a disc about the z axis."""
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (z - o[:, 2]) / d[:, 2]
         x, y = o[:, 0] + t * d[:, 0], o[:, 1] + t * d[:, 1]
@@ -267,7 +267,7 @@ def _disc(o: Array, d: Array, radius: float, z: float) -> Array:
 
 
 def _around(p: Array) -> Array:
-    """Return the direction around the z axis at points (N, 3): along y where a point is on the axis."""
+    """Return the direction around the z axis at points (N, 3), along y where a point is on the axis."""
     from_axis = np.hypot(p[:, 0], p[:, 1])
     x, y = (np.divide(p[:, i], from_axis, where=from_axis > 0.0, out=np.full(len(p), 1.0 - i)) for i in (0, 1))
     return np.stack([-y, x, np.zeros(len(p))], axis=1)

@@ -1,4 +1,4 @@
-"""The chart job: it measures speed against accuracy of the forms of materials and families, and draws them."""
+"""The chart job: measures speed against accuracy of the forms of materials and families, and draws charts."""
 
 from __future__ import annotations
 

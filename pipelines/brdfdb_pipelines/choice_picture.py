@@ -1,4 +1,4 @@
-"""The picture of a choice: truth, choice and next cheaper forms, and how far these are from the truth."""
+"""The picture of a choice: truth, choice and next cheaper forms, with their differences from the truth."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from brdfdb.scenes import image
 from brdfdb.scenes.choice import Seen
 from brdfdb.scenes.shapes import Array
 
-TIMES = 2.0  # the tolerance is where the colours end
-BEYOND = "#e5341a"  # what is further off
-BAR = 16  # pixels, its height
+TIMES = 2.0  # end of the bar of colours, relative to the tolerance
+BEYOND = "#e5341a"  # colour of larger differences
+BAR = 16  # height of the bar [pixel]
 _PANEL = 420  # pixels across, as nearly as makes each pixel of the scene a square of whole ones
 _GAP, _TITLE, _MORE = 14, 30, 60  # pixels: around panels, above them, beside the bar
 _DPI = 128  # a power of two: sizes in inches are whole pixels again
@@ -25,14 +25,14 @@ _TEXT: dict[str, Any] = {"fontsize": 7}
 
 
 def png(seen: Seen, choice: Array, cheaper: Array | None) -> bytes:
-    """Five panels: truth, choice and next cheaper; below, a bar of colours and the differences of the two.
+    """Draw five panels: truth, choice and next cheaper, and below a bar of colours and the differences of the two.
 
     Parameters
     ----------
     seen : Seen
-        The truth, and what a difference is.
+        The scene, with the truth and the measure of differences.
     choice, cheaper : array (height, width, L)
-        Spectral radiance; None: nothing is cheaper.
+        Spectral radiance. `cheaper` is None if nothing is cheaper.
     """
     height, width = seen.truth.shape[:2]
     times = max(1, round(_PANEL / width))

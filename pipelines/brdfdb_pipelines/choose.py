@@ -1,4 +1,4 @@
-"""The choose job: it times the forms of the materials of a scene, and writes choice.json, pictures and tables."""
+"""The choose job: times the forms of the materials of a scene, and writes choice.json, pictures and tables."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from brdfdb_pipelines import terminal
 from brdfdb_pipelines.choice_publication import Built, build, with_reason
 from brdfdb_pipelines.scene_file import SceneError, load
 
-TIMED = 20_000  # pairs of directions of a material on which forms are timed, drawn from those of the scene
+TIMED = 20_000  # pairs of directions of a material for timing, drawn from those of the scene
 SEED = 1992
 ROUNDS = 7  # rounds of timing
-FINER = 2  # choices are checked at one place in each pixel of a picture so many times as wide
+FINER = 2  # width, relative to the picture, of the finer picture with one checked place per pixel
 EDGES = 4000  # places beside edges where forms are compared, and as many others where choices are checked
 
 
@@ -59,7 +59,7 @@ def run(
         Store where chosen tables are published, under the names of their materials, each with its error; made if it
         does not exist.
     tolerances : sequence of float, optional
-        Of planned tables: see `brdfdb.scenes.offered_forms`.
+        Tolerances of planned tables: see `brdfdb.scenes.offered_forms`.
 
     Returns
     -------

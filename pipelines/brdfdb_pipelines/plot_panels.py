@@ -68,7 +68,7 @@ def error_axis(axes: Axes, top: float) -> None:
 
 
 def cost_axes(axes: Axes, costs: list[float], errors: list[float]) -> None:
-    low, high = min(c for c in costs if c > 0.0), max(costs)  # the memory of a function is not known: 0
+    low, high = min(c for c in costs if c > 0.0), max(costs)  # the bytes of a function are unknown, and given as 0
     decades = max(math.log10(high / low), 1.0)
     axes.set_xscale("log")
     axes.set_xlim(low / 10 ** (0.06 * decades), high * 10 ** (0.09 * decades))
@@ -92,7 +92,7 @@ class Label(NamedTuple):
 
 
 def labelled(axes: Axes, labels: Sequence[Label]) -> None:
-    """Draw texts beside points, each where it hides neither a point nor another text; earlier ones have priority."""
+    """Draw texts beside points so that none hides a point or another text. Earlier texts have priority."""
     scale = 72.0 / mpl.rcParams["figure.dpi"]
     at = [axes.transData.transform((label.x, label.y)) * scale for label in labels]
     frame = axes.get_window_extent().extents * scale

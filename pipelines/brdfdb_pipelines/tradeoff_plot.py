@@ -1,4 +1,4 @@
-"""Pictures of charts: error over time and bytes, what is worth having, samplers, and a table of all below."""
+"""Pictures of charts: error over time and bytes with the front, samplers, and a table of all forms below."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from brdfdb_pipelines.plot_panels import (
     wavelengths,
 )
 
-_SHARES = (0.38, 0.15, 0.15, 0.15, 0.17)  # of the width, of the panels
+_SHARES = (0.38, 0.15, 0.15, 0.15, 0.17)  # widths of the panels as shares of the whole
 _DPI = 110
 # Left end of titles and right ends of columns, of the table of forms and of that of samplers
 _COLUMNS = (18.0, 230.0, 280.0, 385.0, 435.0, 485.0, 540.0, 630.0, 680.0, 735.0, 800.0, 935.0, 988.0)
@@ -146,7 +146,7 @@ _WORK_HEADS = ("variance", "ns a sample", "ms to 1 % (quartiles)")
 
 
 def works(sampler: Sampler) -> tuple[str, ...]:
-    """Variance, time and their product of a sampler: for the albedo, then for the sphere."""
+    """Return variance, time and their product of a sampler as text, for the albedo and then for the sphere."""
     cells: list[str] = []
     for work in (sampler.albedo, sampler.sphere):
         ms, low, high = (f"{value:.3g}" for value in (work.ms, work.low_ms, work.high_ms))
@@ -155,7 +155,7 @@ def works(sampler: Sampler) -> tuple[str, ...]:
 
 
 def _samplers(canvas: Canvas, chart: Chart, top: float, height: float) -> None:
-    """Variance and time of samplers as a table, their product with its quartiles as bars."""
+    """Draw variance and time of samplers as a table, and their product with its quartiles as bars."""
     heads = (*(f"albedo: {head}" for head in _WORK_HEADS[:2]), _WORK_HEADS[2])
     heads += (*(f"sphere: {head}" for head in _WORK_HEADS[:2]), _WORK_HEADS[2])
     row_of(

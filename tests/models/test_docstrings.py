@@ -51,10 +51,9 @@ def test_the_docstring_of_a_twin_names_the_function_that_documents_its_parameter
     angles = [each for each in by_angles if each in ANGLES]
     both = angles == [*ANGLES]
     assert both or angles == ["theta_i"]
-    first = f"`{original.__name__}` for unit vectors `wi` of the light" + (
-        " and `wr` of the viewer, " if both else ", "
-    )
-    assert (inspect.getdoc(twin) or "").startswith(first)
+    arguments = "`wi` (light) and `wr` (viewer)" if both else "`wi` (light)"
+    first = rf"Return `{original.__name__}` (\[1(/sr)?\] )?for unit vectors {re.escape(arguments)} of shape \(..., 3\)"
+    assert re.match(first, inspect.getdoc(twin) or "")
     vectors = ["wi", "wr"] if both else ["wi"]
     assert [*by_vectors] == [*vectors, *[*by_angles][len(angles) :]]
     assert [*by_vectors.values()][len(vectors) :] == [*by_angles.values()][len(angles) :]
