@@ -1,7 +1,8 @@
-"""The protocol of a source: all that layouts, tabulation, planner, error measurement and scenes know of f_r."""
+"""The protocol of a source: all that the other rooms know of f_r; and the base of all that is looked up by angles."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
@@ -13,6 +14,57 @@ from brdfdb.parameters import Floats
 
 # Function of unit vectors (N, 3) of light and viewer that gives f_r [1/sr], shape (N, L)
 Evaluate = Callable[[Floats, Floats], Floats]
+
+# theta_i, phi_i, theta_r and phi_r [rad], which broadcast
+FourAngles = tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]
+
+
+class Lookups(ABC):
+    """The base of sources and tables: f_r at angles, over one method that takes the four of them together."""
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Return f_r [1/sr] at angles; a table interpolates it.
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r : array_like [rad]
+            Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
+        wavelength_nm : float or array_like (M,) [nm], optional
+            Within the range of a spectral source or table; by default its wavelengths. Grey ones take any.
+
+        Returns
+        -------
+        array [1/sr]
+            In the shape of the angles, with a last axis for the wavelengths of a spectral source or table, or M if an
+            array of wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is
+            nan. float32 arrays in give float32 out.
+
+        Raises
+        ------
+        ParameterError
+            If an angle or a wavelength is outside its range, or the values of a function are no f_r.
+        StoreError, UnknownRevisionError
+            If a table is behind a service, and the service or the revision is gone.
+        """
+        return self._at_angles((theta_i, phi_i, theta_r, phi_r), wavelength_nm)
+
+    @abstractmethod
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return f_r [1/sr] for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
+
+        Wavelengths, result and errors are those of `lookup`.
+        """
+
+    @abstractmethod
+    def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
+        """Return f_r [1/sr] as by `lookup`; the angles are not checked yet."""
 
 
 class Lossless(NamedTuple):
