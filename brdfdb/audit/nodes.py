@@ -30,8 +30,6 @@ class Nodes(Finding):
 
     key = "nodes"
     order = 4
-    title = "Nodes"
-    columns = ("nodes",)
     explanation = "What is stored against what the model gives at the same nodes: the same but for rounding."
 
     compared: int = Field(description="of the stored numbers; of large tables those of some rows of the first axis")

@@ -44,8 +44,6 @@ class Sampling(Finding):
 
     key = "sampling"
     order = 7
-    title = "Sampling"
-    columns = ("sampling",)
     explanation = (
         "p is the chance of a histogram worse than that of the samples if their density is what the model says. The "
         "weight of a sample is f_r cos theta_r over that density."

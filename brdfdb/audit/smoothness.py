@@ -77,8 +77,6 @@ class Smoothness(Finding):
 
     key = "smoothness"
     order = 5
-    title = "Smoothness"
-    columns = ("smoothness",)
     explanation = (
         "How far f_r jumps where the model changes its formula, and where the table may jump: at its nodes, at the "
         "poles and at both ends of a turn. A table may jump by the error that it states."

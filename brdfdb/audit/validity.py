@@ -30,8 +30,6 @@ class Validity(Finding):
 
     key = "validity"
     order = 8
-    title = "Validity"
-    columns = ("validity",)
     explanation = (
         "Whether the parameters lie inside what the paper of the model says it is good for. Where it says “gentle” "
         "or “much less” and no number, a tenth is taken for inside, and 1 for the edge. The verdict on a table does "

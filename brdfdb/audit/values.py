@@ -17,8 +17,6 @@ class Values(Finding):
 
     key = "values"
     order = 3
-    title = "Values"
-    columns = ("values",)
     explanation = (
         "Stored values, and f_r where it is looked up between them, are finite, and f_r is not negative. Nodes "
         "below the horizon may be: they continue the table, and lookups end at 0."

@@ -14,7 +14,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished, radians, unit_vector
 from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Text
-from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless
+from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
 from brdfdb.parameters import Floats
 
 # (wi, wr, wavelength_nm) of shapes (N, 3), (N, 3) and (L,) -> f_r [1/sr] of shape (N, L); of a grey function the
@@ -69,14 +69,7 @@ class FunctionRecord(BaseModel):
         BeforeValidator(_two_widths),
     ] = None
 
-    @field_validator("wavelengths_nm")
-    @classmethod
-    def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
-            raise ParameterError(
-                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
-            )
-        return wavelengths_nm
+    _check_wavelengths = field_validator("wavelengths_nm")(check_wavelengths)
 
     @model_validator(mode="after")
     def _check_symmetry(self) -> FunctionRecord:

@@ -23,7 +23,7 @@ from brdfdb.errors import MaterialError, ParameterError
 from brdfdb.geometry import degrees
 from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
-from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless
+from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec
@@ -131,14 +131,7 @@ class Material(BaseModel, Lookups):
             return parameters
         return completed(MODELS[info.data["model"]], parameters)
 
-    @field_validator("wavelengths_nm")
-    @classmethod
-    def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
-            raise ParameterError(
-                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
-            )
-        return wavelengths_nm
+    _check_wavelengths = field_validator("wavelengths_nm")(check_wavelengths)
 
     @model_validator(mode="after")
     def _check_provenance(self) -> Material:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.lobes import Lobe
 from brdfdb.parameters import Floats
 
@@ -17,6 +18,15 @@ Evaluate = Callable[[Floats, Floats], Floats]
 
 # theta_i, phi_i, theta_r and phi_r [rad], which broadcast
 FourAngles = tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]
+
+
+def check_wavelengths(wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
+    """Return the wavelengths [nm] of a source; ParameterError if they are not positive and increasing."""
+    if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
+        raise ParameterError(
+            "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
+        )
+    return wavelengths_nm
 
 
 class Lookups(ABC):

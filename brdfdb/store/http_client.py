@@ -168,15 +168,7 @@ class RemoteStore(Mapping[str, RemoteTable]):
         return self._table(self._material(name))
 
     def table(self, name: str, revision: str) -> RemoteTable:
-        """Return the table of a revision, current or not.
-
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If the store has no such material, or it no such revision.
-        StoreError
-            If the revision is damaged.
-        """
+        """Return the table of a revision, current or not; errors are those of `Store.table`."""
         return self._table(self._material(name, f"/revisions/{quote(revision, safe='')}"))
 
     def revisions(self, name: str) -> list[str]:
@@ -207,12 +199,8 @@ class RemoteStore(Mapping[str, RemoteTable]):
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset that is read over HTTP as far as needed.
 
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If the store has no such material, or it no such revision.
-        StoreError
-            If fsspec and aiohttp, which read zarr over HTTP, are not installed.
+        Errors are those of `Store.dataset`. StoreError, too, if fsspec and aiohttp, which read zarr over HTTP, are not
+        installed.
         """
         document = self._material(name, "" if revision is None else f"/revisions/{quote(revision, safe='')}")
         return remote_dataset(f"{self.url}/v1/store/materials/{name}/{document['revision']}")
