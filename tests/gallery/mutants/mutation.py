@@ -6,11 +6,10 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import cache, wraps
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import pytest
 
 from brdfdb.gallery import GALLERY
 from brdfdb.models import MODELS
@@ -177,17 +176,18 @@ class MutantTests:
     mutants: ClassVar[Sequence[Mutant]]
     unchanged: ClassVar[Sequence[Mutant]]
 
-    @pytest.fixture(scope="class")
-    def matrix(self) -> Matrix:
-        """The statements that notice each mutant."""
-        return matrix_of(self.keys, self.mutants)
+    @classmethod
+    @cache
+    def matrix(cls) -> Matrix:
+        """Return the statements that notice each mutant."""
+        return matrix_of(cls.keys, cls.mutants)
 
     def test_the_twins_that_mutants_change_are_the_models(self) -> None:
         for twin in self.unchanged:
             assert not matrix_of(self.keys, [twin]).noticed[twin.name]
 
-    def test_every_statement_fails_for_a_wrong_model(self, matrix: Matrix) -> None:
-        assert not matrix.blind, str(matrix)
+    def test_every_statement_fails_for_a_wrong_model(self) -> None:
+        assert not self.matrix().blind, str(self.matrix())
 
-    def test_every_wrong_model_is_noticed_by_two_statements(self, matrix: Matrix) -> None:
-        assert not matrix.overlooked, str(matrix)
+    def test_every_wrong_model_is_noticed_by_two_statements(self) -> None:
+        assert not self.matrix().overlooked, str(self.matrix())
