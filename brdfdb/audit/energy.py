@@ -40,7 +40,6 @@ class Energy(Finding):
 
     key = "energy"
     order = 1
-    title = "Energy"
     columns = ("albedo of the model", "albedo of the table", "white furnace")
     explanation = (
         "Directional albedo is the share of the light from one direction that leaves the surface in any direction, "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, Literal, NamedTuple, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -96,9 +96,9 @@ class Finding(BaseModel):
     order : int
         Position among the findings, which are judged and shown in this order.
     title : str
-        Name for people.
+        Name for people; by default the key in words.
     columns : tuple of str
-        Headings of its cells.
+        Headings of its cells; by default one, the title.
     explanation : str
         Sentences on how to read it.
     """
@@ -112,6 +112,13 @@ class Finding(BaseModel):
     explanation: ClassVar[str]
 
     verdict: Word
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "key" in vars(cls):
+            words = cls.key.replace("_", " ")
+            cls.title = vars(cls).get("title", words.capitalize())
+            cls.columns = vars(cls).get("columns", (words,))
 
     @classmethod
     def judge(cls, subject: Subject) -> Finding:

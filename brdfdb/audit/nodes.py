@@ -30,8 +30,6 @@ class Nodes(Finding):
 
     key = "nodes"
     order = 4
-    title = "Nodes"
-    columns = ("nodes",)
     explanation = "Stored numbers are compared with those of the model at the same nodes. They differ by rounding only."
 
     compared: int = Field(

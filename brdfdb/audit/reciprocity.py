@@ -49,8 +49,6 @@ class Reciprocity(Finding):
 
     key = "reciprocity"
     order = 2
-    title = "Reciprocity"
-    columns = ("reciprocity",)
     explanation = (
         "Asymmetry is |f − f′| / (|f| + |f′|), where f′ has light and viewer exchanged. 0 is reciprocal "
         "(Helmholtz), 1 is the largest possible asymmetry."

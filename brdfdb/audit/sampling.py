@@ -44,8 +44,6 @@ class Sampling(Finding):
 
     key = "sampling"
     order = 7
-    title = "Sampling"
-    columns = ("sampling",)
     explanation = (
         "p is the probability that samples with the density of the model have a worse histogram. The weight of a "
         "sample is f_r cos theta_r over that density."

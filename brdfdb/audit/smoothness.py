@@ -78,8 +78,6 @@ class Smoothness(Finding):
 
     key = "smoothness"
     order = 5
-    title = "Smoothness"
-    columns = ("smoothness",)
     explanation = (
         "The jumps of f_r where the formula of the model changes, and at the seams of the table: its nodes, the poles, "
         "and both ends of a turn of azimuth. A table may jump by its stated error."

@@ -32,8 +32,6 @@ class TableError(Finding):
 
     key = "table_error"
     order = 6
-    title = "Table error"
-    columns = ("table error",)
     explanation = (
         "|table − model| over the model, or over a thousandth of the Lambertian of the same albedo where the model "
         "is less. 99 of 100 values are below the number shown. The first number is measured at fresh directions, the "

@@ -30,8 +30,6 @@ class Validity(Finding):
 
     key = "validity"
     order = 8
-    title = "Validity"
-    columns = ("validity",)
     explanation = (
         "The standing of the parameters in the limits that the paper states for its model. If the paper says “gentle” "
         "or “much less” without a number, values up to a tenth are inside, and values up to 1 at the edge. Validity "

@@ -17,8 +17,6 @@ class Values(Finding):
 
     key = "values"
     order = 3
-    title = "Values"
-    columns = ("values",)
     explanation = (
         "Stored values and f_r between the nodes are finite, and f_r is not negative. Values at nodes below the "
         "horizon may be negative: they continue the table, and lookups are clipped at 0."

@@ -10,13 +10,15 @@ from pydantic import BaseModel, ConfigDict, Field
 from brdfdb.forms.catalogue import Kind
 from brdfdb.materials.provenance import Number
 
-_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+class _Record(BaseModel):
+    """A part of the document: immutable, without keys that it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Cost(BaseModel):
+class Cost(_Record):
     """Time of an evaluation on one thread of the machine that made the chart."""
-
-    model_config = _STRICT
 
     ns: float = Field(description="median over all rounds of the time of a value of f_r: one direction, one wavelength")
     low: float = Field(description="lower quartile")
@@ -24,10 +26,8 @@ class Cost(BaseModel):
     directions: int = Field(description="number of directions evaluated at once")
 
 
-class Form(BaseModel):
+class Form(_Record):
     """A form and its costs."""
-
-    model_config = _STRICT
 
     key: str
     title: str
@@ -40,10 +40,8 @@ class Form(BaseModel):
     single: Cost = Field(description="cost with one direction")
 
 
-class Saving(BaseModel):
+class Saving(_Record):
     """A ratio of times within rounds."""
-
-    model_config = _STRICT
 
     low: float = Field(description="lower quartile")
     times: float = Field(description="median")
@@ -69,10 +67,8 @@ class Point(Form):
     saving: Saving | None = Field(description="time of that rung over the time of this form, in batches")
 
 
-class Work(BaseModel):
+class Work(_Record):
     """Noise and time of a Monte Carlo estimate."""
-
-    model_config = _STRICT
 
     variance: float = Field(description="variance of one sample over the square of the mean; median over rounds")
     ns: float = Field(description="time of one sample; median over rounds")
@@ -81,10 +77,8 @@ class Work(BaseModel):
     high_ms: float = Field(description="upper quartile")
 
 
-class Sampler(BaseModel):
+class Sampler(_Record):
     """A way to draw directions, for the model of the material at its middle wavelength, without the specular part."""
-
-    model_config = _STRICT
 
     key: str
     title: str
@@ -92,23 +86,19 @@ class Sampler(BaseModel):
     sphere: Work = Field(description="work for the picture of a sphere under a sky and a lamp about 20 degrees wide")
 
 
-class Fronts(BaseModel):
+class Fronts(_Record):
     """Keys of the points worth having, the most accurate (l1) first, each clearly cheaper than the one before.
 
     Models that are meant to differ are left out, and so are forms with a larger error than black.
     """
-
-    model_config = _STRICT
 
     batch: list[str]
     single: list[str]
     bytes: list[str]
 
 
-class Chart(BaseModel):
+class Chart(_Record):
     """One material."""
-
-    model_config = _STRICT
 
     material: str
     title: str
@@ -138,20 +128,16 @@ class Between(Form):
     p99: float
 
 
-class Diagnostic(BaseModel):
+class Diagnostic(_Record):
     """A number that shows the regime of the model of a member, at the middle wavelength."""
-
-    model_config = _STRICT
 
     symbol: str
     title: str
     values: list[float] = Field(description="value of each member")
 
 
-class FamilyChart(BaseModel):
+class FamilyChart(_Record):
     """A family: the forms worth having at each of its members."""
-
-    model_config = _STRICT
 
     family: str
     title: str
@@ -168,10 +154,8 @@ class FamilyChart(BaseModel):
     )
 
 
-class Charts(BaseModel):
+class Charts(_Record):
     """Charts of materials and families from one run. A file holds one of them."""
-
-    model_config = _STRICT
 
     brdfdb: str
     when: datetime

@@ -14,7 +14,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished, radians, unit_vector
 from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Text
-from brdfdb.materials.source import Evaluate, Lossless
+from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
 from brdfdb.parameters import Floats
 
 # (wi, wr, wavelength_nm) of shapes (N, 3), (N, 3) and (L,) -> f_r [1/sr] of shape (N, L). A grey function gets None for
@@ -71,14 +71,7 @@ class FunctionRecord(BaseModel):
         BeforeValidator(_two_widths),
     ] = None
 
-    @field_validator("wavelengths_nm")
-    @classmethod
-    def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
-            raise ParameterError(
-                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
-            )
-        return wavelengths_nm
+    _check_wavelengths = field_validator("wavelengths_nm")(check_wavelengths)
 
     @model_validator(mode="after")
     def _check_symmetry(self) -> FunctionRecord:
@@ -105,7 +98,7 @@ class FunctionRecord(BaseModel):
         return {"function": FunctionRecord.model_dump(self, mode="json", include=set(FunctionRecord.model_fields))}
 
 
-class FunctionSource(FunctionRecord):
+class FunctionSource(FunctionRecord, Lookups):
     """A function of the user as a source, which is tabulated, audited, charted and rendered like a material.
 
     Parameters
@@ -184,39 +177,12 @@ class FunctionSource(FunctionRecord):
         at = self._wavelengths(wavelength_nm)
         return lambda wi, wr: self._values(checked_vectors(wi, wr), wi, wr, at)
 
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-    ) -> Floats:
-        """Return f_r [1/sr] of the function itself, with the arguments of `brdfdb.tables.table.Table.lookup`.
-
-        Parameters
-        ----------
-        theta_i, phi_i, theta_r, phi_r : array_like [rad]
-            Directions of light and viewer, which broadcast.
-        wavelength_nm : float or array_like (M,) [nm], optional
-            Wavelengths within the range of the function. The default is its wavelengths. Grey functions take any.
-
-        Returns
-        -------
-        array [1/sr]
-            In the shape of the angles, with a last axis for a list of wavelengths.
-
-        Raises
-        ------
-        ParameterError
-            If an angle or a wavelength is outside its range, or a value of the function is negative or not finite.
-        """
-        angles = checked_angles(theta_i, phi_i, theta_r, phi_r)
-        light, viewer = unit_vector(angles.theta_i, angles.phi_i), unit_vector(angles.theta_r, angles.phi_r)
-        return self._shaped(angles, light, viewer, wavelength_nm)
+    def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
+        given = checked_angles(*angles)
+        light, viewer = unit_vector(given.theta_i, given.phi_i), unit_vector(given.theta_r, given.phi_r)
+        return self._shaped(given, light, viewer, wavelength_nm)
 
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Return f_r [1/sr] as by `lookup` at unit vectors of light and viewer (..., 3)."""
         vectors = checked_vectors(wi, wr)
         return self._shaped(vectors, vectors.w_i, vectors.w_r, wavelength_nm)
 

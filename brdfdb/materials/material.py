@@ -23,7 +23,7 @@ from brdfdb.errors import MaterialError, ParameterError
 from brdfdb.geometry import degrees
 from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
-from brdfdb.materials.source import Evaluate, Lossless
+from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec
@@ -37,7 +37,7 @@ _SOURCED = ("refractive_index", "wavelengths_nm")  # fields besides parameters t
 _MANY = 2000
 
 
-class Material(BaseModel):
+class Material(BaseModel, Lookups):
     """One material: a model, its parameters in the units of the model, and where each number comes from.
 
     Attributes
@@ -132,14 +132,7 @@ class Material(BaseModel):
             return parameters
         return completed(MODELS[info.data["model"]], parameters)
 
-    @field_validator("wavelengths_nm")
-    @classmethod
-    def _check_wavelengths(cls, wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
-            raise ParameterError(
-                "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
-            )
-        return wavelengths_nm
+    _check_wavelengths = field_validator("wavelengths_nm")(check_wavelengths)
 
     @model_validator(mode="after")
     def _check_provenance(self) -> Material:
@@ -309,37 +302,10 @@ class Material(BaseModel):
 
         return brdf
 
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-    ) -> Floats:
-        """Return f_r [1/sr] of the model itself, with the arguments of `brdfdb.tables.table.Table.lookup`.
-
-        Parameters
-        ----------
-        theta_i, phi_i, theta_r, phi_r : array_like [rad]
-            Directions of light and viewer, which broadcast.
-        wavelength_nm : float or array_like (M,) [nm], optional
-            As in `arguments`. Models that are not spectral take any wavelength.
-
-        Returns
-        -------
-        array [1/sr]
-            In the shape of the angles, with a last axis for a list of wavelengths.
-
-        Raises
-        ------
-        ParameterError
-            If an angle is outside its range, or the wavelengths do not suit the material.
-        """
-        return self._spectrum(self.spec.evaluate, (theta_i, phi_i, theta_r, phi_r), wavelength_nm, None)
+    def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
+        return self._spectrum(self.spec.evaluate, angles, wavelength_nm, None)
 
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Return f_r [1/sr] as by `lookup` at unit vectors of light and viewer (..., 3)."""
         return self._spectrum(self.spec.vectors, (wi, wr), wavelength_nm, None)
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:

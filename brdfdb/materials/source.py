@@ -1,18 +1,80 @@
-"""The protocol of a source: its interface for layouts, tabulation, planner, error measurement and scenes."""
+"""The protocol of a source, and the base class of lookups by angles."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.lobes import Lobe
 from brdfdb.parameters import Floats
 
 # Function of unit vectors (N, 3) of light and viewer that gives f_r [1/sr] of shape (N, L)
 Evaluate = Callable[[Floats, Floats], Floats]
+
+# theta_i, phi_i, theta_r and phi_r [rad], which broadcast
+FourAngles = tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]
+
+
+def check_wavelengths(wavelengths_nm: tuple[float, ...] | None) -> tuple[float, ...] | None:
+    """Return the wavelengths [nm] of a source; ParameterError if they are not positive and increasing."""
+    if wavelengths_nm is not None and not (wavelengths_nm[0] > 0.0 and np.all(np.diff(wavelengths_nm) > 0.0)):
+        raise ParameterError(
+            "wavelengths_nm", f"{list(wavelengths_nm)} must be positive and increasing", wavelengths_nm
+        )
+    return wavelengths_nm
+
+
+class Lookups(ABC):
+    """The base of sources and tables: f_r at angles, over one method that takes the four of them together."""
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Return f_r [1/sr] at angles; a table interpolates it.
+
+        Parameters
+        ----------
+        theta_i, phi_i, theta_r, phi_r : array_like [rad]
+            Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
+        wavelength_nm : float or array_like (M,) [nm], optional
+            Within the range of a spectral source or table; by default its wavelengths. Grey ones take any.
+
+        Returns
+        -------
+        array [1/sr]
+            In the shape of the angles, with a last axis for the wavelengths of a spectral source or table, or M if an
+            array of wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is
+            nan. float32 arrays in give float32 out.
+
+        Raises
+        ------
+        ParameterError
+            If an angle or a wavelength is outside its range, or the values of a function are no f_r.
+        StoreError, UnknownRevisionError
+            If a table is behind a service, and the service or the revision is gone.
+        """
+        return self._at_angles((theta_i, phi_i, theta_r, phi_r), wavelength_nm)
+
+    @abstractmethod
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return f_r [1/sr] for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
+
+        Wavelengths, result and errors are those of `lookup`.
+        """
+
+    @abstractmethod
+    def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
+        """Return f_r [1/sr] as by `lookup`; the angles are not checked yet."""
 
 
 class Lossless(NamedTuple):

@@ -19,7 +19,11 @@ THIRD = 1.0 / 3.0  # largest expected cost of a choice, as a share of the truth'
 
 Weigh = Literal["time", "bytes", "both"]
 
-_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+class _Record(BaseModel):
+    """A part of the document: immutable, without keys that it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Price(NamedTuple):
@@ -34,19 +38,15 @@ class Price(NamedTuple):
         return float(np.median(self.costs))
 
 
-class Residue(BaseModel):
+class Residue(_Record):
     """Error over the places that show a material, in the unit of the tolerance."""
-
-    model_config = _STRICT
 
     counted: float = Field(description="error at the percentile of the tolerance, which must keep to it")
     most: float = Field(description="largest")
 
 
-class Sampled(BaseModel):
+class Sampled(_Record):
     """A sample of the places that show a material. They were not used to choose."""
-
-    model_config = _STRICT
 
     places: int = Field(description="number of places")
     most: float = Field(description="largest error at these places")
@@ -55,10 +55,8 @@ class Sampled(BaseModel):
     )
 
 
-class Option(BaseModel):
+class Option(_Record):
     """A form of a material, with all others of the scene at their truth."""
-
-    model_config = _STRICT
 
     key: str
     title: str
@@ -72,10 +70,8 @@ class Option(BaseModel):
     error: Residue
 
 
-class Material(BaseModel):
+class Material(_Record):
     """The choice for a material, and its reason."""
-
-    model_config = _STRICT
 
     material: str
     title: str
@@ -96,10 +92,8 @@ class Material(BaseModel):
     revision: str | None = Field(description="revision of the table, if a store was named and a table chosen")
 
 
-class Choice(BaseModel):
+class Choice(_Record):
     """The cheapest form of each material within the tolerance of the picture of a scene."""
-
-    model_config = _STRICT
 
     brdfdb: str
     when: datetime

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
 
 from brdfdb.errors import BrdfdbError, MaterialError, ParameterError
 from brdfdb.geometry import radians
@@ -34,17 +34,14 @@ class Light(BaseModel):
 
     model_config = STRICT
 
-    direction: Vector = Field(description="towards the light")
+    direction: Annotated[Vector, AfterValidator(functools.partial(check_direction, "direction"))] = Field(
+        description="towards the light"
+    )
     strength: float = Field(default=1.0, gt=0.0)
     solid_angle_sr: float = Field(default=0.0, ge=0.0, le=1.0)
     samples: int = Field(
         default=16, ge=1, le=1024, description="over the solid angle; much narrower lobes show them one by one"
     )
-
-    @field_validator("direction")
-    @classmethod
-    def _check_direction(cls, direction: Vector) -> Vector:
-        return check_direction("direction", direction)
 
     @property
     def cos_radius(self) -> float:

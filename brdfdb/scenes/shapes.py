@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
@@ -42,13 +43,8 @@ class Shape(BaseModel, ABC):
     model_config = STRICT
 
     position: Vector = (0.0, 0.0, 0.0)
-    axis: Vector = (0.0, 0.0, 1.0)
+    axis: Annotated[Vector, AfterValidator(partial(check_direction, "axis"))] = (0.0, 0.0, 1.0)
     turn_deg: float = Field(default=0.0, description="about the axis, counter-clockwise")
-
-    @field_validator("axis")
-    @classmethod
-    def _check_axis(cls, axis: Vector) -> Vector:
-        return check_direction("axis", axis)
 
     @property
     def _own(self) -> Array:

@@ -16,6 +16,7 @@ from brdfdb.errors import (
     UnknownMaterialError,
 )
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, degrees, finished, spherical_angles
+from brdfdb.materials.source import FourAngles
 from brdfdb.parameters import Floats
 from brdfdb.store.http_service import TIMEOUT_S, Service, TooLargeError
 from brdfdb.store.paths import NAME
@@ -63,17 +64,10 @@ class RemoteTable(BaseTable):
     _specular: bool = field(repr=False)
     _service: Service = field(repr=False)
 
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-    ) -> Floats:
+    def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         self._wavelengths(wavelength_nm)  # what is wrong is refused in the order of a table, before anything is sent
-        np.broadcast_shapes(*(np.shape(angle) for angle in (theta_i, phi_i, theta_r, phi_r)))
-        given = checked_angles(theta_i, phi_i, theta_r, phi_r)
+        np.broadcast_shapes(*(np.shape(angle) for angle in angles))
+        given = checked_angles(*angles)
         return self._looked_up((given.theta_i, given.phi_i, given.theta_r, given.phi_r), given, wavelength_nm)
 
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -174,15 +168,7 @@ class RemoteStore(Mapping[str, RemoteTable]):
         return self._table(self._material(name))
 
     def table(self, name: str, revision: str) -> RemoteTable:
-        """Return the table of a revision, current or not.
-
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If the store has no such material, or it no such revision.
-        StoreError
-            If the revision is damaged.
-        """
+        """Return the table of a revision, current or not; errors are those of `Store.table`."""
         return self._table(self._material(name, f"/revisions/{quote(revision, safe='')}"))
 
     def revisions(self, name: str) -> list[str]:
@@ -213,12 +199,8 @@ class RemoteStore(Mapping[str, RemoteTable]):
     def dataset(self, name: str, revision: str | None = None) -> xr.Dataset:
         """Return a revision, by default the current one, as a lazy Dataset that is read over HTTP as far as needed.
 
-        Raises
-        ------
-        UnknownMaterialError, UnknownRevisionError
-            If the store has no such material, or it no such revision.
-        StoreError
-            If fsspec and aiohttp, which read zarr over HTTP, are not installed.
+        Errors are those of `Store.dataset`. StoreError, too, if fsspec and aiohttp, which read zarr over HTTP, are not
+        installed.
         """
         document = self._material(name, "" if revision is None else f"/revisions/{quote(revision, safe='')}")
         return remote_dataset(f"{self.url}/v1/store/materials/{name}/{document['revision']}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians
+from brdfdb.materials.source import FourAngles
 from brdfdb.parameters import Floats
 from brdfdb.tables import _kernels
 from brdfdb.tables._interpolation import Axes, prepared
@@ -119,26 +120,18 @@ class Table(BaseTable):
         """True if the stored numbers are f_r itself."""
         return self.spectra is None and self.uniform is None and self.interpolation.plain
 
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-    ) -> Floats:
+    def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         at = self._wavelengths(wavelength_nm)
-        given: Sequence[ArrayLike] = (theta_i, phi_i, theta_r, phi_r)
         shape: tuple[int, ...] = ()
-        if all(isinstance(angle, float) for angle in given):  # broadcasting takes longer than the lookup of one point
-            numbers = np.array(given).reshape(4, 1)
+        if all(isinstance(angle, float) for angle in angles):  # broadcasting takes longer than the lookup of one point
+            numbers = np.array(angles).reshape(4, 1)
             numbers.flags.writeable = False  # as by `_flat`
             dtype, flat = numbers.dtype, list(numbers)
         else:
-            arrays = [np.asarray(angle) for angle in given]
-            dtype = asked_for(theta_i, phi_i, theta_r, phi_r)
+            arrays = [np.asarray(angle) for angle in angles]
+            dtype = asked_for(*angles)
             if any(angle.dtype.kind not in "iuf" for angle in arrays):
-                checked_angles(*given)
+                checked_angles(*angles)
             shape = np.broadcast_shapes(*(angle.shape for angle in arrays))
             flat = [_flat(angle, shape, dtype) for angle in arrays]
         values = np.empty(flat[0].size * at.size, dtype)
@@ -146,7 +139,7 @@ class Table(BaseTable):
         if not _kernels.by_angles(
             *self._kernel, at.nodes, at.weight, flat[0], flat[1], flat[2], flat[3], horizon, values
         ):
-            checked_angles(*given)
+            checked_angles(*angles)
         return values.reshape(shape + at.tail)[()]
 
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors
 from brdfdb.materials import FunctionRecord, Material, source_of
+from brdfdb.materials.source import Lookups
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Axis
@@ -64,54 +65,17 @@ class Stated(NamedTuple):
     error: Floats
 
 
-class BaseTable(ABC):
-    """A table of one revision of a material, in memory or behind a service: lookups, metadata and stated error."""
+class BaseTable(Lookups):
+    """A table of one revision of a material, in memory or behind a service: lookups, metadata and stated error.
+
+    Beyond the last theta node of its grid f_r is that of the node. Between the wavelengths of the table the numbers
+    that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
+    """
 
     name: str
     revision: str
     attrs: Mapping[str, Any]
     wavelength_nm: Axis | None
-
-    @abstractmethod
-    def lookup(
-        self,
-        theta_i: ArrayLike,
-        phi_i: ArrayLike,
-        theta_r: ArrayLike,
-        phi_r: ArrayLike,
-        wavelength_nm: ArrayLike | None = None,
-    ) -> Floats:
-        """Interpolate f_r [1/sr].
-
-        Parameters
-        ----------
-        theta_i, phi_i, theta_r, phi_r : array_like [rad]
-            Directions of light (i) and viewer (r), pointing away from the surface; theta in [0, pi]; broadcast.
-        wavelength_nm : float or array_like (M,) [nm], optional
-            Within the table's wavelengths; grey tables take any. By default all wavelengths of the table. Between them
-            the numbers that are stored are interpolated, cubic (Catmull-Rom) in nanometres.
-
-        Returns
-        -------
-        array [1/sr]
-            In the shape of the angles, with a last axis for the wavelengths of a spectral table, or M if an array of
-            wavelengths was given; a single wavelength adds no axis. 0 below the horizon, nan where an angle is nan.
-            Beyond the last theta node of its grid the value is that of the node. float32 arrays in give float32 out.
-
-        Raises
-        ------
-        ParameterError
-            If an angle or a wavelength is outside its range.
-        StoreError, UnknownRevisionError
-            If the table is behind a service, and the service or the revision is gone.
-        """
-
-    @abstractmethod
-    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
-        """Interpolate f_r [1/sr] for unit vectors `wi` of the light and `wr` of the viewer, each of shape (..., 3).
-
-        Wavelengths, result and errors are those of `lookup`.
-        """
 
     @abstractmethod
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:

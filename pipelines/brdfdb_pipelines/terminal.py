@@ -84,11 +84,7 @@ def _print_plainly(title: str, columns: Sequence[str], rows: Sequence[Sequence[s
 
 def size(count: float) -> str:
     """Return a number of bytes as text with a unit."""
-    for unit in ("B", "kB", "MB"):
-        if count < 999.5:
-            return f"{count:.3g} {unit}"
-        count /= 1000.0
-    return f"{count:.3g} GB"
+    return _in_thousands(count, (" B", " kB", " MB", " GB"))
 
 
 def error(p99: float | None) -> str:
@@ -102,11 +98,16 @@ def error(p99: float | None) -> str:
 
 def count(value: float) -> str:
     """Return a number as text of three digits, thousands with a k."""
-    for unit in ("", "k", "M"):
+    return _in_thousands(value, ("", "k", "M", "G"))
+
+
+def _in_thousands(value: float, units: Sequence[str]) -> str:
+    """Return a number as text of three digits, in the first unit of which it is less than a thousand, or the last."""
+    for unit in units[:-1]:
         if value < 999.5:
             return f"{value:.3g}{unit}"
         value /= 1000.0
-    return f"{value:.3g}G"
+    return f"{value:.3g}{units[-1]}"
 
 
 def machine() -> str:

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-RECIPE = """\
+from tests.pipelines.recipes import anisotropic, isotropic
+
+HEAD = """\
 title = "one grey, one anisotropic, one spectral"
 materials = ["foam", "rolled-brass", "scene-copper-sphere"]
 wavelengths_nm = [{ start = 400, stop = 700, step = 20 }]
-[grids.isotropic]
-theta_i_deg = [{ start = 0, stop = 80, step = 10 }, 85, 89.5]
-theta_r_deg = [{ start = 0, stop = 80, step = 10 }, 85, 89.5]
-delta_phi_deg = [{ start = 0, stop = 180, step = 15 }]
-[grids.spectral]
-theta_i_deg = [{ start = 0, stop = 80, step = 10 }, 89.5]
-theta_r_deg = [{ start = 0, stop = 80, step = 10 }, 89.5]
-delta_phi_deg = [{ start = 0, stop = 180, step = 30 }]
-[grids.anisotropic]
-theta_i_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
-phi_i_deg = [{ start = 0, stop = 360, step = 30 }]
-theta_r_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
-phi_r_deg = [{ start = 0, stop = 360, step = 30 }]
 """
+THETA = "[{ start = 0, stop = 80, step = 10 }, 89.5]"
+RECIPE = "".join(
+    [
+        HEAD,
+        isotropic("[{ start = 0, stop = 80, step = 10 }, 85, 89.5]", "[{ start = 0, stop = 180, step = 15 }]"),
+        isotropic(THETA, "[{ start = 0, stop = 180, step = 30 }]", kind="spectral"),
+        anisotropic("[{ start = 0, stop = 80, step = 20 }, 89.5]", "[{ start = 0, stop = 360, step = 30 }]"),
+    ]
+)
 ALBEDO = {"theta_i_deg": [0.0, 90.0], "wavelength_nm": None, "albedo": [[0.5], [1.2]]}
 SENTENCES = [
     ("energy", "Energy", "violates", "reflects 1.2 at 90 degrees", ""),

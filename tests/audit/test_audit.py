@@ -35,18 +35,15 @@ from tests.audit.a_table import (
     written,
 )
 
-pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
+pytestmark = [
+    pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation"),
+    pytest.mark.usefixtures("few_samples"),
+]
 
 # rho / pi rounded to float32, summed in float64; half an ulp is 6e-8
 FLOAT32 = 1e-7
 # Two sums of the same numbers in another order; measured 4e-15
 QUADRATURE_TOLERANCE = 1e-13
-
-
-@pytest.fixture(autouse=True)
-def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Samplers are audited at length in test_audit_model.py."""
-    monkeypatch.setattr("brdfdb.audit.sampling.SAMPLES", 2000)
 
 
 # What passes

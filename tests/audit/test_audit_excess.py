@@ -34,13 +34,10 @@ from tests.audit.a_table import (
     written,
 )
 
-pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
-
-
-@pytest.fixture(autouse=True)
-def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Samplers are audited at length in test_audit_model.py."""
-    monkeypatch.setattr("brdfdb.audit.sampling.SAMPLES", 2000)
+pytestmark = [
+    pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation"),
+    pytest.mark.usefixtures("few_samples"),
+]
 
 
 # What is known

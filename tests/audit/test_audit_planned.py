@@ -21,13 +21,10 @@ from brdfdb.tables.tabulation import tabulate
 from tests.audit.a_table import ISOTROPIC, known, material, verdicts, written
 from tests.tables.test_albedo import KINDS, planned, table_of
 
-pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation")
-
-
-@pytest.fixture(autouse=True)
-def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Samplers are audited at length in test_audit_model.py."""
-    monkeypatch.setattr("brdfdb.audit.sampling.SAMPLES", 2000)
+pytestmark = [
+    pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation"),
+    pytest.mark.usefixtures("few_samples"),
+]
 
 
 def scaled(table: Table, factor: float) -> Table:

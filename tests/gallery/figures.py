@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,18 @@ def statement_of(figure: Figure, phrase: str) -> Statement:
     """Return the only statement of a figure that contains a phrase."""
     (statement,) = (statement for statement in figure.statements if phrase in statement.says)
     return statement
+
+
+def check_statement(figure: Figure, phrase: str) -> None:
+    """Assert that the statement of a figure with a phrase says what its threshold is from, and holds."""
+    statement = statement_of(figure, phrase)
+    assert statement.threshold_from
+    assert statement.holds, statement.seen
+
+
+def check_phrases(statements: Sequence[Phrase], names: Sequence[str], figure: Callable[[str], Figure]) -> None:
+    """Assert that the phrases are as many as the statements of each figure, in the order of the figures."""
+    assert [name for name, _ in statements] == [name for name in names for _ in figure(name).statements]
 
 
 def panel_of(figure: Figure, index: int = 0) -> Panel:

@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 from brdfdb.gallery import GALLERY
-from tests.gallery.mutants.mutation import Matrix, matrix_of
+from tests.gallery.mutants.mutation import MutantTests
 from tests.gallery.mutants.ward_1992 import MUTANTS, PREFIX, UNCHANGED
 
-KEYS = [key for key in GALLERY if key.startswith(PREFIX)]
 
-
-@cache
-def matrix() -> Matrix:
-    return matrix_of(KEYS, MUTANTS)
-
-
-def test_the_twin_that_mutants_change_is_the_model() -> None:
-    assert not matrix_of(KEYS, UNCHANGED).noticed[UNCHANGED[0].name]
-
-
-def test_every_statement_fails_for_a_wrong_model() -> None:
-    assert not matrix().blind, str(matrix())
-
-
-def test_every_wrong_model_is_noticed_by_two_statements() -> None:
-    assert not matrix().overlooked, str(matrix())
+class TestMutants(MutantTests):
+    keys = tuple(key for key in GALLERY if key.startswith(PREFIX))
+    mutants = MUTANTS
+    unchanged = UNCHANGED

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from brdfdb import models
 from brdfdb.geometry import unit_vector
-from brdfdb.parameters import ModelSpec, Parameter
+from brdfdb.parameters import Floats, ModelSpec, Parameter
 from tests.models.draws import (
     HALF_PI,
     ROWS,
@@ -34,6 +34,13 @@ def drawn_vectors(rng: np.random.Generator, *shape: int) -> NDArray[np.float64]:
     return unit_vector(rng.uniform(0.0, HALF_PI, shape), rng.uniform(-np.pi, np.pi, shape))
 
 
+def check_twin(error: Floats, expected: Floats, conditioning: Floats) -> None:
+    """Assert that vectors give the values of their angles, but for rounding and how it is amplified."""
+    assert np.mean(expected > TINY) > 0.5
+    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, TINY))
+    assert worst <= TWIN, f"off by {worst:.3g}"
+
+
 @every_model
 def test_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
     rng = np.random.default_rng(23)
@@ -45,9 +52,7 @@ def test_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> None:
     moved = [spec.evaluate(*angles[:i], angles[i] - step, *angles[i + 1 :], **parameters) for i in range(4)]
     conditioning = sum(np.abs(each - expected) for each in moved) / step
     error = np.abs(spec.vectors(wi, wr, **parameters) - expected)
-    assert np.mean(expected > TINY) > 0.5
-    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, TINY))
-    assert worst <= TWIN, f"off by {worst:.3g}"
+    check_twin(error, expected, conditioning)
 
 
 @every_model
@@ -165,9 +170,7 @@ def test_specular_vectors_give_the_values_of_their_angles(spec: ModelSpec) -> No
     expected, step = specular(spec, theta_i, parameters), 1e-9
     conditioning = np.abs(specular(spec, np.maximum(theta_i - step, 0.0), parameters) - expected) / step
     error = np.abs(specular_vectors(spec, unit_vector(theta_i, phi_i), parameters) - expected)
-    assert np.mean(expected > TINY) > 0.5
-    worst = np.max((error - TWIN_ROUNDING * conditioning) / np.maximum(expected, TINY))
-    assert worst <= TWIN, f"off by {worst:.3g}"
+    check_twin(error, expected, conditioning)
 
 
 @every_specular

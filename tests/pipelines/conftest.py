@@ -7,38 +7,26 @@ from pathlib import Path
 import pytest
 
 from brdfdb_pipelines import cli
+from tests.pipelines.recipes import anisotropic, isotropic, material
 
 # Grey isotropic, anisotropic, spectral, one wavelength, nothing but a Dirac part
-RECIPE = """\
+FINE, LESS = "[{ start = 0, stop = 80, step = 10 }, 85, 89.5]", "[{ start = 0, stop = 80, step = 20 }, 89.5]"
+HEAD = """\
 title = "Größe: one of every kind"
 materials = ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"]
 wavelengths_nm = [{ start = 400, stop = 700, step = 20 }]
-
-[grids.isotropic]
-theta_i_deg = [{ start = 0, stop = 80, step = 10 }, 85, 89.5]
-theta_r_deg = [{ start = 0, stop = 80, step = 10 }, 85, 89.5]
-delta_phi_deg = [{ start = 0, stop = 180, step = 15 }]
-
-[grids.spectral]
-theta_i_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
-theta_r_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
-delta_phi_deg = [{ start = 0, stop = 180, step = 30 }]
-
-[grids.anisotropic]
-theta_i_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
-phi_i_deg = [{ start = 0, stop = 360, step = 30 }]
-theta_r_deg = [{ start = 0, stop = 80, step = 20 }, 89.5]
-phi_r_deg = [{ start = 0, stop = 360, step = 30 }]
-
-[define.mirror]
-title = "Smooth copper: a Dirac part and nothing else"
-model = "he_torrance"
-source = "no paper"
-refractive_index = "main/Cu/Johnson"
-[define.mirror.parameters]
-sigma_0_um = 0
-tau_um = 1
 """
+RECIPE = "".join(
+    [
+        HEAD,
+        isotropic(FINE, "[{ start = 0, stop = 180, step = 15 }]"),
+        isotropic(LESS, "[{ start = 0, stop = 180, step = 30 }]", kind="spectral"),
+        anisotropic(LESS, "[{ start = 0, stop = 360, step = 30 }]"),
+        material(
+            "mirror", "Smooth copper: a Dirac part and nothing else", "he_torrance", "sigma_0_um = 0", "tau_um = 1"
+        ),
+    ]
+)
 NAMES = ["foam", "rolled-brass", "scene-copper-sphere", "blue-plastic", "mirror"]
 
 

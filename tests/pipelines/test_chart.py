@@ -32,6 +32,7 @@ from brdfdb.materials import presets
 from brdfdb.store import family_records
 from brdfdb_pipelines import cli, family_plot, plot_panels, terminal, tradeoff_plot
 from brdfdb_pipelines.recipe_file import load
+from tests.pipelines.recipes import material
 
 Captured = pytest.CaptureFixture[str]
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "chart.schema.json"
@@ -257,20 +258,16 @@ def test_labels_hide_neither_points_nor_each_other_where_there_is_room() -> None
 
 # Families
 
-BRUSHED = """\
-materials = ["brushed"]
-wavelengths_nm = [550]
-tolerance = 0.2
-[sweep.brushed]
-title = "Brushed"
-model = "ward"
-source = "no paper"
-[sweep.brushed.parameters]
-rho_d = 0.1
-rho_s = [0.1, 0.3]
-alpha_x = 0.1
-alpha_y = [0.2, 0.3, 0.4]
-"""
+BRUSHED = 'materials = ["brushed"]\nwavelengths_nm = [550]\ntolerance = 0.2\n' + material(
+    "brushed",
+    "Brushed",
+    "ward",
+    "rho_d = 0.1",
+    "rho_s = [0.1, 0.3]",
+    "alpha_x = 0.1",
+    "alpha_y = [0.2, 0.3, 0.4]",
+    table="sweep",
+)
 
 
 @pytest.fixture

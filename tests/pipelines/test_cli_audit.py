@@ -19,6 +19,7 @@ from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
 from tests.pipelines.command import Captured, run
+from tests.pipelines.recipes import material
 
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "audit.schema.json"
 
@@ -98,15 +99,7 @@ def test_audit_notices_a_file_that_was_exchanged_for_a_sound_one(tmp_path: Path,
     assert [entry["material"] for entry in document["materials"]] == ["white"]
 
 
-WHITE = """
-[define.white]
-title = "White, rough"
-model = "oren_nayar"
-source = "no paper"
-[define.white.parameters]
-rho = 1
-sigma_deg = 20
-"""
+WHITE = material("white", "White, rough", "oren_nayar", "rho = 1", "sigma_deg = 20")
 KNOWN = """
 [define.white.known_excess]
 max_albedo = 1.05

@@ -25,46 +25,19 @@ from brdfdb_pipelines import build as module
 from brdfdb_pipelines import cli, terminal
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.recipe_file import load
+from tests.pipelines.recipes import COARSE, material
 
 AGREEMENT = 0.2  # promised, between a stated p99 and one measured afresh; measured: 0.05
 SCHEMA = Path(__file__).parent.parent.parent / "schemas" / "family.schema.json"
-COPPER = """\
-materials = ["rough-copper"]
-wavelengths_nm = [450, 550, 650]
-tolerance = 0.2
-[sweep.rough-copper]
-title = "Rough copper"
-model = "he_torrance"
-source = "no paper"
-refractive_index = "main/Cu/Johnson"
-[sweep.rough-copper.parameters]
-sigma_0_um = [0.1, 0.12]
-tau_um = [1, 1.2]
-"""
-GREY = """\
-materials = ["grey", "foam"]
-wavelengths_nm = [500]
-[grids.isotropic]
-theta_i_deg = [0, 80]
-theta_r_deg = [0, 80]
-delta_phi_deg = [0, 180]
-[grids.spectral]
-theta_i_deg = [0, 80]
-theta_r_deg = [0, 80]
-delta_phi_deg = [0, 180]
-[grids.anisotropic]
-theta_i_deg = [0, 80]
-phi_i_deg = [0, 360]
-theta_r_deg = [0, 80]
-phi_r_deg = [0, 360]
-[sweep.grey]
-title = "Rough grey"
-model = "oren_nayar"
-source = "no paper"
-[sweep.grey.parameters]
-rho = 0.5
-sigma_deg = [{ start = 0, stop = 30, step = 10 }]
-"""
+COPPER = 'materials = ["rough-copper"]\nwavelengths_nm = [450, 550, 650]\ntolerance = 0.2\n' + material(
+    "rough-copper", "Rough copper", "he_torrance", "sigma_0_um = [0.1, 0.12]", "tau_um = [1, 1.2]", table="sweep"
+)
+SIGMA = "sigma_deg = [{ start = 0, stop = 30, step = 10 }]"
+GREY = (
+    'materials = ["grey", "foam"]\nwavelengths_nm = [500]\n'
+    + COARSE
+    + material("grey", "Rough grey", "oren_nayar", "rho = 0.5", SIGMA, table="sweep")
+)
 
 Captured = pytest.CaptureFixture[str]
 Event = dict[str, Any]

@@ -20,41 +20,25 @@ import pytest
 
 import brdfdb
 from brdfdb_pipelines import cli
+from tests.pipelines.recipes import anisotropic, isotropic, material
 
 KILLS = 50
 SEED = 20261121
 WAIT_S = 60.0
 
-# Its tables are constant: a value tells which recipe it is of, a table of several values mixes two
-RECIPE = """\
-materials = ["grey", "white"]
-wavelengths_nm = [500]
-[grids.isotropic]
-theta_i_deg = [{{ start = 0, stop = 89, step = 1 }}]
-theta_r_deg = [{{ start = 0, stop = 89, step = 0.5 }}]
-delta_phi_deg = [{{ start = 0, stop = 180, step = {step} }}]
-[grids.spectral]
-theta_i_deg = [0, 80]
-theta_r_deg = [0, 80]
-delta_phi_deg = [0, 180]
-[grids.anisotropic]
-theta_i_deg = [0, 80]
-phi_i_deg = [0, 360]
-theta_r_deg = [0, 80]
-phi_r_deg = [0, 360]
-[define.grey]
-title = "Grey"
-model = "lambert"
-source = "no paper"
-[define.grey.parameters]
-rho = {rho}
-[define.white]
-title = "White"
-model = "lambert"
-source = "no paper"
-[define.white.parameters]
-rho = {rho}
-"""
+
+def constant(step: int, rho: float) -> str:
+    """Return the recipe of two constant tables: a value tells the recipe, a table of several values mixes two."""
+    grid = isotropic(ranged(89, 1), ranged(180, step), viewer=ranged(89, 0.5))
+    materials = [material(name, name.title(), "lambert", f"rho = {rho}") for name in ("grey", "white")]
+    head = 'materials = ["grey", "white"]\nwavelengths_nm = [500]\n'
+    return "".join([head, grid, isotropic(kind="spectral"), anisotropic(), *materials])
+
+
+def ranged(stop: float, step: float) -> str:
+    """Return the nodes from 0 to an end."""
+    return f"[{{ start = 0, stop = {stop}, step = {step} }}]"
+
 
 # Imports once, then forks a build for each line: a fork is safe while there is one thread
 NURSERY = """
@@ -118,7 +102,7 @@ def nursery(tmp_path: Path) -> Iterator[Nursery]:
 
 
 def write_recipe(path: Path, rho: float, step: float = 1.0) -> Path:
-    path.write_text(RECIPE.format(rho=rho, step=step), encoding="utf-8")
+    path.write_text(constant(step, rho), encoding="utf-8")
     return path
 
 

@@ -13,27 +13,13 @@ from pathlib import Path
 import pytest
 
 from brdfdb_pipelines import cli
+from tests.pipelines.recipes import COARSE
 
 MOST_S = 10  # of a processor: the clock depends on what else runs
 MOST_BYTES = 500_000_000  # of the process, the program itself included: 190 MB
 
-GRIDS = """
-[grids.isotropic]
-theta_i_deg = [0, 80]
-theta_r_deg = [0, 80]
-delta_phi_deg = [0, 180]
-[grids.spectral]
-theta_i_deg = [0, 80]
-theta_r_deg = [0, 80]
-delta_phi_deg = [0, 180]
-[grids.anisotropic]
-theta_i_deg = [0, 80]
-phi_i_deg = [0, 360]
-theta_r_deg = [0, 80]
-phi_r_deg = [0, 360]
-"""
 HEAD = 'materials = ["foam"]\nwavelengths_nm = [500]\n'
-GOOD = HEAD + GRIDS
+GOOD = HEAD + COARSE
 DEFINE = '[define.mine]\ntitle = "T"\nmodel = "lambert"\nsource = "me"\nparameters = { rho = 0.5 }\n'
 MINE = GOOD.replace("foam", "mine") + DEFINE
 SWEEP = GOOD.replace("foam", "fam") + (
@@ -100,7 +86,7 @@ RECIPES: list[tuple[str, str | bytes, str]] = [
     ("9999 patterns", GOOD.replace('"foam"', many(9999, lambda n: f'"*x{n}",')), "materials"),
     ("112 ranges of 99 999", GOOD.replace(AXIS, f"theta_i_deg = [{LONG * 112}]"), "nodes an axis may have"),
     ("a range of 1e300 nodes", GOOD.replace(AXIS, "theta_i_deg = [{ start = 0, stop = 80, step = 1e-298 }]"), "nodes"),
-    ("a range of wavelengths", HEAD.replace("[500]", "[{ start = 1, stop = 1e9, step = 1e-9 }]") + GRIDS, "nodes"),
+    ("a range of wavelengths", HEAD.replace("[500]", "[{ start = 1, stop = 1e9, step = 1e-9 }]") + COARSE, "nodes"),
     ("112 ranges of wavelengths", GOOD.replace("[500]", f"[{LONG * 112}]"), "nodes"),
     ("a range of nan", GOOD.replace(AXIS, "theta_i_deg = [{ start = 0, stop = nan, step = 1 }]"), "theta_i_deg"),
     ("a number of 100 000 digits", HEAD.replace("500", "5" * 100_000), "not TOML: Exceeds the limit"),

@@ -15,34 +15,15 @@ import brdfdb
 from brdfdb.audit import sampling
 from brdfdb.store.publication import publish_dataset
 from brdfdb_pipelines import cli
+from tests.pipelines.recipes import anisotropic, isotropic, material
 
 DEFINED = """\
 title = "A metal, and a material so dark that half as much light again conserves energy"
 materials = ["scene-copper-sphere", "dark"]
 wavelengths_nm = [{ start = 400, stop = 700, step = 25 }]
-[define.dark]
-title = "Dark"
-model = "oren_nayar"
-source = "no paper"
-[define.dark.parameters]
-rho = 0.3
-sigma_deg = 20
-"""
-GRIDS = """
-[grids.isotropic]
-theta_i_deg = [{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]
-theta_r_deg = [{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]
-delta_phi_deg = [{ start = 0, stop = 180, step = 10 }]
-[grids.spectral]
-theta_i_deg = [{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]
-theta_r_deg = [{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]
-delta_phi_deg = [{ start = 0, stop = 180, step = 10 }]
-[grids.anisotropic]
-theta_i_deg = [0, 80]
-phi_i_deg = [0, 360]
-theta_r_deg = [0, 80]
-phi_r_deg = [0, 360]
-"""
+""" + material("dark", "Dark", "oren_nayar", "rho = 0.3", "sigma_deg = 20")
+THETA, DELTA_PHI = "[{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]", "[{ start = 0, stop = 180, step = 10 }]"
+GRIDS = isotropic(THETA, DELTA_PHI) + isotropic(THETA, DELTA_PHI, kind="spectral") + anisotropic()
 RECIPES = {"planned": DEFINED.replace("[define.dark]", "tolerance = 0.02\n[define.dark]"), "plain": DEFINED + GRIDS}
 
 Change = Callable[[xr.Dataset], xr.Dataset]

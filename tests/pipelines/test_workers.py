@@ -85,6 +85,14 @@ def dask(*arguments: object) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True)
 
 
+def address_of(told: Path, deadline: float) -> str:
+    """Return the address of a scheduler, which writes it to a file once it listens."""
+    while not told.is_file() or not told.read_text():
+        assert time.monotonic() < deadline, "no scheduler"
+        time.sleep(0.05)
+    return str(json.loads(told.read_text())["address"])
+
+
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
     """The address of a scheduler on loopback, and its two workers, each with one thread and no nanny."""
@@ -94,10 +102,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, lis
     processes = [scheduler]
     try:
         deadline = time.monotonic() + START_S
-        while not told.is_file() or not told.read_text():
-            assert time.monotonic() < deadline, "no scheduler"
-            time.sleep(0.05)
-        address = json.loads(told.read_text())["address"]
+        address = address_of(told, deadline)
         options = ("--nthreads", 1, "--no-nanny", "--no-dashboard", "--host", "127.0.0.1", "--local-directory", where)
         processes += [dask("dask_worker", address, *options) for _ in range(2)]
         with workers.cluster(address) as at:
@@ -197,10 +202,7 @@ def test_a_scheduler_that_dies_is_one_sentence(recipe: Path, tmp_path: Path) -> 
     scheduler = dask("dask_scheduler", "--host", "127.0.0.1", "--port", 0, "--no-dashboard", "--scheduler-file", told)
     try:
         deadline = time.monotonic() + START_S
-        while not told.is_file() or not told.read_text():
-            assert time.monotonic() < deadline, "no scheduler"
-            time.sleep(0.05)
-        address = json.loads(told.read_text())["address"]
+        address = address_of(told, deadline)
         # no worker: the build waits until the scheduler goes
         command = [sys.executable, "-m", "brdfdb_pipelines.cli", "build", recipe, "--store", tmp_path / "store"]
         with subprocess.Popen([*command, "--scheduler", address], stderr=subprocess.PIPE, text=True) as builder:

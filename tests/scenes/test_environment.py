@@ -22,6 +22,7 @@ from brdfdb.scenes.image import write_channels
 from brdfdb.scenes.renderer import Reflector, render
 from brdfdb.scenes.scene import Scene
 from brdfdb_pipelines.scene_file import SceneError, load
+from tests.scenes.a_mirror import MIRROR
 
 Array = NDArray[np.float64]
 
@@ -39,13 +40,6 @@ ALBEDO = 1e-3  # of those that ambient light meets: see test_render.py
 COARSE = [float(wavelength) for wavelength in range(400, 701, 20)]
 WAVELENGTH = np.array([400.0, 550.0, 700.0])
 WHITE = {"title": "white", "model": "lambert", "source": "a test", "parameters": {"rho": 1.0}}
-MIRROR = {
-    "title": "smooth copper",
-    "model": "he_torrance",
-    "source": "a test",
-    "refractive_index": "main/Cu/Johnson",
-    "parameters": {"sigma_0_um": 0.0, "tau_um": 1.0},
-}
 SPHERE = {"kind": "sphere", "radius": 1.0}
 FAR = {"position": [0.0, -5.0, 0.0], "height": 2.2, "aspect": 1.0}
 ABOVE = {"position": [0.0, -0.6, 0.8], "height": 1.0, "aspect": 1.0}

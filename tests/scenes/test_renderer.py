@@ -15,6 +15,7 @@ from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.renderer import Reflector, reflectors, render
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
+from tests.scenes.a_mirror import MIRROR
 
 ROUNDING = 2e-15  # 1.6e-15 measured
 LIMB = 1e-13  # of the radiance of a sphere, next to the limb: 4.9e-14 measured
@@ -147,13 +148,6 @@ def smooth_copper(theta: float, wavelength_nm: float) -> float:
     return float(he_torrance_1991.fresnel_unpolarised(np.cos(theta), float(n), float(k)))
 
 
-MIRROR = {
-    "title": "smooth copper",
-    "model": "he_torrance",
-    "source": "a test",
-    "refractive_index": "main/Cu/Johnson",
-    "parameters": {"sigma_0_um": 0.0, "tau_um": 1.0},
-}
 TILTED = {"position": [0.0, -0.6, 0.8], "height": 1.0, "aspect": 1.0}  # 36.87 degrees above the horizon
 THETA = np.arccos(0.8)
 

@@ -15,28 +15,14 @@ import xarray as xr
 
 import brdfdb
 from brdfdb.errors import StoreError
-from brdfdb.materials import Material
 from brdfdb.store import codec, publication, snapshots, verification
 from brdfdb.store.marker import make_store
 from brdfdb.store.paths import manifest_path
 from brdfdb.store.publication import publish_dataset
 from brdfdb.store.revisions import collect, history, rollback, standing
 from brdfdb.store.sealed_json import sealed, unsealed
-from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout, digest
-from brdfdb.tables.tabulation import tabulate
-
-GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0, 90, 180]})
-
-
-def lambert(rho: float) -> xr.Dataset:
-    table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
-    dataset = tabulate(Layout(Material.from_table("white", table), GRID))
-    return dataset.assign_attrs(request={"rho": rho}, request_sha256=digest({"rho": rho}))
-
-
-def rho(root: Path) -> float:
-    return float(np.round(brdfdb.open(root)["white"].brdf[0, 0, 0] * np.pi, 6))
+from brdfdb.tables.layout import digest
+from tests.store.a_white import lambert, rho
 
 
 def findings(root: Path) -> list[str]:

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import wraps
-from typing import Any, NamedTuple
+from functools import cache, wraps
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -167,3 +167,27 @@ def matrix_of(keys: Sequence[str], mutants: Sequence[Mutant]) -> Matrix:
         undrawn = {sentence for sentence in wrong if sentence.says == UNDRAWN}
         noticed[mutant.name] = frozenset(sentence for sentence in holding if not wrong.get(sentence, True)) | undrawn
     return Matrix(holding, noticed)
+
+
+class MutantTests:
+    """The tests of the mutants of a paper; a subclass names the paper's figures, its mutants and their right twins."""
+
+    keys: ClassVar[Sequence[str]]
+    mutants: ClassVar[Sequence[Mutant]]
+    unchanged: ClassVar[Sequence[Mutant]]
+
+    @classmethod
+    @cache
+    def matrix(cls) -> Matrix:
+        """Return the statements that notice each mutant."""
+        return matrix_of(cls.keys, cls.mutants)
+
+    def test_the_twins_that_mutants_change_are_the_models(self) -> None:
+        for twin in self.unchanged:
+            assert not matrix_of(self.keys, [twin]).noticed[twin.name]
+
+    def test_every_statement_fails_for_a_wrong_model(self) -> None:
+        assert not self.matrix().blind, str(self.matrix())
+
+    def test_every_wrong_model_is_noticed_by_two_statements(self) -> None:
+        assert not self.matrix().overlooked, str(self.matrix())
