@@ -253,8 +253,7 @@ def choose(
     planned : Look
         Picture, and places near edges, where each form is compared with the truth, all other materials at their truth.
     check : callable
-        ``check(round)`` gives the scene at fresh places for a round from 1 on, to check all choices at once. It gives
-        None if the scene has no other places.
+        ``check(round)`` gives the scene at fresh places for a round from 1 on, or None if it has no other places.
     offered : mapping
         Forms of each material by its name, the truth first.
     costs : mapping
