@@ -23,6 +23,7 @@ from brdfdb.tables.grids import (
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
+from brdfdb.tables.table_source import TableSource
 from brdfdb.tables.tabulation import POLE_END_DEG
 
 Kind = Literal[FormKind, "table"]
@@ -107,7 +108,10 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         tolerances = SPECTRAL_TOLERANCES if source.spectral else TOLERANCES
     at = None if wavelength_nm is None else np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
     if not isinstance(source, Material):
-        itself = Form("function", source.title, "exact", f"source {source.name}", source.brdf_at(at), 0)
+        key, title = "function", source.title
+        if isinstance(source, TableSource):  # its own source cannot be evaluated
+            key, title = "table-itself", f"{source.title}: the stored table itself"
+        itself = Form(key, title, "exact", f"source {source.name}", source.brdf_at(at), 0)
         return [itself, *_tables(source, source, at, tolerances, "table")]
     listed = list(_of_model(source, at))
     tabulated = _exact(source)

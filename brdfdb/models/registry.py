@@ -1,4 +1,4 @@
-"""The registry of models: the built-in ones, those of installed packages, and those of files that the user names."""
+"""The registry of models: ours, those of installed packages, and those of files that the user names."""
 
 from __future__ import annotations
 
@@ -81,10 +81,12 @@ class Registry(dict[str, ModelSpec]):
         """
         for path in paths:
             file = Path(path).absolute()
+            if os.pathsep in str(file):
+                raise BrdfdbError(f"{file}: the path of a file of models has no {os.pathsep!r}, which separates paths")
             self._add_file(file)
-            known = [entry for entry in os.environ.get(VARIABLE, "").split(os.pathsep) if entry]
-            if str(file) not in (str(Path(entry).absolute()) for entry in known):
-                os.environ[VARIABLE] = os.pathsep.join([*known, str(file)])
+            known = [str(Path(entry).absolute()) for entry in os.environ.get(VARIABLE, "").split(os.pathsep) if entry]
+            # absolute paths: a process that is started later may have another working directory
+            os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*known, str(file)]))
 
     def add_environment(self) -> None:
         """Add the models of the files that the environment variable `VARIABLE` names, as `add_files` does."""
@@ -105,7 +107,7 @@ class Registry(dict[str, ModelSpec]):
         try:
             try:
                 description.loader.exec_module(module)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 raise BrdfdbError(f"{file}: {_message(error)}") from error
             ours = {id(spec) for spec in self.values()}
             specs = {id(spec): spec for spec in vars(module).values() if isinstance(spec, ModelSpec)}
@@ -118,6 +120,6 @@ class Registry(dict[str, ModelSpec]):
             raise
 
 
-def _message(error: Exception) -> str:
+def _message(error: BaseException) -> str:
     """Return the class and the first line of an error."""
     return f"{type(error).__name__}: {error}".partition("\n")[0]

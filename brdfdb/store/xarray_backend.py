@@ -87,6 +87,8 @@ def _local(path: Path, revision: str | None, snapshot: str | None) -> xr.Dataset
     if (root := store_of(path / "r000001")) is not None:
         return Store(root, snapshot=snapshot).dataset(path.name, revision)
     if (root := store_of(path)) is not None:
+        if revision not in (None, path.name):
+            raise ParameterError("revision", f"{revision!r} is another one than that of {path}", revision, path.name)
         return Store(root, snapshot=snapshot).dataset(path.parent.name, path.name)
     if not (path / METADATA).is_file():
         raise StoreError(f"no table at {path}: name a revision, a material of a store, or a store with `material`")

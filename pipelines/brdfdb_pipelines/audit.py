@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import brdfdb
 from brdfdb.atlas import ATLAS
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
-from brdfdb.errors import ParameterError, StoreError
+from brdfdb.errors import BrdfdbError, ParameterError, StoreError
 from brdfdb.gallery import GALLERY
 from brdfdb_pipelines import audit_page, terminal, workers
 
@@ -147,7 +147,7 @@ def _audited(root: Path, name: str, accept_excess: bool) -> Section | StoreError
         audited = audit(store[name], accept_excess=accept_excess)
     except StoreError as error:
         return error
-    except (ValueError, KeyError) as error:  # undamaged files that do not hold a table
+    except BrdfdbError as error:  # undamaged files that do not hold a table
         return StoreError(f"{name} cannot be audited: {error}")
     return Section(audited, audit_page.plots_of(audited))
 

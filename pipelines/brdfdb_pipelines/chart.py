@@ -134,7 +134,15 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
         if name in jobs:
             subject = _Subject(jobs[name].material, jobs[name].wavelength_nm)
         elif table is not None:
-            subject = _Subject(source_of_table(table), table.wavelength_nm)
+            source = source_of_table(table)
+            subject = _Subject(source, table.wavelength_nm)
+            if not isinstance(source, Material):
+                print(
+                    f"{name}: its source cannot be evaluated here. A function is not in the store, and a model of your "
+                    "own needs --models. Errors are those against the stored table itself."
+                )
+                subjects.append(subject)
+                continue
         elif name in sweeps:
             members = [jobs[member] for member in sweeps[name].members]
             materials = [job.material for job in members]
@@ -148,7 +156,7 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
             subjects.append(_Family(family.record, materials, family.wavelength_nm, family))
             continue
         else:
-            known = "the recipe" if recipe_path else "the built-in ones; `brdfdb list --presets` names them"
+            known = "the recipe" if recipe_path else "the presets; `brdfdb list --presets` names them"
             raise ParameterError(name, f"no such material or family, neither in the store nor among {known}", name)
         if table is not None and _fits(table.wavelength_nm, subject.wavelength_nm):
             title = f"table of the store, {terminal.error(table.error.overall.p99 if table.error else None)}"

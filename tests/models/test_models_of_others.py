@@ -187,3 +187,18 @@ def test_the_command_line_takes_files_before_and_after_the_command(
     for arguments in (("--models", tmp_path / "a.py", "list"), ("list", "--models", tmp_path / "a.py")):
         assert run(*arguments) == 2
         assert capsys.readouterr().err == f"brdfdb: {tmp_path / 'a.py'}: no such file of models\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("leaves.py", "import sys; sys.exit(0)", "SystemExit"),
+        ("a:b.py", "", "separates paths"),
+    ],
+)
+def test_a_file_that_ends_the_program_or_splits_its_path_is_refused(
+    tmp_path: Path, name: str, text: str, words: str
+) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with pytest.raises(BrdfdbError, match=words):
+        Registry().add_files([tmp_path / name])

@@ -13,7 +13,7 @@ from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 if TYPE_CHECKING:
     from brdfdb.store.reader import Store
 
-HELP = "List the materials and families of the store, or the built-in presets."
+HELP = "List the materials and families of the store, or the presets."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
