@@ -6,16 +6,30 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import os
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from brdfdb.errors import BrdfdbError, ParameterError
-from brdfdb.parameters import ModelSpec
+from brdfdb.parameters import ModelSpec, Parameter
 
 GROUP = "brdfdb.models"  # group of entry points, each of which gives a ModelSpec or an iterable of them
 VARIABLE = "BRDFDB_MODELS"  # environment variable with paths of Python files, separated as in PATH
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_FUNCTIONS = ("evaluate", "vectors")
+_OPTIONAL_FUNCTIONS = [
+    "specular",
+    "anisotropic",
+    "lobe",
+    "lossless",
+    "forms",
+    "exact_model",
+    "limits",
+    "uniform_bound_cosine",
+]
 
 
 class Registry(dict[str, ModelSpec]):
@@ -37,12 +51,13 @@ class Registry(dict[str, ModelSpec]):
         Raises
         ------
         BrdfdbError
-            If one is no ModelSpec, or its name is taken.
+            If one is no ModelSpec, one of its fields is no such thing as a ModelSpec has, or its name is taken.
         """
         new: dict[str, ModelSpec] = {}
         for spec in specs:
             if not isinstance(spec, ModelSpec):
                 raise BrdfdbError(f"{origin}: {spec!r:.80} is not a brdfdb.parameters.ModelSpec")
+            _check(spec, origin)
             if spec.name in self or spec.name in new:
                 raise BrdfdbError(f"{origin}: the name {spec.name!r} is that of another model; choose another name")
             new[spec.name] = spec
@@ -118,6 +133,24 @@ class Registry(dict[str, ModelSpec]):
         except BrdfdbError:
             del sys.modules[name]
             raise
+
+
+def _check(spec: ModelSpec, origin: str) -> None:
+    """Raise a BrdfdbError that names the first field of a model which cannot be used."""
+    if not isinstance(spec.name, str) or not _NAME.fullmatch(spec.name):
+        raise BrdfdbError(f"{origin}: name: {spec.name!r} is not letters, digits, _ and -, a letter first")
+    if not isinstance(spec.version, int) or spec.version < 1:
+        raise BrdfdbError(f"{origin}: {spec.name}: version: {spec.version!r} is not an integer of at least 1")
+    parameters: Any = spec.parameters
+    if not isinstance(parameters, tuple) or not all(isinstance(parameter, Parameter) for parameter in parameters):
+        raise BrdfdbError(
+            f"{origin}: {spec.name}: parameters: {parameters!r:.80} is not a tuple of brdfdb.parameters.Parameter"
+        )
+    for field in (*_FUNCTIONS, *_OPTIONAL_FUNCTIONS):
+        given = getattr(spec, field)
+        if not callable(given) and (given is not None or field in _FUNCTIONS):
+            allowed = "a function" if field in _FUNCTIONS else "a function or None"
+            raise BrdfdbError(f"{origin}: {spec.name}: {field}: {given!r:.80} is not {allowed}")
 
 
 def _message(error: BaseException) -> str:

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, Field, field_validator, model_va
 from brdfdb.errors import BrdfdbError, MaterialError, ParameterError
 from brdfdb.geometry import radians
 from brdfdb.materials import Material, Source, presets
+from brdfdb.materials.provenance import Text
 from brdfdb.parameters import closest
 from brdfdb.scenes.environment import Environment
 from brdfdb.scenes.recorded_directions import Recorded
@@ -191,7 +192,7 @@ class Scene(BaseModel):
     wavelengths_nm: list[float] = WAVELENGTHS_NM
     tolerance: Tolerance = Tolerance(ciede2000=1.0)
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
-    store: str | None = Field(
+    store: Text | None = Field(
         default=None,
         min_length=1,
         description="directory of a store, beside the scene, for materials store:NAME: the model that the table NAME "

@@ -44,7 +44,7 @@ class TableSource(FunctionSource):
     def evaluated_at(self, wavelength_nm: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return the same wavelengths [nm], or the only one of the table; None if grey."""
         stored = self._table.wavelength_nm
-        return wavelength_nm if stored is None or stored.size > 1 else stored
+        return wavelength_nm if stored is not None and stored.size > 1 else stored
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""

@@ -7,7 +7,9 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -161,6 +163,28 @@ def test_a_file_that_is_wrong_is_refused_in_a_sentence(
             registry.add_files([file])
     assert registry == dict(MODELS)
     assert os.environ[VARIABLE] == ""
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [
+        ("evaluate", 3, "lambert: evaluate: 3 is not a function"),
+        ("vectors", None, "lambert: vectors: None is not a function"),
+        ("lobe", "wide", "lambert: lobe: 'wide' is not a function or None"),
+        ("specular", 0.5, "lambert: specular: 0.5 is not a function or None"),
+        ("version", 0, "lambert: version: 0 is not an integer of at least 1"),
+        ("parameters", ["rho"], "lambert: parameters: ['rho'] is not a tuple of brdfdb.parameters.Parameter"),
+        ("name", "my model", "name: 'my model' is not letters, digits, _ and -, a letter first"),
+        ("name", ["a"], "name: ['a'] is not letters, digits, _ and -, a letter first"),
+    ],
+)
+def test_a_model_with_a_wrong_field_is_refused_in_a_sentence(
+    registry: Registry, field: str, value: Any, sentence: str
+) -> None:
+    with pytest.raises(BrdfdbError) as caught:
+        registry.add([replace(MODELS["lambert"], **{field: value})], "mine.py")
+    assert str(caught.value) == f"mine.py: {sentence}"
+    assert not registry
 
 
 def test_an_entry_point_that_gives_no_model_is_refused(

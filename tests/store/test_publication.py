@@ -131,6 +131,18 @@ def test_a_function_and_its_table_are_charted_with_tables_of_their_own(root: Pat
         np.testing.assert_allclose(table.evaluate(wi, wr), truth.evaluate(wi, wr), rtol=0.2)
 
 
+def test_a_grey_table_without_its_source_has_forms_to_choose_from(root: Path) -> None:
+    grey = FunctionSource(
+        brdf=lambda wi, wr, _: 0.1 * (1.0 + wi[:, 2] * wr[:, 2]), name="grey", title="Grey", provenance="a test"
+    )
+    publish(root, grey, tolerance=0.1)
+    source = source_of_table(brdfdb.open(root)["grey"])
+    assert source.evaluated_at(np.array(VISIBLE_NM)) is None
+    truth, *others = offered_forms(source, None, [0.1])
+    assert truth.form.kind == "exact"
+    assert "table" in [offered.form.kind for offered in others]
+
+
 @pytest.mark.usefixtures("published")
 def test_a_scene_shows_the_table_of_a_function_and_offers_its_forms(root: Path, capsys: Any) -> None:
     path = root.parent / "scene.toml"
