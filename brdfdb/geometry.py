@@ -109,10 +109,12 @@ def checked_angles(theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi
     """Check the four angles and note which directions lie below the horizon.
 
     float32 arrays in give float32 out; the arithmetic is float64. The float32 nearest pi/2 lies above pi/2: it is
-    read as the horizon itself, where every model returns its limit from below.
+    read as the horizon itself, where every model returns its limit from below. ParameterError if the shapes do not
+    broadcast.
     """
     t_i, t_r = check_theta("theta_i", theta_i), check_theta("theta_r", theta_r)
     p_i, p_r = check_phi("phi_i", phi_i), check_phi("phi_r", phi_r)
+    shape_of_angles(t_i, p_i, t_r, p_r)
     return Angles(
         np.minimum(t_i.astype(np.float64), HALF_PI),
         p_i.astype(np.float64),
@@ -187,9 +189,25 @@ def checked_vectors(wi: ArrayLike, wr: ArrayLike) -> Vectors:
     Raises
     ------
     ValueError
-        If an array has no last axis of 3, does not hold numbers, or holds vectors that are not of length 1.
+        If an array has no last axis of 3, does not hold numbers, or holds vectors that are not of length 1, or if the
+        shapes do not broadcast.
     """
-    return Vectors(_unit_vectors("wi", wi), _unit_vectors("wr", wr), asked_for(wi, wr))
+    w_i, w_r = _unit_vectors("wi", wi), _unit_vectors("wr", wr)
+    _common_shape("wi, wr", w_i, w_r)
+    return Vectors(w_i, w_r, asked_for(wi, wr))
+
+
+def shape_of_angles(*angles: NDArray[Any]) -> tuple[int, ...]:
+    """Return the shape that the four angles broadcast to; ParameterError with their shapes if they do not."""
+    return _common_shape("theta_i, phi_i, theta_r, phi_r", *angles)
+
+
+def _common_shape(names: str, *arrays: NDArray[Any]) -> tuple[int, ...]:
+    shapes = tuple(array.shape for array in arrays)
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise ParameterError(names, f"the shapes {', '.join(map(str, shapes))} do not broadcast", shapes) from None
 
 
 Directions = Angles | Vectors

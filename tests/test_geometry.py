@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import (
     HALF_PI,
     PHI_MAX,
     check_phi,
     check_theta,
     checked_angles,
+    checked_vectors,
     degrees,
     directions_from_half_difference,
     finished,
@@ -108,6 +110,16 @@ def test_checked_angles_names_the_angle(position: int) -> None:
     angles[position] = -np.inf
     with pytest.raises(ValueError, match=f"^{ANGLES[position]}: -inf rad"):
         checked_angles(*angles)
+
+
+def test_shapes_that_do_not_broadcast_are_named() -> None:
+    with pytest.raises(
+        ParameterError, match=r"^theta_i, phi_i, theta_r, phi_r: the shapes \(2,\), \(\), \(3,\), \(\) do not"
+    ):
+        checked_angles([0.1, 0.2], 0.0, [0.1, 0.2, 0.3], 1.0)
+    up = np.array([0.0, 0.0, 1.0])
+    with pytest.raises(ParameterError, match=r"^wi, wr: the shapes \(2, 3\), \(4, 3\) do not broadcast$"):
+        checked_vectors(np.tile(up, (2, 1)), np.tile(up, (4, 1)))
 
 
 def test_checked_angles_holds_thetas_at_the_horizon_and_notes_what_lies_below() -> None:

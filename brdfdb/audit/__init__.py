@@ -9,6 +9,7 @@ from importlib.metadata import version
 from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, Verdict
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
+from brdfdb.errors import ParameterError
 from brdfdb.figure import Figure
 from brdfdb.materials import Material, Source
 from brdfdb.tables.table import Table
@@ -37,7 +38,14 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
         for the preset. It is "accepted excess" if the caller accepts the excess of the model, and "violates" if either
         albedo exceeds 1 otherwise. A table may exceed these limits by as much as its stated error explains. A model
         that "loses" light which nothing absorbs is reported, and passes.
+
+    Raises
+    ------
+    ParameterError
+        If the table is behind a service.
     """
+    if not isinstance(table, Table):
+        raise ParameterError("table", f"{type(table).__name__}: an audit needs a table that is decoded in this process")
     if source is None and isinstance(table.source, Material):
         source = table.source
     subject = Subject(table, source, accept_excess)

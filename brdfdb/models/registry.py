@@ -20,7 +20,7 @@ VARIABLE = "BRDFDB_MODELS"  # environment variable with paths of Python files, s
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _FUNCTIONS = ("evaluate", "vectors")
-_OPTIONAL_FUNCTIONS = [
+_OPTIONAL_FUNCTIONS = (
     "specular",
     "anisotropic",
     "lobe",
@@ -29,7 +29,7 @@ _OPTIONAL_FUNCTIONS = [
     "exact_model",
     "limits",
     "uniform_bound_cosine",
-]
+)
 
 
 class Registry(dict[str, ModelSpec]):

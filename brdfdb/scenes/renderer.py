@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
 from brdfdb.materials import Source
+from brdfdb.materials.source import Lookups
 from brdfdb.parameters import Floats
 from brdfdb.scenes.gbuffer import Points, View
 from brdfdb.scenes.scene import Scene
@@ -167,7 +168,7 @@ def radiance(scene: Scene, points: Points, reflector: Reflector, brdf: Brdf | No
 def render(
     scene: Scene,
     view: View,
-    brdfs: Mapping[str, Brdf] | None = None,
+    brdfs: Mapping[str, Brdf | Lookups] | None = None,
     *,
     materials: Mapping[str, Reflector] | None = None,
     progress: Callable[[], None] | None = None,
@@ -181,7 +182,7 @@ def render(
     view : View
         The points of the view, from `brdfdb.scenes.gbuffer.gather`.
     brdfs : mapping, optional
-        By the name of a material, a function that replaces its model.
+        By the name of a material, a function, a source or a table that replaces its model.
     materials : mapping, optional
         The result of `reflectors`, with its albedos, for callers that render a scene more than once.
     progress : callable, optional
@@ -196,11 +197,11 @@ def render(
     Raises
     ------
     ParameterError
-        If `brdfs` has a key that is no material of the scene, or one of them returns a wrong shape. If a material is
-        stated for invisible light.
+        If `brdfs` has a key that is no material of the scene, or one of them is no function or returns a wrong shape.
+        If a material is stated for invisible light.
     """
     known = reflectors(scene) if materials is None else materials
-    replaced = {} if brdfs is None else brdfs
+    replaced = {name: _function(name, given) for name, given in ({} if brdfs is None else brdfs).items()}
     for name in replaced:
         if name not in scene.materials:
             raise ParameterError(
@@ -215,6 +216,15 @@ def render(
         if progress is not None:
             progress()
     return composed(scene, view, lists, known)
+
+
+def _function(name: str, given: Brdf | Lookups) -> Brdf:
+    """Return f_r of a source or a table as a function, and a function as it is."""
+    if isinstance(given, Lookups):
+        return given.lookup_vectors
+    if not callable(given):
+        raise ParameterError("brdfs", f"{name}: {given!r:.80} is not a function, a source or a table", given)
+    return given
 
 
 def composed(

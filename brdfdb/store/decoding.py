@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
 
 from brdfdb.errors import (
     ParameterError,
@@ -24,8 +27,6 @@ def decode(name: str, path: Path, files: Whole, digest: str) -> Table:
     import numpy as np
     import zarr
 
-    from brdfdb.tables.table import table_from
-
     try:
         group = zarr.open_group(files, mode="r")
         stored = dict(group.arrays())
@@ -34,15 +35,28 @@ def decode(name: str, path: Path, files: Whole, digest: str) -> Table:
         raise
     except Exception as error:  # zarr's codecs raise many kinds; each means that the bytes are damaged
         raise StoreError(f"{name} {path.name} is damaged: its values cannot be decoded") from error
+    dims = {key: array.metadata.dimension_names or () for key, array in stored.items()}  # type: ignore[union-attr]
     try:
-        table = table_from(name, path.name, arrays, dict(group.attrs))
-        variable = "brdf" if "brdf" in stored else "parts"
-        dims, axes = stored[variable].metadata.dimension_names or (), table.grid.names  # type: ignore[union-attr]
-        if dims[: len(axes)] != axes:
-            raise ParameterError(variable, f"its dimensions {dims} must begin with {axes}")
-        return replace(table, digest=digest)
+        return replace(table_of(name, path.name, arrays, dims, dict(group.attrs)), digest=digest)
     except ValueError as error:  # written by another program
         raise StoreError(f"{name} {path.name} cannot be looked up: {error}") from error
+
+
+def table_of(
+    name: str,
+    revision: str,
+    arrays: Mapping[str, NDArray[Any]],
+    dims: Mapping[str, tuple[Any, ...]],
+    attrs: Mapping[str, Any],
+) -> Table:
+    """Return the table of arrays, by name with their dimensions; ParameterError if they are none to look up."""
+    from brdfdb.tables.table import table_from
+
+    table = table_from(name, revision, arrays, attrs)
+    variable, axes = "brdf" if "brdf" in arrays else "parts", table.grid.names
+    if dims[variable][: len(axes)] != axes:
+        raise ParameterError(variable, f"its dimensions {dims[variable]} must begin with {axes}")
+    return table
 
 
 def read_metadata(group: Path) -> TableMetadata:

@@ -18,7 +18,7 @@ from brdfdb.errors import (
     StoreError,
 )
 from brdfdb.materials import Source
-from brdfdb.store.decoding import read_metadata
+from brdfdb.store.decoding import read_metadata, table_of
 from brdfdb.store.files import Entry, sync_directory, write_file
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.manifest import Manifest, Summary, check_manifest, read_manifest, whole_revisions
@@ -110,9 +110,11 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
     root : path
         Directory of the store; made if it does not exist.
     name : str
-        Of the material.
+        Name of the material.
     dataset : Dataset
-        As `tabulate.tabulate` makes it.
+        The table, as `brdfdb.tables.tabulation.tabulate` makes it: ``brdf`` [1/sr] over the axes of a
+        `brdfdb.tables.grids.Grid` [degree], in their order, and last, if it is spectral, ``wavelength`` [nm]. Values
+        are float32; float64 is converted. Attributes may be missing.
 
     Returns
     -------
@@ -121,18 +123,18 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
 
     Raises
     ------
+    ParameterError
+        If the name is none of a material, or the dataset is no table that can be looked up.
     StoreError
         If the store cannot be written.
-    ValueError
-        If the name is none of a material: it would never be found again.
     """
     from brdfdb.store.codec import dataset_files
 
     if not NAME.fullmatch(name):
         raise ParameterError("name", f"{name!r} is not made of lower-case letters, digits and single hyphens", name)
+    files = dataset_files(checked_dataset(name, dataset))
     store = Path(root)
     make_store(store)
-    files = dataset_files(dataset)
     with Lock(store, name):
         staging = staged_path(store, name) / "dataset"
         with writing(store, name):
@@ -143,6 +145,19 @@ def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset
                 return publish_staged(store, name, staging, written)
             finally:
                 shutil.rmtree(staging, ignore_errors=True)
+
+
+def checked_dataset(name: str, dataset: xr.Dataset) -> xr.Dataset:
+    """Return a table with values in float32; ParameterError if no lookup could read it."""
+    variable = "brdf" if "brdf" in dataset else "parts"
+    if variable in dataset and dataset[variable].dtype == np.float64:
+        dataset = dataset.assign({variable: dataset[variable].astype(np.float32)})
+    arrays = {str(key): np.asarray(array.values) for key, array in dataset.variables.items()}
+    dims = {str(key): array.dims for key, array in dataset.variables.items()}
+    values = table_of(name, "", arrays, dims, dataset.attrs).values
+    if values.dtype != np.float32:
+        raise ParameterError(variable, f"its values are {values.dtype}, not float32")
+    return dataset
 
 
 def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Entry]) -> tuple[str, int]:

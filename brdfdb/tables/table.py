@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians
+from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians, shape_of_angles
 from brdfdb.materials.source import FourAngles
 from brdfdb.parameters import Floats
 from brdfdb.tables import _kernels
@@ -132,7 +132,7 @@ class Table(BaseTable):
             dtype = asked_for(*angles)
             if any(angle.dtype.kind not in "iuf" for angle in arrays):
                 checked_angles(*angles)
-            shape = np.broadcast_shapes(*(angle.shape for angle in arrays))
+            shape = shape_of_angles(*arrays)
             flat = [_flat(angle, shape, dtype) for angle in arrays]
         values = np.empty(flat[0].size * at.size, dtype)
         horizon = float(dtype.type(HALF_PI))

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import brdfdb
-from brdfdb.errors import StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.audit import audit
+from brdfdb.errors import ParameterError, StoreError, UnknownMaterialError, UnknownRevisionError
 from brdfdb.geometry import unit_vector
 from brdfdb.store import http_client
 from brdfdb.store.reader import Store
@@ -87,6 +88,11 @@ def test_an_unknown_revision(opened: Any) -> None:
 def test_wrong_arguments_are_refused_in_the_same_words(opened: Any, name: str, arguments: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         opened[name].lookup(*arguments)
+
+
+def test_an_audit_of_a_remote_table_is_refused_in_a_sentence(address: str) -> None:
+    with pytest.raises(ParameterError, match=r"^table: RemoteTable: an audit needs a table that is decoded in this"):
+        audit(brdfdb.open(address)["white-tile"])
 
 
 def test_an_error_that_is_not_stated(opened: Any) -> None:

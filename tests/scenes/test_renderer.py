@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brdfdb.errors import ParameterError
 from brdfdb.integrals.quadrature import directional_albedo
-from brdfdb.materials import presets
+from brdfdb.materials import FunctionSource, presets
 from brdfdb.reference import he_torrance_1991, oren_nayar_1994, ward_1992
 from brdfdb.scenes.gbuffer import gather
 from brdfdb.scenes.renderer import Reflector, reflectors, render
 from brdfdb.scenes.scene import Scene
 from brdfdb.scenes.shapes import Array
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.table import Table
 from tests.scenes.a_mirror import MIRROR
 
 ROUNDING = 2e-15  # 1.6e-15 measured
@@ -193,6 +197,19 @@ def test_any_function_can_stand_in_for_a_model() -> None:
     image = rendered(of, brdfs={"clay-vase": brdf})
     lambert = rendered(scene(SPHERE, "white", lights=[{"direction": [0.0, -1.0, 0.0]}]))
     assert np.abs(image - lambert * np.array(COARSE) / 700.0).max() < ROUNDING
+
+
+def test_a_source_or_a_table_can_stand_in_for_a_model() -> None:
+    of = scene(SPHERE, "white", lights=[{"direction": [0.0, -1.0, 0.0]}])
+    third = FunctionSource(brdf=lambda wi, _wr, _: np.full(len(wi), 1.0 / 3.0), name="third", title="x", provenance="x")
+    angles = [0.0, 45.0, 90.0]
+    layout = Layout(third, Grid({"theta_i": angles, "theta_r": angles, "delta_phi": [0.0, 90.0, 180.0]}))
+    table = Table.of(layout, np.full((3, 3, 3), 1.0 / 3.0, np.float32))
+    expected = rendered(of, brdfs={"white": lambda wi, _wr, _wavelength_nm: np.full((len(wi), 1), 1.0 / 3.0)})
+    for given in (third, table):
+        np.testing.assert_allclose(rendered(of, brdfs={"white": given}), expected, rtol=1e-6)
+    with pytest.raises(ParameterError, match=r"^brdfs: white: 0\.3 is not a function, a source or a table$"):
+        rendered(of, 2, brdfs={"white": 0.3})
 
 
 def test_a_function_for_what_is_no_material_of_the_scene_is_said_so() -> None:

@@ -157,8 +157,9 @@ def die(*_):
 
 root, place, step = sys.argv[1:]
 setattr({"pointer": pointer, "publication": publication, "sealed_json": sealed_json, "Path": Path}[place], step, die)
-values = np.full((2, 2), 9.0, dtype=np.float32)
-publication.publish_dataset(root, "white", xr.Dataset({"brdf": (("theta_i", "theta_r"), values)}))
+axes = {"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0]}
+values = np.full((2, 2, 2), 9.0, dtype=np.float32)
+publication.publish_dataset(root, "white", xr.Dataset({"brdf": (tuple(axes), values)}, coords=axes))
 """
 
 

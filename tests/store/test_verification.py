@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 import brdfdb
-from brdfdb.errors import StoreError
+from brdfdb.errors import ParameterError, StoreError
 from brdfdb.store import codec, publication, snapshots, verification
 from brdfdb.store.marker import make_store
 from brdfdb.store.paths import manifest_path
@@ -182,11 +182,41 @@ def test_a_revision_that_is_superseded_and_collected_while_it_is_verified_is_no_
         (lambda d: d.assign(brdf=d["brdf"].astype(np.float64)), "is not a table: brdf is float64, not float32"),
     ],
 )
-def test_verify_knows_what_a_table_is(root: Path, change: Callable[[xr.Dataset], xr.Dataset], said: str) -> None:
-    publish_dataset(root, "white", change(lambert(0.5)))
+def test_verify_knows_what_a_table_is(
+    root: Path, change: Callable[[xr.Dataset], xr.Dataset], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:  # another program does not check
+        patch.setattr(publication, "checked_dataset", lambda _, dataset: dataset)
+        publish_dataset(root, "white", change(lambert(0.5)))
     (found,) = findings(root)
     manifest = manifest_path(root / "materials" / "white" / "r000004")
     assert found == f"white r000004 {said}; `rm {manifest}`, then `brdfdb build` with its recipe repairs it"
+
+
+def test_a_dataset_in_float64_is_published_in_float32_and_verified(root: Path) -> None:
+    publish_dataset(root, "white", lambert(0.5).astype(np.float64))
+    assert findings(root) == []
+    assert rho(root) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d.rename(brdf="rho"), r"brdf: neither it nor parts is among the arrays "),
+        (lambda d: d.drop_vars("theta_r"), r"grid axes: none of "),
+        (lambda d: d.assign_coords(theta_i=np.deg2rad(d.theta_i)[::-1]), "theta_i: the nodes must increase strictly"),
+        (lambda d: d.assign_coords(delta_phi=[0.0, 1.5, 3.14]), "delta_phi: ends at 3.14 degrees, must end at 180"),
+        (lambda d: d.transpose("theta_r", "theta_i", "delta_phi"), r"brdf: shape .* is not "),
+        (lambda d: d.transpose("theta_i", "delta_phi", "theta_r"), r"brdf: its dimensions .* must begin with "),
+        (lambda d: d.assign(brdf=d["brdf"].astype(np.int32)), "brdf: its values are int32, not float32"),
+    ],
+)
+def test_a_dataset_that_no_lookup_can_read_is_not_published(
+    root: Path, change: Callable[[xr.Dataset], xr.Dataset], said: str
+) -> None:
+    with pytest.raises(ParameterError, match=f"^{said}"):
+        publish_dataset(root, "white", change(lambert(0.5)))
+    assert brdfdb.open(root).head("white") == "r000003"
 
 
 def test_verify_remarks_on_what_a_table_does_not_state(root: Path) -> None:

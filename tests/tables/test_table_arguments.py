@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
 from brdfdb.tables import _kernels
@@ -223,6 +224,15 @@ def test_a_bad_angle_is_refused_by_name(kind: str, name: str, value: Any) -> Non
     angles: dict[str, Any] = {"theta_i": 0.1, "phi_i": 0.2, "theta_r": 0.3, "phi_r": 0.4, name: value}
     with pytest.raises(ValueError, match=f"^{name}: "):
         made_up(kind).lookup(**angles)
+
+
+def test_shapes_that_do_not_broadcast_are_refused_by_name() -> None:
+    table = made_up("isotropic")
+    with pytest.raises(ParameterError, match=r"the shapes \(2,\), \(\), \(3,\), \(\) do not broadcast$"):
+        table.lookup([0.1, 0.2], 0.0, [0.1, 0.2, 0.3], 1.0)
+    up = np.array([0.0, 0.0, 1.0])
+    with pytest.raises(ParameterError, match=r"^wi, wr: the shapes \(2, 3\), \(4, 3\) do not broadcast$"):
+        table.lookup_vectors(np.tile(up, (2, 1)), np.tile(up, (4, 1)))
 
 
 def test_a_bad_angle_of_the_dirac_part_is_refused_by_name() -> None:
