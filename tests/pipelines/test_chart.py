@@ -146,7 +146,7 @@ def test_materials_of_a_recipe_can_be_charted(recipe: Path, tmp_path: Path, monk
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["nothing"], r"nothing: no such material or family, neither in the store nor among the built-in ones; .*"),
+        (["nothing"], r"nothing: no such material or family, neither in the store nor among the presets; .*"),
         (["rolled-brass", "--tolerance", "0.1", "--tolerance", "-1"], r"tolerance: -1 is outside \[0.0001, 0.5\]"),
         (["rolled-brass", "--recipe", "no.toml"], r"no.toml: No such file or directory"),
     ],
