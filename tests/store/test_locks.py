@@ -88,9 +88,9 @@ import xarray as xr
 from brdfdb.store.publication import publish_dataset
 
 root, me = Path(sys.argv[1]), sys.argv[2]
-value = np.full((2, 2), float(me), dtype=np.float32)
-axes = {"theta_i": [0.0, 80.0], "theta_r": [0.0, 80.0]}
-dataset = xr.Dataset({"brdf": (("theta_i", "theta_r"), value)}, axes, {"by": me})
+value = np.full((2, 2, 2), float(me), dtype=np.float32)
+axes = {"theta_i": [0.0, 80.0], "theta_r": [0.0, 80.0], "delta_phi": [0.0, 180.0]}
+dataset = xr.Dataset({"brdf": (tuple(axes), value)}, axes, {"by": me})
 root.with_name(me).touch()
 while not (root.with_name("1").exists() and root.with_name("2").exists()):
     time.sleep(0.001)
@@ -116,7 +116,7 @@ def test_two_processes_write_into_one_new_store_and_none_loses_a_revision(tmp_pa
         data = manifest_path(group).read_bytes()
         check_manifest(group, hashlib.sha256(data).hexdigest(), contents=True)
         with xr.open_zarr(group) as found:
-            assert found["brdf"].values.tolist() == [[float(me)] * 2] * 2
+            assert found["brdf"].values.tolist() == [[[float(me)] * 2] * 2] * 2
             assert found.attrs == {"by": me}
     store = brdfdb.open(root)
     store.verify("white")

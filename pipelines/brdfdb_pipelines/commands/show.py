@@ -48,7 +48,7 @@ def _print_material(table: Table, path: Path) -> None:
     if metadata.gaps:
         print(terminal.plain(f"  incomplete  the table {metadata.gaps}"))
     _print_grid(table)
-    _print_error(table.error)
+    _print_error(table.error, "its source" if metadata.model is None else "the model")
     _print_albedo(table)
     print(f"  files       {path} (zarr v3, {terminal.size(_stored(path))})")
 
@@ -68,7 +68,7 @@ def _print_family(family: Family) -> None:
     along = ", ".join({0: f"ln {x}", 1: x}.get(power, f"{x}^{power}") for x, power in how.powers.items())
     print(f"  between     {how.method} in {what} along {along}")
     print(f"  measured    {how.reason}")
-    _print_error(family.error)
+    _print_error(family.error, "the model")
     at = ", ".join(f"{x} {value:g}" for x, value in record.worst.parameters.items())
     print(f"  worst       {terminal.error(record.worst.p99)} at {at}, of {record.points} sets of parameters")
     if record.specular_error is not None:
@@ -151,7 +151,7 @@ def _interpolation(table: Table) -> str:
     return f"{how.method}, of {what}"
 
 
-def _print_error(error: Error | None) -> None:
+def _print_error(error: Error | None, truth: str) -> None:
     """Print the stated error: overall, and by bands and places at the wavelength where it is largest."""
     from brdfdb.tables.places import RINGS_DEG
     from brdfdb_pipelines import terminal
@@ -161,7 +161,7 @@ def _print_error(error: Error | None) -> None:
         return
     overall = error.overall
     print(
-        f"  error       {terminal.error(overall.p99)} of f_r against the model, in 99 of 100 of {error.directions} "
+        f"  error       {terminal.error(overall.p99)} of f_r against {truth}, in 99 of 100 of {error.directions} "
         f"directions (median {overall.median:.2g}, largest {overall.max:.2g}, of what is reflected {overall.l1:.2g})"
     )
     edges = error.theta_i_deg
