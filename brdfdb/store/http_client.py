@@ -15,7 +15,15 @@ from brdfdb.errors import (
     StoreError,
     UnknownMaterialError,
 )
-from brdfdb.geometry import Directions, checked_angles, checked_vectors, degrees, finished, spherical_angles
+from brdfdb.geometry import (
+    Directions,
+    checked_angles,
+    checked_vectors,
+    degrees,
+    finished,
+    shape_of_angles,
+    spherical_angles,
+)
 from brdfdb.materials.source import FourAngles
 from brdfdb.parameters import Floats
 from brdfdb.store.http_service import TIMEOUT_S, Service, TooLargeError
@@ -66,7 +74,7 @@ class RemoteTable(BaseTable):
 
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         self._wavelengths(wavelength_nm)  # what is wrong is refused in the order of a table, before anything is sent
-        np.broadcast_shapes(*(np.shape(angle) for angle in angles))
+        shape_of_angles(*(np.asarray(angle) for angle in angles))
         given = checked_angles(*angles)
         return self._looked_up((given.theta_i, given.phi_i, given.theta_r, given.phi_r), given, wavelength_nm)
 

@@ -79,7 +79,7 @@ def test_an_unknown_revision(opened: Any) -> None:
         ("grey-felt", (2.0, 0.0, 4.0, 0.0), r"^theta_r: 4 rad \(229.183 degrees\) is outside \[0, pi\] rad$"),
         ("grey-felt", (1.0, np.inf, 1.0, 0.0), r"^phi_i: inf rad is outside \[-1e\+15, 1e\+15\] rad$"),
         ("grey-felt", ("1", 0.0, 1.0, 0.0), r"^theta_i: '1' is not a number of radians$"),
-        ("grey-felt", ([1.0, 2.0], 0.0, [1.0, 2.0, 3.0], 0.0), "shape mismatch"),
+        ("grey-felt", ([1.0, 2.0], 0.0, [1.0, 2.0, 3.0], 0.0), "do not broadcast"),
         ("grey-felt", (1.0, 0.0, 1.0, 0.0, np.nan), "^wavelength_nm: nan is not a positive number of nanometres$"),
         ("copper-foil", (1.0, 0.0, 1.0, 0.0, 300), r"^wavelength_nm: 300 is outside \[400, 700\] nm of copper-foil$"),
         ("copper-foil", (1.0, 0.0, 1.0, 0.0, [[500]]), "^wavelength_nm: 2 axes; allowed are"),

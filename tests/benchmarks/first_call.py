@@ -34,7 +34,7 @@ def evaluate_all() -> None:
         rough = job.material.parameters.get("sigma_0_um") != 0.0
         wavelength_nm = None if job.wavelength_nm is None else job.wavelength_nm[0]
         arguments = job.material.arguments(wavelength_nm)
-        calls.setdefault((job.material.model, job.grid.anisotropic, rough), (job.material.spec, arguments))
+        calls.setdefault((job.material.model, job.material.anisotropic, rough), (job.material.spec, arguments))
     read = time.perf_counter()
     seconds: dict[str, float] = {}
     for (model, anisotropic, _), (spec, arguments) in calls.items():

@@ -213,10 +213,17 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "brdfdb_pipelines.cli", *map(str, arguments)]
 
 
+def listen_to_ctrl_c() -> None:
+    """Undo what a shell does to jobs in the background: they ignore Ctrl-C, and so do their children."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_ctrl_c_says_how_to_resume_and_the_same_command_does(tmp_path: Path) -> None:
     recipe, root = write_recipe(tmp_path / "recipe.toml", 0.5, step=0.05), tmp_path / "store"
     build = command("build", recipe, "--store", root, "--jobs", 1, "--json")
-    with subprocess.Popen(build, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        build, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=listen_to_ctrl_c
+    ) as process:
         assert process.stdout is not None
         for line in process.stdout:
             if json.loads(line)["event"] == "block":
