@@ -1,4 +1,4 @@
-"""Where methods fail: our forms of the models and others, against high-precision values and closed forms."""
+"""Places where methods fail: our forms of the models and others, against high-precision values and closed forms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where forms of He et al. 1991 fail: the sum of eq. 78, its limit, shadowing, eq. 81, and the vectors of eqs 61-86."""
+"""Failures of forms of He et al. 1991: sum of eq. 78, its limit, shadowing, eq. 81, and the vectors of eqs 61-86."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where forms of He et al. 1991 fail: names and units, polarisation, vectors, sums of the parts."""
+"""Failures of forms of He et al. 1991: names and units, polarisation, vectors, sums of the parts."""
 
 from __future__ import annotations
 

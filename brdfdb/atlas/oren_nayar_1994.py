@@ -1,4 +1,4 @@
-"""Where forms of Oren and Nayar 1994 fail: cavities, slopes, and the fit below zero and next to the horizon."""
+"""Failures of forms of Oren and Nayar 1994: cavities, slopes, and the fit below zero and next to the horizon."""
 
 from __future__ import annotations
 

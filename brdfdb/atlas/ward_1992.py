@@ -1,4 +1,4 @@
-"""Where forms of Ward 1992 fail: narrow and wide lobes, grazing angles, the loss of the lobe, and its samples."""
+"""Failures of forms of Ward 1992: narrow and wide lobes, grazing angles, the loss of the lobe, and its samples."""
 
 from __future__ import annotations
 

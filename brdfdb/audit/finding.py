@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -121,17 +122,17 @@ class Finding(BaseModel):
             cls.columns = vars(cls).get("columns", (words,))
 
     @classmethod
+    @abstractmethod
     def judge(cls, subject: Subject) -> Finding:
         """Judge a table; return `NotJudged` if the finding needs a source that is not known."""
-        raise NotImplementedError
 
+    @abstractmethod
     def sentences(self) -> list[Sentence]:
         """Return the sentences on the table, the first with the verdict."""
-        raise NotImplementedError
 
+    @abstractmethod
     def cells(self) -> list[Cell]:
         """Return one cell for each column."""
-        raise NotImplementedError
 
     def problems(self) -> list[str]:
         """Return the sentences that a terminal prints: those whose verdict is not a plain pass."""
@@ -164,6 +165,11 @@ class NotJudged(Finding):
 
     verdict: Literal["not judged"] = "not judged"
     reason: str
+
+    @classmethod
+    def judge(cls, subject: Subject) -> NotJudged:
+        """Return the finding on a table that no finding judges."""
+        return subject.not_judged("it takes a source")
 
     def sentences(self) -> list[Sentence]:
         """Return no sentences: `audit` reports the reason under the title of the finding."""

@@ -44,7 +44,7 @@ VARIABLES = {
 
 
 class _Look(NamedTuple):
-    """How a line looks, and what it lies above: a thin truth stays visible on a strong line of ours."""
+    """Look of a line, and the lines below it: a thin truth stays visible on a strong line of ours."""
 
     colour: str
     width: float

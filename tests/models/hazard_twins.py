@@ -50,7 +50,7 @@ def expected(name: str, directions: tuple[Any, ...], parameters: tuple[tuple[str
 
 
 def exact_parameters(parameters: Arguments) -> tuple[tuple[str, Any], ...]:
-    """As 40 digits; a refractive index is the decimal that was typed, see `brdfdb.fresnel`."""
+    """Return 40 digits of a value; a refractive index is the decimal that was typed, see `brdfdb.fresnel`."""
     return tuple((name, mp.mpf(repr(x) if name == "n" else x)) for name, x in parameters.items())
 
 
@@ -80,7 +80,7 @@ def direction_of(point: Point) -> tuple[Any, ...]:
 
 
 def roundings(subject: Subject, point: Point, epsilon: float, parameters: tuple[tuple[str, Any], ...]) -> list[Any]:
-    """How much every value moves, at most, as each argument is rounded in turn; next to pi/2, what is left to it."""
+    """Return the largest change of each value by rounding one argument; next to pi/2 the distance to it is rounded."""
     at = expected(subject.name, direction_of(point), parameters)
     total = [mp.zero] * len(at)
 
@@ -99,7 +99,7 @@ def roundings(subject: Subject, point: Point, epsilon: float, parameters: tuple[
 
 
 def scales(subject: Subject, values: Any) -> list[Any]:
-    """What errors are relative to: each value, in a matrix the largest element."""
+    """Return the scale of relative errors: each value, in a matrix the largest element."""
     if subject.name in MATRICES:
         return [max(abs(value) for value in values)] * len(values)
     return [abs(value) for value in values]

@@ -90,7 +90,7 @@ def jump(
     there: tuple[NDArray[Any], Arguments, Reals],
     dtype: type,
 ) -> float:
-    """How far two neighbouring values lie apart, relative; if that is too much, less the difference of their twins."""
+    """Return the relative step between neighbouring values; a large one less the difference of their twins."""
     difference = there[2].astype(np.float64) - here[2].astype(np.float64)
     sizes = np.maximum(scales(subject, here[2].astype(np.float64)), scales(subject, there[2].astype(np.float64)))
     tolerance = JUMP[dtype]
@@ -112,7 +112,7 @@ def jump(
 def check_continuity(
     subject: Subject, form: str, directions: list[Directions], near: list[list[Directions]], dtype: type, row: Arguments
 ) -> None:
-    """Of every pair of directions to those near it."""
+    """Return the steps from each pair of directions to those near it."""
     for at, beside in zip(directions, near, strict=True):
         given = given_as(form, [at, *beside], dtype)
         values = evaluated(subject, given, row)

@@ -27,7 +27,7 @@ def lambert(rho: float) -> xr.Dataset:
 
 
 def rho(root: Path, name: str = "white") -> float:
-    """What the table that is served says of itself."""
+    """Return the albedo that tells which table is current."""
     return float(np.round(brdfdb.open(root)[name].brdf[0, 0, 0] * np.pi, 6))
 
 

@@ -17,7 +17,7 @@ def publish(root: Path, **tables: xr.Dataset) -> list[str]:
 
 
 def rho(store: Store, name: str = "white") -> float:
-    """What the table that is served says of itself."""
+    """Return the albedo that tells which table is current."""
     return float(np.round(store[name].brdf[0, 0, 0] * np.pi, 6))
 
 

@@ -1,4 +1,4 @@
-"""What the OpenAPI document says beyond signatures: of answers, of bodies, and of queries that are read by hand."""
+"""Notes of the OpenAPI document beyond signatures: answers, bodies, and queries that are read by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the operator of the HTTP layer can set: a store, limits, who may ask; all read from `BRDFDB_*`."""
+"""Settings of the HTTP layer: a store, limits, who may ask; all read from `BRDFDB_*`."""
 
 from __future__ import annotations
 

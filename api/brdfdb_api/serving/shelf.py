@@ -1,4 +1,4 @@
-"""What is served: a store that may change or vanish meanwhile, what lists show of it, and the verdicts of its audit."""
+"""The tables that are served: a store that may change or vanish, the summaries for lists, and tables in memory."""
 
 from __future__ import annotations
 
