@@ -12,18 +12,23 @@ if TYPE_CHECKING:
     from brdfdb.store.reader import Store
 
 
+def default_root() -> str:
+    """Return the store that is meant where none is named: ``$BRDFDB_STORE``, or ``brdf-store`` in this directory."""
+    return os.environ.get("BRDFDB_STORE", "brdf-store")
+
+
 @overload
 def open(root: os.PathLike[str], *, snapshot: str | None = None) -> Store: ...
 @overload
-def open(root: str, *, snapshot: str | None = None) -> Store | RemoteStore: ...
-def open(root: str | os.PathLike[str], *, snapshot: str | None = None) -> Store | RemoteStore:
+def open(root: str | None = None, *, snapshot: str | None = None) -> Store | RemoteStore: ...
+def open(root: str | os.PathLike[str] | None = None, *, snapshot: str | None = None) -> Store | RemoteStore:
     """Open a store of tables for reading.
 
     Parameters
     ----------
-    root : path or address
+    root : path or address, optional
         The directory that ``brdfdb build --store`` wrote, or the address of a service (``brdfdb serve``), such as
-        ``http://127.0.0.1:8000``.
+        ``http://127.0.0.1:8000``. By default that of the environment variable ``BRDFDB_STORE``, or ``brdf-store``.
     snapshot : str, optional
         Name of a snapshot of a directory (``brdfdb snapshot NAME``): the store is then what it names, for good.
 
@@ -40,6 +45,7 @@ def open(root: str | os.PathLike[str], *, snapshot: str | None = None) -> Store 
     ValueError
         If a snapshot is named beside an address: a service serves the one that it was started with.
     """
+    root = default_root() if root is None else root
     if isinstance(root, str) and root.startswith(("http://", "https://")):
         from brdfdb.store.http_client import RemoteStore
 

@@ -1,6 +1,6 @@
 """Pictures and table of the README's section on speed against accuracy: ``python tests/benchmarks/chart.py``.
 
-Run it in the root of the repository: it writes docs/NAME.svg and prints the tables. Times are those of the
+Run it in the root of the repository: it writes docs/pictures/NAME.svg and prints the tables. Times are those of the
 processor, but what shares its caches on a busy machine lengthens them.
 """
 
@@ -15,7 +15,7 @@ from brdfdb_pipelines import chart, plot_panels, terminal, tradeoff_plot
 
 NAMES = ("clay-vase", "magnesium-oxide-ceramic", "rolled-brass", "scene-copper-sphere")
 FAMILY, RECIPE = "copper-roughness", Path("pipelines/brdfdb_pipelines/recipes/copper-roughness.toml")
-PICTURES = Path("docs")
+PICTURES = Path("docs/pictures")
 
 
 def rows(one: Chart) -> list[str]:

@@ -1,4 +1,4 @@
-"""All statements of the gallery name the basis of their thresholds, and docs/mutants.md has all wrong models."""
+"""Statements of the gallery name the basis of their thresholds; docs/results/mutants.md has all wrong models."""
 
 from __future__ import annotations
 

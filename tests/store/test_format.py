@@ -1,4 +1,4 @@
-"""docs/format.md is enough to read a table: this reader uses that page, zarr and numpy, and nothing of brdfdb."""
+"""docs/reference/format.md is enough to read a table: this reader uses it, zarr and numpy, and nothing of brdfdb."""
 
 from __future__ import annotations
 

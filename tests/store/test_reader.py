@@ -95,6 +95,15 @@ def test_a_store_is_a_mapping(root: Path) -> None:
     assert (store["copper"].name, store["copper"].revision) == ("copper", "r000001")
 
 
+def test_a_store_that_is_not_named_is_that_of_the_environment(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BRDFDB_STORE", str(root))
+    assert list(brdfdb.open()) == ["white"]
+    monkeypatch.delenv("BRDFDB_STORE")
+    monkeypatch.chdir(root.parent)
+    with pytest.raises(StoreError, match="brdf-store"):
+        brdfdb.open()
+
+
 def test_a_table_is_what_was_published(root: Path) -> None:
     dataset = copper()
     publish(root, copper=dataset)

@@ -7,6 +7,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from brdfdb.store.opening import default_root
+
 MOST_JOBS = 1024  # threads or processes
 MOST_WIDTH = 4096  # pixels across a picture: a wider one takes tens of gigabytes
 
@@ -18,7 +20,7 @@ def add_store(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--store",
         type=Path,
-        default=Path(os.environ.get("BRDFDB_STORE", "brdf-store")),
+        default=Path(default_root()),
         metavar="DIR",
         help="directory of the store (default: $BRDFDB_STORE or %(default)s)",
     )

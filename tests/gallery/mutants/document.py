@@ -1,4 +1,4 @@
-"""The list of wrong models, as the page docs/mutants.md."""
+"""The list of wrong models, as the page docs/results/mutants.md."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import ModuleType
 from tests.gallery.mutants import he_torrance_1991, oren_nayar_1994, ward_1992
 from tests.gallery.mutants.mutation import BASES
 
-PATH = Path("docs/mutants.md")
+PATH = Path("docs/results/mutants.md")
 PAPERS: dict[str, ModuleType] = {
     "Oren and Nayar 1994": oren_nayar_1994,
     "He, Torrance, Sillion and Greenberg 1991": he_torrance_1991,

@@ -1,0 +1,40 @@
+"""The generated part of the site: pages that are made from the code, a store and its audit before Sphinx reads them.
+
+Each module beside this one writes one kind of page into a folder that git ignores. Pages are written anew at every
+build of the site; a page that did not change keeps its date, so that Sphinx does not read it again.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+
+from _site import api, store
+
+# In the order in which they are written; each has write(docs, store)
+_WRITERS = (api,)
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the writers of pages with Sphinx."""
+    app.connect("config-inited", _write_pages)
+    app.connect("autodoc-process-docstring", _keep_moduli)
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _write_pages(app: Sphinx, _: Any) -> None:
+    docs = Path(app.srcdir)
+    root = store.made(docs)
+    os.environ["BRDFDB_STORE"] = str(root)  # for pages with code, which begin with brdfdb.open()
+    os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for their commands
+    for writer in _WRITERS:
+        writer.write(docs, root)
+
+
+def _keep_moduli(_app: Sphinx, _what: str, _name: str, _value: object, _options: object, lines: list[str]) -> None:
+    """Escape the bars of moduli such as |F|^2, which reStructuredText reads as substitutions."""
+    lines[:] = [line if "``" in line else line.replace("|", r"\|") for line in lines]
