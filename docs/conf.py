@@ -51,7 +51,7 @@ html_theme_options = {
     "navbar_align": "left",
     "show_toc_level": 2,
     "show_prev_next": False,
-    "secondary_sidebar_items": {"**": ["page-toc"], "gallery/**": []},  # plots need the room
+    "secondary_sidebar_items": ["page-toc"],
     "collapse_navigation": True,
     "footer_start": ["copyright"],
     "footer_end": [],

@@ -16,7 +16,7 @@ import brdfdb.atlas
 import brdfdb.gallery
 from _site import audit
 from _site.files import remove_others, write_page
-from _site.markup import Card, cards, code, plain, raw, toctree
+from _site.markup import WIDE, Card, cards, code, plain, raw, toctree
 from _site.papers import PAPERS, Paper, paper_of, reference
 from brdfdb.figure import Figure, Statement
 
@@ -53,7 +53,7 @@ def _index(key: str, paper: Paper, figures: list[Figure], plots: dict[str, list[
     """Return the page of a collection of figures of one paper."""
     title, _, sentence = _COLLECTIONS[key]
     shown = [Card(f"{figure.key}.html", figure.title, _held(figure), plots[figure.key][0].svg) for figure in figures]
-    parts = [f"# {title}: {paper.short}\n", f"{paper.title}. {sentence}\n", cards(shown)]
+    parts = [WIDE, f"# {title}: {paper.short}\n", f"{paper.title}. {sentence}\n", cards(shown)]
     return "\n".join([*parts, toctree(figure.key for figure in figures)])
 
 
@@ -74,6 +74,7 @@ def _page(key: str, figure: Figure, plots: list[audit.Plot]) -> str:
         f'drawings = [svg(panel, f"panel-{{n}}") for n, panel in enumerate(figure.panels)]  # for a page of yours\n'
     )
     parts = [
+        WIDE,
         f"# {plain(figure.title)}\n",
         f"{plain(figure.caption)}\n",
         raw(audit.drawn(plots)),

@@ -7,6 +7,11 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from brdfdb.audit.finding import LEVELS, Word
+
+# Begins a page without a list of its sections: plots need the room
+WIDE = "---\nhtml_theme.sidebar_secondary.remove: true\n---\n"
+
 
 class Card(NamedTuple):
     """A card of an index: the page it opens, and what it shows. `picture` is HTML."""
@@ -59,3 +64,8 @@ def cards(shown: Iterable[Card]) -> str:
         text = f"<span>{html.escape(card.text)}</span>" if card.text else ""
         parts.append(f'<a class="card" href="{card.target}">{picture}<b>{html.escape(card.title)}</b>{text}</a>')
     return raw('<div class="cards">\n' + "\n".join(parts) + "\n</div>")
+
+
+def chip(word: Word) -> str:
+    """Return a verdict as HTML, in the colours of the audit's page."""
+    return f'<span class="chip {LEVELS[word]}">{html.escape(word)}</span>'
