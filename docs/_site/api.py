@@ -32,9 +32,8 @@ def _children(name: str, modules: list[str]) -> list[str]:
 
 def _page(name: str, modules: list[str]) -> str:
     """Return the page of a module. A function named like a module of its package is on the page of that module."""
-    title = name.removeprefix("brdfdb.")
     below = [] if name == "brdfdb" else _children(name, modules)
-    lines = [title, "=" * len(title), "", f".. automodule:: {name}"]
+    lines = [name, "=" * len(name), "", f".. automodule:: {name}"]
     if shadowed := [module.rpartition(".")[2] for module in _children(name, modules)]:
         lines.append(f"   :exclude-members: {', '.join(shadowed)}")
     if below:
@@ -61,4 +60,11 @@ def _listed(names: list[str], prefix: str) -> list[str]:
     for name in names:
         summary = (importlib.import_module(name).__doc__ or "").strip().splitlines()[0]
         lines += [f":doc:`{name.removeprefix(prefix)} <{name}>`", f"    {summary}", ""]
-    return [*lines, ".. toctree::", "   :hidden:", "", *(f"   {name}" for name in names), ""]
+    return [
+        *lines,
+        ".. toctree::",
+        "   :hidden:",
+        "",
+        *(f"   {name.removeprefix(prefix)} <{name}>" for name in names),
+        "",
+    ]

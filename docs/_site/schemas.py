@@ -107,7 +107,8 @@ def kind_of(name: str, schema: Schema) -> str:
     if kind == "object":
         values = schema.get("additionalProperties")
         if isinstance(values, dict):
-            return f"table of {kind_of(name, values)}"
+            kind = kind_of(name, values)
+            return f"table of {'tables' if kind == 'table' else kind}"
         return "table"
     return {"boolean": "true or false", "string": "text"}.get(kind, str(kind))
 
@@ -126,13 +127,19 @@ def limits_of(schema: Schema) -> list[str]:
         "minProperties": "{} entries or more",
         "maxProperties": "{} entries at most",
     }
-    limits = [text.format(f"{schema[key]:g}") for key, text in words.items() if key in schema]
+    limits = [_counted(text, schema[key]) for key, text in words.items() if key in schema]
     if "pattern" in schema:
         limits.append(f"pattern `{schema['pattern']}`")
     for choice in ("anyOf", "oneOf"):
         for each in schema.get(choice, []):
             limits += [limit for limit in limits_of(each) if limit not in limits]
     return limits
+
+
+def _counted(text: str, value: float) -> str:
+    """Return a limit in words: one item or character, and more of them."""
+    words = text.format(f"{value:g}" if abs(value) < 1e5 or value != int(value) else str(int(value)))
+    return words.replace("items", "item").replace("characters", "character") if value == 1 else words
 
 
 def _default(schema: Schema) -> str:
