@@ -44,7 +44,7 @@ toc_object_entries_show_parents = "hide"
 html_theme = "pydata_sphinx_theme"
 html_title = "brdfdb"
 html_static_path = ["_static"]
-html_css_files = ["site.css"]
+html_css_files = ["figures.css", "site.css"]
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {
@@ -52,6 +52,7 @@ html_theme_options = {
     "show_toc_level": 2,
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],
+    "collapse_navigation": True,
     "footer_start": ["copyright"],
     "footer_end": [],
 }

@@ -13,10 +13,10 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-from _site import api, store
+from _site import api, figures, materials, papers, store
 
 # In the order in which they are written; each has write(docs, store)
-_WRITERS = (api,)
+_WRITERS = (api, figures, materials, papers)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

@@ -15,7 +15,7 @@ def made(docs: Path) -> Path:
     where something of it is missing.
     """
     root = Path(os.environ.get("BRDFDB_STORE", docs / "_build" / "brdf-store")).absolute()
-    if not (root / "audit.json").exists():
+    if not (root / "audit.html").exists():
         for command in ("build", "audit"):
             subprocess.run([sys.executable, "-m", "brdfdb_pipelines.cli", command, "--store", str(root)], check=True)
     return root
