@@ -1,26 +1,28 @@
 """Albedos of every preset by Monte Carlo against the quadrature of the audit: ``python tests/benchmarks/albedo.py``.
 
-Prints a line a material and angle and exits with 1 if the two differ by more than five times their combined error
-anywhere. Both leave out the Dirac part, which has a closed form. ``--samples 1e7`` takes about ten times as long as
-the default.
+Prints a line for each material and angle, and exits with 1 if the two differ by more than five times their combined
+error anywhere. Both leave out the specular part, which has a closed form. ``--samples 1e7`` takes about ten times as
+long as the default.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
-import time
+from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb.audit.model_energy import TOLERANCE
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.quadrature import spectral_albedo
 from brdfdb.integrals.sampling import sample
 from brdfdb.materials import Material, presets
-from brdfdb_pipelines import terminal
+from tests.benchmarks.recording import Column, Run
 
 THETA_I_DEG = (10.0, 45.0, 75.0, 85.0)
 PHI_I_DEG = 30.0  # between the axes of anisotropic lobes
@@ -28,6 +30,8 @@ WAVELENGTH_NM = 550.0  # of materials that are not of one wavelength alone
 CHUNK = 200_000  # samples at a time
 ROUNDING = 1e-13  # of means of many float64
 WORTH_A_LOOK, TOO_MUCH = 3.0, 5.0
+QUICK, QUICK_SAMPLES = ("magnesium-oxide-ceramic", "rolled-brass"), 2e4
+MEASURED = "The directional albedo of each preset without its specular part, by Monte Carlo and by the quadrature of the audit."
 
 
 class Estimate(NamedTuple):
@@ -72,40 +76,41 @@ def arguments_of(material: Material) -> dict[str, float]:
     return material.arguments(material.wavelengths_nm[0] if material.wavelengths_nm else WAVELENGTH_NM)
 
 
-def main() -> int:
-    """Measure, print, and say whether all is well."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure, print, and return 1 if a difference is too large."""
+    run = Run("albedo", "accuracy", "Albedo by Monte Carlo and by quadrature", MEASURED)
+    parser = run.parser(__doc__)
     parser.add_argument("--samples", type=float, default=1e6, help="of each material and angle (default: 1e6)")
     parser.add_argument("--seed", type=int, default=1992)
     parser.add_argument("materials", nargs="*", help="names of presets (default: all)")
-    options = parser.parse_args()
-    chosen = [presets()[name] for name in options.materials or presets()]
-    rng, rows, deviations = np.random.default_rng(options.seed), [], []
-    start = time.perf_counter()
-    with terminal.progress() as bar:
-        cases = [(material, theta_i_deg) for material in chosen for theta_i_deg in THETA_I_DEG]
-        for material, theta_i_deg in bar.track(cases, description="sampling"):
+    options = run.parse(parser, arguments)
+    samples = QUICK_SAMPLES if options.quick else options.samples
+    names = options.materials or (QUICK if options.quick else presets())
+    rng, deviations = np.random.default_rng(options.seed), []
+    table = run.table(
+        f"{samples:.0e} samples for each material and angle",
+        Column(name="material", width=32),
+        Column(name="theta_i", unit="deg"),
+        *(Column(name=name, digits=7, width=10) for name in ("quadrature", "Monte Carlo")),
+        *(Column(name=name, digits=2, width=10) for name in ("its error", "standard error", "difference")),
+        Column(name="difference / errors"),
+    )
+    for material in (presets()[name] for name in names):
+        for theta_i_deg in THETA_I_DEG:
             theta_i = float(radians(theta_i_deg))
-            drawn, integrated = monte_carlo(material, theta_i, int(options.samples), rng), quadrature(material, theta_i)
+            drawn, integrated = monte_carlo(material, theta_i, int(samples), rng), quadrature(material, theta_i)
             combined = math.hypot(drawn.error, integrated.error, ROUNDING)
             difference = drawn.albedo - integrated.albedo
             deviations.append(abs(difference) / combined)
-            rows.append(
-                (
-                    material.name,
-                    f"{theta_i_deg:g}",
-                    *(f"{value:.7f}" for value in (integrated.albedo, drawn.albedo)),
-                    *(f"{value:.1e}" for value in (integrated.error, drawn.error, difference)),
-                    f"{deviations[-1]:.2f}",
-                )
-            )
-    columns = ("theta_i", "quadrature", "Monte Carlo", "error", "standard error", "difference", "over both")
-    terminal.print_table(
-        f"Albedo without the Dirac part, {options.samples:.0e} samples", ("material", *columns), rows, numbers=columns
-    )
+            values = (integrated.albedo, drawn.albedo, integrated.error, drawn.error, difference, deviations[-1])
+            table.add(material.name, theta_i_deg, *values)
     above = {limit: sum(each > limit for each in deviations) for limit in (WORTH_A_LOOK, TOO_MUCH)}
-    print(f"{len(rows)} albedos in {time.perf_counter() - start:.0f} s; differences over combined errors:")
-    print(f"{max(deviations):.2f} at most, " + ", ".join(f"{count} above {limit:g}" for limit, count in above.items()))
+    run.say(
+        f"Of {len(deviations)} differences the largest is {max(deviations):.2f} times the combined error; "
+        + ", ".join(f"{count} are above {limit:g}" for limit, count in above.items())
+        + "."
+    )
+    run.end()
     return min(above[TOO_MUCH], 1)
 
 

@@ -1,69 +1,89 @@
 """The power of the audit: planted tables that it must name, and random sound materials that it must not.
 
     python tests/benchmarks/audit_power.py             # every planted table and 200 materials, some minutes
-    python tests/benchmarks/audit_power.py --quick     # the planted tables and 16 materials
+    python tests/benchmarks/audit_power.py --quick     # two planted tables and two materials
 
 It ends with exit code 1 if a planted table passes, or a sound one does not.
 """
 
 from __future__ import annotations
 
-import argparse
-import functools
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb.audit import audit, sampling
 from tests.benchmarks.planted_tables import PLANTED, reasons_of
+from tests.benchmarks.recording import Column, Run
 from tests.benchmarks.sound_materials import materials
 
 SAMPLES = 2000  # of each sampler: what is planted is in the tables
+QUICK, QUICK_COUNT = ("clay times 1.05", "every statistic a tenth"), 2
+MEASURED = "The audit of tables with one thing wrong each, which it must name, and of sound tables, which it must pass."
 
 
-def planted() -> int:
-    """Print a line for each planted table, and return how many were missed."""
+def planted(run: Run, names: Sequence[str]) -> int:
+    """Audit planted tables, and return how many were missed."""
+    table = run.table(
+        "Planted tables",
+        Column(name="what is wrong", width=52),
+        "verdict",
+        Column(name="problems named"),
+        Column(name="processor time", unit="s"),
+    )
     missed = 0
-    for name, make in PLANTED.items():
+    for name in names:
         start = time.process_time()
-        found = audit(make())
-        named = found.verdict == "violates"
+        report = audit(PLANTED[name]())
+        seconds = time.process_time() - start
+        named = report.verdict == "violates"
         missed += not named
-        took = time.process_time() - start
-        print(f"{'named ' if named else 'MISSED'} {name} ({took:.1f} s): {'; '.join(reasons_of(found))}", flush=True)
-    print(f"{len(PLANTED) - missed} of {len(PLANTED)} planted tables named", flush=True)
+        table.add(name, report.verdict, len(reasons_of(report)), seconds)
+        if not named:
+            print(f"MISSED {name}")
+    run.say(f"{len(names) - missed} of {len(names)} planted tables are named.")
     return missed
 
 
-def sound(count: int, seed: int) -> int:
-    """Print the false alarms among random sound materials, and return how many there are."""
-    alarms = number = 0
-    for number, (words, table) in enumerate(materials(count, seed), 1):
-        found = audit(table)
-        if found.verdict != "passes":
-            alarms += 1
-            print(f"ALARM {words}: {'; '.join(reasons_of(found))}", flush=True)
+def sound(run: Run, count: int, seed: int) -> int:
+    """Audit random sound materials, and return the number of false alarms."""
+    table = run.table("Sound tables of random materials", Column(name="model", width=32), "tables", "false alarms")
+    tables: dict[str, int] = {}
+    alarms: dict[str, int] = {}
+    for number, (words, made) in enumerate(materials(count, seed), 1):
+        report = audit(made)
+        model = str(made.attrs["model"])
+        tables[model] = tables.get(model, 0) + 1
+        alarms[model] = alarms.get(model, 0) + (report.verdict != "passes")
+        if report.verdict != "passes":
+            print(f"ALARM {words}: {'; '.join(reasons_of(report))}", flush=True)
         if number % 20 == 0:
-            print(f"{number} sound materials, {alarms} false alarms", flush=True)
-    print(f"{alarms} false alarms among {number} sound materials", flush=True)
-    return alarms
+            print(f"{number} of {count}", file=sys.stderr, flush=True)
+    for model in sorted(tables):
+        table.add(model, tables[model], alarms[model])
+    run.say(f"{sum(alarms.values())} false alarms among {sum(tables.values())} sound tables.")
+    return sum(alarms.values())
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="16 sound materials")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Audit both kinds of tables, and return 1 if a verdict is wrong."""
+    run = Run("audit_power", "accuracy", "Power of the audit", MEASURED)
+    parser = run.parser(__doc__)
     parser.add_argument("--count", type=int, default=200, metavar="N", help="sound materials (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=15, metavar="N", help="of the materials (default: %(default)s)")
     parser.add_argument("--only", choices=("planted", "sound"), help="one of the two parts")
-    options = parser.parse_args()
-    sampling.SAMPLES = SAMPLES
-    parts = {
-        "planted": planted,
-        "sound": functools.partial(sound, 16 if options.quick else options.count, options.seed),
-    }
-    wrong = sum(part() for name, part in parts.items() if options.only in (None, name))
+    options = run.parse(parser, arguments)
+    wrong = 0
+    with mock.patch.object(sampling, "SAMPLES", SAMPLES):
+        if options.only != "sound":
+            wrong += planted(run, QUICK if options.quick else tuple(PLANTED))
+        if options.only != "planted":
+            wrong += sound(run, QUICK_COUNT if options.quick else options.count, options.seed)
+    run.end()
     return 1 if wrong else 0
 
 

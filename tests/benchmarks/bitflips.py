@@ -5,7 +5,6 @@ python tests/benchmarks/bitflips.py --count 300
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -14,10 +13,14 @@ import shutil
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
 from brdfdb_pipelines import cli
+from tests.benchmarks.recording import Column, Run
 
 # A grey, a spectral and two members of a family, on grids so coarse that the store is built in seconds
 RECIPE = """\
@@ -65,14 +68,16 @@ LOOKUPS = (
     ("shade", "30", "0", "50", "120", "--set", "rho=0.6"),
 )
 NAMES = ("white", "copper", "shade-001", "shade-002")
+QUICK_COUNT = 2
+MEASURED = "Bits flipped one at a time in the files of a store: every command must refuse or answer as before."
 _ROUNDS = 6  # of verify and the repairs that it names
 
 
 class Flips(NamedTuple):
-    """What was counted: flips by the kind of file, and every fault as a sentence."""
+    """What was counted: flips and repairs by the kind of file, and every fault as a sentence."""
 
     kinds: Counter[str]
-    outcomes: Counter[str]
+    repaired: Counter[str]
     faults: list[str]
 
 
@@ -204,27 +209,29 @@ def flips(count: int, seed: int, folder: Path) -> Flips:
     for number, file in enumerate(chosen[:count], 1):
         first, faults = flip(master, recipe, file, draw.randrange(8 * (master / file).stat().st_size), told)
         result.kinds[kind(file)] += 1
-        result.outcomes["named and repaired" if first and not faults else "faulty"] += 1
+        result.repaired[kind(file)] += bool(first and not faults)
         result.faults.extend(faults)
         print(f"\r{number} of {count} flips, {len(result.faults)} faults", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     return result
 
 
-def main() -> int:
-    """Flip bits, and print what became of them."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Flip bits, and return 1 if one is not named and repaired."""
+    bench = Run("bitflips", "accuracy", "Flipped bits in a store", MEASURED)
+    parser = bench.parser(__doc__)
     parser.add_argument("--count", type=int, default=300, metavar="N", help="flips (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=20261122, metavar="N", help="of files and bits")
-    parser.add_argument("--quick", action="store_true", help="20 flips")
-    options = parser.parse_args()
+    options = bench.parse(parser, arguments)
     with tempfile.TemporaryDirectory() as folder:
-        result = flips(20 if options.quick else options.count, options.seed, Path(folder))
-    print(", ".join(f"{number} in {name}" for name, number in sorted(result.kinds.items())))
-    print(", ".join(f"{number} {name}" for name, number in sorted(result.outcomes.items())))
+        result = flips(QUICK_COUNT if options.quick else options.count, options.seed, Path(folder))
+    table = bench.table("Flips by the kind of file", Column(name="file", width=20), "flips", "named and repaired")
+    for name, count in sorted(result.kinds.items()):
+        table.add(name, count, result.repaired[name])
     for fault in result.faults:
         print(fault)
-    print(f"{len(result.faults)} faults")
+    bench.say(f"{result.kinds.total()} flips, {len(result.faults)} faults.")
+    bench.end()
     return 1 if result.faults else 0
 
 

@@ -1,53 +1,129 @@
-"""Pictures and table of the README's section on speed against accuracy: ``python tests/benchmarks/chart.py``.
+"""Speed against accuracy of the forms of four materials, and of a family: ``python tests/benchmarks/chart.py``.
 
-Run it in the root of the repository: it writes docs/pictures/NAME.svg and prints the tables. Times are those of the
-processor, but what shares its caches on a busy machine lengthens them.
+Times are those of the processor, but programs that share its caches on a busy machine lengthen them. ``--pictures``
+copies the pictures to docs/pictures/NAME.svg.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
 import shutil
+import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from unittest import mock
 
-from brdfdb.forms.tradeoff_document import Chart
-from brdfdb_pipelines import chart, plot_panels, terminal, tradeoff_plot
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from brdfdb.forms import sampler_efficiency, timing, tradeoff
+from brdfdb.forms.tradeoff_document import Chart, Cost, FamilyChart
+from brdfdb_pipelines import chart
+from tests.benchmarks.recording import Column, Run
+
+ROOT = Path(__file__).parents[2]
 NAMES = ("clay-vase", "magnesium-oxide-ceramic", "rolled-brass", "scene-copper-sphere")
-FAMILY, RECIPE = "copper-roughness", Path("pipelines/brdfdb_pipelines/recipes/copper-roughness.toml")
-PICTURES = Path("docs/pictures")
+FAMILY, RECIPE = "copper-roughness", ROOT / "pipelines" / "brdfdb_pipelines" / "recipes" / "copper-roughness.toml"
+PICTURES = ROOT / "docs" / "pictures"
+QUICK = NAMES[2:3]
+# The least of all that makes a chart complete
+FEWER = (
+    (timing, "ROUNDS", 1),
+    (timing, "MIXED_ROUNDS", 1),
+    (timing, "MATERIALS", 2),
+    (tradeoff, "SINGLES", 1),
+    (sampler_efficiency, "ROUNDS", 1),
+)
+MEASURED = (
+    "Error against the exact form and time of one evaluation on one core, of every form of a material; and variance "
+    "times time of samplers."
+)
+TIMES = ("many at once", "256 at once", "one", "64 materials in turn")
 
 
-def rows(one: Chart) -> list[str]:
-    """Return rows of the front, each with what it saves over the rung of the truth that is as accurate."""
-    points = {point.key: point for point in one.points}
-    lines = []
-    for key in one.fronts.batch:
-        point = points[key]
-        errors = f"{plot_panels.percent(point.l1)} | {tradeoff_plot.tail(point)} | {plot_panels.percent(point.forward)}"
-        times = " | ".join(terminal.count(each.ns) for each in (point.batch, point.block, point.single, point.mixed))
-        faster = tradeoff_plot.against(point) or "-"
-        lines.append(
-            f"| {one.material} | {point.title} | {errors} | {times} | {faster} | {terminal.size(point.bytes)} |"
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Chart the materials and the family, and print their tables."""
+    run = Run("chart", "speed", "Speed against accuracy", MEASURED)
+    parser = run.parser(__doc__)
+    parser.add_argument("--pictures", action="store_true", help="write docs/pictures/NAME.svg")
+    parser.add_argument("names", metavar="NAME", nargs="*", help="of presets, by default four and a family")
+    options = run.parse(parser, arguments)
+    names = options.names or (QUICK if options.quick else NAMES)
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))  # the job prints tables of its own
+        for module, name, value in FEWER if options.quick else ():
+            stack.enter_context(mock.patch.object(module, name, value))
+        charts = chart.run(names, folder, tolerances=[0.2] if options.quick else None).charts
+        families = [] if options.quick or options.names else chart.run((FAMILY,), folder, recipe_path=RECIPE).families
+        for path in folder.glob("*.svg") if options.pictures else ():
+            shutil.copy(path, PICTURES)
+    for one in charts:
+        forms(run, one)
+        samplers(run, one)
+    for family in families:
+        members(run, family)
+    run.end()
+    return 0
+
+
+def forms(run: Run, one: Chart) -> None:
+    """Print the forms of a material, the most accurate first."""
+    table = run.table(
+        f"{one.material}: errors and times of a value of f_r; * marks the forms worth having",
+        Column(name="form", width=44),
+        *("key", "worth having"),
+        *(Column(name=name, unit="%") for name in ("mean error", "p99", "p99 from", "p99 to", "forward")),
+        *(Column(name=name, unit="ns") for name in TIMES),
+        Column(name="times as fast as its rung", digits=2),
+        *("rung", "bytes"),
+    )
+    for point in sorted(one.points, key=lambda point: point.l1):
+        errors = (point.l1, point.p99, point.p99_low, point.p99_high, point.forward)
+        costs: tuple[Cost, ...] = (point.batch, point.block, point.single, point.mixed)
+        table.add(
+            point.title,
+            point.key,
+            "*" if point.key in one.fronts.batch else "",
+            *(None if error is None else 100.0 * error for error in errors),
+            *(cost.ns for cost in costs),
+            None if point.saving is None else point.saving.times,
+            point.rung,
+            point.bytes,
         )
-    return lines
 
 
-def noise(one: Chart) -> list[str]:
-    """Return rows of the samplers."""
-    return [f"| {one.material} | {each.title} | {' | '.join(tradeoff_plot.works(each))} |" for each in one.samplers]
+def samplers(run: Run, one: Chart) -> None:
+    """Print the samplers of a material."""
+    table = run.table(
+        f"{one.material}: samplers, for the albedo at 60 degrees and the picture of a sphere",
+        Column(name="sampler", width=44),
+        *(
+            Column(name=f"{problem}, {name}", unit=unit)
+            for problem in ("albedo", "sphere")
+            for name, unit in (("variance", ""), ("time", "ns"), ("time to 1 %", "ms"), ("from", "ms"), ("to", "ms"))
+        ),
+    )
+    for sampler in one.samplers:
+        works = (sampler.albedo, sampler.sphere)
+        table.add(sampler.title, *(n for w in works for n in (w.variance, w.ns, w.ms, w.low_ms, w.high_ms)))
+
+
+def members(run: Run, family: FamilyChart) -> None:
+    """Print the mean error of every form along a family of one parameter."""
+    ((axis, values),) = family.axes.items()
+    table = run.table(
+        f"{family.family}: {family.title}. Mean error [%] along {axis}",
+        Column(name="form", width=44),
+        Column(name="many at once", unit="ns"),
+        *(Column(name=f"{value:g}") for value in values),
+    )
+    if family.diagnostic is not None:
+        table.add(family.diagnostic.title, None, *family.diagnostic.values)
+    for curve in family.curves:
+        table.add(curve.title, curve.batch.ns, *(None if error is None else 100.0 * error for error in curve.l1))
 
 
 if __name__ == "__main__":
-    PICTURES.mkdir(exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        found = chart.run(NAMES, Path(folder))
-        chart.run((FAMILY,), Path(folder), recipe_path=RECIPE)
-        for name in (*NAMES, FAMILY):
-            shutil.copy(Path(folder, f"{name}.svg"), PICTURES)
-    print("| material | form | mean error | p99 | forward | ns, many | 256 | one | in turn | over its rung | bytes |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
-    print("\n".join(line for one in found.charts for line in rows(one)))
-    print("| material | sampler | albedo: variance | ns | ms to 1 % | sphere: variance | ns | ms to 1 % |")
-    print("|---|---|---|---|---|---|---|---|")
-    print("\n".join(line for one in found.charts for line in noise(one)))
+    sys.exit(main())

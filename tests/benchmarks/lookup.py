@@ -11,18 +11,25 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import PLAIN, Interpolation
 from brdfdb.tables.table import Table
+from tests.benchmarks.recording import Column, Run
 
 REPEATS = 9
+DIRECTIONS, QUICK_DIRECTIONS = 1_000_000, 2000
+MEASURED = "The directions that one core looks up in a second in tables in memory, and scipy's interpolator beside it."
+Case = tuple[str, Table, Any, str]
 RNG = np.random.default_rng(1992)
 
 
@@ -65,15 +72,8 @@ def coordinates(made: Table, given: tuple[Any, ...]) -> Any:
     return np.stack([theta_h, phi_h, theta_d, np.remainder(np.arctan2(across, along), np.pi)], axis=-1)
 
 
-def main(count: int) -> None:
-    """Print the table."""
-    theta = np.arccos(RNG.random((2, count)))
-    phi = RNG.uniform(0.0, 2.0 * np.pi, (2, count))
-    angles = (theta[0], phi[0], theta[1], phi[1])
-    single = tuple(angle.astype(np.float32) for angle in angles)
-    wi, wr = unit_vector(*angles[:2]), unit_vector(*angles[2:])
-    wi_1, wr_1 = wi.astype(np.float32), wr.astype(np.float32)
-
+def cases(angles: Any, single: Any, vectors: tuple[Any, Any]) -> list[Case]:
+    """Return tables with the directions in float64 and float32, and the method of scipy."""
     coarse = {
         "theta_i": np.linspace(0, 90, 46),
         "theta_r": np.linspace(0, 90, 46),
@@ -93,20 +93,39 @@ def main(count: int) -> None:
     }
     brass = {"theta_h": half["theta_h"][::3], "phi_h": np.linspace(0, 90, 8), "theta_d": [0, 90], "phi_d": [0, 180]}
     log_linear, logarithms = Interpolation("linear", True, 1e-4, 0.5), Interpolation("cubic", True, 1e-4, 0.5)
-    cases: list[tuple[str, Table, Any, str]] = [
+    return [
         ("trilinear, light and viewer, 46 x 46 x 91", table(coarse), (angles, single), "linear"),
-        ("linear, half and difference, 46 x 46 x 31", table(half), ((wi, wr), (wi_1, wr_1)), "linear"),
+        ("linear, half and difference, 46 x 46 x 31", table(half), vectors, "linear"),
         ("cubic, light and viewer, 46 x 46 x 31", table(planned, Interpolation("cubic")), (angles, single), "cubic"),
         ("trilinear, 91 x 91 x 181", table(fine), (angles, single), "linear"),
         ("trilinear, 91 x 91 x 181, uneven theta", table(uneven), (angles, single), "linear"),
-        ("log-linear, half and difference", table(half, log_linear), ((wi, wr), (wi_1, wr_1)), "linear"),
-        ("log-cubic, half and difference", table(half, logarithms), ((wi, wr), (wi_1, wr_1)), "cubic"),
-        ("log-cubic, half and difference, 4D", table(brass, logarithms), ((wi, wr), (wi_1, wr_1)), "linear"),
+        ("log-linear, half and difference", table(half, log_linear), vectors, "linear"),
+        ("log-cubic, half and difference", table(half, logarithms), vectors, "cubic"),
+        ("log-cubic, half and difference, 4D", table(brass, logarithms), vectors, "linear"),
         ("log-cubic, half and difference, by angles", table(half, logarithms), (angles, single), "cubic"),
     ]  # fmt: skip
-    print(f"{count} directions; millions a second")
-    print(f"{'':44}{'float64':>9}{'float32':>9}{'scipy':>9}{'times':>7}")
-    for name, made, given, method in cases:
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Time lookups, and print the table."""
+    run = Run("lookup", "speed", "Lookups against scipy", MEASURED)
+    parser = run.parser(__doc__)
+    parser.add_argument("directions", type=float, nargs="?", default=DIRECTIONS)
+    options = run.parse(parser, arguments)
+    count = QUICK_DIRECTIONS if options.quick else int(options.directions)
+    theta = np.arccos(RNG.random((2, count)))
+    phi = RNG.uniform(0.0, 2.0 * np.pi, (2, count))
+    angles = (theta[0], phi[0], theta[1], phi[1])
+    single = tuple(angle.astype(np.float32) for angle in angles)
+    wi, wr = unit_vector(*angles[:2]), unit_vector(*angles[2:])
+    vectors = ((wi, wr), (wi.astype(np.float32), wr.astype(np.float32)))
+    printed = run.table(
+        f"Lookups of {count} directions",
+        Column(name="table", width=44),
+        *(Column(name=name, unit="1e6/s") for name in ("float64", "float32", "scipy")),
+        Column(name="float64 / scipy", digits=2),
+    )
+    for name, made, given, method in cases(angles, single, vectors):
         look = made.lookup if len(given[0]) == 4 else made.lookup_vectors
         double, float32 = (rate(lambda look=look, d=d: look(*d), count) for d in given)
         few = tuple(each[: count if method == "linear" else count // 20] for each in given[0])  # its cubic is slow
@@ -115,8 +134,10 @@ def main(count: int) -> None:
             nodes, made.values.astype(np.float64), method=method, bounds_error=False, fill_value=None
         )
         scipys = rate(lambda peer=peer, made=made, few=few: peer(coordinates(made, few)), len(few[0]), 1)
-        print(f"{name:44}{double:9.1f}{float32:9.1f}{scipys:9.3f}{double / scipys:7.0f}", flush=True)
+        printed.add(name, double, float32, scipys, double / scipys)
+    run.end()
+    return 0
 
 
 if __name__ == "__main__":
-    main(int(float(sys.argv[1])) if len(sys.argv) > 1 else 1_000_000)
+    sys.exit(main())

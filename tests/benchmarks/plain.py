@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from brdfdb_pipelines.recipe_file import Recipe, load
 
 
@@ -25,8 +27,26 @@ GRIDS = {
 }
 
 
-def plain_recipe(models: list[str] | None = None) -> Recipe:
-    """The default recipe on these grids; only the materials of some models, if they are named."""
+COARSE_GRIDS = {
+    "isotropic": {"theta_i_deg": _theta(75, 15), "theta_r_deg": _theta(75, 15), "delta_phi_deg": _phi(180, 30)},
+    "spectral": {"theta_i_deg": _theta(75, 15), "theta_r_deg": _theta(75, 15), "delta_phi_deg": _phi(180, 30)},
+    "anisotropic": {
+        "theta_i_deg": _theta(60, 30),
+        "phi_i_deg": _phi(360, 60),
+        "theta_r_deg": _theta(60, 30),
+        "phi_r_deg": _phi(360, 60),
+    },
+}
+COARSE_NAMES = ("clay-vase", "rolled-brass", "scene-copper-sphere")
+
+
+def plain_recipe(models: Sequence[str] = (), *, coarse: bool = False) -> Recipe:
+    """Return the default recipe on these grids; only the materials of some models, if they are named.
+
+    A coarse one has few nodes, and a material of each paper.
+    """
     recipe = load()
-    names = [job.material.name for job in recipe.jobs() if not models or job.material.model in models]
-    return Recipe.model_validate({**recipe.model_dump(), "materials": names, "tolerance": None, "grids": GRIDS})
+    jobs = [job for job in recipe.jobs() if not models or job.material.model in models]
+    names = [job.material.name for job in jobs if not coarse or job.material.name in COARSE_NAMES]
+    grids = COARSE_GRIDS if coarse else GRIDS
+    return Recipe.model_validate({**recipe.model_dump(), "materials": names, "tolerance": None, "grids": grids})

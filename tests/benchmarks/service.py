@@ -1,12 +1,13 @@
-"""How fast the service answers on loopback: python tests/benchmarks/service.py --store brdf-store
+"""The speed of the service on loopback: ``python tests/benchmarks/service.py [--store brdf-store]``.
 
 Starts `brdfdb serve`, one worker, and asks over 8 connections from a process of its own, each connection as soon as it
-has its answer. Prints requests a second, percentiles of the time to an answer, and CPU time of the server a request.
+has its answer. Prints requests a second, percentiles of the time to an answer, and processor time of the server for a
+request. Without a store it builds the two tables that it asks for. Then it looks up the same points through the Python
+client and in the directory.
 """
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import io
@@ -15,16 +16,26 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from tests.benchmarks.recording import Column, Run, Table
+
 CONNECTIONS = 8
+NAMES = ("rolled-brass", "scene-copper-sphere")
+SECONDS, QUICK_SECONDS = 2.0, 0.05
+DECODING = 5.0  # seconds that the server may take to decode what lists show
+REPEATS = 5
+MEASURED = "Requests a second and the time to an answer of one worker on loopback, and lookups of the Python client."
 LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
 
 
@@ -71,7 +82,7 @@ class Client(asyncio.Protocol):
 
 
 def load(port: int, request: bytes, connections: int, seconds: float) -> tuple[list[float], float]:
-    """Ask for a while; the time each answer took, and the whole."""
+    """Ask for a while; return the time to each answer, and the whole."""
 
     async def ask() -> tuple[list[float], float]:
         loop = asyncio.get_running_loop()
@@ -113,7 +124,7 @@ def as_npy(array: np.ndarray) -> bytes:
 
 @contextlib.contextmanager
 def served(store: str) -> Iterator[tuple[int, int, float]]:
-    """A server: its port, its process and the seconds until it was ready."""
+    """Start a server: yield its port, its process and the seconds until it was ready."""
     start = time.perf_counter()
     command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", store, "--port", "0"]
     with open(os.devnull, "wb") as nowhere:
@@ -134,61 +145,131 @@ def served(store: str) -> Iterator[tuple[int, int, float]]:
 
 
 def cpu_seconds(pid: int) -> float:
-    """Of a process, so far."""
+    """Return the processor time of a process."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def report(title: str, seconds: list[float], whole: float, cpu: float | None = None) -> None:
+def made_store(root: Path, quick: bool) -> None:
+    """Publish the tables that are asked for, as the default build has them; coarse ones for a quick run."""
+    from brdfdb.store.publication import publish_layout  # here, since the processes that ask import this module
+    from brdfdb_pipelines import recipe_file
+    from tests.benchmarks.plain import plain_recipe
+
+    recipe = plain_recipe(coarse=True) if quick else recipe_file.load()
+    for job in recipe.jobs():
+        if job.material.name in NAMES:
+            publish_layout(root, job.material.name, job.layout())
+
+
+def requests() -> list[tuple[str, bytes, int]]:
+    """Return requests with their titles and numbers of connections."""
+    query = "theta_i=45&theta_r=30&phi_r=180"
+    made = [
+        (f"one point of {name}", get(f"/v1/materials/{name}/lookup?{query}&wavelength_nm=550"), CONNECTIONS)
+        for name in NAMES
+    ]
+    made.append(("one point, all wavelengths", get(f"/v1/materials/{NAMES[1]}/lookup?{query}"), CONNECTIONS))
+    thousand = dict(zip(("theta_i", "phi_i", "theta_r", "phi_r"), points(1000).round(3).T.tolist(), strict=True))
+    body = json.dumps({**thousand, "wavelength_nm": 550.0}).encode()
+    for name in NAMES:
+        request = post(f"/v1/materials/{name}/lookup", "application/json", body)
+        made.append((f"1000 points as JSON of {name}", request, CONNECTIONS))
+    made += [(f"100 000 points as npy of {name}", as_npy_request(name), 2) for name in NAMES]
+    return made
+
+
+def as_npy_request(name: str) -> bytes:
+    """Return a request for 100 000 points."""
+    path = f"/v1/materials/{name}/lookup?wavelength_nm=550&format=npy"
+    return post(path, "application/x-npy", as_npy(points(100_000)))
+
+
+def add(table: Table, title: str, connections: int, seconds: list[float], whole: float, cpu: float | None) -> None:
+    """Add the row of a measurement."""
     p50, p99 = 1e3 * np.percentile(seconds, [50.0, 99.0])
-    used = "" if cpu is None else f"{1e6 * cpu / len(seconds):9.0f} us CPU"
-    print(f"{title:42s}{len(seconds) / whole:9.0f} a second   p50 {p50:6.2f} ms   p99 {p99:6.2f} ms{used}", flush=True)
+    used = None if cpu is None else 1e6 * cpu / len(seconds)
+    table.add(title, connections, len(seconds) / whole, p50, p99, used)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--store", default="brdf-store")
-    parser.add_argument("--seconds", type=float, default=5.0, help="of each measurement")
-    options = parser.parse_args()
-    with (
-        served(options.store) as (port, pid, ready),
-        ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool,
-    ):
-        print(f"ready after {ready:.2f} s")
-        time.sleep(5.0)  # the server decodes what lists show
-        names = ("rolled-brass", "scene-copper-sphere")
+def time_of(call: Callable[[], object], repeats: int) -> float:
+    """Return the median time [s] of a call."""
+    call()
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        seconds.append(time.perf_counter() - start)
+    return float(np.median(seconds))
 
-        def measure(title: str, request: bytes, connections: int = CONNECTIONS) -> None:
-            pool.submit(load, port, request, 1, 0.5).result()  # tables decoded, threads started
+
+def clients(run: Run, store: str, port: int, quick: bool) -> None:
+    """Time lookups through the Python client and in the directory."""
+    import brdfdb
+
+    table = run.table(
+        "Lookups in Python of rolled-brass",
+        Column(name="points", width=28),
+        *(Column(name=name, unit="ms") for name in ("from the service", "from the directory")),
+    )
+    tables = [brdfdb.open(place)[NAMES[0]] for place in (f"http://127.0.0.1:{port}", store)]
+    for count in (1, 1000) if quick else (1, 1000, 1_000_000):
+        angles = np.radians(points(count)).T
+        # many calls of one point: a single one takes microseconds
+        calls = 100 if count == 1 and not quick else 1
+        times = [
+            time_of(lambda one=one, angles=angles, calls=calls: [one.lookup(*angles) for _ in range(calls)], REPEATS)
+            for one in tables
+        ]
+        table.add(count, *(1e3 * seconds / calls for seconds in times))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Start the service, ask it, and print the times."""
+    run = Run("service", "speed", "Lookups over HTTP", MEASURED)
+    parser = run.parser(__doc__)
+    parser.add_argument("--store", help="by default two tables are built")
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of each measurement (default: %(default)s)")
+    options = run.parse(parser, arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        store = options.store or folder
+        if options.store is None:
+            made_store(Path(folder), options.quick)
+        measure(run, store, QUICK_SECONDS if options.quick else options.seconds, options.quick)
+    run.end()
+    return 0
+
+
+def measure(run: Run, store: str, duration: float, quick: bool) -> None:
+    """Ask for every kind of answer."""
+    with served(store) as (port, pid, ready), ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        run.say(f"The service is ready {ready:.2f} s after its start.")
+        time.sleep(0.0 if quick else DECODING)
+        table = run.table(
+            f"Requests, {duration:g} s each",
+            Column(name="request", width=42),
+            "connections",
+            Column(name="requests", unit="1/s"),
+            *(Column(name=name, unit="ms") for name in ("median", "p99")),
+            Column(name="processor time", unit="us"),
+        )
+        made = requests()
+        for title, request, connections in made:
+            pool.submit(load, port, request, 1, min(duration, 0.5)).result()  # tables decoded, threads started
             before = cpu_seconds(pid)
-            seconds, whole = pool.submit(load, port, request, connections, options.seconds).result()
-            report(title, seconds, whole, cpu_seconds(pid) - before)
-
-        one = {
-            name: get(f"/v1/materials/{name}/lookup?theta_i=45&theta_r=30&phi_r=180&wavelength_nm=550")
-            for name in names
-        }
-        for name in names:
-            measure(f"one point of {name}", one[name])
-        measure(
-            "one point, 41 wavelengths", get("/v1/materials/scene-copper-sphere/lookup?theta_i=45&theta_r=30&phi_r=180")
-        )
-        thousand = dict(zip(("theta_i", "phi_i", "theta_r", "phi_r"), points(1000).round(3).T.tolist(), strict=True))
-        body = json.dumps({**thousand, "wavelength_nm": 550.0}).encode()
-        many = as_npy(points(100_000))
-        for name in names:
-            measure(f"1000 points as JSON of {name}", post(f"/v1/materials/{name}/lookup", "application/json", body))
-        for name in names:
-            path = f"/v1/materials/{name}/lookup?wavelength_nm=550&format=npy"
-            measure(f"100 000 points as npy of {name}", post(path, "application/x-npy", many), 2)
-        path = "/v1/materials/rolled-brass/lookup?wavelength_nm=550&format=npy"
-        beside = pool.submit(load, port, post(path, "application/x-npy", many), 2, options.seconds)
-        report(
+            seconds, whole = pool.submit(load, port, request, connections, duration).result()
+            add(table, title, connections, seconds, whole, cpu_seconds(pid) - before)
+        beside = pool.submit(load, port, as_npy_request(NAMES[0]), 2, duration)
+        add(
+            table,
             "one point beside 100 000 as npy",
-            *pool.submit(load, port, one["rolled-brass"], 1, options.seconds).result(),
+            1,
+            *pool.submit(load, port, made[0][1], 1, duration).result(),
+            None,
         )
-        report("100 000 as npy beside one point", *beside.result())
+        add(table, "100 000 as npy beside one point", 2, *beside.result(), None)
+        clients(run, store, port, quick)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,13 +1,12 @@
-"""The service under mixed load while new revisions are published: python tests/benchmarks/soak.py --minutes 5
+"""The service under mixed load while new revisions are published: ``python tests/benchmarks/soak.py --minutes 5``.
 
-Of a Lambertian material whose albedo tells in every answer which revision its numbers are of: 0.001 of the first, 0.002
-of the second, and 0.001 again after a thousand. Exits with 1 after an answer that is an error, mixes revisions or is of
-one that was not current, or if memory goes on growing.
+The albedo of a Lambertian material names the revision in every answer: 0.001 is the first, 0.002 the second, and 0.001
+comes again after a thousand. Exits with 1 after an answer that is an error, mixes revisions or is of one that was not
+current, or if memory goes on growing.
 """
 
 from __future__ import annotations
 
-import argparse
 import http.client
 import io
 import json
@@ -22,9 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
-from service import as_npy, points, served
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
@@ -32,6 +30,8 @@ from brdfdb.store.revisions import collect
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
+from tests.benchmarks.recording import Column, Run
+from tests.benchmarks.service import as_npy, points, served
 
 GRID = Grid({"theta_i": [0, 30, 60, 85], "theta_r": [0, 30, 60, 85], "delta_phi": [0, 90, 180]})
 NAME = "changing"
@@ -40,6 +40,8 @@ OFF = 1e-7  # of float32 tables, albedos up to 1: 3e-9 measured up to 0.06, neig
 LEVELS = 0.51  # of 255: levels are whole numbers
 GROWTH = 1.1  # of memory, from the middle of the time to its end
 MANY = points(2000)
+MEASURED = "Answers of the service while new revisions are published: each must be of a revision that was current."
+QUICK_MINUTES, QUICK_EVERY = 0.03, 0.2
 
 Get = Callable[..., bytes]
 Told = Sequence[float] | np.ndarray  # steps of albedo; none where there is nothing to tell yet
@@ -184,45 +186,55 @@ def resident(pid: int) -> float:
     return pages * 4096 / 1e6
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Ask while revisions are published, and return 1 if an answer is wrong."""
+    run = Run("soak", "accuracy", "The service while revisions change", MEASURED)
+    parser = run.parser(__doc__)
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--every", type=float, default=1.0, metavar="S", help="seconds between revisions")
-    options = parser.parse_args()
+    options = run.parse(parser, arguments)
+    minutes, every = (QUICK_MINUTES, QUICK_EVERY) if options.quick else (options.minutes, options.every)
     with tempfile.TemporaryDirectory() as folder:
-        store = Path(folder)
-        published(store, 1)
-        with served(str(store)) as (port, pid, _):
-            soak = Soak(port)
-            threads = [threading.Thread(target=soak.client, args=(what,)) for what in ASKED]
-            for thread in threads:
-                thread.start()
-            start, revision, memory = time.monotonic(), 1, []
-            while time.monotonic() - start < 60.0 * options.minutes:
-                time.sleep(options.every)
-                revision = soak.begun = revision + 1
-                published(store, revision)
-                soak.done = revision
-                if revision % 10 == 0:
-                    collect(store, keep=10)  # enough for requests that name one
-                memory.append(resident(pid))
-            soak.stop.set()
-            for thread in threads:
-                thread.join()
+        soak, revision, memory = soaked(Path(folder), 60.0 * minutes, every)
+    table = run.table(f"{minutes:g} minutes, {revision} revisions", Column(name="request", width=28), "right answers")
+    for what in ASKED:
+        table.add(what, soak.right[what])
     half = len(memory) // 2
-    table = Table(title=f"{options.minutes:g} minutes, {revision} revisions")
-    table.add_column("asked")
-    table.add_column("answers", justify="right")
-    for what, count in soak.right.items():
-        table.add_row(what, str(count))
-    Console().print(table)
-    print(f"memory: {memory[0]:.0f} MB at first, {memory[half]:.0f} MB half way, {memory[-1]:.0f} MB at the end")
+    memories = run.table("Memory of the service", Column(name="time", width=28), Column(name="memory", unit="MB"))
+    for name, megabytes in (("at first", memory[0]), ("half way", memory[half]), ("at the end", memory[-1])):
+        memories.add(name, megabytes)
     for line, count in Counter(soak.wrong).most_common(10):
         print(f"{count} times {line}")
-    grown = memory[-1] > GROWTH * memory[half]
+    run.say(f"{soak.right.total()} answers are right, {len(soak.wrong)} are wrong.")
+    # a quick run is too short to see what memory does
+    grown = not options.quick and memory[-1] > GROWTH * memory[half]
     if grown:
-        print("memory goes on growing")
+        run.say("Memory goes on growing.")
+    run.end()
     return 1 if soak.wrong or grown or set(soak.right) != set(ASKED) else 0
+
+
+def soaked(store: Path, seconds: float, every: float) -> tuple[Soak, int, list[float]]:
+    """Publish and ask for some seconds, and until each kind of question has an answer."""
+    published(store, 1)
+    with served(str(store)) as (port, pid, _):
+        soak = Soak(port)
+        threads = [threading.Thread(target=soak.client, args=(what,)) for what in ASKED]
+        for thread in threads:
+            thread.start()
+        start, revision, memory = time.monotonic(), 1, [resident(pid)]
+        while time.monotonic() - start < seconds or not (soak.wrong or set(soak.right) == set(ASKED)):
+            time.sleep(every)
+            revision = soak.begun = revision + 1
+            published(store, revision)
+            soak.done = revision
+            if revision % 10 == 0:
+                collect(store, keep=10)  # enough for requests that name one
+            memory.append(resident(pid))
+        soak.stop.set()
+        for thread in threads:
+            thread.join()
+    return soak, revision, memory
 
 
 if __name__ == "__main__":

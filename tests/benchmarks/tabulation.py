@@ -1,4 +1,4 @@
-"""How fast one core tabulates the presets on plain grids: ``python tests/benchmarks/tabulation.py``.
+"""The speed at which one core tabulates the presets on plain grids: ``python tests/benchmarks/tabulation.py``.
 
 Machines are shared and noisy: compare models or commits in one run, not numbers of different days.
 """
@@ -8,29 +8,51 @@ from __future__ import annotations
 import sys
 import time
 from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
 
-from plain import plain_recipe
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb.tables.tabulation import tabulate
+from tests.benchmarks.plain import plain_recipe
+from tests.benchmarks.recording import Column, Run
+
+MEASURED = "The values of f_r that one core computes in a second when it fills tables on plain grids."
 
 
-def main(wanted: list[str]) -> None:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Time every table on its plain grid, or those of the models that are named."""
-    jobs = [job for job in plain_recipe().jobs() if not wanted or job.material.model in wanted]
+    run = Run("tabulation", "speed", "Tabulation on one core", MEASURED)
+    parser = run.parser(__doc__)
+    parser.add_argument("models", metavar="MODEL", nargs="*", help="by default all")
+    options = run.parse(parser, arguments)
+    jobs = plain_recipe(options.models, coarse=options.quick).jobs()
     for first in {job.material.model: job for job in jobs}.values():  # compile before the clock runs
         tabulate(first.layout())
-    totals: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
+    totals: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0, 0.0])
+    table = run.table(
+        "Tables", Column(name="material", width=32), Column(name="model", width=12), "values", rate("values")
+    )
     for job in jobs:
         start = time.perf_counter()
         tabulate(job.layout())
         seconds = time.perf_counter() - start
         size = job.layout().size
-        print(f"{job.material.name:36}{job.material.model:14}{size / seconds / 1e6:8.1f} million values a second")
-        totals[job.material.model][0] += size
-        totals[job.material.model][1] += seconds
-    for model, (size, seconds) in totals.items():
-        print(f"{'all of':36}{model:14}{size / seconds / 1e6:8.1f} million values a second, one core")
+        table.add(job.material.name, job.material.model, size, size / seconds / 1e6)
+        totals[job.material.model] = [
+            a + b for a, b in zip(totals[job.material.model], (1, size, seconds), strict=True)
+        ]
+    models = run.table("All tables of a model", Column(name="model", width=32), "tables", rate("values"))
+    for model, (count, size, seconds) in totals.items():
+        models.add(model, int(count), size / seconds / 1e6)
+    run.end()
+    return 0
+
+
+def rate(name: str) -> Column:
+    """Return a column of millions a second."""
+    return Column(name=name, unit="1e6/s")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(main())
