@@ -13,10 +13,10 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-from _site import api, figures, materials, papers, store
+from _site import api, figures, materials, papers, results, store
 
 # In the order in which they are written; each has write(docs, store)
-_WRITERS = (api, figures, materials, papers)
+_WRITERS = (api, figures, materials, papers, results)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

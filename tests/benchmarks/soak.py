@@ -178,6 +178,7 @@ class Soak:
             except Exception as error:
                 self.wrong.append(f"{what}: {type(error).__name__}: {error}")
                 connection.close()
+        connection.close()
 
 
 def resident(pid: int) -> float:
