@@ -43,9 +43,9 @@ def _page(record: Record) -> str:
     elif record.kind == "speed" and record.load >= _BUSY:
         busy = f"Other programs kept {record.load:g} processors busy when this run began: times are too long."
         lines += _warning(busy)
-    lines += [line for sentence in record.sentences for line in (f"* {_escaped(sentence)}",)]
+    lines += [f"* {_escaped(sentence)}" for sentence in record.sentences]
     for table in record.tables:
-        lines += ["", f"## {_escaped(table.title)}", "", *_table(table)]
+        lines += ["", f"## {_escaped(table.title)}", "", ":::{div} record", *_table(table), ":::"]
     lines += ["", "## Run", "", "```sh", record.command, "```", "", *_run(record.machine, record)]
     return "\n".join(lines) + "\n"
 
