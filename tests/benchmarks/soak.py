@@ -41,7 +41,7 @@ LEVELS = 0.51  # of 255: levels are whole numbers
 GROWTH = 1.1  # of memory, from the middle of the time to its end
 MANY = points(2000)
 MEASURED = "Answers of the service while new revisions are published: each must be of a revision that was current."
-QUICK_MINUTES, QUICK_EVERY = 0.03, 0.2
+QUICK_MINUTES, QUICK_EVERY = 0.01, 0.2
 
 Get = Callable[..., bytes]
 Told = Sequence[float] | np.ndarray  # steps of albedo; none where there is nothing to tell yet
@@ -178,6 +178,7 @@ class Soak:
             except Exception as error:
                 self.wrong.append(f"{what}: {type(error).__name__}: {error}")
                 connection.close()
+        connection.close()
 
 
 def resident(pid: int) -> float:
