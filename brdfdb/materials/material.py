@@ -26,6 +26,7 @@ from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, Kno
 from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
+from brdfdb.notebook import card, listed, spectrum
 from brdfdb.parameters import Floats, ModelSpec
 from brdfdb.spectra import refractive_index
 
@@ -375,6 +376,19 @@ class Material(BaseModel, Lookups):
             "refractive_index": self.refractive_index or "",
             "known_excess": self.known_excess.model_dump() if self.known_excess else {},
         }
+
+    def _repr_html_(self) -> str:
+        """Return the material for notebooks."""
+        facts = [
+            ("model", f"{self.spec.title} ({self.spec.equation})"),
+            ("parameters", listed(self.file_parameters())),
+            ("source", self.source),
+            ("assumed", ", ".join(self.assumed)),
+            ("refractive index", self.refractive_index or ""),
+            ("wavelengths", spectrum(self.wavelengths_nm) if self.wavelengths_nm or not self.spectral else "any"),
+            ("note", self.note),
+        ]
+        return card("Material", self.name, self.title, facts)
 
     def document(self) -> dict[str, Any]:
         """Return the material as JSON, parameters in the units of the model; `brdfdb.materials.source_of` reads it."""
