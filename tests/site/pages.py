@@ -30,8 +30,9 @@ class Page(HTMLParser):
 
 
 def read_pages(site: Path) -> dict[Path, Page]:
-    """Return all pages of a site by path."""
-    return {path: Page(path.read_text(encoding="utf-8")) for path in sorted(site.rglob("*.html"))}
+    """Return all pages of a site by path, those aside that the theme keeps for itself."""
+    paths = [path for path in sorted(site.rglob("*.html")) if "_static" not in path.relative_to(site).parts]
+    return {path: Page(path.read_text(encoding="utf-8")) for path in paths}
 
 
 def broken_links(pages: dict[Path, Page]) -> list[str]:
