@@ -15,16 +15,11 @@ import pytest
 ROOT = Path(__file__).parents[1]
 SOURCES = [path for folder in ("brdfdb", "pipelines", "api") for path in sorted((ROOT / folder).rglob("*.py"))]
 GLOSSARY = ROOT / "docs" / "reference" / "glossary.md"
-# Records of decisions quote what was rejected, and generated pages quote titles of papers
-DOCS = ROOT / "docs"
-NOT_READ = (
-    *(GLOSSARY, DOCS / "explanation" / "decisions", DOCS / "_build", DOCS / "gallery" / "figures"),
-    *(DOCS / "gallery" / "materials", DOCS / "reference" / "generated", DOCS / "results" / "generated"),
-)
-PAGES = [
-    *(ROOT / "README.md", ROOT / "brdfdb" / "DESIGN.md"),
-    *sorted(path for path in DOCS.rglob("*.md") if not any(path.is_relative_to(place) for place in NOT_READ)),
-]
+# Folders of pages that the build of the site writes, and of records that quote what was rejected
+_WRITTEN = {"_build", "generated", "figures", "materials", "papers", "api"}
+_DECISIONS = ROOT / "docs" / "explanation" / "decisions"
+_OF_THE_SITE = {path for path in (ROOT / "docs").rglob("*.md") if not _WRITTEN & {*path.relative_to(ROOT).parts}}
+PAGES = [ROOT / "README.md", ROOT / "brdfdb" / "DESIGN.md", *sorted(_OF_THE_SITE - {GLOSSARY, *_DECISIONS.iterdir()})]
 # Names of variables that say nothing of what they hold
 EMPTY_NAMES = {"found", "each", "said", "told", "asked", "here"}
 # A function's docstring begins with a verb in the imperative; these begin another kind of sentence
