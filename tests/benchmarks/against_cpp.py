@@ -1,7 +1,7 @@
 """Our models against the same arithmetic in C++, on one core: ``python tests/benchmarks/against_cpp.py [section ...]``.
 
-What is compared is timed in turns, in several rounds of one run. A rate is the median over rounds of the median pass,
-"best" the fastest pass of all, "+-" the spread of the rounds; a ratio is the median over rounds of ours over theirs.
+The contestants take turns, in several rounds of one run. A rate is the median over rounds of the median pass, "best"
+the fastest pass of all, "spread" that of the rounds; a ratio is the median over rounds of ours over theirs.
 Seconds are those of the processor: others on the machine count less.
 "public" is the function as a user calls it, checks and new arrays and all; "loop" is its compiled loop alone, on the
 arrays that the public function hands it. A floor is a goal, not a test. Values are compared before they are timed.
@@ -9,43 +9,70 @@ arrays that the public function hands it. A floor is a goal, not a test. Values 
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from statistics import median
 from subprocess import PIPE
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.models import MODELS
+from tests.benchmarks.recording import Column, Run, Table
 
 FLAGS = ["-std=c++17", "-O3", "-march=native", "-ffast-math"]
 SEED = 1994
-DIRECTIONS = 1_000_000
-SUMMED_DIRECTIONS = 50_000  # of He-Torrance, where each is a sum
 AGREEMENT = 1e-8  # of values, relative; those below TINY are 0
 TINY = 1e-30
 ROWS = 2  # of theta_i at a time, as brdfdb.tables.tabulation cuts a grid of this size
-LIGHT_STEP = 6  # of the tables of He-Torrance every sixth row is computed: a rate, sooner
+MEASURED = "Million values of f_r a second on one core: our models beside the same arithmetic in C++."
 
-THETA, PHI = np.deg2rad(np.linspace(0.0, 89.5, 90)), np.deg2rad(np.linspace(0.0, 180.0, 180))
-COARSE_THETA, COARSE_PHI = np.deg2rad(np.linspace(0.0, 89.5, 46)), np.deg2rad(np.linspace(0.0, 180.0, 91))
-WAVELENGTHS_NM = np.linspace(400.0, 700.0, 31)
+
+class Size(NamedTuple):
+    """The size of a run: numbers of directions, of nodes, of rounds, and the length of a turn [s]."""
+
+    directions: int
+    summed: int  # directions of He-Torrance, where each is a sum
+    integrated: int  # directions of the Gaussian facets, where each is an integral
+    polar: int
+    azimuths: int
+    coarse_polar: int
+    coarse_azimuths: int
+    light_step: int  # of the tables of He-Torrance every so manieth row is computed: a rate, sooner
+    wavelengths: int
+    presets: int
+    rounds: int
+    long_rounds: int  # of passes that take a second or more
+    seconds: float
+
+    @property
+    def axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Nodes of polar angle and azimuth."""
+        return _nodes(self.polar, self.azimuths)
+
+
+FULL = Size(1_000_000, 50_000, 2000, 90, 180, 46, 91, 6, 31, 1000, 5, 2, 0.2)
+SMALL = Size(2000, 20, 2, 6, 12, 3, 5, 3, 2, 1, 1, 1, 0.001)
+
+
+def _nodes(polar: int, azimuths: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return np.deg2rad(np.linspace(0.0, 89.5, polar)), np.deg2rad(np.linspace(0.0, 180.0, azimuths))
+
 
 ANALYTIC: dict[str, dict[str, float]] = {
     "ward": {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": 0.15, "alpha_y": 0.3},
@@ -54,7 +81,6 @@ ANALYTIC: dict[str, dict[str, float]] = {
 }
 SUMMED = ((10, 0.2516, 4.0), (500, 1.779, 20.0))  # g of the median direction, sigma_0 [um], floor; tau is 10 sigma_0
 ALUMINUM = {"wavelength_nm": 500.0, "n": 0.769, "k": 6.08, "a": 0.0}
-LONG_ROUNDS = 3  # of passes that take a second or more
 OVER_CPP, OVER_RANDOM, TABLE_RATE, GAUSSIAN_RATE = 0.9, 1.5, {"float64": 30.0, "float32": 80.0}, 0.02
 
 Call = Callable[[], Any]
@@ -64,7 +90,7 @@ Vectors = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Rates:
-    """Million values a second, round by round: of the median and of the fastest pass."""
+    """Million values a second of each round: of the median and of the fastest pass."""
 
     medians: list[float]
     fastest: list[float]
@@ -86,39 +112,27 @@ class Row:
     theirs: Rates | None = None
     floor: float | None = None
 
-    @property
-    def figures(self) -> dict[str, Any]:
-        """What is printed, for JSON."""
-        named: dict[str, Any] = {"case": self.case, "timed": self.timed, "floor": self.floor}
-        for whose, rates in (("theirs", self.theirs), ("ours", self.ours)):
-            names = (whose, f"{whose}_best", f"{whose}_spread_percent")
-            named |= dict(zip(names, (None,) * 3 if rates is None else rates.cells, strict=True))
-        value = named["ours"]
+    def add_to(self, table: Table) -> None:
+        """Add the line to a table."""
+        theirs = (None, None, None) if self.theirs is None else self.theirs.cells
+        ratio = best = None
         if self.theirs is not None:
-            value = median(a / b for a, b in zip(self.ours.medians, self.theirs.medians, strict=True))
-            named |= {"ratio": value, "ratio_of_best": named["ours_best"] / named["theirs_best"]}
-        return named | {"verdict": "" if self.floor is None else "ok" if value >= self.floor else "below"}
-
-    def __str__(self) -> str:
-        of = self.figures
-
-        def cell(name: str, width: int, digits: int) -> str:
-            return f"{'' if of.get(name) is None else format(of[name], f'.{digits}f'):>{width}}"
-
-        digits = 1 if of["ours"] >= 1.0 else 4
-        rates = "".join(
-            cell(whose, 8, digits) + cell(f"{whose}_best", 8, digits) + cell(f"{whose}_spread_percent", 4, 0)
-            for whose in ("theirs", "ours")
-        )
-        ratios = cell("ratio", 7, 2) + cell("ratio_of_best", 6, 2)
-        floor = "" if self.floor is None else f"{self.floor:g}"
-        return f"{self.case:52}{self.timed:7}{rates}{ratios}{floor:>6} {of['verdict']}"
+            ratio = median(a / b for a, b in zip(self.ours.medians, self.theirs.medians, strict=True))
+            best = self.ours.cells[1] / self.theirs.cells[1]
+        value = self.ours.cells[0] if ratio is None else ratio
+        verdict = "" if self.floor is None else "ok" if value >= self.floor else "below"
+        table.add(self.case, self.timed, *theirs, *self.ours.cells, ratio, best, self.floor, verdict)
 
 
-HEADER = (
-    f"{'million values a second: case / against':52}{'timed':7}"
-    f"{'theirs':>8}{'best':>8}{'+-%':>4}{'ours':>8}{'best':>8}{'+-%':>4}{'ratio':>7}{'best':>6}{'floor':>6}"
-)
+def columns() -> list[Column]:
+    """Return the columns of `Row`."""
+    rates = [
+        Column(name=f"{whose}{name}", unit=unit)
+        for whose in ("C++", "ours")
+        for name, unit in (("", "1e6/s"), (", best", "1e6/s"), (", spread", "%"))
+    ]
+    ratios = (Column(name="ratio"), Column(name="ratio of best"), Column(name="floor"), Column(name="verdict"))
+    return [Column(name="case / against", width=52), Column(name="timed"), *rates, *ratios]
 
 
 class Cpp:
@@ -141,17 +155,16 @@ class Cpp:
         return passes
 
     def check(self, kernel: str, parameters: list[float], ours: NDArray[np.floating]) -> None:
-        """Say how far our values are from those of the C++; SystemExit if that is too far."""
+        """Compare our values with those of the C++; SystemExit if they differ."""
         self._ask("dump", kernel, self.folder / "values", *parameters)
         theirs = np.fromfile(self.folder / "values", count=ours.size)
         error = np.max(np.abs(ours.ravel() - theirs) / np.maximum(np.abs(theirs), TINY))
-        print(f"  {kernel}, {ours.size} values: the largest relative difference is {error:.1e}")
         if not error < AGREEMENT:
             raise SystemExit(f"{kernel}: C++ and Python compute different things")
 
 
 @contextmanager
-def baseline(wi: NDArray[np.float64], wr: NDArray[np.float64]) -> Iterator[Cpp]:
+def baseline(wi: NDArray[np.float64], wr: NDArray[np.float64], size: Size) -> Iterator[Cpp]:
     """Compile baseline.cpp and start it on the directions and axes."""
     compiler = shutil.which("g++")
     if compiler is None:
@@ -160,7 +173,8 @@ def baseline(wi: NDArray[np.float64], wr: NDArray[np.float64]) -> Iterator[Cpp]:
         folder = Path(name)
         program = folder / "baseline"
         subprocess.run([compiler, *FLAGS, "-o", program, Path(__file__).with_name("baseline.cpp")], check=True)
-        for array, file in ((wi, "w_i"), (wr, "w_r"), (THETA, "theta"), (PHI, "phi")):
+        theta, phi = size.axes
+        for array, file in ((wi, "w_i"), (wr, "w_r"), (theta, "theta"), (phi, "phi")):
             array.tofile(folder / file)
         with subprocess.Popen([program, folder], text=True, stdin=PIPE, stdout=PIPE) as process:
             yield Cpp(process, folder)
@@ -233,27 +247,27 @@ def grid(model: str, theta: NDArray[Any], phi: NDArray[Any], **parameters: Any) 
     return MODELS[model].evaluate(theta[:, None, None], 0.0, theta[:, None], phi, **parameters)
 
 
-def analytic(model: str, cpp: Cpp, directions: Vectors, rounds: int, seconds: float) -> Iterator[Row]:
+def analytic(model: str, cpp: Cpp, directions: Vectors, size: Size) -> Iterator[Row]:
     """Random directions and a grid of one model, against C++ and against each other."""
     parameters = ANALYTIC[model]
     values = list(parameters.values())
     contestants: dict[str, tuple[int, Clock]] = {}
     layouts: dict[str, Call] = {
         "": partial(MODELS[model].vectors, *directions, **parameters),
-        "_grid": partial(grid, model, THETA, PHI, **parameters),
+        "_grid": partial(grid, model, *size.axes, **parameters),
     }
     for layout, public in layouts.items():
         ours = public()
         cpp.check(model + layout, values, ours)
         loop = compiled_loop(public)
         kinds = ["public"] if loop is None else ["loop", "public"]
-        contestants[f"cpp{layout}"] = ours.size, cpp.clock(model + layout, values, seconds)
+        contestants[f"cpp{layout}"] = ours.size, cpp.clock(model + layout, values, size.seconds)
         if loop is not None:
-            contestants[f"loop{layout}"] = ours.size, clock(loop, seconds)
-        contestants[f"public{layout}"] = ours.size, clock(public, seconds)
+            contestants[f"loop{layout}"] = ours.size, clock(loop, size.seconds)
+        contestants[f"public{layout}"] = ours.size, clock(public, size.seconds)
     cpp.check(f"{model}_six", values, layouts[""]())
-    contestants["cpp_six"] = DIRECTIONS, cpp.clock(f"{model}_six", values, seconds)
-    rates = in_turns(rounds, contestants)
+    contestants["cpp_six"] = size.directions, cpp.clock(f"{model}_six", values, size.seconds)
+    rates = in_turns(size.rounds, contestants)
     for case, ours, theirs, floor in (
         ("random / C++", "", "cpp", OVER_CPP),
         ("random / C++ on six arrays", "", "cpp_six", None),
@@ -264,23 +278,23 @@ def analytic(model: str, cpp: Cpp, directions: Vectors, rounds: int, seconds: fl
             yield Row(f"{model}, {case}", kind, rates[kind + ours], rates[theirs or kind], floor)
 
 
-def he_torrance(cpp: Cpp, directions: Vectors, rounds: int, seconds: float) -> Iterator[Row]:
+def he_torrance(cpp: Cpp, directions: Vectors, size: Size) -> Iterator[Row]:
     """Random directions, against the sum of eq. 78 term by term until the terms fall below 1e-9 or 1e-12 of it."""
-    w_i, w_r = (w[:SUMMED_DIRECTIONS] for w in directions)
+    w_i, w_r = (w[: size.summed] for w in directions)
     for g, sigma_0, floor in SUMMED:
         surface = {"sigma_0_um": sigma_0, "tau_um": 10.0 * sigma_0, **ALUMINUM}
         public = partial(MODELS["he_torrance"].vectors, w_i, w_r, **surface)
         ours = public()
         loop = compiled_loop(public)
-        contestants = {"public": (ours.size, clock(public, seconds))}
+        contestants = {"public": (ours.size, clock(public, size.seconds))}
         if loop is not None:
-            contestants["loop"] = (ours.size, clock(loop, seconds))
+            contestants["loop"] = (ours.size, clock(loop, size.seconds))
         for tolerance in (1e-12, 1e-9):
             order = (surface["wavelength_nm"] / 1e3, sigma_0, 10.0 * sigma_0, *(surface[name] for name in "nka"))
-            values = [*order, tolerance, SUMMED_DIRECTIONS]
+            values = [*order, tolerance, size.summed]
             cpp.check("he_torrance", values, ours)
-            contestants[f"{tolerance:g}"] = ours.size, cpp.clock("he_torrance", values, seconds)
-        rates = in_turns(rounds, contestants)
+            contestants[f"{tolerance:g}"] = ours.size, cpp.clock("he_torrance", values, size.seconds)
+        rates = in_turns(size.rounds, contestants)
         for stopped in ("1e-09", "1e-12"):
             for kind in [kind for kind in ("loop", "public") if kind in rates]:
                 yield Row(f"he_torrance, g ~ {g} / C++ to {stopped}", kind, rates[kind], rates[stopped], floor)
@@ -304,99 +318,100 @@ def in_one_call(material: Material, axes: list[NDArray[Any]], spectrum: list[dic
     material.spec.evaluate(light, 0.0, viewer, delta_phi, **spectrum[0] | leading)
 
 
-def he_torrance_tables(rounds: int) -> Iterator[Row]:
+def he_torrance_tables(size: Size) -> Iterator[Row]:
     """Every preset on a grid with a spectrum, in both precisions, by slabs and with all wavelengths in one call.
 
     A preset whose refractive index is not known from 400 to 700 nm keeps the one at the wavelength it is stated for.
     """
-    lights = THETA[::LIGHT_STEP]
-    size = lights.size * THETA.size * PHI.size * WAVELENGTHS_NM.size
+    theta, phi = size.axes
+    lights, wavelengths_nm = theta[:: size.light_step], np.linspace(400.0, 700.0, size.wavelengths)
+    values = lights.size * theta.size * phi.size * wavelengths_nm.size
     seen: list[tuple[Any, ...]] = []
     for material in presets().values():
         surface = (material.parameters, material.refractive_index)
-        if material.model != "he_torrance" or surface in seen:
+        if material.model != "he_torrance" or surface in seen or len(seen) == size.presets:
             continue
         seen.append(surface)
         try:
-            spectrum = [material.arguments(wavelength_nm) for wavelength_nm in WAVELENGTHS_NM]
+            spectrum = [material.arguments(wavelength_nm) for wavelength_nm in wavelengths_nm]
         except ValueError:
             stated = {name: np.ravel(value)[0] for name, value in material.arguments().items()}
-            spectrum = [stated | {"wavelength_nm": wavelength_nm} for wavelength_nm in WAVELENGTHS_NM]
+            spectrum = [stated | {"wavelength_nm": wavelength_nm} for wavelength_nm in wavelengths_nm]
         contestants: dict[str, tuple[int, Clock]] = {}
         for dtype in TABLE_RATE:
-            axes = [axis.astype(dtype) for axis in (lights, THETA, PHI)]
+            axes = [axis.astype(dtype) for axis in (lights, theta, phi)]
             for name, fill in (("slabs", by_slabs), ("one call", in_one_call)):
                 fill(material, [axis[:ROWS] for axis in axes], spectrum)  # compile before the clock runs
-                contestants[f"{name} {dtype}"] = size, once(partial(fill, material, axes, spectrum))
-        for name, rates in in_turns(rounds, contestants).items():
+                contestants[f"{name} {dtype}"] = values, once(partial(fill, material, axes, spectrum))
+        for name, rates in in_turns(size.long_rounds, contestants).items():
             yield Row(f"{material.name}, {name}", "public", rates, floor=TABLE_RATE[name.split()[-1]])
 
 
-def oren_nayar_gaussian(directions: Vectors, rounds: int) -> Iterator[Row]:
-    """The model without the paper's fit, if there is one: its masking integral direction by direction."""
-    spec = MODELS.get("oren_nayar_gaussian")
-    if spec is None:
-        print("  no such model")
-        return
+def oren_nayar_gaussian(directions: Vectors, size: Size) -> Iterator[Row]:
+    """Time the model without the paper's fit: its masking integral direction by direction."""
+    spec = MODELS["oren_nayar_gaussian"]
     parameters = {each.name: each.default for each in spec.parameters if each.default is not None}
     parameters |= {"rho": 0.9, "sigma": 0.5}
-    w_i, w_r = (w[:2000] for w in directions)
+    w_i, w_r = (w[: size.integrated] for w in directions)
+    theta, phi = _nodes(size.coarse_polar, size.coarse_azimuths)
     spec.vectors(w_i[:2], w_r[:2], **parameters)  # compile before the clock runs
-    grid(spec.name, COARSE_THETA[:2], COARSE_PHI[:2], **parameters)
-    size = COARSE_THETA.size**2 * COARSE_PHI.size
-    rates = in_turns(
-        rounds,
-        {
-            "random": (len(w_i), once(partial(spec.vectors, w_i, w_r, **parameters))),
-            "46 x 46 x 91 grid": (size, once(partial(grid, spec.name, COARSE_THETA, COARSE_PHI, **parameters))),
-        },
-    )
-    for name, rate in rates.items():
-        yield Row(f"{spec.name}, {name}", "public", rate, floor=GAUSSIAN_RATE if name == "random" else None)
-    print(
-        f"  a {COARSE_THETA.size} x {COARSE_THETA.size} x {COARSE_PHI.size} grid took "
-        f"{size / 1e6 / median(rates['46 x 46 x 91 grid'].medians):.2f} s"
-    )
+    grid(spec.name, theta[:2], phi[:2], **parameters)
+    name = f"{theta.size} x {theta.size} x {phi.size} grid"
+    contestants: dict[str, tuple[int, Clock]] = {
+        "random": (len(w_i), once(partial(spec.vectors, w_i, w_r, **parameters))),
+        name: (theta.size**2 * phi.size, once(partial(grid, spec.name, theta, phi, **parameters))),
+    }
+    for title, rate in in_turns(size.long_rounds, contestants).items():
+        yield Row(f"{spec.name}, {title}", "public", rate, floor=GAUSSIAN_RATE if title == "random" else None)
 
 
-def random_directions(rng: np.random.Generator) -> NDArray[np.float64]:
-    """Unit vectors, uniform over the hemisphere, contiguous (N, 3)."""
-    return unit_vector(np.arccos(rng.uniform(0.0, 1.0, DIRECTIONS)), rng.uniform(-np.pi, np.pi, DIRECTIONS))
+def random_directions(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+    """Return unit vectors, uniform over the hemisphere, contiguous (N, 3)."""
+    return unit_vector(np.arccos(rng.uniform(0.0, 1.0, count)), rng.uniform(-np.pi, np.pi, count))
 
 
-def main() -> None:
-    """Time what is asked for, by default all, print each row as it is known and perhaps write JSON."""
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep this process and those that it starts on one core."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Time all sections or those that are named, and print each row as it is known."""
     sections = [*ANALYTIC, "he_torrance", "he_torrance_tables", "oren_nayar_gaussian"]
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    run = Run("against_cpp", "speed", "Models against C++", MEASURED)
+    parser = run.parser(__doc__)
     parser.add_argument("section", nargs="*", help=", ".join(sections))
-    parser.add_argument("--rounds", type=int, default=7, help="turns that each contestant takes; of long ones 3")
-    parser.add_argument("--seconds", type=float, default=0.2, help="length of a turn")
-    parser.add_argument("--json", type=Path, metavar="PATH", help="write the rows there too")
-    asked = parser.parse_args()
-    if asked.rounds < 1:
-        parser.error(f"--rounds: {asked.rounds} is less than 1")
-    if unknown := [name for name in asked.section if name not in sections]:
+    parser.add_argument("--rounds", type=int, default=FULL.rounds, help="turns that each contestant takes")
+    parser.add_argument("--seconds", type=float, default=FULL.seconds, help="length of a turn")
+    options = run.parse(parser, arguments)
+    if options.rounds < 1:
+        parser.error(f"--rounds: {options.rounds} is less than 1")
+    if unknown := [name for name in options.section if name not in sections]:
         parser.error(f"{', '.join(unknown)}: the sections are {', '.join(sections)}")
-    if hasattr(os, "sched_setaffinity"):  # the C++ inherits it
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    size = SMALL if options.quick else FULL._replace(rounds=options.rounds, seconds=options.seconds)
     rng = np.random.default_rng(SEED)
-    directions = random_directions(rng), random_directions(rng)
-    rows: list[Row] = []
-    print(HEADER)
-    with baseline(*directions) as cpp:
-        runs: dict[str, Iterator[Row]] = {
-            model: analytic(model, cpp, directions, asked.rounds, asked.seconds) for model in ANALYTIC
-        }
-        runs["he_torrance"] = he_torrance(cpp, directions, asked.rounds, asked.seconds)
-        runs["he_torrance_tables"] = he_torrance_tables(min(asked.rounds, LONG_ROUNDS))
-        runs["oren_nayar_gaussian"] = oren_nayar_gaussian(directions, min(asked.rounds, LONG_ROUNDS))
-        for section in asked.section or sections:
+    directions = random_directions(rng, size.directions), random_directions(rng, size.directions)
+    table = run.table("Values a second", *columns())
+    with one_core(), baseline(*directions, size) as cpp:
+        runs: dict[str, Iterator[Row]] = {model: analytic(model, cpp, directions, size) for model in ANALYTIC}
+        runs["he_torrance"] = he_torrance(cpp, directions, size)
+        runs["he_torrance_tables"] = he_torrance_tables(size)
+        runs["oren_nayar_gaussian"] = oren_nayar_gaussian(directions, size)
+        for section in options.section or sections:
             for row in runs[section]:
-                print(row, flush=True)
-                rows.append(row)
-    if asked.json:
-        asked.json.write_text(json.dumps([row.figures for row in rows], indent=1) + "\n", encoding="utf-8")
+                row.add_to(table)
+    run.end()
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

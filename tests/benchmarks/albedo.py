@@ -31,7 +31,9 @@ CHUNK = 200_000  # samples at a time
 ROUNDING = 1e-13  # of means of many float64
 WORTH_A_LOOK, TOO_MUCH = 3.0, 5.0
 QUICK, QUICK_SAMPLES = ("magnesium-oxide-ceramic", "rolled-brass"), 2e4
-MEASURED = "The directional albedo of each preset without its specular part, by Monte Carlo and by the quadrature of the audit."
+MEASURED = (
+    "The directional albedo of each preset, specular part left out, by Monte Carlo and by the audit's quadrature."
+)
 
 
 class Estimate(NamedTuple):

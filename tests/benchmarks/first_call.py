@@ -20,7 +20,7 @@ from typing import Any
 
 FLOORS = {"cold": 15.0, "warm": 0.5}
 WARM_ROUNDS = 3
-QUICK_MODEL = "ward"
+QUICK_MODEL = "lambert"
 MEASURED = "The seconds to the first values of each model in a fresh process, without compiled code and with it."
 
 

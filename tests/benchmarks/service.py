@@ -127,21 +127,19 @@ def served(store: str) -> Iterator[tuple[int, int, float]]:
     """Start a server: yield its port, its process and the seconds until it was ready."""
     start = time.perf_counter()
     command = [sys.executable, "-m", "brdfdb_pipelines.cli", "serve", "--store", store, "--port", "0"]
-    with open(os.devnull, "wb") as nowhere:
-        server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=nowhere, text=True)
-    try:
-        assert server.stdout is not None
-        line = server.stdout.readline()
-        port = int(line.rsplit(":", 1)[1].strip(" /\n"))
-        while True:
-            with contextlib.suppress(OSError), urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz") as answer:
-                if answer.status == 200:
-                    break
-            time.sleep(0.01)
-        yield port, server.pid, time.perf_counter() - start
-    finally:
-        server.terminate()
-        server.wait()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
+        try:
+            assert server.stdout is not None
+            line = server.stdout.readline()
+            port = int(line.rsplit(":", 1)[1].strip(" /\n"))
+            while True:
+                with contextlib.suppress(OSError), urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz") as answer:
+                    if answer.status == 200:
+                        break
+                time.sleep(0.01)
+            yield port, server.pid, time.perf_counter() - start
+        finally:
+            server.terminate()
 
 
 def cpu_seconds(pid: int) -> float:

@@ -1,8 +1,8 @@
 """Every preset at a tolerance: the size of its table, the error it states, one measured afresh, and a uniform grid.
 
-``python tests/benchmarks/tables.py`` prints a line for each material and exits with 1 if a promise is broken: the
-tolerance is kept at directions that the planner did not see, a stated p99 and a fresh one are within 20 %, a part takes
-no more than 2 MB (isotropic) or 40 MB, and lobes of width 0.1 or less take a twentieth of the uniform grid over theta_i,
+``python tests/benchmarks/tables.py`` prints a line for each material and exits with 1 if a promise is broken. The
+tolerance is kept at directions that the planner did not see. A stated p99 and a fresh one are within 20 %. A part takes
+no more than 2 MB (isotropic) or 40 MB. Lobes of width 0.1 or less take a twentieth of the uniform grid over theta_i,
 theta_r and azimuth (phi_i and phi_r for anisotropic surfaces) that is as good.
 """
 

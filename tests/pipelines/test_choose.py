@@ -18,6 +18,7 @@ from brdfdb.scenes.choice_document import Choice, Price
 from brdfdb.scenes.offered_forms import OfferedForm
 from brdfdb_pipelines import choose, cli, terminal
 from brdfdb_pipelines.documents import schema
+from tests.benchmarks.picture_judge import judge
 
 TABLE_OFF = 1.5e-4  # 1.21e-4 measured, of a table planned for 1e-3
 
@@ -260,9 +261,6 @@ def test_pictures_that_share_no_code_find_no_more_beyond_the_tolerance_than_is_s
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(choose, "_prices", made_up_prices)
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "benchmarks"))
-    from choices import judge  # type: ignore[import-not-found]
-
     path, told = tmp_path / "judged.toml", tmp_path / "out" / "choice.json"
     path.write_text(JUDGED, encoding="utf-8")
     choice = choose.run(str(path), tmp_path / "out", width=48, tolerances=[0.01])

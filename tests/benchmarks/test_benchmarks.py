@@ -1,0 +1,121 @@
+"""Quick runs of every benchmark: each ends well, and its record is valid, finite and of sensible numbers."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.benchmarks import recording
+from tests.benchmarks.recording import Record, Table
+
+FOLDER = Path(__file__).parent
+HELPERS = {"picture_judge", "plain", "planted_tables", "recording", "sound_materials", "test_benchmarks"}
+SCRIPTS = sorted({path.stem for path in FOLDER.glob("*.py")} - HELPERS)
+SIGNED = {"difference"}  # columns whose numbers may be negative
+
+needs = {"against_cpp": pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")}
+
+
+def test_helpers_are_no_scripts_and_all_others_are() -> None:
+    runs = {path.stem for path in FOLDER.glob("*.py") if '\nif __name__ == "__main__":\n' in path.read_text("utf-8")}
+    assert runs == {*SCRIPTS}
+
+
+def test_every_script_has_a_record_and_every_record_a_script() -> None:
+    assert sorted(path.stem for path in recording.FOLDER.glob("*.json")) == SCRIPTS
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_records_of_the_site_are_valid_and_name_no_machine(name: str) -> None:
+    text = (recording.FOLDER / f"{name}.json").read_text(encoding="utf-8")
+    check(Record.model_validate_json(text), name)
+    assert not re.search(r'[" ](/[\w.-]+){2}', text)
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=needs.get(name, ())) for name in SCRIPTS])
+def test_a_quick_run_ends_well(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(recording, "FOLDER", tmp_path)
+    script = importlib.import_module(f"tests.benchmarks.{name}")
+    assert script.main(["--quick", "--record"]) == 0
+    record = Record.model_validate_json((tmp_path / f"{name}.json").read_text(encoding="utf-8"))
+    check(record, name)
+    assert record.quick
+    assert record.command == f"python tests/benchmarks/{name}.py --quick --record"
+    printed = capsys.readouterr().out
+    for table in record.tables:
+        assert table.title in printed
+        for row in table.rows:
+            assert all(column.cell(value) in printed for column, value in zip(table.columns, row, strict=True))
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_help_names_the_arguments(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    script = importlib.import_module(f"tests.benchmarks.{name}")
+    with pytest.raises(SystemExit) as ended:
+        script.main(["--help"])
+    assert ended.value.code == 0
+    printed = capsys.readouterr().out
+    assert "--quick" in printed
+    assert "--record" in printed
+
+
+def check(record: Record, name: str) -> None:
+    """Check a record: tables of the same width throughout, with numbers that are not negative."""
+    assert record.name == name
+    assert record.title
+    assert record.measured.endswith(".")
+    assert record.tables
+    for table in record.tables:
+        assert table.rows, table.title
+        check_numbers(table)
+    names = [table.title for table in record.tables]
+    assert len(set(names)) == len(names)
+
+
+def check_numbers(table: Table) -> None:
+    """Check that numbers are positive or 0, and that shares are no more than the whole."""
+    assert {len(row) for row in table.rows} == {len(table.columns)}
+    for number, column in enumerate(table.columns):
+        values = [row[number] for row in table.rows]
+        numbers = [value for value in values if isinstance(value, int | float)]
+        if column.name not in SIGNED:
+            assert all(value >= 0 for value in numbers), (table.title, column.heading)
+        if table.title.startswith("Share "):
+            assert all(value <= 1 for value in numbers), (table.title, column.heading)
+
+
+def test_a_record_holds_numbers_of_numpy_and_leaves_out_what_is_not_finite() -> None:
+    table = Table(
+        title="A table", columns=[recording.Column(name=name) for name in ("name", "count", "number", "none")]
+    )
+    table.add("a", np.int64(3), np.float32(0.25), np.nan)
+    assert table.rows == [["a", 3, 0.25, None]]
+    assert [column.cell(value) for column, value in zip(table.columns, table.rows[0], strict=True)] == [
+        "a",
+        "3",
+        "0.25",
+        "-",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "cell"),
+    [
+        (0.0, "0"),
+        (1234.5, "1230"),
+        (0.012345, "0.0123"),
+        (1e-5, "1.00e-05"),
+        (2.5e7, "2.50e+07"),
+        (None, "-"),
+        ("x", "x"),
+    ],
+)
+def test_numbers_are_shown_with_three_digits(value: float | str | None, cell: str) -> None:
+    assert recording.Column(name="any").cell(value) == cell
