@@ -19,7 +19,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from brdfdb.errors import MaterialError, ParameterError
+from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.geometry import degrees
 from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
@@ -405,7 +405,7 @@ def _each(arguments: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _field_and_sentence(error: ErrorDetails) -> tuple[str, str]:
     """Return the field and the sentence of an error of pydantic. A ParameterError names the field itself."""
-    ours = error["ctx"]["error"] if error["type"] == "value_error" else error["msg"]
+    ours = error["ctx"]["error"] if error["type"] == "value_error" else sentence_of(error)
     if isinstance(ours, ParameterError):
         return ours.parameter, ours.sentence
     return ".".join(map(str, error["loc"])), str(ours)

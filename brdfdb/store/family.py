@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from brdfdb.errors import ParameterError, StoreError
+from brdfdb.errors import ParameterError, StoreError, sentence_of
 from brdfdb.geometry import checked_angles, checked_vectors, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
@@ -128,7 +128,7 @@ def record_from(content: Mapping[str, Any], where: str) -> FamilyRecord:
         record = FamilyRecord.model_validate(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise StoreError(f"{where} is damaged: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+        raise StoreError(f"{where} is damaged: {'.'.join(map(str, first['loc']))}: {sentence_of(first)}") from None
     if where != f"the family {record.name}":
         raise StoreError(f"{where} is damaged: its record is that of {record.name}")
     return record

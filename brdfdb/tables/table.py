@@ -174,7 +174,7 @@ class Table(BaseTable):
         )
         axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
         channels = self.values.size // int(np.prod(grid.shape))
-        spectra = np.empty((0, 0)) if self.spectra is None else self.spectra
+        spectra = np.empty((0, 0)) if self.spectra is None else np.ascontiguousarray(self.spectra)  # else a kernel more
         count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
         uniform = np.zeros(count) if self.uniform is None else np.broadcast_to(self.uniform, (count,)).copy()
         return rule, axes, self.values.reshape(-1), channels, spectra, uniform
