@@ -86,11 +86,6 @@ def test_schemas_are_those_of_the_code(name: str) -> None:
     assert written == documents.schema(name), "run python -m brdfdb_pipelines.documents and review the difference"
 
 
-def test_the_model_table_of_the_readme_is_that_of_the_code() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert text == documents.readme(text), "run python -m brdfdb_pipelines.documents and review the difference"
-
-
 def test_readme_has_exactly_two_set_up_commands() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(re.findall(r"^python3 -m venv .*$", text, flags=re.MULTILINE)) == 2

@@ -13,10 +13,10 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-from _site import api, figures, materials, papers, results, store
+from _site import api, commands, figures, http, materials, models, papers, results, schemas, store
 
-# In the order in which they are written; each has write(docs, store)
-_WRITERS = (api, figures, materials, papers, results)
+# Each has write(docs, store)
+_WRITERS = (api, commands, figures, http, materials, models, papers, results, schemas)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

@@ -1,10 +1,9 @@
-"""The pages of the Python interface: a page for every public module of the library, by room."""
+"""The pages of the Python interface: a page for every public module of the library, below the page of its room."""
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-from itertools import groupby
 from pathlib import Path
 
 import brdfdb
@@ -18,7 +17,7 @@ def public_modules() -> list[str]:
 
 
 def write(docs: Path, _: Path) -> None:
-    """Write ``reference/api``: an index of rooms, and a page a module."""
+    """Write ``reference/api``: an index of rooms, a page a room, and below it a page for each of its modules."""
     folder = docs / "reference" / "api"
     modules = public_modules()
     for name in modules:
@@ -27,24 +26,45 @@ def write(docs: Path, _: Path) -> None:
     remove_others(folder, {"index.rst", *(f"{name}.rst" for name in modules)})
 
 
+def _children(name: str, modules: list[str]) -> list[str]:
+    return [other for other in modules if other.rpartition(".")[0] == name]
+
+
 def _page(name: str, modules: list[str]) -> str:
     """Return the page of a module. A function named like a module of its package is on the page of that module."""
+    below = [] if name == "brdfdb" else _children(name, modules)
     lines = [name, "=" * len(name), "", f".. automodule:: {name}"]
-    shadowed = [last for package, _, last in (other.rpartition(".") for other in modules) if package == name]
-    if shadowed:
+    if shadowed := [module.rpartition(".")[2] for module in _children(name, modules)]:
         lines.append(f"   :exclude-members: {', '.join(shadowed)}")
+    if below:
+        lines += ["", "Modules", "-------", "", *_listed(below, f"{name}.")]
     return "\n".join(lines) + "\n"
 
 
 def _index(modules: list[str]) -> str:
-    """Return the page that lists the modules of each room with the first line of their docstrings."""
+    """Return the page that lists the rooms and the modules beside them."""
     title = "Python"
-    lines = [title, "=" * len(title), "", "Every public module of the library, by room.", ""]
-    for room, names in groupby(modules, key=lambda name: ".".join(name.split(".")[:2])):
-        listed = list(names)
-        lines += [room, "-" * len(room), ""]
-        for name in listed:
-            summary = (importlib.import_module(name).__doc__ or "").strip().splitlines()[0]
-            lines += [f":doc:`{name} <{name}>`", f"    {summary}", ""]
-        lines += [".. toctree::", "   :hidden:", "", *(f"   {name}" for name in listed), ""]
+    top = _children("brdfdb", modules)
+    rooms = [name for name in top if _children(name, modules)]
+    files = [name for name in top if name not in rooms]
+    lines = [title, "=" * len(title), "", "Every public module of the library, by room."]
+    lines += ["Angles are in radians, and f_r is in 1/sr without the cosine.", ""]
+    for heading, names in (("Rooms", ["brdfdb", *rooms]), ("Modules", files)):
+        lines += [heading, "-" * len(heading), "", *_listed(names, "brdfdb.")]
     return "\n".join(lines)
+
+
+def _listed(names: list[str], prefix: str) -> list[str]:
+    """Return modules with the first lines of their docstrings, and the tree of their pages."""
+    lines = []
+    for name in names:
+        summary = (importlib.import_module(name).__doc__ or "").strip().splitlines()[0]
+        lines += [f":doc:`{name.removeprefix(prefix)} <{name}>`", f"    {summary}", ""]
+    return [
+        *lines,
+        ".. toctree::",
+        "   :hidden:",
+        "",
+        *(f"   {name.removeprefix(prefix)} <{name}>" for name in names),
+        "",
+    ]

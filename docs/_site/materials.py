@@ -1,4 +1,4 @@
-"""The pages of the materials: parameters with sources, the table and its error, the verdict, and files to take along."""
+"""The pages of the materials: parameters with sources, the table and its error, the verdict, and files."""
 
 from __future__ import annotations
 
@@ -75,7 +75,8 @@ def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[
         f"# {plain(material.title)}\n",
         raw(f'<p class="under"><code>{name}</code> {chip(judged.verdict)} {largest}</p>'),
         material_files.picture(name, material.title),
-        f"Model: {{py:obj}}`{spec.title} <brdfdb.models.{spec.name}>`, {plain(spec.equation)} ({cited(spec.reference)}).",
+        f"Model: {{py:obj}}`{spec.title} <brdfdb.models.{spec.name}>`, {plain(spec.equation)}, of "
+        f"{cited(spec.reference)}.",
         f"Source: {plain(material.source)}.\n",
         "## Parameters\n",
         _parameters(material),
@@ -159,13 +160,13 @@ def _table(stored: Table) -> str:
         rows.append(("coefficients", f"{stored.spectra.shape[0]} for each spectrum"))
     metadata = stored.metadata
     rows.append(("values", f"{stored.values.size}, with {metadata.bits} of 23 bits of the mantissa"))
-    rows.append(("f_r", f"`{metadata.reconstruction}`"))
+    rows.append((r"f\_r", f"`{metadata.reconstruction}`"))
     error = stored.error
     assert error is not None
     overall = error.overall
     stated = f"{terminal.error(overall.p99)} of f_r in 99 of 100 of {error.directions} directions"
     rows.append(("stated error", f"**{stated}** (median {overall.median:.2g}, largest {overall.max:.2g})"))
-    parts = [table(("", ""), [(plain(label) if label == "f_r" else label, text) for label, text in rows])]
+    parts = [table(("axis or quantity", "stored"), rows)]
     bands = [f"{low:g} to {high:g}" for low, high in itertools.pairwise(error.theta_i_deg)]
     worst = [f"{max(row):.2g}" for row in error.p99]
     parts.append("Stated error by band of theta\\_i, in degrees, at the worst wavelength:\n")

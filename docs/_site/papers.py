@@ -38,7 +38,9 @@ def paper_of(key: str) -> Paper:
 def cited(key: str) -> str:
     """Return a link to an entry of the page of literature."""
     entry = bibliography()[key]
-    return f"[{plain(_names(entry))} {entry['year']}](#bib-{key})"
+    first, *others = [person.split(", ")[0] for person in entry["author"].split(" and ")]
+    names = first if not others else f"{first} and {others[0]}" if len(others) == 1 else f"{first} et al."
+    return f"[{plain(names)} {entry['year']}](#bib-{key})"
 
 
 def reference(key: str) -> str:

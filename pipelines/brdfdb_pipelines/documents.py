@@ -1,4 +1,4 @@
-"""Generated documents that are kept in the repository for review: JSON Schemas and the README's model table.
+"""Generated documents that are kept in the repository for review: JSON Schemas.
 
 ``python -m brdfdb_pipelines.documents`` in the root of the repository writes them anew; the tests compare. Nothing
 reads them at run time.
@@ -15,7 +15,6 @@ from pydantic import BaseModel
 from brdfdb.audit import AuditReport
 from brdfdb.forms.tradeoff_document import Charts
 from brdfdb.materials import Material
-from brdfdb.models import MODELS
 from brdfdb.scenes.choice_document import Choice
 from brdfdb.scenes.scene import Scene
 from brdfdb.store.family import FamilyRecord
@@ -33,8 +32,6 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "table": TableMetadata,
 }
 
-TABLE_BEGIN, TABLE_END = "<!-- generated: models -->", "<!-- end -->"
-
 
 def schema(name: str) -> str:
     """Return the text of ``schemas/<name>.schema.json``."""
@@ -47,26 +44,6 @@ def schema(name: str) -> str:
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
-def model_table() -> str:
-    """Return the README's table of models and their parameters."""
-    lines = ["| function | model | equations | parameters |", "|---|---|---|---|"]
-    for spec in MODELS.values():
-        parameters = ", ".join(f"`{p.name}` {p.interval}" for p in spec.parameters)
-        if spec.spectral:
-            parameters += ", `wavelength_nm`, `n`, `k`"
-        lines.append(f"| `{spec.name}` | {spec.title} | {spec.equation} | {parameters} |")
-    return "\n".join(lines)
-
-
-def readme(text: str) -> str:
-    """Return a README with its model table brought up to date."""
-    before, rest = text.split(TABLE_BEGIN)
-    _, after = rest.split(TABLE_END)
-    return f"{before}{TABLE_BEGIN}\n{model_table()}\n{TABLE_END}{after}"
-
-
 if __name__ == "__main__":
     for name in SCHEMAS:
         Path("schemas", f"{name}.schema.json").write_text(schema(name), encoding="utf-8")
-    path = Path("README.md")
-    path.write_text(readme(path.read_text(encoding="utf-8")), encoding="utf-8")
