@@ -10,12 +10,15 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
+from matplotlib.image import imsave
+
 from _site.files import write_page
 from brdfdb.formats import EXPORTERS
 from brdfdb.materials import Material
+from brdfdb.scenes.lit_sphere import lit_sphere
 from brdfdb.store.reader import Store
 
-PICTURES = False
+SIZE = 192  # pixels across a picture
 _KIND = "half_difference"  # of slices: the smallest of the three kinds
 
 
@@ -26,12 +29,18 @@ def write(folder: Path, store: Store, materials: Iterable[Material]) -> None:
         name = material.name
         group = store.path(name)
         write_page(folder / f"{name}.toml", recipe(name))
-        archive, image = folder / f"{name}.zarr.zip", folder / f"{name}.exr"
         built = (group / "zarr.json").stat().st_mtime
-        if not archive.exists() or archive.stat().st_mtime < built:
+        archive, image, ball = (folder / f"{name}{suffix}" for suffix in (".zarr.zip", ".exr", ".png"))
+        if not _newer(archive, built):
             _zip(group, archive)
-        if not image.exists() or image.stat().st_mtime < built:
+        if not _newer(image, built):
             EXPORTERS["exr"].write(store[name], image, kind=_KIND)
+        if not _newer(ball, built):
+            imsave(ball, lit_sphere(store[name], SIZE), metadata={"Software": ""})
+
+
+def _newer(path: Path, built: float) -> bool:
+    return path.exists() and path.stat().st_mtime > built
 
 
 def links(name: str) -> str:
@@ -51,7 +60,7 @@ def links(name: str) -> str:
 
 def picture(name: str, title: str) -> str:
     """Return the picture of a material for its page."""
-    return f"![{title}](files/{name}.png)\n" if PICTURES else ""
+    return f"![{title}: a sphere under the same light as those of all pages](files/{name}.png)\n"
 
 
 def recipe(name: str) -> str:

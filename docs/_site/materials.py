@@ -59,9 +59,9 @@ def _paper(material: Material) -> Paper:
 
 
 def _card(material: Material, judged: MaterialAudit) -> Card:
-    picture = f'<img src="../../_images/{material.name}.png" alt="" loading="lazy" width="256" height="256">'
+    picture = f'<img src="../../_images/{material.name}.png" alt="" loading="lazy" width="192" height="192">'
     text = f"{material.spec.title}: {judged.verdict}"
-    return Card(f"{material.name}.html", material.title, text, picture if material_files.PICTURES else "")
+    return Card(f"{material.name}.html", material.title, text, picture)
 
 
 def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[audit.Plot]) -> str:
