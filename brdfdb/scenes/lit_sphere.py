@@ -17,8 +17,7 @@ from brdfdb.parameters import Floats
 from brdfdb.scenes.environment import widest_lobe
 from brdfdb.scenes.studio import studio
 from brdfdb.spectra import colour_science, covers_visible, srgb_weights
-from brdfdb.store.http_client import RemoteTable
-from brdfdb.tables.table import Table
+from brdfdb.tables.table_base import BaseTable
 
 Array = NDArray[np.float64]
 
@@ -41,12 +40,12 @@ _BLURS_FROM = radians(np.array([1.2, 2.4]))
 _ACROSS = 3  # points across each pixel, and down
 
 
-def lit_sphere(surface: Source | Table | RemoteTable, size: int = SIZE, light: Light = studio) -> Array:
+def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio) -> Array:
     """Return a picture of a sphere in sRGB (size, size, 4) in [0, 1], with its coverage as the last channel.
 
     Parameters
     ----------
-    surface : Source or Table or RemoteTable
+    surface : Source or BaseTable
         A material, a function or a table. Of a table the picture shows the lookups.
     size : int
         Pixels across and down, up to 2048. The sphere fills the picture.
@@ -90,12 +89,12 @@ def lit_sphere(surface: Source | Table | RemoteTable, size: int = SIZE, light: L
     return np.concatenate([encoded, coverage[..., np.newaxis]], axis=-1)
 
 
-def sphere_radiance(surface: Source | Table | RemoteTable, theta: Array, phi: Array, light: Light) -> Array:
+def sphere_radiance(surface: Source | BaseTable, theta: Array, phi: Array, light: Light) -> Array:
     """Return the radiance (..., 3) in linear sRGB of points of a sphere, in the unit of the light.
 
     Parameters
     ----------
-    surface : Source or Table or RemoteTable
+    surface : Source or BaseTable
         As of `lit_sphere`.
     theta : array [rad]
         Angle between the normal and the viewer, 0 to pi/2.
@@ -121,7 +120,7 @@ def sphere_radiance(surface: Source | Table | RemoteTable, theta: Array, phi: Ar
 class _Shown(NamedTuple):
     """A surface as a picture shows it: with weights (L, 3) of its wavelengths for linear sRGB."""
 
-    surface: Source | Table | RemoteTable
+    surface: Source | BaseTable
     source: Source | FunctionRecord | None
     wavelength_nm: Array | None
     weights: Array
@@ -143,9 +142,9 @@ class _Shown(NamedTuple):
         return np.asarray((values[..., np.newaxis] if self.wavelength_nm is None else values) @ self.weights)
 
 
-def _shown(surface: Source | Table | RemoteTable) -> _Shown:
+def _shown(surface: Source | BaseTable) -> _Shown:
     """Return a surface with the wavelengths of its picture: the visible, or the first one that it is known for."""
-    if not isinstance(surface, Table | RemoteTable):
+    if not isinstance(surface, BaseTable):
         return _at(surface, surface, surface.evaluated_at(_VISIBLE_NM))
     stored = surface.wavelength_nm
     if stored is not None:
@@ -153,7 +152,7 @@ def _shown(surface: Source | Table | RemoteTable) -> _Shown:
     return _at(surface, surface.source, stored)
 
 
-def _at(surface: Source | Table | RemoteTable, source: Source | FunctionRecord | None, at: Array | None) -> _Shown:
+def _at(surface: Source | BaseTable, source: Source | FunctionRecord | None, at: Array | None) -> _Shown:
     weights = np.ones((1, 1)) if at is None else srgb_weights(tuple(at.tolist()))
     return _Shown(surface, source, at, weights)
 

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 import brdfdb
 from brdfdb.materials import presets
 from brdfdb.scenes.lit_sphere import WHITE, lit_sphere
-from brdfdb.store.http_client import RemoteTable
-from brdfdb.tables.table import Table
+from brdfdb.tables.table_base import BaseTable
 from brdfdb_pipelines import terminal
 
 Array = NDArray[np.float64]
@@ -47,7 +46,7 @@ def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
     with terminal.progress() as bar, ThreadPoolExecutor(jobs) as pool:
         task = bar.add_task("rendering", total=len(tables))
 
-        def picture(table: Table | RemoteTable) -> Array:
+        def picture(table: BaseTable) -> Array:
             sphere = lit_sphere(table, _SPHERE)
             bar.advance(task)
             return sphere
@@ -59,17 +58,17 @@ def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
     print(f"{out}: {len(tables)} materials, {image.shape[1]} x {image.shape[0]} pixels")
 
 
-def sections(tables: Mapping[str, Table | RemoteTable]) -> dict[str, list[Table | RemoteTable]]:
+def sections(tables: Mapping[str, BaseTable]) -> dict[str, list[BaseTable]]:
     """Return tables by their paper, which is the text of their source before the first comma, in the paper's order."""
     order = {name: number for number, name in enumerate(presets())}
-    papers: dict[str, list[Table | RemoteTable]] = {}
+    papers: dict[str, list[BaseTable]] = {}
     for name in sorted(tables, key=lambda name: (order.get(name, len(order)), name)):
         source = tables[name].metadata.source or "Other materials"
         papers.setdefault(source.partition(",")[0], []).append(tables[name])
     return papers
 
 
-def sheet(papers: Mapping[str, Sequence[Table | RemoteTable]], spheres: Mapping[str, Array]) -> NDArray[np.uint8]:
+def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array]) -> NDArray[np.uint8]:
     """Return the contact sheet as sRGB bytes (height, width, 3)."""
     columns = (WIDTH - 2 * _MARGIN) // _CELL
     rows = [-(-len(tables) // columns) for tables in papers.values()]
@@ -98,7 +97,7 @@ def sheet(papers: Mapping[str, Sequence[Table | RemoteTable]], spheres: Mapping[
     return np.round(255.0 * image).astype(np.uint8)
 
 
-def label(table: Table | RemoteTable) -> str:
+def label(table: BaseTable) -> str:
     """Return the name of a table in lines, broken after hyphens."""
     lines = [""]
     for word in table.name.replace("-", "- ").split():

@@ -36,8 +36,8 @@ FEWER = (
     (sampler_efficiency, "ROUNDS", 1),
 )
 MEASURED = (
-    "Error against the exact form and time of one evaluation on one core, of every form of a material; and variance "
-    "times time of samplers."
+    "Error against the exact form, and time of a value of f_r on one core, of every form of a material; variance and "
+    "time of samplers for the albedo in light from 60 degrees and for the picture of a sphere."
 )
 TIMES = ("many at once", "256 at once", "one", "64 materials in turn")
 
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def forms(run: Run, one: Chart) -> None:
     """Print the forms of a material, the most accurate first."""
     table = run.table(
-        f"{one.material}: errors and times of a value of f_r; * marks the forms worth having",
+        f"{one.material}: forms",
         Column(name="form", width=44),
         *("key", "worth having"),
         *(Column(name=name, unit="%") for name in ("mean error", "p99", "p99 from", "p99 to", "forward")),
@@ -97,7 +97,7 @@ def forms(run: Run, one: Chart) -> None:
 def samplers(run: Run, one: Chart) -> None:
     """Print the samplers of a material."""
     table = run.table(
-        f"{one.material}: samplers, for the albedo at 60 degrees and the picture of a sphere",
+        f"{one.material}: samplers",
         Column(name="sampler", width=44),
         *(
             Column(name=f"{problem}, {name}", unit=unit)
@@ -114,7 +114,7 @@ def members(run: Run, family: FamilyChart) -> None:
     """Print the mean error of every form along a family of one parameter."""
     ((axis, values),) = family.axes.items()
     table = run.table(
-        f"{family.family}: {family.title}. Mean error [%] along {axis}",
+        f"{family.family}: mean error in % along {axis}",
         Column(name="form", width=44),
         Column(name="many at once", unit="ns"),
         *(Column(name=f"{value:g}") for value in values),

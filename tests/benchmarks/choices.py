@@ -52,11 +52,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("scenes", metavar="SCENE", nargs="*", help="names or files, by default those that are shipped")
     options = run.parse(parser, arguments)
     table = run.table(
-        "Choices. Errors: of this material alone, and of the whole picture with all samples",
+        "Choices of the scenes",
         Column(name="scene", width=20),
         Column(name="material", width=26),
         Column(name="choice", width=46),
-        *(Column(name=name, unit="CIEDE2000", digits=2) for name in ("alone", "whole")),
+        *(Column(name=name, unit="CIEDE2000", digits=2) for name in ("error alone", "of the whole picture")),
         *("evenly, 1 in", "edges, 1 in"),
         Column(name="cost / exact", digits=2),
         Column(name="next cheaper", width=46),
@@ -108,7 +108,7 @@ def judged(run: Run, choices: dict[Path, tuple[Choice, Path]], most: int | None,
     """Judge choices by other pictures, and return the number of broken statements."""
     widths, offsets = (QUICK_WIDTHS, QUICK_OFFSETS) if quick else (WIDTHS, OFFSETS)
     table = run.table(
-        f"Pictures that share no code, at {len(widths)} widths and {offsets} offsets",
+        f"Other pictures, at {len(widths)} widths and {offsets} offsets",
         Column(name="scene", width=20),
         Column(name="material", width=26),
         *("pixels", "beyond the tolerance"),
