@@ -10,6 +10,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
+from matplotlib import pyplot, rc_context
 from matplotlib.image import imsave
 
 from _site.files import write_page
@@ -30,13 +31,18 @@ def write(folder: Path, store: Store, materials: Iterable[Material]) -> None:
         group = store.path(name)
         write_page(folder / f"{name}.toml", recipe(name))
         built = (group / "zarr.json").stat().st_mtime
-        archive, image, ball = (folder / f"{name}{suffix}" for suffix in (".zarr.zip", ".exr", ".png"))
+        archive, image, ball, plot = (folder / f"{name}{suffix}" for suffix in (".zarr.zip", ".exr", ".png", ".svg"))
         if not _newer(archive, built):
             _zip(group, archive)
         if not _newer(image, built):
             EXPORTERS["exr"].write(store[name], image, kind=_KIND)
         if not _newer(ball, built):
             imsave(ball, lit_sphere(store[name], SIZE), metadata={"Software": ""})
+        if not _newer(plot, built):
+            with rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
+                canvas = store[name].plot.lobe().get_figure()
+                canvas.savefig(plot, metadata={"Date": None})
+                pyplot.close(canvas)
 
 
 def _newer(path: Path, built: float) -> bool:
@@ -51,6 +57,7 @@ def links(name: str) -> str:
             '`xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))`',
             f"* {{download}}`A slice <files/{name}.exr>` over half and difference angles as OpenEXR, a channel a "
             f"wavelength; `brdfdb export exr {name}` writes all slices",
+            f"* {{download}}`The plot of the lobe <files/{name}.svg>`; `brdfdb plot {name}` draws others",
             f"* {{download}}`A recipe <files/{name}.toml>` that builds this material alone: "
             f"`brdfdb build {name}.toml --store my-store`",
             "",
@@ -58,9 +65,15 @@ def links(name: str) -> str:
     )
 
 
-def picture(name: str, title: str) -> str:
-    """Return the picture of a material for its page."""
-    return f"![{title}: a sphere under the same light as those of all pages](files/{name}.png)\n"
+def pictures(name: str, title: str) -> str:
+    """Return the sphere and the lobe of a material for its page."""
+    sphere = f"{title}: a sphere under the same light as those of all pages"
+    lobe = f"f_r of {title} in the plane of incidence, as a polar plot"
+    return "\n".join([_image(f"{name}.png", sphere, "dark-light"), _image(f"{name}.svg", lobe, "lobe")])
+
+
+def _image(file: str, text: str, kind: str) -> str:
+    return f":::{{image}} files/{file}\n:alt: {text}\n:class: {kind}\n:::\n"
 
 
 def recipe(name: str) -> str:
