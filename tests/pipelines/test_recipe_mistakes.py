@@ -45,7 +45,8 @@ BAD = [
     changed('materials = ["foam"]\n', "", "materials: is missing"),
     changed("wavelengths_nm = [500, 550]\n", "", "wavelengths_nm: is missing; scene-copper-sphere is spec", COPPER),
     changed(
-        "[grids.isotropic]\ntheta_i_deg = [{ start = 0, stop = 80, step = 40 }]\ntheta_r_deg = [0, 80]\ndelta_phi_deg = [0, 180]\n",
+        "[grids.isotropic]\ntheta_i_deg = [{ start = 0, stop = 80, step = 40 }]\n"
+        "theta_r_deg = [0, 80]\ndelta_phi_deg = [0, 180]\n",
         "",
         "grids.isotropic: is missing; foam needs it",
     ),
