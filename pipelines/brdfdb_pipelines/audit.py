@@ -81,7 +81,7 @@ def run(
     tasks |= {f"figure {key}": partial(_drawn, key) for key in drawn}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
-        task = bar.add_task("auditing", total=len(tasks))
+        task = bar.add_task("auditing tables, computing figures", total=len(tasks))
         for name, outcome in _outcomes(tasks, jobs):
             done[name] = outcome
             bar.advance(task)

@@ -22,7 +22,7 @@ def run(root: Path, names: list[str], directory: Path, file_format: str, options
     directory.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
     with terminal.progress() as bar:
-        for name in bar.track(revisions, description="exporting"):
+        for name in bar.track(revisions, description="exporting tables"):
             table = store[name]
             for kind in kinds:
                 written.append(directory / f"{name}_{kind}{exporter.suffix}")

@@ -60,6 +60,7 @@ def _build(options: argparse.Namespace) -> None:
     from brdfdb_pipelines import build_resources, recipe_file, workers
     from brdfdb_pipelines.build import build
     from brdfdb_pipelines.build_progress import Bars, Lines
+    from brdfdb_pipelines.compilation import compile_kernels
 
     recipe = recipe_file.load(options.recipe)
     start = time.perf_counter()
@@ -71,6 +72,8 @@ def _build(options: argparse.Namespace) -> None:
         memory = build_resources.machine_memory() if memory is None else memory
         at = (workers.processes if options.processes else workers.threads)(options.jobs)
     with at as opened, Lines() if options.json else Bars() as report:
+        if not options.scheduler:
+            compile_kernels(recipe, options.store, options.jobs, report)
         built = build(recipe, options.store, opened, report, memory=memory)
     if not options.json:
         _print(built, options.store, time.perf_counter() - start)

@@ -44,7 +44,7 @@ def _create(root: Path, name: str) -> None:
     from brdfdb_pipelines import terminal
 
     with terminal.progress() as bar:
-        task = bar.add_task("reading every file", total=len(Store(root)))
+        task = bar.add_task("reading tables", total=len(Store(root)))
         digest = snapshots.create(root, name, lambda: bar.advance(task))
     print(f"{_contents(root, name)}; sha256 {digest}")
 

@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
             raise UnknownMaterialError(name, [*store, *families])
     findings, total = [], 0
     with terminal.progress() as bar:
-        task = bar.add_task("verifying", total=len(wanted))
+        task = bar.add_task("verifying tables", total=len(wanted))
         for name in wanted:
             size, wrong = (verification.material if name in store else verification.family)(root, name)
             total += size
