@@ -62,7 +62,8 @@ class _Parser(argparse.ArgumentParser):
         choices = [str(choice) for choice in action.choices]
         near = difflib.get_close_matches(str(value), choices, n=1)
         hint = f"did you mean {near[0]}?" if near else f"choose from {', '.join(choices)}"
-        raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {hint}")
+        more = "" if near else getattr(action, "hint", "")
+        raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {hint}{more}")
 
 
 class _Version(argparse.Action):

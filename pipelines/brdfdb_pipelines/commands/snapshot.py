@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, counted
 from brdfdb_pipelines.commands._arguments import add_store
 
 HELP = (
@@ -67,4 +67,4 @@ def _contents(root: Path, name: str) -> str:
     from brdfdb.store.snapshot_record import read_snapshot
 
     content = read_snapshot(root, name)
-    return f"{name}: {len(content['materials'])} materials, {len(content['families'])} families"
+    return f"{name}: {counted(len(content['materials']), 'material')}, {len(content['families'])} families"
