@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import difflib
 import importlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from types import ModuleType
+from typing import Any
 
 _SHOWN = 60  # characters of an unknown name that a sentence repeats
 
@@ -151,3 +152,62 @@ def missing_extra(module: str) -> MissingExtraError | None:
     if not commands:
         return None
     return MissingExtraError(f"{package} is not installed; it comes with {' or '.join(commands)}")
+
+
+# What is not of the type that a field has, by the types of pydantic's errors
+_NO = {
+    "string_type": "a text, in quotes",
+    **dict.fromkeys(("float_type", "float_parsing"), "a number"),
+    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "a whole number"),
+    "finite_number": "a finite number",
+    **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
+    **dict.fromkeys(("list_type", "tuple_type"), "a list, in square brackets"),
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "a table of fields"),
+    **dict.fromkeys(("date_type", "datetime_type"), "a date"),
+}
+_LIMITS = {
+    "greater_than": ("gt", "must be greater than"),
+    "greater_than_equal": ("ge", "must be at least"),
+    "less_than": ("lt", "must be less than"),
+    "less_than_equal": ("le", "must be at most"),
+}
+_PATTERNS = {
+    "^[a-z0-9]+(-[a-z0-9]+)*$": "lower-case letters, digits and single hyphens",
+    "^[^/]+/[^/]+/[^/]+$": "SHELF/BOOK/PAGE of refractiveindex.info",
+}
+
+
+def sentence_of(error: Mapping[str, Any]) -> str:
+    """Return the sentence on a finding of pydantic, without the name of its field: the value and what is allowed."""
+    kind, context = error["type"], error.get("ctx", {})
+    if kind == "missing":
+        return "is missing"
+    if kind == "extra_forbidden":
+        return "unknown key"
+    if kind == "value_error":
+        return str(context["error"])
+    value = repr(error["input"])
+    value = value if len(value) <= _SHOWN else f"{value[:_SHOWN]}..."
+    if kind in _NO:
+        return f"{value} is not {_NO[kind]}"
+    if kind in _LIMITS:
+        bound, must = _LIMITS[kind]
+        return f"{value} {must} {context[bound]:g}"
+    if kind == "string_too_short":
+        return "must not be empty"
+    if kind == "string_too_long":
+        return f"has more than the {counted(context['max_length'], 'character')} that are allowed"
+    if kind == "too_short":
+        return f"has {counted(context['actual_length'], 'value')}, needs at least {context['min_length']}"
+    if kind == "too_long":
+        return f"has more than the {counted(context['max_length'], 'value')} that are allowed"
+    if kind == "literal_error":
+        return f"{value} is not one of {context['expected'].replace(' or ', ', ')}"
+    if kind == "string_pattern_mismatch" and context["pattern"] in _PATTERNS:
+        return f"{value} is not {_PATTERNS[context['pattern']]}"
+    return f"{value} is not allowed: {error['msg']}"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, which takes an s unless the number is 1."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

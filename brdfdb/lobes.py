@@ -67,3 +67,11 @@ class Lobe(NamedTuple):
     alpha_x: Array
     alpha_y: Array
     distribution: SlopeDistribution = GAUSSIAN
+
+
+def narrowest(lobe: Lobe | None) -> Lobe | None:
+    """Return a lobe as narrow as that of any wavelength: panels that resolve it resolve the others."""
+    if lobe is None:
+        return None
+    share, alpha_x, alpha_y = np.max(lobe.share), np.min(lobe.alpha_x), np.min(lobe.alpha_y)
+    return lobe._replace(share=np.asarray(share), alpha_x=np.asarray(alpha_x), alpha_y=np.asarray(alpha_y))

@@ -1,6 +1,28 @@
-"""What all tests share: Hypothesis draws the same examples every time and has no clock, since a first call compiles."""
+"""What all tests share: a browser; and Hypothesis, whose examples never change, and whose clock stands still."""
 
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+
+import pytest
 from hypothesis import settings
 
-settings.register_profile("brdfdb", derandomize=True, deadline=None, database=None)
+from tests.api.chromium import Chromium
+
+settings.register_profile("brdfdb", derandomize=True, deadline=None, database=None)  # no clock: a first call compiles
 settings.load_profile("brdfdb")
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
+    """A Chromium; without one these tests are skipped, or fail where it is known to be there."""
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        if binary := shutil.which(name):
+            with Chromium(binary, tmp_path_factory.mktemp("profile")) as browser:
+                yield browser
+            return
+    if os.environ.get("BRDFDB_NEEDS_BROWSER"):
+        pytest.fail("BRDFDB_NEEDS_BROWSER is set, and no chromium, chromium-browser or google-chrome is on PATH")
+    pytest.skip("no chromium, chromium-browser or google-chrome on PATH")

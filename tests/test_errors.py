@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import ast
+import math
 import pickle
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Literal
 
 import pytest
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from brdfdb.errors import (
     BrdfdbError,
@@ -22,7 +25,9 @@ from brdfdb.errors import (
     UnknownMaterialError,
     UnknownRevisionError,
     WriteError,
+    counted,
     import_extra,
+    sentence_of,
 )
 from brdfdb.parameters import Parameter
 from brdfdb.scenes.choice import InfeasibleError
@@ -103,3 +108,52 @@ def test_a_module_of_an_extra_is_imported_or_named(monkeypatch: pytest.MonkeyPat
         import_extra("distributed")
     with pytest.raises(ModuleNotFoundError):
         import_extra("brdfdb.nowhere")
+
+
+class Fields(BaseModel):
+    """One field of each kind that recipes, scenes and requests have."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+    title: str = Field(default="x", min_length=1, max_length=9)
+    flag: bool = True
+    width: float = Field(default=1.0, gt=0.0, le=0.5)
+    count: int = Field(default=1, ge=1, lt=10)
+    rows: list[float] = Field(default=[1.0], min_length=1, max_length=2)
+    table: dict[str, float] = {}
+    method: Literal["linear", "cubic"] = "linear"
+    name: str = Field(default="a", pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [
+        ("title", 5, "5 is not a text, in quotes"),
+        ("title", "", "must not be empty"),
+        ("title", "long titles", "has more than the 9 characters that are allowed"),
+        ("flag", 1, "1 is not true or false"),
+        ("width", "1", "'1' is not a number"),
+        ("width", math.nan, "nan is not a finite number"),
+        ("width", 0, "0 must be greater than 0"),
+        ("width", 5, "5 must be at most 0.5"),
+        ("count", 1.5, "1.5 is not a whole number"),
+        ("count", 0, "0 must be at least 1"),
+        ("count", 10, "10 must be less than 10"),
+        ("rows", 5, "5 is not a list, in square brackets"),
+        ("rows", [], "has 0 values, needs at least 1"),
+        ("rows", [1.0, 2.0, 3.0], "has more than the 2 values that are allowed"),
+        ("table", 5, "5 is not a table of fields"),
+        ("method", "quintic", "'quintic' is not one of 'linear', 'cubic'"),
+        ("name", "My name", "'My name' is not lower-case letters, digits and single hyphens"),
+        ("colour", "red", "unknown key"),
+        ("table", "x" * 100, f"'{'x' * 59}... is not a table of fields"),
+    ],
+)
+def test_a_finding_of_pydantic_is_said_in_our_words(field: str, value: object, sentence: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        Fields.model_validate({field: value})
+    assert sentence_of(caught.value.errors()[0]) == sentence
+
+
+def test_a_number_of_one_has_no_plural() -> None:
+    assert [counted(number, "table") for number in (0, 1, 2)] == ["0 tables", "1 table", "2 tables"]

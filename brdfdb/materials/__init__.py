@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from brdfdb.errors import BrdfdbError
+from brdfdb.errors import BrdfdbError, sentence_of
 from brdfdb.materials.function_source import FunctionRecord, FunctionSource
 from brdfdb.materials.material import Material
 from brdfdb.materials.preset_files import presets
@@ -48,4 +48,4 @@ def source_of(document: Mapping[str, Any]) -> Material | FunctionRecord:
     except KeyError:
         raise BrdfdbError("source: the document names neither a material nor a function") from None
     except ValidationError as error:
-        raise BrdfdbError(f"source: {error.errors(include_url=False)[0]['msg']}") from None
+        raise BrdfdbError(f"source: {sentence_of(error.errors(include_url=False)[0])}") from None

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from brdfdb._elementary import COS_HORIZON
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished, radians, unit_vector
 from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Text
@@ -298,6 +298,6 @@ def _refusal(error: ValidationError) -> ParameterError:
     if first["type"] == "missing":
         return ParameterError(parameter, "missing; a function needs a name, a title and a provenance")
     if first["type"] != "value_error":
-        return ParameterError(parameter, f"{first['input']!r}: {first['msg']}", first["input"])
+        return ParameterError(parameter, sentence_of(first), first["input"])
     ours = first["ctx"]["error"]
     return ours if isinstance(ours, ParameterError) else ParameterError(parameter, str(ours), first["input"])

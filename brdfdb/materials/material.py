@@ -19,13 +19,14 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from brdfdb.errors import MaterialError, ParameterError
+from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.geometry import degrees
 from brdfdb.lobes import Lobe
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
 from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
+from brdfdb.notebook import card, listed, spectrum
 from brdfdb.parameters import Floats, ModelSpec
 from brdfdb.spectra import refractive_index
 
@@ -376,6 +377,19 @@ class Material(BaseModel, Lookups):
             "known_excess": self.known_excess.model_dump() if self.known_excess else {},
         }
 
+    def _repr_html_(self) -> str:
+        """Return the material for notebooks."""
+        facts = [
+            ("model", f"{self.spec.title} ({self.spec.equation})"),
+            ("parameters", listed(self.file_parameters())),
+            ("source", self.source),
+            ("assumed", ", ".join(self.assumed)),
+            ("refractive index", self.refractive_index or ""),
+            ("wavelengths", spectrum(self.wavelengths_nm) if self.wavelengths_nm or not self.spectral else "any"),
+            ("note", self.note),
+        ]
+        return card("Material", self.name, self.title, facts)
+
     def document(self) -> dict[str, Any]:
         """Return the material as JSON, parameters in the units of the model; `brdfdb.materials.source_of` reads it."""
         return {"model_version": self.spec.version, "material": self.model_dump(mode="json")}
@@ -391,7 +405,7 @@ def _each(arguments: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _field_and_sentence(error: ErrorDetails) -> tuple[str, str]:
     """Return the field and the sentence of an error of pydantic. A ParameterError names the field itself."""
-    ours = error["ctx"]["error"] if error["type"] == "value_error" else error["msg"]
+    ours = error["ctx"]["error"] if error["type"] == "value_error" else sentence_of(error)
     if isinstance(ours, ParameterError):
         return ours.parameter, ours.sentence
     return ".".join(map(str, error["loc"])), str(ours)

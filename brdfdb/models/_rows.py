@@ -64,15 +64,21 @@ def _split(shape: tuple[int, ...], scalars: Sequence[Floats]) -> tuple[int, int,
 
 
 def _column(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> NDArray[np.float64]:
-    if np.ndim(array) and np.size(array) == np.shape(array)[-1] == length:  # all rows share it
-        return np.ascontiguousarray(array, dtype=np.float64).reshape(1, length)
-    return np.ascontiguousarray(np.broadcast_to(array, shape), dtype=np.float64).reshape(rows, length)
+    shared = np.ndim(array) and np.size(array) == np.shape(array)[-1] == length  # by all rows
+    whole = np.ascontiguousarray(array if shared else np.broadcast_to(array, shape), dtype=np.float64)
+    return _read_only(whole.reshape(1 if shared else rows, length))
 
 
 def _vectors(array: Floats, shape: tuple[int, ...], rows: int, length: int) -> NDArray[Any]:
     shared = array.ndim > 1 and array.size == 3 * array.shape[-2] == 3 * length
     wide = array if shared else np.broadcast_to(array, (*shape, 3))
-    return np.ascontiguousarray(wide).reshape(1 if shared else rows, length, 3)
+    return _read_only(np.ascontiguousarray(wide).reshape(1 if shared else rows, length, 3))
+
+
+def _read_only(view: NDArray[Any]) -> NDArray[Any]:
+    """Return a view that is never writable: loops are compiled anew for arrays that are, seconds each time."""
+    view.flags.writeable = False
+    return view
 
 
 def _packed(scalars: Sequence[Floats], leading: tuple[int, ...], rows: int) -> NDArray[np.float64]:

@@ -127,7 +127,7 @@ class Environment(BaseModel):
         number = np.arange(self.samples)[:, np.newaxis]
         # The numbers are even over the unit square for any number of samples. Random turns make points independent
         u1, u2 = (number / self.samples + turns[0]) % 1.0, (number * _TURN + turns[1]) % 1.0
-        lobe = _widest(source, wavelength_nm, wr)
+        lobe = widest_lobe(source.lobe(wr[:, np.newaxis, 2], source.evaluated_at(wavelength_nm)), len(wr))
         wi = directions(lobe, u1, u2, wr)
         density = self.samples * mixture_density(lobe, wr, wi)
         return Drawn(wi, np.divide(1.0, density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape)))
@@ -144,17 +144,23 @@ class Drawn(NamedTuple):
     solid_angle: Array
 
 
-def _widest(source: Source, wavelength_nm: Array, wr: Array) -> Lobe:
-    """Return the lobe (N,) around the mirror directions of viewers, no narrower than that of any wavelength."""
-    at = source.evaluated_at(wavelength_nm)
-    lobe = source.lobe(wr[:, np.newaxis, 2], at) or DIFFUSE
-    width = 1 if at is None else at.size
+def widest_lobe(lobe: Lobe | None, count: int) -> Lobe:
+    """Return a lobe of shape (count,), no narrower than that of any wavelength.
+
+    Parameters
+    ----------
+    lobe : Lobe or None
+        The lobe of a source around the mirror directions of viewers, (count, 1) or (count, wavelengths). None for a
+        diffuse source.
+    count : int
+        Number of viewers.
+    """
     share, alpha_x, alpha_y = (
-        np.broadcast_to(value, (len(wr), width)) for value in (lobe.share, lobe.alpha_x, lobe.alpha_y)
+        np.broadcast_to(value, np.broadcast_shapes(np.shape(value), (count, 1))) for value in (lobe or DIFFUSE)[:3]
     )
     mean = share.mean(axis=1)
     share = np.where(mean > 0.0, np.clip(mean, _LEAST, _MOST), 0.0)
-    return lobe._replace(share=share, alpha_x=alpha_x.max(axis=1), alpha_y=alpha_y.max(axis=1))
+    return (lobe or DIFFUSE)._replace(share=share, alpha_x=alpha_x.max(axis=1), alpha_y=alpha_y.max(axis=1))
 
 
 def _checked(name: str, picture: Array) -> Array:

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from brdfdb.errors import ParameterError, StoreError
+from brdfdb.errors import ParameterError, StoreError, sentence_of
 from brdfdb.geometry import checked_angles, checked_vectors, radians
 from brdfdb.materials import written_name
 from brdfdb.models import MODELS
+from brdfdb.notebook import card, percent
 from brdfdb.parameters import Floats, Parameter
 from brdfdb.store.sealed_json import read_sealed
 from brdfdb.tables.grids import Axis
@@ -127,7 +128,7 @@ def record_from(content: Mapping[str, Any], where: str) -> FamilyRecord:
         record = FamilyRecord.model_validate(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise StoreError(f"{where} is damaged: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+        raise StoreError(f"{where} is damaged: {'.'.join(map(str, first['loc']))}: {sentence_of(first)}") from None
     if where != f"the family {record.name}":
         raise StoreError(f"{where} is damaged: its record is that of {record.name}")
     return record
@@ -233,6 +234,19 @@ class Family:
     def name(self) -> str:
         """Name of the family."""
         return self.record.name
+
+    def _repr_html_(self) -> str:
+        """Return the family for notebooks: what its record states."""
+        record = self.record
+        swept = [f"{name} {values[0]:g} to {values[-1]:g} ({len(values)})" for name, values in record.axes.items()]
+        facts = [
+            ("model", record.model),
+            ("parameters", ", ".join(swept)),
+            ("members", str(len(record.members))),
+            ("interpolation", record.interpolation.method),
+            ("stated error", f"{percent(record.error.overall.p99)} (99 of 100 values)"),
+        ]
+        return card("Family", record.name, record.title, facts)
 
     @property
     def error(self) -> Error:

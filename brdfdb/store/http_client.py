@@ -55,22 +55,28 @@ class RemoteTable(BaseTable):
         Name of the material, and its revision.
     attrs : dict
         The attributes as stored, without the request of the build; `metadata` is the typed record of them.
-    axes_deg : dict of arrays [degree]
-        Nodes of the angular axes by name.
     wavelength_nm : array (L,) [nm] or None
         Wavelengths of a spectral table; None for a grey one, which holds at any wavelength.
-    anisotropic : bool
-        True if the table has an axis for the azimuth of the surface.
     """
 
     name: str
     revision: str
     attrs: Mapping[str, Any] = field(repr=False)
-    axes_deg: Mapping[str, Axis] = field(repr=False)
     wavelength_nm: Axis | None = field(repr=False)
-    anisotropic: bool
+    _axes_deg: Mapping[str, Axis] = field(repr=False)
+    _anisotropic: bool = field(repr=False)
     _specular: bool = field(repr=False)
     _service: Service = field(repr=False)
+
+    @property
+    def axes_deg(self) -> Mapping[str, Axis]:
+        """Nodes of the angular axes [degree] by name."""
+        return self._axes_deg
+
+    @property
+    def anisotropic(self) -> bool:
+        """True if the table has an axis for the azimuth of the surface."""
+        return self._anisotropic
 
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
         self._wavelengths(wavelength_nm)  # what is wrong is refused in the order of a table, before anything is sent
@@ -240,9 +246,9 @@ class RemoteStore(Mapping[str, RemoteTable]):
             name=document["name"],
             revision=document["revision"],
             attrs=document["attributes"] if error is None else {**document["attributes"], "error": error},
-            axes_deg={axis: np.array(nodes) for axis, nodes in document["axes_deg"].items()},
+            _axes_deg={axis: np.array(nodes) for axis, nodes in document["axes_deg"].items()},
             wavelength_nm=None if wavelengths is None else np.array(wavelengths),
-            anisotropic=document["anisotropic"],
+            _anisotropic=document["anisotropic"],
             _specular=document["specular"],
             _service=self._service,
         )

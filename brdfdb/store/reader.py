@@ -15,6 +15,7 @@ rewrite a shared root file, and stale metadata hides groups.
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import threading
 import weakref
@@ -29,6 +30,7 @@ from brdfdb.errors import (
     UnknownMaterialError,
     UnknownRevisionError,
 )
+from brdfdb.notebook import listing, percent
 from brdfdb.store.decoding import decode, read_metadata
 from brdfdb.store.files import regular_bytes
 from brdfdb.store.manifest import check_manifest, read_manifest, whole_revisions
@@ -93,6 +95,29 @@ class Store(Mapping[str, "Table"]):
         self._lock = threading.Lock()
         self._decoding = threading.Lock()
         _OPEN[next(_NUMBERS)] = self
+
+    def _repr_html_(self) -> str:
+        """Return the store for notebooks: its materials, with the verdicts of its last audit."""
+        verdicts, rows = self._verdicts(), []
+        for name in self:
+            try:
+                head = self.summary(name)
+            except StoreError as error:
+                rows.append((name, str(error), "", "", ""))
+                continue
+            verdict = verdicts.get((name, head["revision"]), "")
+            rows.append((name, head["title"], head["model"], percent(head.get("error_p99")), verdict))
+        families = len(self.families())
+        title = f"{len(rows)} materials" + (f", {families} families" if families else "")
+        return listing("Store", str(self.root), title, ("material", "title", "model", "error (p99)", "audit"), rows)
+
+    def _verdicts(self) -> dict[tuple[str, str], str]:
+        """Return the verdicts of the last audit by material and revision; none where there is no readable report."""
+        try:
+            report = json.loads((self.root / "audit.json").read_bytes())
+            return {(one["material"], one["revision"]): str(one["verdict"]) for one in report["materials"]}
+        except (OSError, ValueError, KeyError, TypeError):
+            return {}
 
     def __iter__(self) -> Iterator[str]:
         if self.snapshot is not None:

@@ -54,6 +54,7 @@ def unsealed(data: bytes, where: str, file: str) -> dict[str, Any]:
 
 
 def bytes_of(path: Path, where: str) -> bytes:
+    """Return the content of a file of the store; StoreError, which names `where`, if it cannot be read."""
     try:
         return regular_bytes(path)
     except FileNotFoundError:

@@ -8,7 +8,7 @@ import numpy as np
 
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
-from brdfdb.lobes import Lobe
+from brdfdb.lobes import narrowest
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Axis
@@ -152,7 +152,7 @@ def source_albedo(
         brdf,
         theta_i,
         phi_i,
-        _narrowest(source.lobe(np.asarray(np.cos(theta_i)), wavelength_nm)),
+        narrowest(source.lobe(np.asarray(np.cos(theta_i)), wavelength_nm)),
         tolerance=tolerance,
         most_panels=most_panels,
         width=width,
@@ -189,21 +189,13 @@ def _integrated(table: Table, theta_i_deg: Axis) -> TableAlbedo:
             brdf,
             theta_i,
             float(radians(phi_i_deg[p])),
-            _narrowest(lobe),
+            narrowest(lobe),
             tolerance=QUADRATURE_TOLERANCE,
             most_panels=_MOST_PANELS,
             width=width,
             mirrored=not table.anisotropic,
         )
     return TableAlbedo(theta_i_deg, phi_i_deg, albedo, error.max(axis=1))
-
-
-def _narrowest(lobe: Lobe | None) -> Lobe | None:
-    """Return a lobe as narrow as that of any wavelength: panels that resolve it resolve the others."""
-    if lobe is None:
-        return None
-    share, alpha_x, alpha_y = np.max(lobe.share), np.min(lobe.alpha_x), np.min(lobe.alpha_y)
-    return lobe._replace(share=np.asarray(share), alpha_x=np.asarray(alpha_x), alpha_y=np.asarray(alpha_y))
 
 
 def _trapezoid_weights(nodes: Axis) -> Axis:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, PrivateAttr, ValidationError
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.materials.provenance import Assumption, KnownExcess
 from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.stated_error import Error
@@ -95,7 +95,7 @@ class TableMetadata(BaseModel):
         try:
             return cls.model_validate(known)
         except ValidationError as error:
-            strange = {str(item["loc"][0]): item["msg"] for item in error.errors(include_url=False)}
+            strange = {str(item["loc"][0]): sentence_of(item) for item in error.errors(include_url=False)}
         metadata = cls.model_validate({key: value for key, value in known.items() if key not in strange})
         metadata._strange.update(strange)
         return metadata

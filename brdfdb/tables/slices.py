@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import geometry
 from brdfdb.errors import ParameterError
-from brdfdb.tables.table import Table
+from brdfdb.parameters import Floats
 
 LOBE_SIZE = 256
 LEFT_TO_RIGHT = "left to right"
 BOTTOM_TO_TOP = "bottom to top"
+
+
+class Sliced(Protocol):
+    """The properties of a table that slices need."""
+
+    @property
+    def wavelength_nm(self) -> NDArray[np.float64] | None: ...
+
+    def lookup(
+        self,
+        theta_i: ArrayLike,
+        phi_i: ArrayLike,
+        theta_r: ArrayLike,
+        phi_r: ArrayLike,
+        wavelength_nm: ArrayLike | None = None,
+    ) -> Floats:
+        """Return f_r [1/sr] at angles [rad]."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +86,13 @@ class Slice:
             )
 
 
-def half_difference_slice(table: Table, *, phi_h_deg: float = 0.0, phi_d_deg: float = 90.0) -> Slice:
+def half_difference_slice(table: Sliced, *, phi_h_deg: float = 0.0, phi_d_deg: float = 90.0) -> Slice:
     """Return f_r [1/sr] over theta_h (to the right) and theta_d (upwards), one pixel a degree.
 
     Parameters
     ----------
-    table : Table
-        Table in memory.
+    table : Table or RemoteTable
+        The table.
     phi_h_deg : float [degree]
         Azimuth of the half vector; matters for anisotropic tables only.
     phi_d_deg : float [degree]
@@ -105,13 +122,13 @@ def half_difference_slice(table: Table, *, phi_h_deg: float = 0.0, phi_d_deg: fl
     )
 
 
-def in_plane_slice(table: Table, *, phi_i_deg: float = 0.0) -> Slice:
+def in_plane_slice(table: Sliced, *, phi_i_deg: float = 0.0) -> Slice:
     """Return f_r [1/sr] in the plane of incidence over signed theta_r (to the right) and theta_i (upwards).
 
     Parameters
     ----------
-    table : Table
-        Table in memory.
+    table : Table or RemoteTable
+        The table.
     phi_i_deg : float [degree]
         Azimuth of the light; matters for anisotropic tables only.
 
@@ -138,13 +155,13 @@ def in_plane_slice(table: Table, *, phi_i_deg: float = 0.0) -> Slice:
     )
 
 
-def lobe_map(table: Table, *, theta_i_deg: float = 45.0, phi_i_deg: float = 0.0) -> Slice:
+def lobe_map(table: Sliced, *, theta_i_deg: float = 45.0, phi_i_deg: float = 0.0) -> Slice:
     """Return f_r [1/sr] over the hemisphere of viewers for one light, as a disc with the radius theta_r.
 
     Parameters
     ----------
-    table : Table
-        Table in memory.
+    table : Table or RemoteTable
+        The table.
     theta_i_deg : float [degree]
         Polar angle of the light, 0 to 90.
     phi_i_deg : float [degree]

@@ -14,6 +14,7 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, asked_for, checked_angles, checked_vectors, radians, shape_of_angles
 from brdfdb.materials.source import FourAngles
+from brdfdb.notebook import polar_sketch
 from brdfdb.parameters import Floats
 from brdfdb.tables import _kernels
 from brdfdb.tables._interpolation import Axes, prepared
@@ -24,6 +25,9 @@ from brdfdb.tables.table_base import BaseTable
 
 # how numbers become f_r, the axes, the numbers, how many a node, how they make up a spectrum, the uniform part
 _Ready = tuple[_kernels.Rule, Axes, NDArray[np.float32], int, NDArray[np.float64], NDArray[np.float64]]
+
+# Cut that notebooks show: angles of viewer and light, and the wavelength
+_SKETCHED_DEG, _SKETCHED_LIGHT_DEG, _SKETCHED_NM = np.linspace(-88.0, 88.0, 177), 45.0, 550.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +113,14 @@ class Table(BaseTable):
         f_r = rebuilt(numbers, self.interpolation, self.spectra, self.uniform, *self.grid.directions()[::2])
         return f_r.astype(np.float32).reshape(self.grid.shape if self.wavelength_nm is None else f_r.shape)
 
+    def _sketch(self) -> str:
+        """Return a cut in the plane of incidence as SVG, at 550 nm or the wavelength closest to it."""
+        stored = self.wavelength_nm
+        wavelength = None if stored is None else float(np.clip(_SKETCHED_NM, stored[0], stored[-1]))
+        phi_r = np.where(_SKETCHED_DEG > 0.0, np.pi, 0.0)
+        f_r = self.lookup(radians(_SKETCHED_LIGHT_DEG), 0.0, radians(np.abs(_SKETCHED_DEG)), phi_r, wavelength)
+        return polar_sketch(_SKETCHED_DEG.tolist(), np.asarray(f_r).tolist(), _SKETCHED_LIGHT_DEG)
+
     @property
     def nbytes(self) -> int:
         """Size [byte] of the arrays that lookups read."""
@@ -162,7 +174,7 @@ class Table(BaseTable):
         )
         axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
         channels = self.values.size // int(np.prod(grid.shape))
-        spectra = np.empty((0, 0)) if self.spectra is None else self.spectra
+        spectra = np.empty((0, 0)) if self.spectra is None else np.ascontiguousarray(self.spectra)  # else a kernel more
         count = 1 if self.wavelength_nm is None else self.wavelength_nm.size
         uniform = np.zeros(count) if self.uniform is None else np.broadcast_to(self.uniform, (count,)).copy()
         return rule, axes, self.values.reshape(-1), channels, spectra, uniform

@@ -14,10 +14,12 @@ from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors
 from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.materials.source import Lookups
+from brdfdb.notebook import card, listed, percent, spectrum
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.metadata import TableMetadata
+from brdfdb.tables.plot import Plot
 from brdfdb.tables.stated_error import Error, stated
 
 _MOST_KNOWN = 64  # single wavelengths that are remembered
@@ -76,6 +78,21 @@ class BaseTable(Lookups):
     revision: str
     attrs: Mapping[str, Any]
     wavelength_nm: Axis | None
+
+    @property
+    @abstractmethod
+    def axes_deg(self) -> Mapping[str, Axis]:
+        """Nodes of the angular axes [degree] by name."""
+
+    @property
+    @abstractmethod
+    def anisotropic(self) -> bool:
+        """True if the table has an axis for the azimuth of the surface."""
+
+    @property
+    def plot(self) -> Plot:
+        """Plots of the table with matplotlib: `Plot.lobe`, `Plot.cuts`, `Plot.albedo` and `Plot.slices`."""
+        return Plot(self)
 
     @abstractmethod
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
@@ -142,6 +159,27 @@ class BaseTable(Lookups):
     def error(self) -> Error | None:
         """The error that the table states; None if none was measured."""
         return self.metadata.error
+
+    def _repr_html_(self) -> str:
+        """Return the table for notebooks: what it states, and a sketch of its lobe where that needs no service."""
+        known, error = self.metadata, self.error
+        axes = " × ".join(f"{name} {nodes.size}" for name, nodes in self.axes_deg.items())
+        wavelengths = None if self.wavelength_nm is None else self.wavelength_nm.tolist()
+        facts = [
+            ("model", known.model_title or known.model or ""),
+            ("parameters", listed(known.parameters)),
+            ("source", known.source or ""),
+            ("wavelengths", spectrum(wavelengths)),
+            ("grid", axes),
+            ("interpolation", known.reconstruction or ""),
+            ("stated error", "" if error is None else f"{percent(error.overall.p99)} (99 of 100 values)"),
+            ("revision", self.revision),
+        ]
+        return card("Table", self.name, known.title or "", facts, self._sketch())
+
+    def _sketch(self) -> str:
+        """Return a picture of the lobe as SVG; empty where its values are not at hand."""
+        return ""
 
     def _stated(self, directions: Directions, brdf: Floats, wavelength_nm: ArrayLike | None) -> Floats:
         if self.error is None:

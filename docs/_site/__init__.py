@@ -31,6 +31,7 @@ def _write_pages(app: Sphinx, _: Any) -> None:
     root = store.made(docs)
     os.environ["BRDFDB_STORE"] = str(root)  # for pages with code, which begin with brdfdb.open()
     os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for their commands
+    os.environ["TTY_COMPATIBLE"] = "0"  # rich: these commands write as to a file, without codes that move a cursor
     for writer in _WRITERS:
         writer.write(docs, root)
 

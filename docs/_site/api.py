@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 from pathlib import Path
 
@@ -36,9 +37,19 @@ def _page(name: str, modules: list[str]) -> str:
     lines = [name, "=" * len(name), "", f".. automodule:: {name}"]
     if shadowed := [module.rpartition(".")[2] for module in _children(name, modules)]:
         lines.append(f"   :exclude-members: {', '.join(shadowed)}")
+    for constant in _constants(name):
+        lines += ["", f".. autodata:: {name}.{constant}", "   :no-value:"]
     if below:
         lines += ["", "Modules", "-------", "", *_listed(below, f"{name}.")]
     return "\n".join(lines) + "\n"
+
+
+def _constants(name: str) -> list[str]:
+    """Return the names that a module exports beside classes, functions and modules."""
+    module = importlib.import_module(name)
+    exported = {constant: getattr(module, constant) for constant in getattr(module, "__all__", ())}
+    others = (inspect.isclass, inspect.isroutine, inspect.ismodule)
+    return [constant for constant, value in exported.items() if not any(kind(value) for kind in others)]
 
 
 def _index(modules: list[str]) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, FailFast, Field, Tag, TypeAdapter, ValidationError
 
-from brdfdb.errors import MaterialError, ParameterError
+from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.materials import Material, presets, written_name
 from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
@@ -140,13 +140,16 @@ AnyAnisotropicGrid = Annotated[
 
 
 class Grids(BaseModel):
-    """The grid for each kind of material, over light and viewer or over half and difference vectors."""
+    """The grid for each kind of material, over light and viewer or over half and difference vectors.
+
+    A kind of which the recipe has no material may be left out.
+    """
 
     model_config = _STRICT
 
-    isotropic: AnyIsotropicGrid
-    spectral: AnyIsotropicGrid
-    anisotropic: AnyAnisotropicGrid
+    isotropic: AnyIsotropicGrid | None = None
+    spectral: AnyIsotropicGrid | None = None
+    anisotropic: AnyAnisotropicGrid | None = None
 
 
 @dataclass(frozen=True)
@@ -203,7 +206,7 @@ class Recipe(BaseModel):
     materials: Annotated[list[str], FailFast()] = Field(
         min_length=1, max_length=_MOST_PATTERNS, description="names or shell patterns"
     )
-    wavelengths_nm: Nodes
+    wavelengths_nm: Nodes = Field(default=[], description="of spectral materials that state none themselves")
     tolerance: float | None = Field(
         default=None, ge=1e-4, le=0.5, description="99th percentile of the relative error, instead of grids"
     )
@@ -228,19 +231,21 @@ class Recipe(BaseModel):
             raise RecipeError("tolerance, grids", "give one of the two")
         if self.interpolation is not None and self.grids is None:
             raise RecipeError("interpolation", "goes with grids; to a tolerance, the planner chooses")
-        grids = {} if self.grids is None else {name: self._grid(self.grids, name) for name in Grids.model_fields}
-        try:
-            wavelengths = check_wavelengths(_nodes("wavelengths_nm", self.wavelengths_nm))
-        except ParameterError as error:
-            raise RecipeError(error.parameter, error.sentence) from None
+        given = {} if self.grids is None else {name: grid for name, grid in self.grids if grid is not None}
+        grids = {name: self._grid(grid, name) for name, grid in given.items()}
+        wavelengths = self._wavelengths()
         jobs = []
         for material, family in self._selected():
             wavelength_nm = None
             if material.spectral:
                 stated = material.wavelengths_nm
                 wavelength_nm = wavelengths if stated is None else np.array(stated)
+                if wavelength_nm is None:
+                    raise RecipeError("wavelengths_nm", f"is missing; {material.name} is spectral and states none")
             several = wavelength_nm is not None and wavelength_nm.size > 1
             kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
+            if self.grids is not None and kind not in grids:
+                raise RecipeError(f"grids.{kind}", f"is missing; {material.name} needs it")
             job = Job(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear", family)
             try:
                 job.check()
@@ -250,8 +255,16 @@ class Recipe(BaseModel):
             jobs.append(job)
         return jobs
 
-    def _grid(self, grids: Grids, name: str) -> Grid:
-        parts: dict[str, list[float | Range]] = dict(getattr(grids, name))
+    def _wavelengths(self) -> Axis | None:
+        if not self.wavelengths_nm:
+            return None
+        try:
+            return check_wavelengths(_nodes("wavelengths_nm", self.wavelengths_nm))
+        except ParameterError as error:
+            raise RecipeError(error.parameter, error.sentence) from None
+
+    def _grid(self, grid: BaseModel, name: str) -> Grid:
+        parts: dict[str, list[float | Range]] = dict(grid)
         try:
             axes = {field.removesuffix("_deg"): _nodes(field, nodes) for field, nodes in parts.items()}
         except RecipeError as error:
@@ -400,4 +413,5 @@ def _first(error: ValidationError) -> tuple[str, str]:
     errors = error.errors(include_url=False)
     first = next(item for item in errors if not ("float" in item["loc"][-1:] and isinstance(item["input"], dict)))
     field = ".".join(str(part) for part in first["loc"] if part not in ("float", "Range", "plain", "half"))
-    return field, "unknown key" if first["type"] == "extra_forbidden" else first["msg"]
+    hint = "; 0.01 is 1 %" if field == "tolerance" and first["type"] != "missing" else ""
+    return field, sentence_of(first) + hint

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.parameters import closest
 from brdfdb.scenes.scene import Scene
 from brdfdb_pipelines import toml_file
@@ -90,7 +90,7 @@ def _field_and_sentence(error: ValidationError) -> tuple[str, str]:
             sentence = f"{first['ctx']['tag']!r} is not one of {first['ctx']['expected_tags'].replace(chr(39), '')}"
         case "union_tag_not_found":
             loc.append("kind")
-            sentence = "Field required"
+            sentence = "is missing"
         case _:
-            sentence = first["msg"]
+            sentence = sentence_of(first)
     return ".".join(loc), sentence

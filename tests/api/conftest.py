@@ -17,7 +17,7 @@ import pytest
 from brdfdb.store.reader import Store
 from brdfdb_pipelines import cli
 from tests.api.a_store import TURNED, Client, client_of, publish, serving
-from tests.api.chromium import SECONDS, Chromium
+from tests.api.chromium import SECONDS
 from tests.api.explored import AUDIT, RECIPE
 
 
@@ -81,19 +81,6 @@ def address(explored: Path) -> Iterator[str]:
     yield found[0]
     server.send_signal(signal.SIGINT)
     server.communicate(timeout=SECONDS)
-
-
-@pytest.fixture(scope="session")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
-    """A Chromium; without one these tests are skipped, or fail where it is known to be there."""
-    for name in ("chromium", "chromium-browser", "google-chrome"):
-        if binary := shutil.which(name):
-            with Chromium(binary, tmp_path_factory.mktemp("profile")) as browser:
-                yield browser
-            return
-    if os.environ.get("BRDFDB_NEEDS_BROWSER"):
-        pytest.fail("BRDFDB_NEEDS_BROWSER is set, and no chromium, chromium-browser or google-chrome is on PATH")
-    pytest.skip("no chromium, chromium-browser or google-chrome on PATH")
 
 
 @pytest.fixture

@@ -200,7 +200,7 @@ def test_what_is_printed_says_how_many_pixels_keep_to_the_tolerance(
     ("old", "new", "said"),
     [
         ("{ ciede2000 = 0.5 }", "{ relative = 1e-9 }", "tolerance: 1e-09 (relative) is finer than the truth is known"),
-        ("0.5 }", "0.5, percentile = 0 }", "tolerance.percentile: Input should be greater than 0"),
+        ("0.5 }", "0.5, percentile = 0 }", "tolerance.percentile: 0 must be greater than 0"),
         ('"rendered-sphere-40deg"', '"no-such"', "objects.ball.material: 'no-such' is unknown"),
         ("[0, -1, 0.5]", "[0, 1, 0]", "lights.0: falls on nothing that is seen"),
         ('kind = "sphere", radius = 1', 'kind = "recorded", file = "none.exr"', "none.exr"),

@@ -15,7 +15,7 @@ from brdfdb.tables.grids import HALF_DIFFERENCE_AXES
 from brdfdb.tables.layout import digest
 from brdfdb.tables.planner import PLAN_VERSION
 from brdfdb_pipelines.recipe_file import Range, RecipeError, load
-from tests.pipelines.recipes import DEFINED, GOOD, SWEPT
+from tests.pipelines.recipes import DEFINED, GOOD, SWEPT, isotropic
 
 # What the fields do
 
@@ -24,6 +24,15 @@ def recipe_of(directory: Path, text: str) -> Path:
     path = directory / "recipe.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def test_what_no_material_needs_may_be_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "grey.toml"
+    path.write_text(f'materials = ["foam"]\n{isotropic()}', encoding="utf-8")
+    (job,) = load(path).jobs()
+    assert (job.wavelength_nm, job.layout().shape) == (None, (2, 2, 2))
+    path.write_text('materials = ["rolled-brass"]\ntolerance = 0.1\n', encoding="utf-8")
+    assert load(path).jobs()[0].tolerance == 0.1
 
 
 def test_every_preset_is_a_job_of_the_default_recipe() -> None:
@@ -84,10 +93,14 @@ def test_grids_may_be_of_half_and_difference_vectors_and_cubic(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"log-cubic"', '"quintic"', "interpolation: Input should be 'linear', 'cubic', 'log-linear' or 'log-cubic'"),
+        (
+            '"log-cubic"',
+            '"quintic"',
+            "interpolation: 'quintic' is not one of 'linear', 'cubic', 'log-linear', 'log-cubic'",
+        ),
         ("phi_d_deg = [0, 45, 90]", "phi_d_deg = [0, 45, 91]", "grids.isotropic.phi_d_deg: ends at 91 degrees, must"),
-        ("phi_d_deg = [0, 45, 90]\n", "", "grids.isotropic.phi_d_deg: Field required"),
-        ("theta_d_deg = [0, 90]", "theta_r_deg = [0, 90]", "grids.anisotropic.theta_d_deg: Field required"),
+        ("phi_d_deg = [0, 45, 90]\n", "", "grids.isotropic.phi_d_deg: is missing"),
+        ("theta_d_deg = [0, 90]", "theta_r_deg = [0, 90]", "grids.anisotropic.theta_d_deg: is missing"),
     ],
 )
 def test_what_is_wrong_with_such_a_recipe_is_one_sentence(tmp_path: Path, old: str, new: str, said: str) -> None:

@@ -340,9 +340,9 @@ def test_another_picture_is_another_light(tmp_path: Path) -> None:
         ("{ rows = [[]] }", "environment.rows: must be lists of numbers, all of one length"),
         ("{ rows = [[1, 2], [3]] }", "environment.rows: must be lists of numbers, all of one length"),
         ("{ rows = [[1], [-2]] }", "environment.rows: -2 at row 1, column 0 must be finite and not below 0"),
-        ("{ rows = [[nan]] }", "environment.rows.0.0: Input should be a finite number"),
+        ("{ rows = [[nan]] }", "environment.rows.0.0: nan is not a finite number"),
         ("{ rows = [[0, 0]] }", "environment.rows: radiance is 0 everywhere"),
-        ("{ rows = [[1]], samples = 0 }", "environment.samples: Input should be greater than or equal to 1"),
+        ("{ rows = [[1]], samples = 0 }", "environment.samples: 0 must be at least 1"),
         ("{ rows = [[1]], colour = 0 }", "environment.colour: unknown key"),
     ],
 )

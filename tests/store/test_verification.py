@@ -226,7 +226,7 @@ def test_verify_remarks_on_what_a_table_does_not_state(root: Path) -> None:
     assert size > 0
     assert str(remark) == (
         "white r000004 does not state its material, table version, model, model version, parameters, source, "
-        "conventions, and states its bits wrongly (Input should be less than or equal to 23)"
+        "conventions, and states its bits wrongly (99 must be at most 23)"
     )
     assert rho(root) == 0.5
 

@@ -54,7 +54,7 @@ def test_a_strange_attribute_is_named_and_leaves_the_others() -> None:
     assert (read.title, read.model, read.note) == (None, "lambert", "")
     assert set(read.strange) == {"title", "note"}
     assert "title" not in read.missing
-    assert "states its title wrongly (Input should be a valid string)" in read.gaps
+    assert "states its title wrongly (['White'] is not a text, in quotes)" in read.gaps
 
 
 def test_assumptions_of_earlier_tables_are_names_alone() -> None:

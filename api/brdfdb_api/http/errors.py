@@ -12,7 +12,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 
-from brdfdb.errors import BrdfdbError, StoreError, UnknownMaterialError, UnknownRevisionError
+from brdfdb.errors import BrdfdbError, StoreError, UnknownMaterialError, UnknownRevisionError, sentence_of
 
 PROBLEM_JSON = "application/problem+json"
 
@@ -63,7 +63,7 @@ def problem_of(error: Exception) -> Response:
         case RequestValidationError():
             first = error.errors()[0]
             parameter = str(first["loc"][1])  # ("query", name, ...)
-            return _problem(422, f"{parameter}: {first['msg'].lower()}", parameter)
+            return _problem(422, f"{parameter}: {sentence_of(first)}", parameter)
         case UnknownMaterialError():
             return _problem(404, str(error), closest=error.closest)
         case UnknownRevisionError():

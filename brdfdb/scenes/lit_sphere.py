@@ -1,0 +1,273 @@
+"""Pictures of materials: a sphere of each under the same light, at the same exposure."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import radians, spherical_angles, unit_vector
+from brdfdb.integrals.sampling import directions, mixture_density
+from brdfdb.materials import FunctionRecord, Source
+from brdfdb.parameters import Floats
+from brdfdb.scenes.environment import widest_lobe
+from brdfdb.scenes.studio import studio
+from brdfdb.spectra import colour_science, covers_visible, srgb_weights
+from brdfdb.tables.table_base import BaseTable
+
+Array = NDArray[np.float64]
+
+# Radiance [1] that comes from directions (..., 3): x to the right, y upwards, z towards the viewer
+Light = Callable[[Array], Array]
+
+SIZE, MOST_SIZE = 160, 2048  # pixels across a picture
+WHITE = 0.8  # linear value of a white Lambertian sphere where it is brightest
+_VISIBLE_NM = np.arange(420.0, 681.0, 20.0)
+# Normals at which reflected light is computed: angles to the viewer up to the last, and azimuths, a multiple of 4
+_THETAS, _LAST_DEG, _PHIS = 72, 89.0, 96
+# Directions of light for each normal. Anisotropic surfaces have many more normals
+_SAMPLES, _SAMPLES_ANISOTROPIC = 768, 256
+_GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+# Table of the light: half a degree apart, columns a multiple of _PHIS; every eighth of its rows and columns is blurred
+_ROWS, _COLUMNS, _COARSE = 385, 768, 8
+# Standard deviations of the blurred light, and the radius of a sample from which each is used
+_BLURS_DEG = np.array([3.5, 7.0])
+_BLURS_FROM = radians(np.array([1.2, 2.4]))
+_ACROSS = 3  # points across each pixel, and down
+
+
+def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio) -> Array:
+    """Return a picture of a sphere in sRGB (size, size, 4) in [0, 1], with its coverage as the last channel.
+
+    Parameters
+    ----------
+    surface : Source or BaseTable
+        A material, a function or a table. Of a table the picture shows the lookups.
+    size : int
+        Pixels across and down, up to 2048. The sphere fills the picture.
+    light : callable
+        ``light(towards)`` gives the radiance [1] from directions (..., 3). The default is `studio`.
+
+    Returns
+    -------
+    array (size, size, 4) [1]
+        Red, green, blue and coverage. A white Lambertian sphere has 0.8 of the screen's white, without the transfer
+        curve, where it is brightest. Radiance brighter than white is clipped.
+
+    Raises
+    ------
+    ParameterError
+        If `size` is out of range.
+
+    Notes
+    -----
+    The viewer is far away. The reflected light is the integral of f_r L cos theta_i over the hemisphere, by
+    importance sampling with the lobe of the source and the same pairs of numbers for each normal. Thus there is no
+    noise, and a small smooth error. It is computed on a grid of normals and interpolated. The specular part shows the
+    light in the mirror direction of each point, exactly. There is one reflection and no shadow. The grain of
+    an anisotropic material (its x axis) runs around the vertical axis of the sphere, as in scenes.
+
+    A spectrum is summed from 420 to 680 nm under D65. A material that is known for too few wavelengths for a colour is
+    grey, at the first of them.
+    """
+    if not 1 <= size <= MOST_SIZE:
+        raise ParameterError("size", f"{size} is not a number of pixels from 1 to {MOST_SIZE}", size, (1, MOST_SIZE))
+    fine = (np.arange(size * _ACROSS) + 0.5) / _ACROSS - size / 2.0
+    radius = np.hypot(fine, fine[:, np.newaxis]) / (size / 2.0)
+    theta = np.arcsin(np.minimum(radius, 1.0))
+    phi = np.arctan2(-fine[:, np.newaxis], fine)
+    radiance = sphere_radiance(surface, theta, phi, light)
+    covered = (radius <= 1.0).astype(np.float64)
+    total = _averaged(covered[..., np.newaxis] * radiance)
+    coverage = _averaged(covered)
+    linear = WHITE / _tabulated(light).brightest * total / np.maximum(coverage, 1e-9)[..., np.newaxis]
+    encoded = colour_science().cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB")
+    return np.concatenate([encoded, coverage[..., np.newaxis]], axis=-1)
+
+
+def sphere_radiance(surface: Source | BaseTable, theta: Array, phi: Array, light: Light) -> Array:
+    """Return the radiance (..., 3) in linear sRGB of points of a sphere, in the unit of the light.
+
+    Parameters
+    ----------
+    surface : Source or BaseTable
+        As of `lit_sphere`.
+    theta : array [rad]
+        Angle between the normal and the viewer, 0 to pi/2.
+    phi : array [rad]
+        Azimuth of the normal in the picture, counter-clockwise from the right.
+    light : callable
+        As of `lit_sphere`.
+    """
+    shown = _shown(surface)
+    nodes = radians(np.linspace(0.0, _LAST_DEG, _THETAS))
+    sky = _tabulated(light)
+    grid, turn = _reflected(shown, nodes, sky), phi / (2.0 * np.pi)
+    places = np.stack([np.minimum(theta / nodes[-1], 1.0) * (_THETAS - 1), turn * _PHIS])
+    values = np.stack([_interpolated(channel, places) for channel in np.moveaxis(grid, -1, 0)], axis=-1)
+    mirror = shown.specular(nodes)
+    if np.any(mirror):
+        seen = _interpolated(sky.sharp, np.stack([2.0 * theta / np.pi * (_ROWS - 1), turn * _COLUMNS]))
+        reflectance = np.stack([np.interp(theta, nodes, channel) for channel in mirror.T], axis=-1)
+        values = values + seen[..., np.newaxis] * reflectance
+    return np.broadcast_to(values, (*theta.shape, 3))
+
+
+class _Shown(NamedTuple):
+    """A surface as a picture shows it: with weights (L, 3) of its wavelengths for linear sRGB."""
+
+    surface: Source | BaseTable
+    source: Source | FunctionRecord | None
+    wavelength_nm: Array | None
+    weights: Array
+
+    @property
+    def elliptical(self) -> bool:
+        """True if quarters of the sphere have mirrored reflections."""
+        return self.source is not None and self.source.elliptical
+
+    def brdf(self, wi: Array, wr: Array) -> Array:
+        """Return f_r [1/sr] in linear sRGB (..., 3)."""
+        return self._coloured(self.surface.lookup_vectors(wi, wr, self.wavelength_nm))
+
+    def specular(self, theta: Array) -> Array:
+        """Return the specular reflectance [1] in linear sRGB (..., 3)."""
+        return self._coloured(self.surface.specular_reflectance(theta, self.wavelength_nm))
+
+    def _coloured(self, values: Floats) -> Array:
+        return np.asarray((values[..., np.newaxis] if self.wavelength_nm is None else values) @ self.weights)
+
+
+def _shown(surface: Source | BaseTable) -> _Shown:
+    """Return a surface with the wavelengths of its picture: the visible, or the first one that it is known for."""
+    if not isinstance(surface, BaseTable):
+        return _at(surface, surface, surface.evaluated_at(_VISIBLE_NM))
+    stored = surface.wavelength_nm
+    if stored is not None:
+        stored = _VISIBLE_NM if covers_visible(stored) else stored[:1]
+    return _at(surface, surface.source, stored)
+
+
+def _at(surface: Source | BaseTable, source: Source | FunctionRecord | None, at: Array | None) -> _Shown:
+    weights = np.ones((1, 1)) if at is None else srgb_weights(tuple(at.tolist()))
+    return _Shown(surface, source, at, weights)
+
+
+def _reflected(shown: _Shown, nodes: Array, sky: _Sky) -> Array:
+    """Return the radiance (thetas, azimuths, 3) that a sphere reflects, without the specular part."""
+    theta, phi = np.meshgrid(nodes, _azimuths(shown), indexing="ij")
+    frame = _frames(theta, phi).reshape(-1, 3, 3)
+    wr = frame[..., 2]
+    lobe = None if shown.source is None else shown.source.lobe(wr[:, np.newaxis, 2], shown.wavelength_nm)
+    widest = widest_lobe(lobe, len(wr))
+    samples = _SAMPLES_ANISOTROPIC if shown.surface.anisotropic else _SAMPLES
+    wi = directions(widest, *_numbers(samples), wr)
+    density = samples * mixture_density(widest, wr, wi)
+    share = np.divide(wi[..., 2], density, where=wi[..., 2] > 0.0, out=np.zeros(density.shape))
+    weight = shown.brdf(wi, np.broadcast_to(wr, wi.shape)) * share[..., np.newaxis]
+    towards = np.einsum("npi,pij->npj", wi, frame)
+    across = (*theta.shape, samples)
+    weight = np.moveaxis(weight, 0, -1).reshape(*theta.shape, -1, samples)
+    from_viewer, around = (angle.T.reshape(across) for angle in spherical_angles(towards))
+    rows = np.rint(from_viewer / np.pi * (_ROWS - 1)).astype(np.int64)
+    radius = np.sqrt(1.0 / (np.pi * np.maximum(density, 1e-9)))  # of a cone with the solid angle of a sample
+    rows += _ROWS * np.searchsorted(_BLURS_FROM, radius).T.reshape(across)
+    start = rows * _COLUMNS
+    columns = np.rint(around / (2.0 * np.pi) * _COLUMNS).astype(np.int64)
+    radiance = np.empty((len(nodes), _PHIS, weight.shape[2]))
+    flat = np.concatenate([sky.sharp, *sky.blurred]).reshape(-1)
+    for number_of_phi in range(_PHIS):
+        same, sign, turn = _same_as(number_of_phi, theta.shape[1])
+        incoming = flat[start[:, same] + (sign * columns[:, same] + turn) % _COLUMNS]
+        radiance[:, number_of_phi] = (weight[:, same] @ incoming[..., np.newaxis])[..., 0]
+    return radiance
+
+
+def _numbers(samples: int) -> tuple[Array, Array]:
+    """Return pairs of numbers (samples, 1) in [0, 1], whose azimuths 2 pi u2 are symmetric about both axes."""
+    number = np.arange(samples // 4)[:, np.newaxis]
+    u1, u2 = (number + 0.5) / len(number), number * _GOLDEN % 1.0
+    return np.tile(u1, (4, 1)), np.concatenate([u2, 1.0 - u2, (0.5 + u2) % 1.0, (1.5 - u2) % 1.0])
+
+
+def _azimuths(shown: _Shown) -> Array:
+    """Return the azimuths [rad] whose reflection gives that of all others: one, a quarter turn, or all of them."""
+    full = 2.0 * np.pi * np.arange(_PHIS) / _PHIS
+    if not shown.surface.anisotropic:
+        return full[:1]
+    return full[: _PHIS // 4 + 1] if shown.elliptical else full
+
+
+def _same_as(phi: int, known: int) -> tuple[int, int, int]:
+    """Return the known azimuth with the same reflection, and the sign and turn of the columns of its light there."""
+    half = _PHIS // 2
+    if known == 1:
+        return 0, 1, phi * _COLUMNS // _PHIS
+    if known == _PHIS:
+        return phi, 1, 0
+    quadrant, rest = divmod(phi, half // 2)
+    return (
+        (rest, 1, 0),
+        (half // 2 - rest, -1, _COLUMNS // 2),
+        (rest, 1, _COLUMNS // 2),
+        (half // 2 - rest, -1, 0),
+    )[quadrant]
+
+
+def _frames(theta: Array, phi: Array) -> Array:
+    """Return tangents around the vertical axis, bitangents and normals as the rows of (..., 3, 3)."""
+    normal = unit_vector(theta, phi)
+    tangent = np.cross((0.0, 1.0, 0.0), normal)
+    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
+    return np.stack([tangent, np.cross(normal, tangent), normal], axis=-2)
+
+
+class _Sky(NamedTuple):
+    """The light over the angle to the viewer and the azimuth: (385, 768), about half a degree apart.
+
+    `brightest` is the largest radiance of a white Lambertian sphere, of normals that the viewer sees.
+    """
+
+    sharp: Array
+    blurred: list[Array]
+    brightest: float
+
+
+@functools.lru_cache(maxsize=4)
+def _tabulated(light: Light) -> _Sky:
+    def grid(rows: int, columns: int) -> tuple[Array, Array]:
+        theta = np.linspace(0.0, np.pi, rows)[:, np.newaxis]
+        return theta, unit_vector(theta, 2.0 * np.pi * np.arange(columns) / columns)
+
+    sharp = light(grid(_ROWS, _COLUMNS)[1])
+    coarse = sharp[::_COARSE, ::_COARSE]
+    theta, towards = grid(*coarse.shape)
+    towards = towards.reshape(-1, 3)
+    area = np.broadcast_to(np.sin(theta), coarse.shape).reshape(-1)
+    cosine = towards @ towards.T
+    places = np.stack(np.meshgrid(np.arange(_ROWS) / _COARSE, np.arange(_COLUMNS) / _COARSE, indexing="ij"))
+    blurred = []
+    for width in radians(_BLURS_DEG):
+        spread = np.exp((cosine - 1.0) / width**2) * area
+        mean = spread @ coarse.reshape(-1) / spread.sum(axis=1)
+        blurred.append(_interpolated(mean.reshape(coarse.shape), places))
+    seen = np.maximum(cosine[towards[:, 2] >= 0.0], 0.0) * area
+    brightest = np.max(seen @ coarse.reshape(-1)) / (area.sum() / 4.0)
+    return _Sky(sharp, blurred, float(brightest))
+
+
+def _interpolated(values: Array, at: Array) -> Array:
+    """Return values (rows, columns) at places (2, ...), linear between them; columns are periodic."""
+    from scipy.ndimage import map_coordinates
+
+    return np.asarray(map_coordinates(values, at, order=1, mode="grid-wrap"))
+
+
+def _averaged(fine: Array) -> Array:
+    """Return means over the points of each pixel."""
+    size = len(fine) // _ACROSS
+    return np.asarray(fine.reshape(size, _ACROSS, size, _ACROSS, *fine.shape[2:]).mean(axis=(1, 3)))

@@ -1,0 +1,417 @@
+"""Plots of a table with matplotlib, as `table.plot.lobe()`: lobe, cuts, albedo and slices."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.errors import ParameterError, import_extra
+from brdfdb.geometry import radians
+from brdfdb.integrals.quadrature import reflected_share
+from brdfdb.lobes import narrowest
+from brdfdb.materials import FunctionRecord, Material
+from brdfdb.parameters import Floats
+from brdfdb.tables.slices import Slice, Sliced, half_difference_slice, in_plane_slice
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+# Colours that are told apart with any kind of colour blindness (after Okabe and Ito); the first for the first curve
+COLOURS = ("#0b5fc0", "#c8401e", "#00806b", "#8c4aa6", "#b47400", "#3e97cf")
+_INK, _MUTED, _GRID = "#1b2028", "#5a6470", "#dde2e8"
+_DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
+_SHOWN_NM = 550.0  # wavelength of a plot by default
+_UNIT = "$f_r$ [1/sr]"
+_SPECTRUM_NM = (380.0, 780.0)  # ends of the colours of wavelengths
+
+# Angles of a cut [degree]: even ones up to where poles at the horizon begin, and more around the mirror direction
+_EVEN_DEG, _AROUND_DEG = np.linspace(-89.0, 89.0, 357), np.linspace(-8.0, 8.0, 161)
+ALBEDO_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0], dtype=np.float64)
+_TOLERANCE, _MOST_PANELS = 1e-3, 300  # of an albedo; a line is as wide as 0.005
+
+_SLICES: dict[str, Callable[[Sliced], Slice]] = {"in_plane": in_plane_slice, "half_difference": half_difference_slice}
+
+
+class Plotted(Sliced, Protocol):
+    """The properties of a table that plots need."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def anisotropic(self) -> bool: ...
+
+    @property
+    def source(self) -> Material | FunctionRecord | None: ...
+
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats: ...
+
+    def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats: ...
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Plots of one table. Each draws on `ax`, or on new axes, and returns the axes.
+
+    matplotlib is imported by the first call. MissingExtraError names the command that installs it.
+    """
+
+    table: Plotted
+
+    def lobe(
+        self,
+        theta_i_deg: float | Sequence[float] = (0.0, 30.0, 60.0),
+        phi_i_deg: float | Sequence[float] | None = None,
+        wavelength_nm: float | Sequence[float] | None = None,
+        *,
+        ax: Axes | None = None,
+    ) -> Axes:
+        """Draw f_r [1/sr] in the plane of incidence as a polar plot, with the light on the left.
+
+        Parameters
+        ----------
+        theta_i_deg : float or sequence [degree]
+            Polar angles of the light, 0 to 90.
+        phi_i_deg : float or sequence [degree], optional
+            Azimuths of the light. The default is 0, and of anisotropic tables also 90 degrees.
+        wavelength_nm : float or sequence [nm], optional
+            Wavelengths of a spectral table. The default is the one of its range that is closest to 550 nm.
+        ax : matplotlib Axes, optional
+            Axes to draw on.
+
+        Returns
+        -------
+        Axes
+            The axes. The radius is f_r, and the angle to the vertical is theta_r: on the right around the mirror
+            direction, on the left back towards the light.
+
+        Raises
+        ------
+        ParameterError
+            If an angle or a wavelength is out of range.
+        MissingExtraError
+            If matplotlib is not installed.
+        """
+        curves = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
+        axes = _axes(ax, (6.4, 3.9))
+        largest = max((float(np.nanmax(curve.brdf)) for curve in curves), default=1.0) or 1.0
+        ticker = import_extra("matplotlib.ticker")
+        rings = [r for r in ticker.MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, largest) if r > 0.0]
+        edge = rings[-1]
+        _polar_grid(axes, rings)
+        for curve in curves:
+            theta, radius = radians(curve.theta_r_deg), curve.brdf / edge
+            axes.plot(
+                radius * np.sin(theta), radius * np.cos(theta), color=curve.colour, linestyle=curve.dashes, lw=1.8
+            )
+        _legend(axes, curves)
+        axes.set(xlim=(-1.13, 1.13), ylim=(-0.1, 1.13), aspect="equal", xticks=[], yticks=[])
+        axes.spines[:].set_visible(False)
+        axes.set_xlabel(f"← towards the light    {_UNIT} over $\\theta_r$    mirror side →", color=_MUTED)
+        axes.set_title(self._title(curves), loc="left")
+        return axes
+
+    def cuts(
+        self,
+        theta_i_deg: float | Sequence[float] = (0.0, 20.0, 40.0, 60.0),
+        phi_i_deg: float | Sequence[float] | None = 0.0,
+        wavelength_nm: float | Sequence[float] | None = None,
+        *,
+        log: bool | None = None,
+        ax: Axes | None = None,
+    ) -> Axes:
+        """Draw f_r [1/sr] in the plane of incidence over theta_r, which is positive on the mirror side.
+
+        Parameters and errors are those of `lobe`. `log` chooses a logarithmic axis. The default is one where the
+        largest value is more than 50 times the median.
+        """
+        curves = self._curves(theta_i_deg, phi_i_deg, wavelength_nm)
+        axes = _axes(ax, (6.4, 3.9))
+        values = np.concatenate([curve.brdf for curve in curves])
+        if log is None:
+            log = bool(np.max(values) > 50.0 * max(float(np.median(values)), 1e-30))
+        for curve in curves:
+            axes.plot(curve.theta_r_deg, curve.brdf, color=curve.colour, linestyle=curve.dashes, lw=1.8)
+        if log:
+            axes.set_yscale("log")
+            positive = values[values > 0.0]
+            if positive.size:
+                top = 2.0 * float(positive.max())
+                axes.set_ylim(max(float(positive.min()) / 1.5, top * 1e-7), top)
+        else:
+            axes.set_ylim(0.0, 1.12 * float(np.max(values)) or 1.0)
+        axes.set(xlim=(-90.0, 90.0), xticks=range(-90, 91, 30))
+        axes.set_xlabel("$\\theta_r$ [°]: negative towards the light, positive on the mirror side", color=_MUTED)
+        axes.set_ylabel(_UNIT, color=_MUTED)
+        axes.grid(color=_GRID, lw=0.7)
+        _legend(axes, curves)
+        axes.set_title(self._title(curves), loc="left")
+        return axes
+
+    def albedo(self, phi_i_deg: float = 0.0, wavelength_nm: float | None = None, *, ax: Axes | None = None) -> Axes:
+        """Draw the directional albedo [1] over theta_i: the shares of uniform part, lobe and specular part, and 1.
+
+        Parameters
+        ----------
+        phi_i_deg : float [degree]
+            Azimuth of the light. It matters for anisotropic tables only.
+        wavelength_nm : float [nm], optional
+            As of `lobe`.
+        ax : matplotlib Axes, optional
+            Axes to draw on.
+
+        Returns
+        -------
+        Axes
+            The axes. The shares are stacked. The uniform part is shown where the source of the table names it.
+
+        Raises
+        ------
+        ParameterError, MissingExtraError
+            As of `lobe`.
+        """
+        axes = _axes(ax, (6.4, 3.9))
+        (wavelength,) = self._wavelengths(wavelength_nm)
+        shares = albedo_shares(self.table, float(radians(phi_i_deg)), wavelength)
+        kept = {label: share for label, share in shares.items() if np.max(share) > 0.0} or {"reflected": np.zeros(21)}
+        colours = [COLOURS[list(shares).index(label) % len(COLOURS)] for label in kept]
+        axes.stackplot(ALBEDO_DEG, *kept.values(), colors=colours, alpha=0.85, lw=0)
+        below = np.zeros(ALBEDO_DEG.size)
+        for label, share in kept.items():
+            at = int(np.argmax(share[:-3]))
+            thick = share[at] > 0.07
+            axes.text(
+                np.clip(ALBEDO_DEG[at], 12.0, 66.0),
+                below[at] + share[at] / 2.0 if thick else below[at] + share[at] + 0.015,
+                label,
+                ha="center",
+                va="center" if thick else "bottom",
+                color="white" if thick else _INK,
+            )
+            below = below + share
+        axes.axhline(1.0, color=_INK, lw=1.2)
+        axes.text(1.0, 1.01, "1: everything is reflected", color=_INK, va="bottom", fontsize="small")
+        axes.set(xlim=(0.0, 90.0), ylim=(0.0, max(1.1, 1.05 * float(below.max()))), xticks=range(0, 91, 15))
+        axes.set_xlabel("$\\theta_i$ [°]", color=_MUTED)
+        axes.set_ylabel("directional albedo [1]", color=_MUTED)
+        azimuth = f", $\\phi_i$ = {phi_i_deg:g}°" if self.table.anisotropic else ""
+        axes.set_title(f"{self.table.name}{_at(wavelength)}{azimuth}", loc="left")
+        return axes
+
+    def slices(
+        self,
+        kind: Literal["in_plane", "half_difference"] = "in_plane",
+        wavelength_nm: float | None = None,
+        *,
+        ax: Axes | None = None,
+    ) -> Axes:
+        """Draw f_r [1/sr] as an image on a logarithmic scale.
+
+        Parameters
+        ----------
+        kind : str
+            "in_plane": theta_i over theta_r in the plane of incidence, as `brdfdb.tables.slices.in_plane_slice`.
+            "half_difference": theta_d over theta_h, as `brdfdb.tables.slices.half_difference_slice`.
+        wavelength_nm : float [nm], optional
+            Of a spectral table. The wavelength of the table that is closest is shown; the default is the closest to
+            550 nm.
+        ax : matplotlib Axes, optional
+            Axes to draw on.
+
+        Returns
+        -------
+        Axes
+            The axes; the colour bar has its own beside them.
+
+        Raises
+        ------
+        ParameterError, MissingExtraError
+            As of `lobe`; also if `kind` is another word.
+        """
+        ways: dict[str, Callable[[Sliced], Slice]] = {
+            "in_plane": in_plane_slice,
+            "half_difference": half_difference_slice,
+        }
+        if kind not in ways:
+            raise ParameterError("kind", f"{kind!r} is not one of {', '.join(ways)}", kind, tuple(ways))
+        axes = _axes(ax, (6.4, 3.6))
+        picture = _SLICES[kind](self.table)
+        values, stored = picture.values, self.table.wavelength_nm
+        at = None
+        if stored is not None:
+            (wanted,) = self._wavelengths(wavelength_nm)
+            index = int(np.argmin(np.abs(stored - (_SHOWN_NM if wanted is None else wanted))))
+            values, at = values[..., index], float(stored[index])
+        positive = values[values > 0.0]
+        high = float(positive.max()) if positive.size else 1.0
+        low = max(float(positive.min()) if positive.size else 0.1, 1e-6 * high)
+        colours = import_extra("matplotlib.colors")
+        norm = colours.LogNorm(low, high if high > 1.001 * low else 1.1 * low, clip=True)
+        extent = (picture.x.first - 0.5, picture.x.last + 0.5, picture.y.first - 0.5, picture.y.last + 0.5)
+        look: dict[str, Any] = {"norm": norm, "cmap": "viridis", "aspect": "auto", "interpolation": "nearest"}
+        image = axes.imshow(np.maximum(values, low), extent=extent, **look)
+        bar = axes.figure.colorbar(image, ax=axes, pad=0.02)
+        bar.set_label(_UNIT, color=_MUTED)
+        bar.outline.set_visible(False)
+        labels = {
+            "in_plane": ("$\\theta_r$ [°]: negative towards the light", "$\\theta_i$ [°]"),
+            "half_difference": ("$\\theta_h$ [°]", "$\\theta_d$ [°]"),
+        }
+        axes.set_xlabel(labels[kind][0], color=_MUTED)
+        axes.set_ylabel(labels[kind][1], color=_MUTED)
+        axes.set(xticks=range(-90 if kind == "in_plane" else 0, 91, 30), yticks=range(0, 91, 30))
+        axes.set_title(f"{self.table.name}{_at(at)}", loc="left")
+        return axes
+
+    def _curves(
+        self,
+        theta_i_deg: float | Sequence[float],
+        phi_i_deg: float | Sequence[float] | None,
+        wavelength_nm: float | Sequence[float] | None,
+    ) -> list[_Curve]:
+        """Return cuts in the plane of incidence: one for each light, azimuth and wavelength."""
+        if phi_i_deg is None:
+            phi_i_deg = (0.0, 90.0) if self.table.anisotropic else 0.0
+        lights, azimuths = _numbers(theta_i_deg), _numbers(phi_i_deg)
+        wavelengths = self._wavelengths(wavelength_nm)
+        for theta in lights:
+            if not 0.0 <= theta <= 90.0:
+                raise ParameterError("theta_i_deg", f"{theta:g} is outside [0, 90] degrees", theta, (0.0, 90.0))
+        curves = []
+        for (number, theta), (row, phi), wavelength in itertools.product(
+            enumerate(lights), enumerate(azimuths), wavelengths
+        ):
+            around = _AROUND_DEG + theta
+            signed = np.union1d(_EVEN_DEG, around[np.abs(around) <= 89.0])
+            phi_r = phi + np.where(signed > 0.0, 180.0, 0.0)
+            light = radians(theta), radians(phi)
+            brdf = np.asarray(
+                self.table.lookup(*light, radians(np.abs(signed)), radians(phi_r), wavelength), np.float64
+            )
+            parts = [f"$\\theta_i$ = {theta:g}°"]
+            parts += [f"$\\phi_i$ = {phi:g}°"] if len(azimuths) > 1 else []
+            parts += [f"{wavelength:g} nm"] if len(wavelengths) > 1 else []
+            if wavelength is None or len(wavelengths) == 1:
+                colour, dashes = COLOURS[number % len(COLOURS)], _DASHES[row % len(_DASHES)]
+            else:
+                colour, dashes = _spectral_colour(wavelength), _DASHES[number % len(_DASHES)]
+            curves.append(_Curve(", ".join(parts), signed, brdf, colour, dashes, wavelength))
+        return curves
+
+    def _wavelengths(self, wavelength_nm: float | Sequence[float] | None) -> list[float | None]:
+        stored = self.table.wavelength_nm
+        if stored is None:
+            return [None]
+        if wavelength_nm is None:
+            return [float(np.clip(_SHOWN_NM, stored[0], stored[-1]))]
+        return list(_numbers(wavelength_nm))
+
+    def _title(self, curves: list[_Curve]) -> str:
+        wavelengths = {curve.wavelength_nm for curve in curves}
+        return f"{self.table.name}{_at(wavelengths.pop()) if len(wavelengths) == 1 else ''}"
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """A cut and its look; angles are negative towards the light."""
+
+    label: str
+    theta_r_deg: Array
+    brdf: Array
+    colour: Any
+    dashes: Any
+    wavelength_nm: float | None
+
+
+def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> dict[str, Array]:
+    """Return shares [1] of reflected light at `ALBEDO_DEG`: uniform part, rest of f_r, specular part, by their labels.
+
+    Parameters
+    ----------
+    table : Table or RemoteTable
+        The table. Its lookups are integrated to 1e-3.
+    phi_i : float [rad]
+        Azimuth of the light.
+    wavelength_nm : float [nm] or None
+        None for a grey table.
+    """
+    source, theta_i = table.source, radians(ALBEDO_DEG)
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        return np.asarray(table.lookup_vectors(wi, wr, wavelength_nm))[..., np.newaxis]
+
+    total = np.empty(theta_i.size)
+    at = None if wavelength_nm is None else np.array([wavelength_nm])
+    for number, theta in enumerate(theta_i):
+        lobe = None if source is None else source.lobe(np.asarray(np.cos(theta)), at)
+        total[number] = reflected_share(
+            brdf,
+            float(theta),
+            phi_i,
+            narrowest(lobe),
+            tolerance=_TOLERANCE,
+            most_panels=_MOST_PANELS,
+            mirrored=not table.anisotropic,
+        ).albedo[0]
+    known = source.uniform if isinstance(source, Material) else None
+    uniform = np.minimum(np.full(theta_i.size, np.pi * (known or 0.0)), total)
+    rest = "lobe" if isinstance(source, Material) and source.has_lobe else "reflected"
+    specular = np.asarray(table.specular_reflectance(theta_i, wavelength_nm), dtype=np.float64)
+    return {"uniform part": uniform, rest: total - uniform, "specular part": specular}
+
+
+def _numbers(given: float | Sequence[float]) -> list[float]:
+    return [float(number) for number in np.atleast_1d(np.asarray(given, dtype=np.float64))]
+
+
+def _at(wavelength_nm: float | None) -> str:
+    return "" if wavelength_nm is None else f" at {wavelength_nm:g} nm"
+
+
+def _spectral_colour(wavelength_nm: float) -> Any:
+    """Return a colour from blue at 380 nm to red at 780 nm."""
+    low, high = _SPECTRUM_NM
+    return import_extra("matplotlib").colormaps["turbo"](
+        0.08 + 0.84 * np.clip((wavelength_nm - low) / (high - low), 0, 1)
+    )
+
+
+def _axes(ax: Axes | None, size: tuple[float, float]) -> Axes:
+    """Return the axes to draw on, in the look of all plots."""
+    axes = ax
+    if axes is None:
+        axes = import_extra("matplotlib.pyplot").subplots(figsize=size, layout="constrained")[1]
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(_GRID)
+    axes.tick_params(colors=_MUTED, length=0)
+    axes.set_axisbelow(True)
+    return axes
+
+
+def _polar_grid(axes: Axes, rings: Sequence[float]) -> None:
+    """Draw half circles at values of f_r [1/sr], the last of radius 1, and spokes every 30 degrees."""
+    turn = np.linspace(-np.pi / 2.0, np.pi / 2.0, 181)
+    for ring in rings:
+        radius = ring / rings[-1]
+        axes.plot(radius * np.sin(turn), radius * np.cos(turn), color=_GRID, lw=0.8, zorder=0)
+        axes.text(radius, -0.02, f"{ring:g}", ha="center", va="top", color=_MUTED, fontsize="small")
+    for angle_deg in range(-90, 91, 30):
+        x, y = float(np.sin(radians(angle_deg))), float(np.cos(radians(angle_deg)))
+        axes.plot([0.0, x], [0.0, y], color=_GRID, lw=0.8, zorder=0)
+        if abs(angle_deg) < 90:
+            text = f"{abs(angle_deg)}°"
+            axes.text(1.06 * x, 1.05 * y, text, ha="center", va="center", color=_MUTED, fontsize="small")
+
+
+def _legend(axes: Axes, curves: Sequence[_Curve]) -> None:
+    """Label curves in their own colours, beside the axes."""
+    lines = import_extra("matplotlib.lines")
+    handles = [lines.Line2D([], [], color=c.colour, linestyle=c.dashes, lw=1.8, label=c.label) for c in curves]
+    axes.legend(handles=handles, frameon=False, labelcolor="linecolor", loc="upper left", bbox_to_anchor=(1.0, 1.02))

@@ -1,0 +1,36 @@
+"""The command `brdfdb gallery`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store
+
+HELP = "Draw a contact sheet: a lit sphere of each material, as PNG."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the store, the materials and the file."""
+    parser.add_argument("names", nargs="*", metavar="NAME", help="materials (default: all of the store)")
+    add_store(parser)
+    add_jobs(parser, "threads")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("brdf-gallery.png"),
+        metavar="FILE",
+        help="the PNG to write (default: %(default)s)",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the contact sheet."""
+    from brdfdb.errors import import_extra
+
+    for module in ("colour", "matplotlib.image", "scipy.ndimage"):  # before the time is spent
+        import_extra(module)
+    from brdfdb_pipelines import contact_sheet
+
+    contact_sheet.run(options.store, options.names, options.out, options.jobs)
+    return 0

@@ -1,0 +1,142 @@
+"""The contact sheet of a store: a lit sphere of each material, with its name, by paper."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.image import imsave
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+import brdfdb
+from brdfdb.materials import presets
+from brdfdb.scenes.lit_sphere import WHITE, lit_sphere
+from brdfdb.tables.table_base import BaseTable
+from brdfdb_pipelines import terminal
+
+Array = NDArray[np.float64]
+
+# Lengths in pixels
+WIDTH, _MARGIN, _CELL, _SPHERE, _LABEL = 1400, 40, 132, 116, 50
+_HEADER, _SECTION, _BETWEEN, _CAPTION = 104, 46, 12, 96
+_DPI = 100
+_PLATE, _INK, _MUTED, _LINE = "#14171c", "#eef1f4", "#9aa4b0", "#2b3139"
+_SPACING = 1.3  # between lines of text, in its size
+_LETTERS = 17  # of a line of a name
+
+
+Align = Literal["left", "center", "right"]
+CAPTION = (
+    "Spheres with the values of the tables, all under the same light and at the same exposure: a white Lambertian "
+    f"sphere has {100.0 * WHITE:g} % of the screen's white where it is\nbrightest. Brighter light is clipped. A "
+    "material whose source states no colour, or a single wavelength, is grey."
+)
+
+
+def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
+    """Write the contact sheet of materials of a store, by default of all, as a PNG, and print its size."""
+    store = brdfdb.open(root)
+    tables = {name: store[name] for name in names or store}
+    with terminal.progress() as bar, ThreadPoolExecutor(jobs) as pool:
+        task = bar.add_task("rendering", total=len(tables))
+
+        def picture(table: BaseTable) -> Array:
+            sphere = lit_sphere(table, _SPHERE)
+            bar.advance(task)
+            return sphere
+
+        spheres = dict(zip(tables, pool.map(picture, tables.values()), strict=True))
+    out.parent.mkdir(parents=True, exist_ok=True)
+    image = sheet(sections(tables), spheres)
+    imsave(out, image, pil_kwargs={"optimize": True})
+    print(f"{out}: {len(tables)} materials, {image.shape[1]} x {image.shape[0]} pixels")
+
+
+def sections(tables: Mapping[str, BaseTable]) -> dict[str, list[BaseTable]]:
+    """Return tables by their paper, which is the text of their source before the first comma, in the paper's order."""
+    order = {name: number for number, name in enumerate(presets())}
+    papers: dict[str, list[BaseTable]] = {}
+    for name in sorted(tables, key=lambda name: (order.get(name, len(order)), name)):
+        source = tables[name].metadata.source or "Other materials"
+        papers.setdefault(source.partition(",")[0], []).append(tables[name])
+    return papers
+
+
+def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array]) -> NDArray[np.uint8]:
+    """Return the contact sheet as sRGB bytes (height, width, 3)."""
+    columns = (WIDTH - 2 * _MARGIN) // _CELL
+    rows = [-(-len(tables) // columns) for tables in papers.values()]
+    height = _HEADER + _CAPTION + sum(_SECTION + count * (_SPHERE + _LABEL) + _BETWEEN for count in rows)
+    page = _Page(height)
+    count = sum(map(len, papers.values()))
+    page.write(_MARGIN, 36, f"{count} materials" if count > 1 else "1 material", 30, _INK)
+    page.write(WIDTH - _MARGIN, 50, "brdfdb", 20, _MUTED, align="right")
+    top, corners = _HEADER, {}
+    for (paper, tables), lines in zip(papers.items(), rows, strict=True):
+        page.write(_MARGIN, top, paper, 16, _MUTED)
+        page.rule(top + 26)
+        top += _SECTION
+        for number, table in enumerate(tables):
+            row, column = divmod(number, columns)
+            left, upper = _MARGIN + column * _CELL, top + row * (_SPHERE + _LABEL)
+            corners[table.name] = (upper, left + (_CELL - _SPHERE) // 2)
+            page.write(left + _CELL / 2, upper + _SPHERE + 7, label(table), 12.2, _INK, align="center")
+        top += lines * (_SPHERE + _LABEL) + _BETWEEN
+    page.write(_MARGIN, top + 16, CAPTION, 13.5, _MUTED)
+    image = page.drawn()
+    for name, (upper, left) in corners.items():
+        part = image[upper : upper + _SPHERE, left : left + _SPHERE]
+        colour, coverage = spheres[name][..., :3], spheres[name][..., 3:]
+        part += coverage * (colour - part)
+    return np.round(255.0 * image).astype(np.uint8)
+
+
+def label(table: BaseTable) -> str:
+    """Return the name of a table in lines, broken after hyphens."""
+    lines = [""]
+    for word in table.name.replace("-", "- ").split():
+        if lines[-1] and len(lines[-1]) + len(word) > _LETTERS:
+            lines.append("")
+        lines[-1] += word
+    return "\n".join(lines)
+
+
+class _Page:
+    """A dark page with text, in pixels from the upper left corner."""
+
+    def __init__(self, height: int) -> None:
+        self._height = height
+        self._figure = Figure(figsize=(WIDTH / _DPI, height / _DPI), dpi=_DPI, facecolor=_PLATE)
+
+    def write(self, x: float, y: float, text: str, size: float, colour: str, align: Align = "left") -> None:
+        """Write lines of text of a size in pixels; y is the upper end of the first."""
+        for number, line in enumerate(text.splitlines()):
+            self._figure.text(
+                x / WIDTH,
+                1.0 - (y + size * (1.0 + _SPACING * number)) / self._height,
+                line,
+                ha=align,
+                va="baseline",
+                color=colour,
+                fontsize=size * 72.0 / _DPI,
+                parse_math=False,
+                fontfamily="DejaVu Sans",
+            )
+
+    def rule(self, y: float) -> None:
+        """Draw a line across the page."""
+        ends, level = [_MARGIN / WIDTH, 1.0 - _MARGIN / WIDTH], 1.0 - y / self._height
+        self._figure.add_artist(Line2D(ends, [level, level], color=_LINE, linewidth=1.0))
+
+    def drawn(self) -> Array:
+        """Return the page as sRGB in [0, 1], of shape (height, width, 3)."""
+        pixels = io.BytesIO()
+        self._figure.savefig(pixels, format="rgba", dpi=_DPI, facecolor=_PLATE)
+        image = np.frombuffer(pixels.getvalue(), dtype=np.uint8).reshape(self._height, WIDTH, 4)
+        return image[..., :3] / 255.0
