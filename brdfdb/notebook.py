@@ -11,6 +11,7 @@ _CARD = (
     "line-height:1.4;color:inherit"
 )
 _CELL = "padding:0.1em 1em 0.1em 0;text-align:left;vertical-align:top;border:none;background:none;color:inherit"
+_TABLE = "border:none;margin:0.3em 0 0;color:inherit;font-size:inherit"
 _MUTED = "opacity:0.65"
 _MOST_ROWS = 200
 
@@ -37,7 +38,7 @@ def card(kind: str, name: str, title: str, facts: Iterable[tuple[str, str]], pic
     shown = f'<div style="float:right;margin:0 0 0 1.5em">{picture}</div>' if picture else ""
     return (
         f'<div style="{_CARD}">{shown}<div><span style="{_MUTED}">{escape(kind)}</span> <b>{escape(name)}</b></div>'
-        f'<div>{escape(title)}</div><table style="border:none;margin:0.3em 0 0">{"".join(rows)}</table></div>'
+        f'<div>{escape(title)}</div><table style="{_TABLE}">{"".join(rows)}</table></div>'
     )
 
 
@@ -45,14 +46,14 @@ def listing(kind: str, name: str, title: str, columns: Sequence[str], rows: Sequ
     """Return an object as HTML with a list that scrolls; of more than 200 rows the first 200."""
     head = "".join(f'<th style="{_CELL};{_MUTED};font-weight:normal">{escape(column)}</th>' for column in columns)
     lines = [
-        "<tr>" + "".join(f'<td style="{_CELL}">{escape(cell)}</td>' for cell in row) + "</tr>"
+        "<tr>" + "".join(f'<td style="{_CELL};white-space:nowrap">{escape(cell)}</td>' for cell in row) + "</tr>"
         for row in rows[:_MOST_ROWS]
     ]
     more = f'<div style="{_MUTED}">and {len(rows) - _MOST_ROWS} more</div>' if len(rows) > _MOST_ROWS else ""
     return (
         f'<div style="{_CARD}"><div><span style="{_MUTED}">{escape(kind)}</span> <b>{escape(name)}</b></div>'
         f'<div>{escape(title)}</div><div style="max-height:18em;overflow:auto">'
-        f'<table style="border:none;margin:0.3em 0 0"><tr>{head}</tr>{"".join(lines)}</table></div>{more}</div>'
+        f'<table style="{_TABLE}"><tr>{head}</tr>{"".join(lines)}</table></div>{more}</div>'
     )
 
 

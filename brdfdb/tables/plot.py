@@ -29,7 +29,16 @@ _INK, _MUTED, _GRID = "#1b2028", "#5a6470", "#dde2e8"
 _DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _SHOWN_NM = 550.0  # wavelength of a plot by default
 _UNIT = "$f_r$ [1/sr]"
-_SPECTRUM_NM = (380.0, 780.0)  # ends of the colours of wavelengths
+_SPECTRUM_NM = (400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 750.0)
+_SPECTRUM = (
+    (0.35, 0.10, 0.55),
+    (0.04, 0.37, 0.75),
+    (0.00, 0.50, 0.55),
+    (0.15, 0.52, 0.12),
+    (0.72, 0.46, 0.00),
+    (0.80, 0.20, 0.10),
+    (0.45, 0.05, 0.10),
+)
 
 # Angles of a cut [degree]: even ones up to where poles at the horizon begin, and more around the mirror direction
 _EVEN_DEG, _AROUND_DEG = np.linspace(-89.0, 89.0, 357), np.linspace(-8.0, 8.0, 161)
@@ -298,6 +307,7 @@ class Plot:
             parts = [f"$\\theta_i$ = {theta:g}°"]
             parts += [f"$\\phi_i$ = {phi:g}°"] if len(azimuths) > 1 else []
             parts += [f"{wavelength:g} nm"] if len(wavelengths) > 1 else []
+            colour: str | tuple[float, ...]
             if wavelength is None or len(wavelengths) == 1:
                 colour, dashes = COLOURS[number % len(COLOURS)], _DASHES[row % len(_DASHES)]
             else:
@@ -325,7 +335,7 @@ class _Curve:
     label: str
     theta_r_deg: Array
     brdf: Array
-    colour: Any
+    colour: str | tuple[float, ...]
     dashes: Any
     wavelength_nm: float | None
 
@@ -375,12 +385,9 @@ def _at(wavelength_nm: float | None) -> str:
     return "" if wavelength_nm is None else f" at {wavelength_nm:g} nm"
 
 
-def _spectral_colour(wavelength_nm: float) -> Any:
-    """Return a colour from blue at 380 nm to red at 780 nm."""
-    low, high = _SPECTRUM_NM
-    return import_extra("matplotlib").colormaps["turbo"](
-        0.08 + 0.84 * np.clip((wavelength_nm - low) / (high - low), 0, 1)
-    )
+def _spectral_colour(wavelength_nm: float) -> tuple[float, ...]:
+    """Return the colour [sRGB] of a wavelength: violet, blue, green, orange, red, all dark enough for labels."""
+    return tuple(float(np.interp(wavelength_nm, _SPECTRUM_NM, channel)) for channel in zip(*_SPECTRUM, strict=True))
 
 
 def _axes(ax: Axes | None, size: tuple[float, float]) -> Axes:

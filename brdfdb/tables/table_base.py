@@ -171,7 +171,7 @@ class BaseTable(Lookups):
             ("source", known.source or ""),
             ("wavelengths", spectrum(wavelengths)),
             ("grid", axes),
-            ("interpolation", known.reconstruction or ""),
+            ("interpolation", known.interpolation.method + (" of logarithms" if known.interpolation.logarithm else "")),
             ("stated error", "" if error is None else f"{percent(error.overall.p99)} (99 of 100 values)"),
             ("revision", self.revision),
         ]

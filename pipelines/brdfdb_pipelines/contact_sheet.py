@@ -23,7 +23,7 @@ from brdfdb_pipelines import terminal
 Array = NDArray[np.float64]
 
 # Lengths in pixels
-WIDTH, _MARGIN, _CELL, _SPHERE, _LABEL = 1400, 40, 132, 116, 50
+WIDTH, _MARGIN, _CELL, SPHERE, _LABEL = 1400, 40, 132, 116, 50
 _HEADER, _SECTION, _BETWEEN, _CAPTION = 104, 46, 12, 96
 _DPI = 100
 _PLATE, _INK, _MUTED, _LINE = "#14171c", "#eef1f4", "#9aa4b0", "#2b3139"
@@ -47,7 +47,7 @@ def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
         task = bar.add_task("rendering", total=len(tables))
 
         def picture(table: BaseTable) -> Array:
-            sphere = lit_sphere(table, _SPHERE)
+            sphere = lit_sphere(table, SPHERE)
             bar.advance(task)
             return sphere
 
@@ -72,7 +72,7 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
     """Return the contact sheet as sRGB bytes (height, width, 3)."""
     columns = (WIDTH - 2 * _MARGIN) // _CELL
     rows = [-(-len(tables) // columns) for tables in papers.values()]
-    height = _HEADER + _CAPTION + sum(_SECTION + count * (_SPHERE + _LABEL) + _BETWEEN for count in rows)
+    height = _HEADER + _CAPTION + sum(_SECTION + count * (SPHERE + _LABEL) + _BETWEEN for count in rows)
     page = _Page(height)
     count = sum(map(len, papers.values()))
     page.write(_MARGIN, 36, f"{count} materials" if count > 1 else "1 material", 30, _INK)
@@ -84,23 +84,23 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
         top += _SECTION
         for number, table in enumerate(tables):
             row, column = divmod(number, columns)
-            left, upper = _MARGIN + column * _CELL, top + row * (_SPHERE + _LABEL)
-            corners[table.name] = (upper, left + (_CELL - _SPHERE) // 2)
-            page.write(left + _CELL / 2, upper + _SPHERE + 7, label(table), 12.2, _INK, align="center")
-        top += lines * (_SPHERE + _LABEL) + _BETWEEN
+            left, upper = _MARGIN + column * _CELL, top + row * (SPHERE + _LABEL)
+            corners[table.name] = (upper, left + (_CELL - SPHERE) // 2)
+            page.write(left + _CELL / 2, upper + SPHERE + 7, wrapped(table.name), 12.2, _INK, align="center")
+        top += lines * (SPHERE + _LABEL) + _BETWEEN
     page.write(_MARGIN, top + 16, CAPTION, 13.5, _MUTED)
     image = page.drawn()
     for name, (upper, left) in corners.items():
-        part = image[upper : upper + _SPHERE, left : left + _SPHERE]
+        part = image[upper : upper + SPHERE, left : left + SPHERE]
         colour, coverage = spheres[name][..., :3], spheres[name][..., 3:]
         part += coverage * (colour - part)
     return np.round(255.0 * image).astype(np.uint8)
 
 
-def label(table: BaseTable) -> str:
-    """Return the name of a table in lines, broken after hyphens."""
+def wrapped(name: str) -> str:
+    """Return a name in lines, broken after hyphens."""
     lines = [""]
-    for word in table.name.replace("-", "- ").split():
+    for word in name.replace("-", "- ").split():
         if lines[-1] and len(lines[-1]) + len(word) > _LETTERS:
             lines.append("")
         lines[-1] += word

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import brdfdb
 from brdfdb.audit import audit
@@ -55,6 +56,17 @@ def test_what_lists_show(opened: Any) -> None:
     assert opened.revisions("grey-felt") == ["r000001"]
     assert opened.metadata("grey-felt").parameters["sigma_deg"] == 20.0
     assert opened["grey-felt"].attrs["source"] == "no paper, grey-felt"
+
+
+def test_tables_are_drawn_and_shown_in_notebooks(opened: Any) -> None:
+    table = opened["brushed-metal"]
+    assert "Test brushed-metal" in table._repr_html_()
+    assert ("<svg" in table._repr_html_()) is isinstance(opened, Store)  # showing it asks no service
+    axes = table.plot.cuts(20.0, ax=Figure().add_subplot())
+    line = axes.lines[0]
+    at = int(np.argmax(line.get_ydata()))
+    expected = table.lookup(*np.radians([20.0, 0.0, line.get_xdata()[at], 180.0]))
+    assert line.get_ydata()[at] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("ask", ["__getitem__", "summary", "head", "metadata", "revisions", "dataset"])

@@ -285,6 +285,12 @@ def test_angles_are_radians_and_both_ends_are_within(families: Families) -> None
     assert family.lookup(*at, sigma=0) == tables["clay-001"].lookup(*at)
 
 
+def test_notebooks_show_the_record(families: Families) -> None:
+    html = families["clay"][0]._repr_html_()
+    for text in ("clay", "oren_nayar", "sigma_deg 0 to 40 (5)", families["clay"][0].record.interpolation.method):
+        assert f">{text}<" in html
+
+
 def test_values_are_shaped_as_those_of_a_table(families: Families) -> None:
     family, tables = families["copper"]
     table = tables["copper-001"]

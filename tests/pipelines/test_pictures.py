@@ -1,0 +1,73 @@
+"""brdfdb plot and gallery: the files that they write, and what they refuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+import brdfdb
+from brdfdb.scenes.lit_sphere import lit_sphere
+from brdfdb_pipelines import contact_sheet
+from tests.pipelines.command import Captured, run
+
+
+def test_plot_writes_a_file_of_each_kind(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    assert run("plot", "foam", "--store", built, "--out", tmp_path / "plots") == 0
+    names = sorted(path.name for path in (tmp_path / "plots").iterdir())
+    assert names == [f"foam-{kind}.png" for kind in ("albedo", "cuts", "lobe", "slices")]
+    assert all(np.ptp(imread(path)[..., :3]) > 0.5 for path in (tmp_path / "plots").iterdir())
+    assert capsys.readouterr().out == f"4 PNG files in {tmp_path / 'plots'}\n"
+
+
+def test_plot_writes_the_same_svg_again(built: Path, tmp_path: Path) -> None:
+    texts = []
+    for out in (tmp_path / "one", tmp_path / "two"):
+        assert run("plot", "foam", "--kind", "lobe", "--format", "svg", "--store", built, "--out", out) == 0
+        texts.append((out / "foam-lobe.svg").read_bytes())
+    assert texts[0] == texts[1]
+    assert ElementTree.fromstring(texts[0]).tag.endswith("svg")
+
+
+def test_unknown_names_are_refused_before_anything_is_drawn(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    for command in ("plot", "gallery"):
+        assert run(command, "foam", "foan", "--store", built, "--out", tmp_path / "new") == 2
+        assert "no material 'foan' in the store; closest: foam" in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
+
+
+def test_gallery_has_a_sphere_of_each_material(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "new" / "sheet.png"
+    assert run("gallery", "--store", built, "--out", out, "--jobs", "2") == 0
+    store = brdfdb.open(built)
+    image = imread(out)[..., :3]
+    count = len(store)
+    assert f"{count} materials, {image.shape[1]} x {image.shape[0]} pixels" in capsys.readouterr().out
+    assert image.shape[1] == contact_sheet.WIDTH
+    # the first sphere stands in the upper left cell; its middle has the colour of the library
+    first = next(iter(contact_sheet.sections({name: store[name] for name in store}).values()))[0]
+    sphere = lit_sphere(first, contact_sheet.SPHERE)
+    middle = sphere[contact_sheet.SPHERE // 2, contact_sheet.SPHERE // 2, :3]
+    differences = np.abs(image - middle).max(axis=-1)
+    assert differences[:400, :200].min() < 2.0 / 255.0
+
+
+def test_names_are_broken_after_hyphens() -> None:
+    assert contact_sheet.wrapped("latex-semi-gloss-sprayed-sheetrock") == "latex-semi-gloss-\nsprayed-sheetrock"
+    assert contact_sheet.wrapped("foam") == "foam"
+    assert "".join(contact_sheet.wrapped("a-" * 40 + "b").split("\n")) == "a-" * 40 + "b"
+
+
+@pytest.mark.parametrize("command", ["plot", "gallery"])
+def test_a_missing_extra_is_named(command: str, built: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
+    from brdfdb import errors
+
+    def missing(module: str) -> None:
+        raise errors.MissingExtraError(f"{module} is not installed")
+
+    monkeypatch.setattr(errors, "import_extra", missing)
+    assert run(command, "foam", "--store", built) == 2
+    assert "is not installed" in capsys.readouterr().err

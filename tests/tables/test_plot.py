@@ -1,0 +1,143 @@
+"""Plots of tables: curves and images hold the lookups, shares add up to the albedo, bad input is refused."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from brdfdb.errors import MissingExtraError, ParameterError
+from brdfdb.geometry import radians
+from brdfdb.materials import Material
+from brdfdb.tables.albedo import directional_albedo
+from brdfdb.tables.plot import ALBEDO_DEG, albedo_shares
+from brdfdb.tables.table import Table
+from tests.tables.made_up import WAVELENGTHS, made_up
+
+mpl.use("Agg")
+
+
+@pytest.fixture
+def grey() -> Table:
+    return made_up("isotropic")
+
+
+def test_cut_draws_lookups_over_signed_angles(grey: Table) -> None:
+    axes = grey.plot.cuts([0.0, 40.0], ax=Figure().add_subplot())
+    for line, theta_i in zip(axes.lines, (0.0, 40.0), strict=True):
+        theta_r, brdf = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+        assert np.all(np.diff(theta_r) > 0.0)
+        expected = grey.lookup(radians(theta_i), 0.0, radians(np.abs(theta_r)), np.where(theta_r > 0.0, np.pi, 0.0))
+        np.testing.assert_allclose(brdf, expected, rtol=1e-12)
+    assert "[1/sr]" in axes.get_ylabel()
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == [r"$\theta_i$ = 0°", r"$\theta_i$ = 40°"]
+
+
+def test_lobe_has_the_mirror_direction_on_the_right(grey: Table) -> None:
+    axes = grey.plot.lobe(30.0, ax=Figure().add_subplot())
+    x, y = (np.asarray(values) for values in axes.lines[-1].get_data())
+    radius, angle = np.hypot(x, y), np.arctan2(x, y)
+    expected = grey.lookup(radians(30.0), 0.0, np.abs(angle), np.where(angle > 0.0, np.pi, 0.0))
+    np.testing.assert_allclose(radius / radius.max(), expected / expected.max(), rtol=1e-6)
+
+
+def test_lobe_of_an_anisotropic_table_has_two_azimuths() -> None:
+    legend = made_up("anisotropic").plot.lobe([0.0, 60.0], ax=Figure().add_subplot()).get_legend()
+    assert legend is not None
+    labels = [text.get_text() for text in legend.get_texts()]
+    assert len(labels) == 4
+    assert labels[:2] == [r"$\theta_i$ = 0°, $\phi_i$ = 0°", r"$\theta_i$ = 0°, $\phi_i$ = 90°"]
+
+
+def test_wavelengths_have_curves_and_colours_of_their_own() -> None:
+    table = made_up("isotropic", WAVELENGTHS)
+    axes = table.plot.cuts(40.0, wavelength_nm=[400.0, 600.0], ax=Figure().add_subplot())
+    lines = axes.lines
+    assert lines[0].get_color() != lines[1].get_color()
+    theta_r = np.asarray(lines[1].get_xdata())
+    expected = table.lookup(radians(40.0), 0.0, radians(np.abs(theta_r)), np.where(theta_r > 0.0, np.pi, 0.0), 600.0)
+    np.testing.assert_allclose(np.asarray(lines[1].get_ydata()), expected, rtol=1e-12)
+    assert table.plot.cuts(ax=Figure().add_subplot()).get_title(loc="left") == "random at 550 nm"
+
+
+def test_shares_add_up_to_the_albedo_of_the_table(grey: Table) -> None:
+    table = made_up("isotropic", dirac=True)
+    shares = albedo_shares(table, 0.0, None)
+    exact = directional_albedo(grey, ALBEDO_DEG).albedo[:, 0, 0]
+    # random values have a kink at every node; measured 1e-4. They differ with the azimuth of a light at the normal
+    np.testing.assert_allclose((shares["uniform part"] + shares["reflected"])[1:], exact[1:], atol=1e-3)
+    np.testing.assert_allclose(shares["specular part"], table.specular_reflectance(radians(ALBEDO_DEG)))
+
+
+def test_albedo_is_stacked_below_a_line_at_one(grey: Table) -> None:
+    axes = grey.plot.albedo(ax=Figure().add_subplot())
+    assert list(np.asarray(axes.lines[0].get_ydata())) == [1.0, 1.0]
+    assert {text.get_text() for text in axes.texts} == {"reflected", "1: everything is reflected"}
+
+
+@pytest.mark.parametrize("kind", ["in_plane", "half_difference"])
+def test_slice_is_shown_with_a_colour_bar(grey: Table, kind: str) -> None:
+    figure = Figure()
+    axes = grey.plot.slices(kind, ax=figure.add_subplot())  # type: ignore[arg-type]
+    (image,) = axes.images
+    assert image.norm.vmax == pytest.approx(float(np.asarray(image.get_array()).max()))
+    assert "[1/sr]" in figure.axes[1].get_ylabel()
+
+
+def test_new_axes_are_made_where_none_are_given(grey: Table) -> None:
+    from matplotlib import pyplot
+
+    axes = grey.plot.cuts()
+    assert axes.figure is pyplot.gcf()
+    pyplot.close("all")
+
+
+def test_bad_input_is_refused(grey: Table) -> None:
+    with pytest.raises(ParameterError, match=r"theta_i_deg: 91 is outside \[0, 90\] degrees"):
+        grey.plot.lobe(91.0, ax=Figure().add_subplot())
+    with pytest.raises(ParameterError, match="kind: 'disc' is not one of in_plane, half_difference"):
+        grey.plot.slices("disc")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="wavelength_nm: 300 is outside"):
+        made_up("isotropic", WAVELENGTHS).plot.cuts(wavelength_nm=300.0, ax=Figure().add_subplot())
+
+
+def test_missing_matplotlib_is_named_in_one_sentence(grey: Table, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.split(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtraError, match="matplotlib is not installed; it comes with pip install"):
+        grey.plot.cuts()
+
+
+def test_tables_load_no_matplotlib() -> None:
+    code = "import sys, brdfdb.tables.table; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_uniform_part_of_a_material_is_its_share() -> None:
+    source = Material(
+        name="gloss",
+        title="Gloss",
+        model="ward",
+        source="a test",
+        parameters={"rho_d": 0.2, "rho_s": 0.0, "alpha_x": 0.2, "alpha_y": 0.2},
+    )
+    table = made_up("isotropic")
+    flat = Table(
+        "gloss",
+        "r000001",
+        {"source_record": source.document()},
+        table.grid,
+        None,
+        np.full(table.values.shape, 0.2 / np.pi, np.float32),
+        None,
+    )
+    shares = albedo_shares(flat, 0.0, None)
+    np.testing.assert_allclose(shares["uniform part"], 0.2, atol=1e-3)
+    np.testing.assert_allclose(shares["lobe"], 0.0, atol=1e-3)
