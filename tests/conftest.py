@@ -1,4 +1,4 @@
-"""What all tests share: a browser; and Hypothesis, whose examples never change, and whose clock stands still."""
+"""The browser of all tests, and Hypothesis without chance and without a clock."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def test_pages_with_code_have_run(site: Path, pages: dict[Path, Page]) -> None:
 
 @pytest.fixture
 def address(site: Path) -> Iterator[str]:
-    """Where the site is served."""
+    """Serve the site, and yield its address."""
 
     class Handler(SimpleHTTPRequestHandler):
         def log_message(self, *_: object) -> None:
