@@ -10,17 +10,18 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
-from numba.core import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+# Kernels stay functions of Python, and numba is not imported. numba reads the same variable
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 SHARED = ("_elementary.py", "fresnel.py", "tables/_interpolation.py", "models/_diffraction_series.py")
 
 
@@ -41,11 +42,14 @@ def loop(function: F) -> F:
 
 
 def _compiled(function: F, *, forceinline: bool) -> F:
+    if INTERPRETED:
+        return function
+    import numba
+
     compiled: Any = numba.njit(
         cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, forceinline=forceinline
     )(function)
-    if not config.DISABLE_JIT:  # type: ignore[attr-defined]  # numba makes its settings at run time
-        _stamp(compiled._cache)
+    _stamp(compiled._cache)
     return cast(F, compiled)
 
 
@@ -68,6 +72,11 @@ def _stamp(cache: Any) -> None:
             save(*arguments)
 
     cache.save_overload = try_to_save
+
+
+def is_cached(kernel: Any) -> bool:
+    """Return True if compiled code of a kernel is stored, or kernels are not compiled at all."""
+    return INTERPRETED or bool(kernel._cache._cache_file._load_index())
 
 
 def elementwise(function: F) -> Callable[..., Any]:
@@ -93,8 +102,10 @@ def elementwise(function: F) -> Callable[..., Any]:
 
 
 def _ufunc(function: Callable[..., Any], arity: int) -> Callable[..., Any]:
-    if config.DISABLE_JIT:  # type: ignore[attr-defined]  # numba makes its settings at run time
+    if INTERPRETED:
         return np.vectorize(function, otypes=[np.float64])  # numba would compile, and fail on kernels that are Python
+    import numba
+
     ufunc = numba.vectorize(cache=True)(function)  # type: ignore[no-untyped-call]  # numba leaves it untyped
     _stamp(ufunc._dispatcher.cache)
     ufunc.add(numba.float64(*[numba.float64] * arity))

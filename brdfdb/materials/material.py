@@ -123,7 +123,9 @@ class Material(BaseModel, Lookups):
     @classmethod
     def _check_model(cls, model: str) -> str:
         if model not in MODELS:
-            raise ParameterError("model", f"{model!r} is not one of {', '.join(MODELS)}", model, tuple(MODELS))
+            raise ParameterError(
+                "model", f"{model!r} is not one of {', '.join(MODELS)}; --models FILE adds yours", model, tuple(MODELS)
+            )
         return model
 
     @field_validator("parameters")

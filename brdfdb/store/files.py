@@ -10,6 +10,8 @@ import uuid
 from pathlib import Path
 from typing import TypedDict
 
+NON_BLOCKING = getattr(os, "O_NONBLOCK", 0)  # without it the opening of a pipe waits for its writer; Windows has none
+
 
 class Entry(TypedDict):
     """A file of a revision."""
@@ -20,7 +22,7 @@ class Entry(TypedDict):
 
 def regular_bytes(path: str | Path) -> bytes:
     """Return the bytes of a regular file; OSError if it is none. A pipe would wait for its writer for good."""
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+    with open(os.open(path, os.O_RDONLY | NON_BLOCKING), "rb") as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise OSError(errno.EINVAL, "Not a regular file", str(path))
         return file.read()

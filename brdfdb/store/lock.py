@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +14,11 @@ from brdfdb.errors import (
     StoreError,
 )
 from brdfdb.store.paths import staged_path, staging_path
+
+try:
+    import fcntl
+except ModuleNotFoundError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 
 @contextmanager
@@ -42,6 +46,8 @@ class Lock:
     ------
     BusyError
         If another process, or another thread of this one, holds it.
+    StoreError
+        If the system has no file locks, or the store cannot be written.
     """
 
     def __init__(self, root: Path, name: str, *, wait: bool = True) -> None:
@@ -50,6 +56,10 @@ class Lock:
         self._handle: IO[bytes] | None = None
 
     def __enter__(self) -> Lock:
+        if fcntl is None:
+            raise StoreError(
+                f"cannot write to the store at {self.root}: this system has no file locks; use Linux or macOS"
+            )
         with writing(self.root, self.name):
             staging_path(self.root).mkdir(exist_ok=True)
             while self._handle is None:

@@ -37,19 +37,20 @@ def _page(name: str, modules: list[str]) -> str:
     lines = [name, "=" * len(name), "", f".. automodule:: {name}"]
     if shadowed := [module.rpartition(".")[2] for module in _children(name, modules)]:
         lines.append(f"   :exclude-members: {', '.join(shadowed)}")
-    for constant in _constants(name):
-        lines += ["", f".. autodata:: {name}.{constant}", "   :no-value:"]
+    for constant, kind in _constants(name).items():
+        lines += ["", f".. py:data:: {constant}", f"   :module: {name}", f"   :type: {kind}"]
     if below:
         lines += ["", "Modules", "-------", "", *_listed(below, f"{name}.")]
     return "\n".join(lines) + "\n"
 
 
-def _constants(name: str) -> list[str]:
-    """Return the names that a module exports beside classes, functions and modules."""
+def _constants(name: str) -> dict[str, str]:
+    """Return the names that a module exports beside classes, functions and modules, with their types."""
     module = importlib.import_module(name)
     exported = {constant: getattr(module, constant) for constant in getattr(module, "__all__", ())}
     others = (inspect.isclass, inspect.isroutine, inspect.ismodule)
-    return [constant for constant, value in exported.items() if not any(kind(value) for kind in others)]
+    constants = {key: value for key, value in exported.items() if not any(kind(value) for kind in others)}
+    return {key: type(value).__name__.lstrip("_") for key, value in constants.items()}
 
 
 def _index(modules: list[str]) -> str:

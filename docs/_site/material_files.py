@@ -10,12 +10,16 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
+from matplotlib import pyplot, rc_context
+from matplotlib.image import imsave
+
 from _site.files import write_page
 from brdfdb.formats import EXPORTERS
 from brdfdb.materials import Material
+from brdfdb.scenes.lit_sphere import lit_sphere
 from brdfdb.store.reader import Store
 
-PICTURES = False
+SIZE = 192  # pixels across a picture
 _KIND = "half_difference"  # of slices: the smallest of the three kinds
 
 
@@ -26,12 +30,23 @@ def write(folder: Path, store: Store, materials: Iterable[Material]) -> None:
         name = material.name
         group = store.path(name)
         write_page(folder / f"{name}.toml", recipe(name))
-        archive, image = folder / f"{name}.zarr.zip", folder / f"{name}.exr"
         built = (group / "zarr.json").stat().st_mtime
-        if not archive.exists() or archive.stat().st_mtime < built:
+        archive, image, ball, plot = (folder / f"{name}{suffix}" for suffix in (".zarr.zip", ".exr", ".png", ".svg"))
+        if not _newer(archive, built):
             _zip(group, archive)
-        if not image.exists() or image.stat().st_mtime < built:
+        if not _newer(image, built):
             EXPORTERS["exr"].write(store[name], image, kind=_KIND)
+        if not _newer(ball, built):
+            imsave(ball, lit_sphere(store[name], SIZE), metadata={"Software": ""})
+        if not _newer(plot, built):
+            with rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
+                canvas = store[name].plot.lobe().get_figure()
+                canvas.savefig(plot, metadata={"Date": None})
+                pyplot.close(canvas)
+
+
+def _newer(path: Path, built: float) -> bool:
+    return path.exists() and path.stat().st_mtime > built
 
 
 def links(name: str) -> str:
@@ -42,6 +57,7 @@ def links(name: str) -> str:
             '`xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))`',
             f"* {{download}}`A slice <files/{name}.exr>` over half and difference angles as OpenEXR, a channel a "
             f"wavelength; `brdfdb export exr {name}` writes all slices",
+            f"* {{download}}`The plot of the lobe <files/{name}.svg>`; `brdfdb plot {name}` draws others",
             f"* {{download}}`A recipe <files/{name}.toml>` that builds this material alone: "
             f"`brdfdb build {name}.toml --store my-store`",
             "",
@@ -49,9 +65,15 @@ def links(name: str) -> str:
     )
 
 
-def picture(name: str, title: str) -> str:
-    """Return the picture of a material for its page."""
-    return f"![{title}](files/{name}.png)\n" if PICTURES else ""
+def pictures(name: str, title: str) -> str:
+    """Return the sphere and the lobe of a material for its page."""
+    sphere = f"{title}: a sphere under the same light as those of all pages"
+    lobe = f"f_r of {title} in the plane of incidence, as a polar plot"
+    return "\n".join([_image(f"{name}.png", sphere, "dark-light"), _image(f"{name}.svg", lobe, "lobe")])
+
+
+def _image(file: str, text: str, kind: str) -> str:
+    return f":::{{image}} files/{file}\n:alt: {text}\n:class: {kind}\n:::\n"
 
 
 def recipe(name: str) -> str:

@@ -59,9 +59,10 @@ def _paper(material: Material) -> Paper:
 
 
 def _card(material: Material, judged: MaterialAudit) -> Card:
-    picture = f'<img src="../../_images/{material.name}.png" alt="" loading="lazy" width="256" height="256">'
+    size = f'width="{material_files.SIZE}" height="{material_files.SIZE}"'
+    picture = f'<img class="dark-light" src="../../_images/{material.name}.png" alt="" loading="lazy" {size}>'
     text = f"{material.spec.title}: {judged.verdict}"
-    return Card(f"{material.name}.html", material.title, text, picture if material_files.PICTURES else "")
+    return Card(f"{material.name}.html", material.title, text, picture)
 
 
 def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[audit.Plot]) -> str:
@@ -74,7 +75,7 @@ def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[
         WIDE,
         f"# {plain(material.title)}\n",
         raw(f'<p class="under"><code>{name}</code> {chip(judged.verdict)} {largest}</p>'),
-        material_files.picture(name, material.title),
+        material_files.pictures(name, material.title),
         f"Model: {{py:obj}}`{spec.title} <brdfdb.models.{spec.name}>`, {plain(spec.equation)}, of "
         f"{cited(spec.reference)}.",
         f"Source: {plain(material.source)}.\n",

@@ -17,6 +17,8 @@ from brdfdb.atlas import ATLAS
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError
 from brdfdb.gallery import GALLERY
+from brdfdb.models import MODELS
+from brdfdb.store.reader import Store
 from brdfdb_pipelines import audit_page, terminal, workers
 
 Task = Callable[[], Any]
@@ -81,7 +83,7 @@ def run(
     tasks |= {f"figure {key}": partial(_drawn, key) for key in drawn}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
-        task = bar.add_task("auditing", total=len(tasks))
+        task = bar.add_task("auditing tables, computing figures", total=len(tasks))
         for name, outcome in _outcomes(tasks, jobs):
             done[name] = outcome
             bar.advance(task)
@@ -157,7 +159,16 @@ def _drawn(key: str) -> Section:
     return Section(figure, audit_page.plots_of(figure))
 
 
+def _why(store: Store, name: str) -> str:
+    """Return the reason why the source of a table cannot be evaluated."""
+    model = store.metadata(name).model
+    if model is None or model in MODELS:
+        return "its source cannot be evaluated"
+    return f"its model {model} is not known here, --models FILE or $BRDFDB_MODELS adds it"
+
+
 def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
+    store = Store(root)
     audits, columns = audit_report.materials, audit_page.columns()
     terminal.print_table(
         f"Audit of {root}, the tables as interpolated",
@@ -169,17 +180,19 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
         for problem in a.problems():
             print(f"{a.material}: {problem}")
         if a.not_judged:
-            print(f"{a.material}: its source cannot be evaluated; not judged: {', '.join(a.not_judged).lower()}")
+            print(f"{a.material}: {_why(store, a.material)}; not judged: {', '.join(a.not_judged).lower()}")
     for key, kind in FINDINGS.items():
         for sentence in kind.overview([a.findings[key] for a in audits]):
             print(sentence)
     known = sum(a.verdict == "known published excess" for a in audits)
     accepted = sum(a.verdict == "accepted excess" for a in audits)
     violating = len(audit_report.violations)
+    partly = sum(bool(a.not_judged) for a in audits)
+    not_whole = f"{partly} only in part, for lack of a source; " if partly else ""
     allowed = f"{accepted} exceed 1 as --allow accepts, " if accepted else ""
     page_path = report_path.with_suffix(".html")
     print(
-        f"{len(audits)} audited: {len(audits) - known - accepted - violating} pass, {known} exceed 1 as "
+        f"{len(audits)} audited: {not_whole}{len(audits) - known - accepted - violating} pass, {known} exceed 1 as "
         f"their published parameters are known to, {allowed}{violating} violate; page {page_path}, "
         f"data {report_path}"
     )

@@ -56,6 +56,7 @@ class Bars:
 
     def __init__(self) -> None:
         self._progress = terminal.progress(counted=False, text="{task.fields[rate]}")
+        self._kernels: TaskID | None = None
         self._overall: TaskID | None = None
         self._tables: dict[str, TaskID] = {}
 
@@ -71,10 +72,16 @@ class Bars:
     def __call__(self, event: Event) -> None:
         """Show an event."""
         match event["event"]:
+            case "compiling":
+                self._kernels = self._begun("compiling, once after an installation", event["kernels"], "kernels")
+            case "compiled" if self._kernels is not None:
+                self._advance(self._kernels)
             case "start":
-                self._overall = self._progress.add_task("planning", total=event["tables"], rate="")
+                if self._kernels is not None:
+                    self._progress.remove_task(self._kernels)
+                self._overall = self._begun("planning", event["tables"], "tables")
             case "surveyed" if self._overall is not None:
-                self._progress.advance(self._overall)
+                self._advance(self._overall)
             case "planned" if self._overall is not None:
                 self._progress.reset(
                     self._overall, description="tabulating", total=event["values"], completed=0, rate=""
@@ -93,6 +100,15 @@ class Bars:
             case "published" | "adopted" | "unchanged":
                 if (task := self._tables.pop(event["material"], None)) is not None:
                     self._progress.remove_task(task)
+
+    def _begun(self, description: str, total: int, unit: str) -> TaskID:
+        return self._progress.add_task(description, total=total, unit=unit, rate=f"0/{total} {unit}")
+
+    def _advance(self, task: TaskID) -> None:
+        """Advance a bar by one of its units, and say how many of them are done."""
+        self._progress.advance(task)
+        bar = self._progress.tasks[self._progress.task_ids.index(task)]
+        self._progress.update(task, rate=f"{bar.completed:.0f}/{bar.total:.0f} {bar.fields['unit']}")
 
     def _family(self, event: Event) -> None:
         name = event["family"]

@@ -50,8 +50,10 @@ def table_bytes(layout: Layout) -> int:
     return layout.size * (9 + layout.bits) // 8
 
 
-def machine_memory() -> int:
-    """Return the memory [byte] of this machine."""
+def machine_memory() -> int | None:
+    """Return the memory [byte] of this machine; None where the system does not tell."""
+    if not hasattr(os, "sysconf"):
+        return None
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 

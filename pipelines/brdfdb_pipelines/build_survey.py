@@ -6,7 +6,10 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from brdfdb.errors import BusyError
+import numpy as np
+
+from brdfdb.errors import BusyError, ParameterError
+from brdfdb.geometry import unit_vector
 from brdfdb.store.lock import Lock
 from brdfdb.store.paths import material_path, pointer_path, request_path
 from brdfdb.store.revisions import Standing, standing
@@ -14,6 +17,9 @@ from brdfdb.store.staging import planned, prepare
 from brdfdb.tables.layout import Layout, digest
 from brdfdb_pipelines import build_resources
 from brdfdb_pipelines.recipe_file import Job
+
+_THETA_DEG = (0.0, 30.0, 60.0, 85.0)
+_PHI_DEG = (0.0, 90.0, 180.0)
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,7 @@ def survey(root: str, job: Job) -> Survey:
         return Survey(status, head)
     text = planned(store, name, request)
     if text is None:
+        check_values(job)
         text = json.dumps(job.layout().document())
         try:
             with Lock(store, name, wait=False):
@@ -55,6 +62,30 @@ def survey(root: str, job: Job) -> Survey:
     staged = build_resources.stored_bytes([request_path(store, name, digest(request)) / "table"])
     disk = max(0, build_resources.table_bytes(layout) - staged)
     return Survey(status, head, text, tuple(layout.shape), values, build_resources.task_bytes(layout), disk)
+
+
+def check_values(job: Job) -> None:
+    """Raise ParameterError if the model gives values at a few directions that no BRDF has: nan, infinite, negative."""
+    theta, phi = np.radians(_THETA_DEG), np.radians(_PHI_DEG)
+    theta_i, theta_r, phi_r = (axis.ravel() for axis in np.meshgrid(theta, theta, phi))
+    wi, wr = unit_vector(theta_i, np.zeros_like(phi_r)), unit_vector(theta_r, phi_r)
+    wavelength_nm = job.wavelength_nm
+    f_r = job.material.lookup_vectors(wi, wr, None if wavelength_nm is None else wavelength_nm[:: wavelength_nm.size])
+    values = np.reshape(f_r, (len(wi), -1))[:, 0]
+    wrong = ~(np.isfinite(values) & (values >= 0.0))
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        where = ", ".join(
+            f"{name} {np.degrees(angle[at]):.0f}"
+            for name, angle in (("theta_i", theta_i), ("theta_r", theta_r), ("phi_r", phi_r))
+        )
+        given = ", ".join(f"{name} = {value}" for name, value in job.material.file_parameters().items())
+        raise ParameterError(
+            job.material.name,
+            f"its model {job.material.model} with {given} gives {values[at]:.3g} /sr at {where} degrees; f_r must be "
+            "finite and not negative",
+            float(values[at]),
+        )
 
 
 def head_of(root: Path, name: str) -> str:

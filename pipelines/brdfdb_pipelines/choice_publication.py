@@ -41,7 +41,7 @@ def build(root: Path, layouts: Mapping[str, Layout]) -> dict[str, Built]:
     """
     built = {}
     with terminal.progress() as bar:
-        task = bar.add_task("building", total=len(layouts))
+        task = bar.add_task("building tables", total=len(layouts))
         for name, layout in layouts.items():
             built[name] = _build(root, name, layout)
             bar.advance(task)

@@ -62,7 +62,8 @@ class _Parser(argparse.ArgumentParser):
         choices = [str(choice) for choice in action.choices]
         near = difflib.get_close_matches(str(value), choices, n=1)
         hint = f"did you mean {near[0]}?" if near else f"choose from {', '.join(choices)}"
-        raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {hint}")
+        more = "" if near else getattr(action, "hint", "")
+        raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {hint}{more}")
 
 
 class _Version(argparse.Action):
@@ -80,7 +81,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that lacks a letter shows ? in its place
-    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments is None:
+        arguments = sys.argv[1:]
+        command = next((text for text in arguments if not text.startswith("-")), "")
+        if command == "lookup" and "BRDFDB_MODELS" not in os.environ:
+            os.environ.setdefault("NUMBA_DISABLE_JIT", "1")  # loading compiled kernels takes longer than one value
     options = _parser().parse_args(arguments, argparse.Namespace(arguments=arguments))
     try:
         _add_models(options)

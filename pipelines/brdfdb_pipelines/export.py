@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import brdfdb
+from brdfdb.errors import counted
 from brdfdb.formats import EXPORTERS
 from brdfdb_pipelines import terminal
 
@@ -22,7 +23,7 @@ def run(root: Path, names: list[str], directory: Path, file_format: str, options
     directory.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
     with terminal.progress() as bar:
-        for name in bar.track(revisions, description="exporting"):
+        for name in bar.track(revisions, description="exporting tables"):
             table = store[name]
             for kind in kinds:
                 written.append(directory / f"{name}_{kind}{exporter.suffix}")
@@ -31,4 +32,4 @@ def run(root: Path, names: list[str], directory: Path, file_format: str, options
                 written.append(directory / f"{name}{exporter.suffix}")
                 exporter.write(table, written[-1], **options)
     total = sum(path.stat().st_size for path in written)
-    print(f"{len(written)} {file_format.upper()} files, {terminal.size(total)}, in {directory}")
+    print(f"{counted(len(written), f'{file_format.upper()} file')}, {terminal.size(total)}, in {directory}")

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, FailFast, Field, Tag,
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.materials import Material, presets, written_name
 from brdfdb.models import MODELS
+from brdfdb.parameters import closest
 from brdfdb.store.family import Sweep
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest
@@ -326,7 +327,10 @@ class Recipe(BaseModel):
             for family in fnmatch.filter(families, pattern):
                 matches += families[family]
             if not matches:
-                raise RecipeError("materials", f"{pattern!r} matches no material; `brdfdb list --presets` names them")
+                near = closest(pattern, [*known, *families])
+                raise RecipeError(
+                    "materials", f"{pattern!r} matches no material{near}; `brdfdb list --presets` names them"
+                )
             chosen |= {name: known[name] for name in matches}
         return list(chosen.values())
 

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+_FOLDED = 8  # width of a column of text below which a table is wider than the terminal instead
 _MANY = 200  # rows that rich lays out in a tenth of a second; longer tables are printed plainly
 
 
@@ -58,15 +59,29 @@ def print_table(
         return
     table = Table(header_style="bold", box=None, pad_edge=False)
     for column in columns:
-        table.add_column(column, justify="right" if column in numbers else "left", overflow="fold")
+        number = column in numbers
+        whole = number or column == columns[0]  # names and numbers are never cut: other columns take more lines
+        table.add_column(column, justify="right" if number else "left", overflow="fold", no_wrap=whole)
     for row in rows:
         table.add_row(*row)
     console = Console(markup=False, emoji=False, highlight=False)  # a name may hold [brackets] and :colons:
     if not console.is_terminal:
         console.width = 10_000
         console.width = console.measure(table).maximum
+    elif _least_width(columns, rows, numbers) > console.width:  # names and numbers alone are wider than the terminal
+        _print_plainly(title, columns, rows, numbers)
+        return
     console.print(title, style="bold", soft_wrap=True)
     console.print(table)
+
+
+def _least_width(columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[str]) -> int:
+    """Return the width [1] of a table whose names and numbers are whole, and whose other columns are folded."""
+    widths = [max(map(cell_len, cells)) for cells in zip(columns, *rows, strict=True)]
+    whole = [column in (columns[0], *numbers) for column in columns]
+    return sum(width if keep else min(width, _FOLDED) for width, keep in zip(widths, whole, strict=True)) + 2 * len(
+        columns
+    )
 
 
 def _print_plainly(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[str]) -> None:

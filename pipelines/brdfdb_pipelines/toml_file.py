@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from brdfdb.errors import BrdfdbError
+from brdfdb.store.files import NON_BLOCKING
 
 MOST_BYTES = 4_000_000  # size of a file [byte]: tomllib reads about a megabyte a second
 MOST_KEY_PARTS = 64  # parts of a dotted key; the memory of tomllib grows with their square
@@ -71,7 +72,7 @@ def _check_integers(value: Any) -> None:
 
 def _bounded(path: Path) -> bytes:
     """Return the bytes of a regular file; a pipe or a device is never read, as it may have no end."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # without O_NONBLOCK a pipe waits for its writer
+    descriptor = os.open(path, os.O_RDONLY | NON_BLOCKING)
     with open(descriptor, "rb") as file:
         status = os.fstat(descriptor)
         if stat.S_ISDIR(status.st_mode):

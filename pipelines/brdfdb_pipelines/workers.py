@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from brdfdb.errors import BrdfdbError, import_extra
+from brdfdb.errors import BrdfdbError, ParameterError, import_extra
 
 _CONNECT_S = 10  # time for the scheduler to answer [s]
 _ASK_S = 1.0  # interval [s] at which a cluster is asked for its size, which may grow
@@ -68,9 +68,13 @@ def cluster(address: str) -> Iterator[Workers]:
     ------
     WorkersError
         If nothing answers there; from `slots`, if the scheduler is gone.
+    ParameterError
+        If the address has no port.
     MissingExtraError
         If dask is not installed.
     """
+    if ":" not in address:  # dask waits for half a minute, and then prints a traceback of its own
+        raise ParameterError("--scheduler", f"{address!r} is no address, such as tcp://10.0.0.1:8786", address)
     distributed: Any = import_extra("distributed")
     # a dead scheduler is one sentence of ours; dask sets levels of its own loggers
     for name in ("distributed", "distributed.client", "distributed.core", "tornado", "asyncio"):

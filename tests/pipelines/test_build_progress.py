@@ -30,8 +30,15 @@ def test_lines_are_json_and_bars_are_on_stderr(capsys: pytest.CaptureFixture[str
     assert (json.loads(out), err) == ({"event": "unchanged", "material": "Größe", "revision": "r000001"}, "")
     block = {"event": "block", "blocks": 2, "kept": False, "values_total": 4, "values_per_s": 2e6, "seconds_left": 0.0}
     with Bars() as bars:
+        bars({"event": "compiling", "kernels": 2})
+        bars({"event": "compiled"})
+        (compiling,) = bars._progress.tasks
+        assert (compiling.description, compiling.completed) == ("compiling, once after an installation", 1)
+        assert compiling.fields["rate"] == "1/2 kernels"
         bars({"event": "start", "tables": 2, "store": "store"})
         bars({"event": "surveyed", "material": "white", "state": "missing", "why": "new"})
+        (overall,) = bars._progress.tasks
+        assert overall.fields["rate"] == "1/2 tables"
         bars({"event": "planned", "tables": 2, "values": 4})
         bars({"event": "waiting", "material": "grey"})
         bars({**block, "material": "white", "block": 0, "values_done": 2})

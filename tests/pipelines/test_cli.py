@@ -101,7 +101,7 @@ def test_build_shows_progress_on_stderr_and_a_table_on_stdout(
     assert "tabulating" in err
     assert "tabulating" not in out
     lines = out.splitlines()
-    assert lines[0].startswith("5 tables, 0.0 million values, in ")
+    assert lines[0].startswith("5 tables, 17294 values, in ")
     assert lines[1].split() == ["material", "model", "shape", "revision", "stored", "why"]
     assert [line.split()[0] for line in lines[2:7]] == names
     assert lines[2].split()[:8] == ["foam", "oren_nayar_body_surface", "11", "x", "11", "x", "13", "r000001"]

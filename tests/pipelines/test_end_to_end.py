@@ -71,7 +71,7 @@ def test_on_a_node_the_answer_is_the_model(name: str, built: Path, recipe: Path)
 
 def test_every_table_is_audited(built: Path, names: list[str], tmp_path: Path) -> None:
     report = tmp_path / "audit.json"
-    code = cli.main(["audit", "--no-figures", "--store", str(built), "--report", str(report)])
+    code = cli.main(["audit", "--no-figures", "--jobs", "1", "--store", str(built), "--report", str(report)])
     entries = {entry["material"]: entry for entry in json.loads(report.read_bytes())["materials"]}
     assert sorted(entries) == sorted(names)
     for entry in entries.values():

@@ -25,6 +25,7 @@ from tests.pipelines.recipes import anisotropic, isotropic, material
 KILLS = 50
 SEED = 20261121
 WAIT_S = 60.0
+PAUSE_S = 0.005  # between reads: the builds need the processor, too
 
 
 def constant(step: int, rho: float) -> str:
@@ -118,7 +119,7 @@ class Reader(threading.Thread):
     def run(self) -> None:
         seen: dict[str, int] = {}
         try:
-            while not self.over.is_set():
+            while not self.over.wait(PAUSE_S):
                 for name in ("grey", "white"):
                     try:
                         table = brdfdb.open(self.root)[name]

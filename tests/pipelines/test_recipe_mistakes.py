@@ -14,6 +14,11 @@ from brdfdb_pipelines import cli
 from tests.pipelines.recipes import DEFINED, GOOD, SWEPT
 
 COPPER = GOOD.replace("foam", "scene-copper-sphere")
+PLAIN = """\
+theta_i_deg = [{ start = 0, stop = 80, step = 40 }]
+theta_r_deg = [0, 80]
+delta_phi_deg = [0, 180]
+"""
 
 
 def tree(root: Path) -> dict[str, bytes]:
@@ -45,8 +50,7 @@ BAD = [
     changed('materials = ["foam"]\n', "", "materials: is missing"),
     changed("wavelengths_nm = [500, 550]\n", "", "wavelengths_nm: is missing; scene-copper-sphere is spec", COPPER),
     changed(
-        "[grids.isotropic]\ntheta_i_deg = [{ start = 0, stop = 80, step = 40 }]\n"
-        "theta_r_deg = [0, 80]\ndelta_phi_deg = [0, 180]\n",
+        "[grids.isotropic]\n" + PLAIN,
         "",
         "grids.isotropic: is missing; foam needs it",
     ),

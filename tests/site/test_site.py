@@ -101,7 +101,7 @@ def test_every_material_has_a_page_with_its_verdict_and_files(site: Path, pages:
         page = pages[site / "gallery" / "materials" / f"{name}.html"]
         assert {"chip", "plots"} <= page.classes
         files = {link.rpartition("/")[2] for link in page.links if "_downloads" in link}
-        assert {f"{name}.zarr.zip", f"{name}.exr", f"{name}.toml"} <= files
+        assert {f"{name}.zarr.zip", f"{name}.exr", f"{name}.svg", f"{name}.toml"} <= files
         assert f"gallery/materials/{name}.html" in {
             path.relative_to(site).as_posix() for path in pages if path.parent.name == "materials"
         }

@@ -36,10 +36,15 @@ def add_jobs(parser: argparse.ArgumentParser, workers: str) -> None:
     parser.add_argument(
         "--jobs",
         type=whole_number(MOST_JOBS),
-        default=len(os.sched_getaffinity(0)),
+        default=processors(),
         metavar="N",
         help=f"{workers} (default: %(default)s)",
     )
+
+
+def processors() -> int:
+    """Return the number of processors that this process may use; of all, where the system does not tell."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def add_out(parser: argparse.ArgumentParser, directory: str) -> None:

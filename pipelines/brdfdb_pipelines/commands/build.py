@@ -60,6 +60,7 @@ def _build(options: argparse.Namespace) -> None:
     from brdfdb_pipelines import build_resources, recipe_file, workers
     from brdfdb_pipelines.build import build
     from brdfdb_pipelines.build_progress import Bars, Lines
+    from brdfdb_pipelines.compilation import compile_kernels
 
     recipe = recipe_file.load(options.recipe)
     start = time.perf_counter()
@@ -71,6 +72,8 @@ def _build(options: argparse.Namespace) -> None:
         memory = build_resources.machine_memory() if memory is None else memory
         at = (workers.processes if options.processes else workers.threads)(options.jobs)
     with at as opened, Lines() if options.json else Bars() as report:
+        if not options.scheduler:
+            compile_kernels(recipe, options.store, options.jobs, report)
         built = build(recipe, options.store, opened, report, memory=memory)
     if not options.json:
         _print(built, options.store, time.perf_counter() - start)
@@ -78,13 +81,15 @@ def _build(options: argparse.Namespace) -> None:
 
 def _print(built: list[Built], root: Path, seconds: float) -> None:
     """Print a line for each table that is not as it was before."""
+    from brdfdb.errors import counted
     from brdfdb_pipelines import terminal
 
     changed = [one for one in built if one.state != "unchanged"]
     if changed:
         values = sum(math.prod(one.shape) for one in changed if one.shape)
+        amount = f"{values / 1e6:.1f} million values" if values >= 1e5 else counted(values, "value")
         terminal.print_table(
-            f"{len(changed)} tables, {values / 1e6:.1f} million values, in {seconds:.1f} s",
+            f"{counted(len(changed), 'table')}, {amount}, in {seconds:.1f} s",
             ("material", "model", "shape", "revision", "stored", "why"),
             [
                 (
@@ -100,5 +105,5 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
             numbers=("shape", "stored"),
         )
     if len(changed) < len(built):
-        print(f"{len(built) - len(changed)} tables unchanged")
+        print(f"{counted(len(built) - len(changed), 'table')} unchanged")
     print(f"{terminal.size(sum(one.stored_bytes for one in built))} in {root}")

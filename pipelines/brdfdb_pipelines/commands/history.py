@@ -17,12 +17,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print a line for each revision of the material, oldest first."""
+    from brdfdb.errors import counted
     from brdfdb.store import revisions
     from brdfdb_pipelines import terminal
 
     history = revisions.history(options.store, options.name)
     terminal.print_table(
-        f"{len(history)} revisions of {options.name} in {options.store}",
+        f"{counted(len(history), 'revision')} of {options.name} in {options.store}",
         ("revision", "built", "model", "version", "stored", "request", ""),
         [
             (

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import brdfdb
-from brdfdb.errors import StoreError
+from brdfdb.errors import StoreError, counted
 from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 
 if TYPE_CHECKING:
@@ -53,13 +53,16 @@ def _print_materials(store: Store, root: Path) -> list[str]:
         try:
             head = store.summary(name)
             if not (head["title"] and head["model"]):  # the pointer of a whole table has both
-                incomplete.append(f"{name} {head['revision']} {store.metadata(name).gaps}")
+                gaps = store.metadata(name).gaps
+                incomplete += [f"{name} {head['revision']} {gaps}"] if gaps else []  # a function has no model
         except StoreError as error:
             damaged.append(str(error))
             continue
-        rows.append((name, head["title"], head["model"], terminal.error(head.get("error_p99")), head["revision"]))
+        rows.append(
+            (name, head["title"], head["model"] or "function", terminal.error(head.get("error_p99")), head["revision"])
+        )
     terminal.print_table(
-        f"{len(rows)} materials in {root}",
+        f"{counted(len(rows), 'material')} in {root}",
         ("material", "title", "model", "error (p99)", "revision"),
         rows,
         numbers=("error (p99)",),
@@ -86,5 +89,10 @@ def _print_families(store: Store) -> list[str]:
         rows.append((name, record.get("title", ""), record.get("model", ""), tables, axes, terminal.error(p99)))
     if rows:
         columns = ("family", "title", "model", "tables", "over", "error (p99)")
-        terminal.print_table(f"{len(rows)} families", columns, rows, numbers=("tables", "error (p99)"))
+        terminal.print_table(
+            f"{len(rows)} {'family' if len(rows) == 1 else 'families'}",
+            columns,
+            rows,
+            numbers=("tables", "error (p99)"),
+        )
     return damaged

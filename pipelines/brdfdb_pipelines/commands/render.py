@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     except ParameterError as error:
         raise scene_file.SceneError(name, error.parameter, error.sentence) from None
     with terminal.progress() as bar:
-        task = bar.add_task("rendering", total=len(view.points))
+        task = bar.add_task("rendering points", total=len(view.points))
         radiance = render(scene, view, materials=materials, progress=lambda: bar.advance(task))
     directory.mkdir(parents=True, exist_ok=True)
     stem = directory / Path(name).stem

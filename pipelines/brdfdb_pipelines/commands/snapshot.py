@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import ParameterError, counted
 from brdfdb_pipelines.commands._arguments import add_store
 
 HELP = (
@@ -44,7 +44,7 @@ def _create(root: Path, name: str) -> None:
     from brdfdb_pipelines import terminal
 
     with terminal.progress() as bar:
-        task = bar.add_task("reading every file", total=len(Store(root)))
+        task = bar.add_task("reading tables", total=len(Store(root)))
         digest = snapshots.create(root, name, lambda: bar.advance(task))
     print(f"{_contents(root, name)}; sha256 {digest}")
 
@@ -67,4 +67,4 @@ def _contents(root: Path, name: str) -> str:
     from brdfdb.store.snapshot_record import read_snapshot
 
     content = read_snapshot(root, name)
-    return f"{name}: {len(content['materials'])} materials, {len(content['families'])} families"
+    return f"{name}: {counted(len(content['materials']), 'material')}, {len(content['families'])} families"

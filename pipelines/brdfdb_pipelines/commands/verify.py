@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Verify materials and families, by default all of the store and its snapshots; print each damage."""
-    from brdfdb.errors import UnknownMaterialError
+    from brdfdb.errors import UnknownMaterialError, counted
     from brdfdb.store import verification
     from brdfdb.store.reader import Store
     from brdfdb_pipelines import terminal
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
             raise UnknownMaterialError(name, [*store, *families])
     findings, total = [], 0
     with terminal.progress() as bar:
-        task = bar.add_task("verifying", total=len(wanted))
+        task = bar.add_task("verifying tables", total=len(wanted))
         for name in wanted:
             size, wrong = (verification.material if name in store else verification.family)(root, name)
             total += size
@@ -46,7 +46,8 @@ def run(options: argparse.Namespace) -> int:
     for finding in findings:
         print(f"brdfdb: {finding}", file=sys.stderr)
     family_count = sum(name not in store for name in wanted)
-    what = f"{len(wanted) - family_count} materials" + (f" and {family_count} families" if family_count else "")
+    what = counted(len(wanted) - family_count, "material")
+    what += f" and {family_count} {'family' if family_count == 1 else 'families'}" if family_count else ""
     damaged = len({finding.name for finding in findings if not finding.remark})
     print(f"{what} verified, {terminal.size(total)}: {damaged or 'none'} damaged")
     return REFUSED if damaged else 0
