@@ -37,6 +37,7 @@ _ROWS, _COLUMNS, _COARSE = 385, 768, 8
 # Standard deviations of the blurred light, and the radius of a sample from which each is used
 _BLURS_DEG = np.array([3.5, 7.0])
 _BLURS_FROM = radians(np.array([1.2, 2.4]))
+_BLOCKS = 12  # of normals of anisotropic surfaces, so that arrays stay in the cache
 _ACROSS = 3  # points across each pixel, and down
 
 
@@ -106,7 +107,8 @@ def sphere_radiance(surface: Source | BaseTable, theta: Array, phi: Array, light
     shown = _shown(surface)
     nodes = radians(np.linspace(0.0, _LAST_DEG, _THETAS))
     sky = _tabulated(light)
-    grid, turn = _reflected(shown, nodes, sky), phi / (2.0 * np.pi)
+    blocks = np.array_split(nodes, _BLOCKS if shown.surface.anisotropic else 1)
+    grid, turn = np.concatenate([_reflected(shown, block, sky) for block in blocks]), phi / (2.0 * np.pi)
     places = np.stack([np.minimum(theta / nodes[-1], 1.0) * (_THETAS - 1), turn * _PHIS])
     values = np.stack([_interpolated(channel, places) for channel in np.moveaxis(grid, -1, 0)], axis=-1)
     mirror = shown.specular(nodes)
