@@ -20,6 +20,7 @@ from brdfdb.audit.model_energy import (
     model_energy_of,
 )
 from brdfdb.audit.table_energy import TableEnergy, table_energy_of
+from brdfdb.errors import counted
 from brdfdb.figure import Map, Panel, number
 from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
@@ -111,20 +112,22 @@ class Energy(Finding):
         """Return a sentence on tables that exceed 1 where their models do not, and on models that lose light."""
         energies = [finding for finding in findings if isinstance(finding, Energy)]
         sentences = []
-        if any(energy.table.verdict == "violates" for energy in energies):
+        coarse = [energy for energy in energies if energy.table.verdict == "violates"]
+        if any(energy.model is None or energy.model.verdict in ("conserves", "loses") for energy in coarse):
             sentences.append(
                 "a table whose grid is too coarse for its lobe can exceed 1 where its model does not: try a finer grid"
             )
         within = sum(energy.table.verdict == "passes" and bool(energy.table.reason) for energy in energies)
         if within:
             sentences.append(
-                f"{within} exceed 1 by no more than the error that they state, or that of the integration, and pass"
+                f"{counted(within, 'table')} above 1 by no more than the stated error, or that of the integration, "
+                f"{'passes' if within == 1 else 'pass'}"
             )
         losing = sum(energy.verdict == "loses" for energy in energies)
         if losing:
             sentences.append(
-                f"{losing} are of models that lose light even where nothing absorbs it: the report says how much, and "
-                "where"
+                f"{counted(losing, 'table')} of {'a model that loses' if losing == 1 else 'models that lose'} light "
+                "even where nothing absorbs it: the report says how much, and where"
             )
         return sentences
 
