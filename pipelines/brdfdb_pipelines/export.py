@@ -21,7 +21,7 @@ def run(root: Path, names: list[str], directory: Path, file_format: str, options
 
     A format with several kinds of files writes one of each, NAME_KIND.SUFFIX, unless the options choose a kind.
     """
-    exporter, store = EXPORTERS[file_format], brdfdb.open(root)
+    store = brdfdb.open(root)
     revisions = {name: store.head(name) for name in names or store}
     directory.mkdir(parents=True, exist_ok=True)
     write = partial(_write, store, directory=directory, file_format=file_format, options=options)
