@@ -37,6 +37,7 @@ autodoc_typehints = "none"  # the docstrings state types, units and ranges
 napoleon_google_docstring = False
 napoleon_use_ivar = True
 napoleon_use_param = napoleon_use_rtype = False  # types are words such as "array (N, 3)", not names to link
+smartquotes = False  # messages and options are copied from pages
 default_role = "py:obj"  # single backquotes in docstrings: a link where a name is known
 add_module_names = False
 toc_object_entries_show_parents = "hide"

@@ -171,7 +171,8 @@ def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: f
             return replace(finished, reason=_reason(finished, tolerance, table_kinds))
     raise ParameterError(
         "tolerance",
-        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for more error",
+        f"{tolerance:g} takes more than {MOST_VALUES} values of {source.name}; ask for another error, "
+        "or say grazing_pole if f_r has a pole or a root at the horizon",
         tolerance,
     )
 
