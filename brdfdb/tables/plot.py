@@ -186,8 +186,8 @@ class Plot:
         ParameterError, MissingExtraError
             As of `lobe`.
         """
+        wavelength = self._wavelength(wavelength_nm)
         axes = _axes(ax, (6.4, 3.9))
-        (wavelength,) = self._wavelengths(wavelength_nm)
         shares = albedo_shares(self.table, float(radians(phi_i_deg)), wavelength)
         kept = {label: share for label, share in shares.items() if np.max(share) > 0.0} or {"reflected": np.zeros(21)}
         colours = [COLOURS[list(shares).index(label) % len(COLOURS)] for label in kept]
@@ -250,12 +250,12 @@ class Plot:
         }
         if kind not in ways:
             raise ParameterError("kind", f"{kind!r} is not one of {', '.join(ways)}", kind, tuple(ways))
+        wanted = self._wavelength(wavelength_nm)
         axes = _axes(ax, (6.4, 3.6))
         picture = _SLICES[kind](self.table)
         values, stored = picture.values, self.table.wavelength_nm
         at = None
         if stored is not None:
-            (wanted,) = self._wavelengths(wavelength_nm)
             index = int(np.argmin(np.abs(stored - (_SHOWN_NM if wanted is None else wanted))))
             values, at = values[..., index], float(stored[index])
         positive = values[values > 0.0]
@@ -288,7 +288,7 @@ class Plot:
         """Return cuts in the plane of incidence: one for each light, azimuth and wavelength."""
         if phi_i_deg is None:
             phi_i_deg = (0.0, 90.0) if self.table.anisotropic else 0.0
-        lights, azimuths = _numbers(theta_i_deg), _numbers(phi_i_deg)
+        lights, azimuths = _numbers("theta_i_deg", theta_i_deg), _numbers("phi_i_deg", phi_i_deg)
         wavelengths = self._wavelengths(wavelength_nm)
         for theta in lights:
             if not 0.0 <= theta <= 90.0:
@@ -317,11 +317,18 @@ class Plot:
 
     def _wavelengths(self, wavelength_nm: float | Sequence[float] | None) -> list[float | None]:
         stored = self.table.wavelength_nm
+        wanted = [] if wavelength_nm is None else _numbers("wavelength_nm", wavelength_nm)
+        if wanted:
+            self.table.lookup(0.0, 0.0, 0.0, 0.0, wanted)  # refuses what lookups refuse, also of a grey table
         if stored is None:
             return [None]
-        if wavelength_nm is None:
-            return [float(np.clip(_SHOWN_NM, stored[0], stored[-1]))]
-        return list(_numbers(wavelength_nm))
+        return list(wanted) or [float(np.clip(_SHOWN_NM, stored[0], stored[-1]))]
+
+    def _wavelength(self, wavelength_nm: float | None) -> float | None:
+        wavelengths = self._wavelengths(wavelength_nm)
+        if len(wavelengths) > 1:
+            raise ParameterError("wavelength_nm", f"{len(wavelengths)} numbers; one is shown at a time", wavelength_nm)
+        return wavelengths[0]
 
     def _title(self, curves: list[_Curve]) -> str:
         wavelengths = {curve.wavelength_nm for curve in curves}
@@ -377,8 +384,15 @@ def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> 
     return {"uniform part": uniform, rest: total - uniform, "specular part": specular}
 
 
-def _numbers(given: float | Sequence[float]) -> list[float]:
-    return [float(number) for number in np.atleast_1d(np.asarray(given, dtype=np.float64))]
+def _numbers(name: str, given: float | Sequence[float]) -> list[float]:
+    """Return an argument as numbers, at least one; ParameterError if it is none."""
+    try:
+        numbers = np.asarray(given, dtype=np.float64).reshape(-1).tolist()
+    except (TypeError, ValueError):
+        raise ParameterError(name, f"{given!r} is neither a number nor a list of numbers", given) from None
+    if not numbers:
+        raise ParameterError(name, "is an empty list; at least one number is needed", given)
+    return [float(number) for number in numbers]
 
 
 def _at(wavelength_nm: float | None) -> str:

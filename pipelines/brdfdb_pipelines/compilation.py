@@ -40,7 +40,7 @@ def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Eve
     # the longest first: He-Torrance's kernels take as long as all others together
     tasks = sorted(models, key=lambda name: not name.startswith("he_torrance"))
     report({"event": "compiling", "kernels": 1 + len(tasks)})
-    with workers.processes(min(jobs, 1 + len(tasks))) as pool:
+    with workers.processes(min(jobs, 1 + len(tasks)), patient=False) as pool:  # a kernel takes up to half a minute
         futures: list[Any] = [pool.executor.submit(models[name]) for name in tasks[:1]]
         futures.append(pool.executor.submit(_compile_tables))
         futures += [pool.executor.submit(models[name]) for name in tasks[1:]]

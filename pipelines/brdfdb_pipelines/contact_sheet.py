@@ -15,8 +15,10 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 import brdfdb
+from brdfdb.errors import counted
 from brdfdb.materials import presets
 from brdfdb.scenes.lit_sphere import WHITE, lit_sphere
+from brdfdb.store.files import write_file
 from brdfdb.tables.table_base import BaseTable
 from brdfdb_pipelines import terminal
 
@@ -43,6 +45,7 @@ def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
     """Write the contact sheet of materials of a store, by default of all, as a PNG, and print its size."""
     store = brdfdb.open(root)
     tables = {name: store[name] for name in names or store}
+    out.parent.mkdir(parents=True, exist_ok=True)
     with terminal.progress() as bar, ThreadPoolExecutor(jobs) as pool:
         task = bar.add_task("rendering", total=len(tables))
 
@@ -52,10 +55,10 @@ def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
             return sphere
 
         spheres = dict(zip(tables, pool.map(picture, tables.values()), strict=True))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    image = sheet(sections(tables), spheres)
-    imsave(out, image, pil_kwargs={"optimize": True})
-    print(f"{out}: {len(tables)} materials, {image.shape[1]} x {image.shape[0]} pixels")
+    image, encoded = sheet(sections(tables), spheres), io.BytesIO()
+    imsave(encoded, image, format="png", pil_kwargs={"optimize": True})
+    write_file(out, encoded.getvalue(), out.parent)
+    print(f"{out}: {counted(len(tables), 'material')}, {image.shape[1]} x {image.shape[0]} pixels")
 
 
 def sections(tables: Mapping[str, BaseTable]) -> dict[str, list[BaseTable]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 import brdfdb
+from brdfdb.store.files import write_file
 from brdfdb_pipelines import terminal
 
 _SIZE = (6.4, 3.9)  # inches
@@ -38,7 +40,9 @@ def run(
                     getattr(table.plot, kind)(wavelength_nm=wavelength_nm, ax=figure.add_subplot())
                     path = directory / f"{name}-{kind}.{file_format}"
                     undated = {"Date": None} if file_format == "svg" else None
-                    figure.savefig(path, format=file_format, dpi=_DPI, metadata=undated)
+                    drawn = io.BytesIO()
+                    figure.savefig(drawn, format=file_format, dpi=_DPI, metadata=undated)
+                    write_file(path, drawn.getvalue(), directory)  # whole, or not at all
                 bar.advance(task)
     files = len(revisions) * len(kinds)
     print(f"{files} {file_format.upper()} file{'s' if files > 1 else ''} in {directory}")

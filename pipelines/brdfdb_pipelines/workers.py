@@ -41,11 +41,19 @@ def threads(count: int) -> Iterator[Workers]:
 
 
 @contextmanager
-def processes(count: int) -> Iterator[Workers]:
-    """Provide processes of this machine, spawned: a fork would inherit locks of threads that it does not have."""
-    context = multiprocessing.get_context("spawn")
+def processes(count: int, *, patient: bool = True) -> Iterator[Workers]:
+    """Provide processes of this machine, spawned: a fork would inherit locks of threads that it does not have.
+
+    Ctrl-C lets their tasks end, or kills them at once where they are not `patient`.
+    """
+    context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
     with ProcessPoolExecutor(count, mp_context=context, initializer=_start_process) as executor:
-        yield Workers(executor, lambda: count)
+        try:
+            yield Workers(executor, lambda: count)
+        except KeyboardInterrupt:
+            for process in () if patient else set(multiprocessing.active_children()) - others:
+                process.kill()
+            raise
 
 
 def _start_process() -> None:

@@ -171,3 +171,8 @@ def test_a_title_of_a_strange_store_cannot_write_on_the_terminal(tmp_path: Path,
     assert out.count("\\x1b[2Jgone\\u202e") == 2
     assert "\x1b" not in out
     assert "\u202e" not in out
+
+
+def test_an_azimuth_without_meaning_is_refused_in_degrees(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("lookup", "foam", 30, 1e300, 40, 0, "--store", built) == 2
+    assert capsys.readouterr().err == "brdfdb: phi_i: 1e+300 is outside [-5.72958e+16, 5.72958e+16] degrees\n"

@@ -33,10 +33,10 @@ def test_plot_writes_the_same_svg_again(built: Path, tmp_path: Path) -> None:
 
 
 def test_unknown_names_are_refused_before_anything_is_drawn(built: Path, tmp_path: Path, capsys: Captured) -> None:
-    for command in ("plot", "gallery"):
-        assert run(command, "foam", "foan", "--store", built, "--out", tmp_path / "new") == 2
+    for command, name in (("plot", "new"), ("gallery", "new.png")):
+        assert run(command, "foam", "foan", "--store", built, "--out", tmp_path / name) == 2
         assert "no material 'foan' in the store; closest: foam" in capsys.readouterr().err
-    assert not (tmp_path / "new").exists()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_gallery_has_a_sphere_of_each_material(built: Path, tmp_path: Path, capsys: Captured) -> None:
@@ -71,3 +71,20 @@ def test_a_missing_extra_is_named(command: str, built: Path, monkeypatch: pytest
     monkeypatch.setattr(errors, "import_extra", missing)
     assert run(command, "foam", "--store", built) == 2
     assert "is not installed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"), [("", "is a directory"), ("sheet.svg", "does not end in .png"), ("sheet", "in .png")]
+)
+def test_gallery_refuses_other_files_before_it_draws(
+    name: str, sentence: str, built: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        run("gallery", "foam", "--store", built, "--out", f"{tmp_path}/{name}")
+    assert sentence in capsys.readouterr().err
+
+
+def test_gallery_of_one_material_says_so(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    assert run("gallery", "foam", "--store", built, "--out", tmp_path / "one.png") == 0
+    assert "one.png: 1 material, 1400 x" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["one.png"]

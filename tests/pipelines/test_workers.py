@@ -53,6 +53,22 @@ def test_a_process_that_is_killed_is_one_sentence_and_the_build_resumes(recipe: 
         assert {b.state for b in build(load(recipe), tmp_path, at)} == {"published"}
 
 
+def test_an_interrupt_kills_processes_that_are_not_patient() -> None:
+    futures = []
+
+    def interrupted() -> None:
+        with workers.processes(1, patient=False) as at:
+            at.executor.submit(os.getpid).result()
+            futures.append(at.executor.submit(time.sleep, START_S))
+            raise KeyboardInterrupt
+
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert time.monotonic() - started < START_S
+    assert workers.lost(futures[0].exception(START_S) or OSError())
+
+
 ORPHAN = """
 import sys, time
 from brdfdb_pipelines import workers

@@ -141,3 +141,25 @@ def test_uniform_part_of_a_material_is_its_share() -> None:
     shares = albedo_shares(flat, 0.0, None)
     np.testing.assert_allclose(shares["uniform part"], 0.2, atol=1e-3)
     np.testing.assert_allclose(shares["lobe"], 0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["lobe", "cuts", "albedo", "slices"])
+@pytest.mark.parametrize("wavelengths", [None, WAVELENGTHS], ids=["grey", "spectral"])
+def test_every_plot_refuses_wavelengths_that_lookups_refuse(kind: str, wavelengths: object) -> None:
+    table = made_up("isotropic") if wavelengths is None else made_up("isotropic", WAVELENGTHS)
+    draw = getattr(table.plot, kind)
+    refused = {float("nan"): "positive", -5.0: "positive", "blue": "neither a number nor a list", (): "empty list"}
+    for given, sentence in refused.items():
+        with pytest.raises(ParameterError, match=f"wavelength_nm: .*{sentence}"):
+            draw(wavelength_nm=given, ax=Figure().add_subplot())
+    if wavelengths is not None:
+        with pytest.raises(ParameterError, match="outside"):
+            draw(wavelength_nm=1e9, ax=Figure().add_subplot())
+    if wavelengths is not None and kind in ("albedo", "slices"):
+        with pytest.raises(ParameterError, match="2 numbers; one is shown at a time"):
+            draw(wavelength_nm=list(WAVELENGTHS[:2]), ax=Figure().add_subplot())
+
+
+def test_a_cut_without_a_light_is_refused(grey: Table) -> None:
+    with pytest.raises(ParameterError, match="theta_i_deg: is an empty list"):
+        grey.plot.cuts([])

@@ -80,6 +80,16 @@ def whole_number(most: int | None = None) -> Callable[[str], int]:
     return number
 
 
+def png_file(text: str) -> Path:
+    """Return the path of a PNG to write; a directory and other suffixes are refused, before time is spent."""
+    path = Path(text)
+    if path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text!r} is a directory; name a file in it")
+    if path.suffix.lower() != ".png":
+        raise argparse.ArgumentTypeError(f"{text!r} does not end in .png")
+    return path
+
+
 def byte_count(text: str) -> int:
     """Return a number of bytes [byte] from a text such as 500MB."""
     number = text.rstrip("BkMGT")

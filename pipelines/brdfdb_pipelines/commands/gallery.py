@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_jobs, add_store
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store, png_file
 
 HELP = "Draw a contact sheet: a lit sphere of each material, as PNG."
 
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_jobs(parser, "threads")
     parser.add_argument(
         "--out",
-        type=Path,
+        type=png_file,
         default=Path("brdf-gallery.png"),
         metavar="FILE",
         help="the PNG to write (default: %(default)s)",

@@ -41,14 +41,17 @@ def run(options: argparse.Namespace) -> int:
     """Print f_r [1/sr] at the directions [degree], and the specular reflectance [1] where there is a specular part."""
     import numpy as np
 
-    from brdfdb.geometry import radians
+    from brdfdb.geometry import PHI_MAX, degrees, radians
 
+    most_deg = float(degrees(PHI_MAX))
     angles_deg = [getattr(options, angle) for angle in _ANGLES]
     for angle, value in zip(_ANGLES, angles_deg, strict=True):
         if not math.isfinite(value):
             raise ParameterError(angle, f"{value} is not a number of degrees", value)
         if angle.startswith("theta") and not 0.0 <= value <= 180.0:
             raise ParameterError(angle, f"{value:g} is outside [0, 180] degrees", value, (0.0, 180.0))
+        if abs(value) > most_deg:
+            raise ParameterError(angle, f"{value:g} is outside [{-most_deg:g}, {most_deg:g}] degrees", value)
     root: Path = options.store
     store = brdfdb.open(root, snapshot=options.snapshot)
     source: Table | Family
