@@ -15,6 +15,14 @@ settings.register_profile("brdfdb", derandomize=True, deadline=None, database=No
 settings.load_profile("brdfdb")
 
 
+_LONG = {"site", "test_house.py"}  # the site and the static checks take minutes in one piece
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the long files: a worker that comes to them last keeps all others waiting."""
+    items.sort(key=lambda item: _LONG.isdisjoint(item.path.parts))
+
+
 @pytest.fixture(scope="session")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
     """A Chromium; without one these tests are skipped, or fail where it is known to be there."""
