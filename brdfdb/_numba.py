@@ -46,9 +46,11 @@ def _compiled(function: F, *, forceinline: bool) -> F:
         return function
     import numba
 
-    compiled: Any = numba.njit(
-        cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, forceinline=forceinline
-    )(function)
+    options: Any = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "forceinline": forceinline}
+    try:
+        compiled: Any = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # neither beside the sources nor at home can anything be written: nothing is stored
+        return cast(F, numba.njit(**options)(function))
     _stamp(compiled._cache)
     return cast(F, compiled)
 
@@ -75,8 +77,10 @@ def _stamp(cache: Any) -> None:
 
 
 def is_cached(kernel: Any) -> bool:
-    """Return True if compiled code of a kernel is stored, or kernels are not compiled at all."""
-    return INTERPRETED or bool(kernel._cache._cache_file._load_index())
+    """Return True if compiled code of a kernel is stored, or cannot be, or kernels are not compiled at all."""
+    if INTERPRETED or not hasattr(kernel._cache, "_cache_file"):
+        return True
+    return bool(kernel._cache._cache_file._load_index())
 
 
 def elementwise(function: F) -> Callable[..., Any]:
@@ -106,8 +110,12 @@ def _ufunc(function: Callable[..., Any], arity: int) -> Callable[..., Any]:
         return np.vectorize(function, otypes=[np.float64])  # numba would compile, and fail on kernels that are Python
     import numba
 
-    ufunc = numba.vectorize(cache=True)(function)  # type: ignore[no-untyped-call]  # numba leaves it untyped
-    _stamp(ufunc._dispatcher.cache)
+    vectorize: Any = numba.vectorize  # numba leaves it untyped
+    try:
+        ufunc = vectorize(cache=True)(function)
+        _stamp(ufunc._dispatcher.cache)
+    except RuntimeError:  # as in `_compiled`
+        ufunc = vectorize()(function)
     ufunc.add(numba.float64(*[numba.float64] * arity))
     ufunc.disable_compile()
     return cast(Callable[..., Any], ufunc)

@@ -176,3 +176,15 @@ def test_compiled_code_is_old_when_a_shared_file_has_changed(monkeypatch: pytest
         assert stamp() != before
     finally:
         _numba._shared_digest.cache_clear()
+
+
+def test_kernels_work_where_no_cache_can_be_written() -> None:
+    code = (
+        "from numba.core import caching\n"
+        "caching.CacheImpl._locator_classes = []\n"
+        "from brdfdb import _numba\n"
+        "double = _numba.kernel(lambda x: 2.0 * x)\n"
+        "print(double(3.0), _numba.elementwise(lambda x: x + 1.0)(2.0), _numba.is_cached(double))\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.stdout, ran.returncode) == ("6.0 3.0 True\n", 0), ran.stderr
