@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._numba import is_cached
-from brdfdb.materials import Material
+from brdfdb.materials import FunctionSource, Material
+from brdfdb.models import MODELS
 from brdfdb.store.paths import material_path, pointer_path
 from brdfdb.tables import _kernels
 from brdfdb.tables.layout import Layout
@@ -37,8 +38,8 @@ def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Eve
     models: dict[str, Callable[[], None]] = {}
     for job in missing:
         models.setdefault(job.material.model, partial(_compile_model, job.material, job.wavelength_nm))
-    # the longest first: He-Torrance's kernels take as long as all others together
-    tasks = sorted(models, key=lambda name: not name.startswith("he_torrance"))
+    # the longest first: kernels of a spectral model take as long as all others together
+    tasks = sorted(models, key=lambda name: not MODELS[name].spectral)
     report({"event": "compiling", "kernels": 1 + len(tasks)})
     with workers.processes(min(jobs, 1 + len(tasks)), patient=False) as pool:  # a kernel takes up to half a minute
         futures: list[Any] = [pool.executor.submit(models[name]) for name in tasks[:1]]
@@ -50,8 +51,8 @@ def compile_kernels(recipe: Recipe, root: Path, jobs: int, report: Callable[[Eve
 
 def _compile_tables() -> None:
     """Compile the kernels of lookups."""
-    fields = {"title": "White", "model": "lambert", "source": "none", "parameters": {"rho": 0.5}}
-    layout = Layout(material := Material.from_table("white", fields), coarsest(material), None)
+    white = FunctionSource(brdf=lambda wi, *_: np.full(len(wi), 0.3), name="white", title="White", provenance="none")
+    layout = Layout(white, coarsest(white), None)
     Table.of(layout, np.zeros(layout.shape, np.float32)).lookup_vectors(_UP, _UP[::-1])
     points(layout.grid, _UP, _UP[::-1])
 

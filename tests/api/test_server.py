@@ -23,7 +23,7 @@ import pytest
 from brdfdb_api.http.protocol import HEAD_BYTES
 from tests.api.a_store import publish
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "http.md"
 LOOKUP = "/v1/materials/grey/lookup?theta_i=10&theta_r=20"
 BODY = b'{"theta_i": 10, "theta_r": 20}'
 COUNTED = re.compile(r'^brdfdb_requests_total{route="/v1/materials/{name}/lookup",status="200"} (\d+)', re.MULTILINE)
@@ -261,8 +261,8 @@ def test_workers_end_with_the_command_that_started_them_even_while_they_start(st
     assert server.logged() == []
 
 
-def test_uvicorn_as_the_readme_starts_it_logs_once_and_bounds_heads(store: Path, tmp_path: Path) -> None:
-    (words,) = re.findall(r"`uvicorn (--factory [^`]*)`", README.read_text())
+def test_uvicorn_as_the_page_on_http_starts_it_logs_once_and_bounds_heads(store: Path, tmp_path: Path) -> None:
+    (words,) = re.findall(r"^uvicorn (--factory .*)$", PAGE.read_text(), flags=re.MULTILINE)
     command = [sys.executable, "-m", "uvicorn", *words.split(), "--port", "0"]
     log = tmp_path / "log"
     with (

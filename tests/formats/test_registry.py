@@ -52,7 +52,7 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_format_of_fifteen_lines_is_a_command(store: Path, tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "out"
     assert run("export", "csv", "grey", "--digits", "3", "--store", store, "--out", out) == 0
-    assert capsys.readouterr().out.startswith("1 CSV files, ")
+    assert capsys.readouterr().out.startswith("1 CSV file, ")
     assert (out / "grey.csv").read_text(encoding="utf-8").startswith(FIRST)
     assert run("export", "csv", "grey", "--digits", "12", "--store", store, "--out", out) == 2
     assert capsys.readouterr().err == "brdfdb: digits: '12' is not a number in [1, 9]\n"

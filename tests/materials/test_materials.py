@@ -322,7 +322,11 @@ def test_defaults_are_filled_in_and_integers_are_numbers():
 @pytest.mark.parametrize(
     ("name", "table", "sentence"),
     [
-        ("plaster", plaster(model="phong"), f"plaster: model: 'phong' is not one of {', '.join(MODELS)}"),
+        (
+            "plaster",
+            plaster(model="phong"),
+            f"plaster: model: 'phong' is not one of {', '.join(MODELS)}; --models FILE adds yours",
+        ),
         ("plaster", plaster(model=None), "plaster: model: is missing"),
         (
             "plaster",

@@ -147,7 +147,7 @@ def test_a_family_is_listed_shown_and_looked_up(copper: Path, capsys: Captured) 
     assert run(copper, "list") == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].strip() == f"4 materials in {copper}"
-    assert lines[6].strip() == "1 families"
+    assert lines[6].strip() == "1 family"
     assert lines[8].split()[:5] == ["rough-copper", "Rough", "copper", "he_torrance", "4"]
     family = brdfdb.open(copper).family("rough-copper")
     p99 = family.error.overall.p99
@@ -299,9 +299,9 @@ def test_it_is_measured_on_workers(tmp_path: Path) -> None:
 def test_verify_looks_at_families_too(grey: Path, capsys: Captured) -> None:
     assert run(grey, "verify") == 0
     out, _ = capsys.readouterr()
-    assert out.startswith("5 materials and 1 families verified, ")
+    assert out.startswith("5 materials and 1 family verified, ")
     assert run(grey, "verify", "grey") == 0
-    assert capsys.readouterr().out.startswith("0 materials and 1 families verified, ")
+    assert capsys.readouterr().out.startswith("0 materials and 1 family verified, ")
     built(grey, GREY.replace('["grey", "foam"]', '["grey-002"]').replace("rho = 0.5", "rho = 0.6"))
     assert run(grey, "verify") == 2
     said = "the family grey is out of date: grey-002 is another table than it was measured with; build its recipe again"

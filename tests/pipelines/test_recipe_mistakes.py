@@ -109,7 +109,11 @@ BAD = [
     changed("[500, 550]", "[500, 9e9]", "scene-copper-sphere on grids.spectral: wavelength_nm: 9e+09 has no", COPPER),
     # materials
     changed('["foam"]', "[]", "materials: "),
-    changed('["foam"]', '["foam", "fome"]', "materials: 'fome' matches no material; `brdfdb list --presets` names"),
+    changed(
+        '["foam"]',
+        '["foam", "fome"]',
+        "materials: 'fome' matches no material; closest: foam; `brdfdb list --presets` names",
+    ),
     changed('["foam"]', '["foam", "steel-*"]', "materials: 'steel-*' matches no material"),
     changed('["foam"]', '["../foam"]', "materials: '../foam' matches no material"),
     changed("alpha_y = 0.3", "alpha_y = -1", "define.mine: alpha_y: -1 is outside ", GOOD + DEFINED),
