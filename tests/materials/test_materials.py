@@ -319,14 +319,13 @@ def test_defaults_are_filled_in_and_integers_are_numbers():
     assert material.file_parameters() == {"rho": 1.0, "sigma_deg": 90.0, "interreflection": True}
 
 
+NAMES = f"{', '.join(MODELS)}; --models FILE adds yours"
+
+
 @pytest.mark.parametrize(
     ("name", "table", "sentence"),
     [
-        (
-            "plaster",
-            plaster(model="phong"),
-            f"plaster: model: 'phong' is not one of {', '.join(MODELS)}; --models FILE adds yours",
-        ),
+        ("plaster", plaster(model="phong"), f"plaster: model: 'phong' is not one of {NAMES}"),
         ("plaster", plaster(model=None), "plaster: model: is missing"),
         (
             "plaster",

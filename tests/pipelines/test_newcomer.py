@@ -123,7 +123,7 @@ def test_kernels_compile_in_processes_before_the_first_build_only(
     path.write_text('materials = ["foam", "rolled-brass"]\ntolerance = 0.1\n', encoding="utf-8")
     recipe, events = recipe_file.load(path), list[Event]()
     pool = workers.Workers(ThreadPoolExecutor(1), lambda: 1)
-    monkeypatch.setattr(workers, "processes", lambda _: _Opened(pool))
+    monkeypatch.setattr(workers, "processes", lambda _, **__: _Opened(pool))
     monkeypatch.setattr(compilation, "is_cached", lambda _: False)
     compilation.compile_kernels(recipe, tmp_path, 2, events.append)
     assert [event["event"] for event in events] == ["compiling", *["compiled"] * 3]

@@ -142,7 +142,7 @@ def address(site: Path) -> Iterator[str]:
 def test_no_page_is_wider_than_a_phone(site: Path, pages: dict[Path, Page], chromium: Chromium, address: str) -> None:
     names = [path.relative_to(site).as_posix() for path in pages]
     alike = ("reference/api/", "gallery/figures/", "gallery/materials/")  # of these, some
-    shown = [name for index, name in enumerate(names) if not name.startswith(alike) or index % 10 == 0]
+    shown = [name for index, name in enumerate(names) if not name.startswith(alike) or index % 30 == 0]
     chromium.open(f"{address}/index.html")
     chromium.until("document.readyState == 'complete' && location.protocol == 'http:'")
     widths = {name: chromium.evaluate(WIDTH_IN_A_FRAME % (name, NARROW)) for name in shown}
