@@ -1,4 +1,4 @@
-"""The configuration of the site: ``sphinx-build -W docs site`` in the root of the repository builds it."""
+"""The configuration of the site: ``sphinx-build -W -j auto docs site`` in the root of the repository builds it."""
 
 from __future__ import annotations
 
