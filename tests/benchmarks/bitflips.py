@@ -74,7 +74,7 @@ _ROUNDS = 6  # of verify and the repairs that it names
 
 
 class Flips(NamedTuple):
-    """What was counted: flips and repairs by the kind of file, and every fault as a sentence."""
+    """Counts of a run: flips and repairs by the kind of file, and every fault as a sentence."""
 
     kinds: Counter[str]
     repaired: Counter[str]

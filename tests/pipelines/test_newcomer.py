@@ -1,4 +1,4 @@
-"""What trips a newcomer: cut names, missing hints, bad values of models, systems without what Linux has."""
+"""Tests of what trips a newcomer: cut names, missing hints, bad values of models, systems other than Linux."""
 
 from __future__ import annotations
 
