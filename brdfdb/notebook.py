@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from typing import Any
 
 _CARD = (
     "display:inline-block;max-width:60em;padding:0.6em 1em;border:1px solid rgba(128,128,128,0.4);border-radius:6px;"
@@ -57,8 +58,8 @@ def listing(kind: str, name: str, title: str, columns: Sequence[str], rows: Sequ
     )
 
 
-def listed(parameters: Mapping[str, float | bool]) -> str:
-    """Return parameters as text: names with their numbers."""
+def listed(parameters: Mapping[str, Any]) -> str:
+    """Return parameters as text: names with their numbers, or with the range of their spectra."""
     return ", ".join(f"{name} = {value:g}" for name, value in parameters.items())
 
 

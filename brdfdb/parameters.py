@@ -22,7 +22,10 @@ Standing = Literal["inside", "at the edge", "outside", "unknown"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of a model: its public name, the paper's symbol, its unit and the values it may take."""
+    """One parameter of a model: its public name, the paper's symbol, its unit and the values it may take.
+
+    `reflectance` marks an albedo or a reflectance, which a material may give as a spectrum.
+    """
 
     name: str
     symbol: str
@@ -31,6 +34,7 @@ class Parameter:
     high: float
     meaning: str
     default: float | bool | None = None
+    reflectance: bool = False
 
     @property
     def interval(self) -> str:
@@ -136,9 +140,12 @@ class ModelSpec:
     and the directions. Audits quote it, and it excuses nothing.
     `lobe_axes` names the two parameters that make the model anisotropic if they differ. Models that are anisotropic in
     another way have `anisotropic`, a function of the parameters that returns True if they make the model so.
+    `degree` is the degree of f_r as a polynomial in its reflectances, 1 or 2, if it is one: spectra of them then take
+    a few evaluations, not one for each wavelength. None: it is no such polynomial.
     `uniform` names the parameter that, divided by pi, is the uniform part of f_r; None: there is none.
     `lobe` returns the lobe of the model as ``lobe(cos_i, **parameters)``; None: a diffuse model.
-    `lossless` returns the parameters to change, with their values, so that nothing is absorbed. Light that is still
+    `lossless` returns the parameters to change, with their values, so that nothing is absorbed; reflectances may be
+    arrays over the wavelength. Light that is still
     missing is lost by the model itself. None: no parameters do that.
 
     For charts, `forms` gives the forms of the model at some arguments, the exact one first; None: the model itself.
@@ -165,9 +172,10 @@ class ModelSpec:
     lobe_axes: tuple[str, str] | None = None
     anisotropic: Callable[[Mapping[str, Any]], bool] | None = None
     lobe: Callable[..., Lobe] | None = None
+    degree: Literal[1, 2] | None = None
     uniform: str | None = None
     excess: str = ""
-    lossless: Callable[[Mapping[str, Any]], dict[str, float]] | None = None
+    lossless: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
     forms: Callable[[Arguments], Iterable[ModelForm]] | None = None
     exact_model: Callable[[Mapping[str, Any]], tuple[str, dict[str, Any]] | None] | None = None
     diagnostic: Diagnostic | None = None

@@ -308,15 +308,15 @@ def _bound(source: Source, wavelength_nm: Axis | None, lights: _Lights, reflecte
     spec, arguments = source.spec, source.arguments(wavelength_nm)
     if spec.uniform_bound_cosine is None or spec.uniform is None:
         return None
-    a = float(source.parameters[spec.uniform])
+    nm = np.ravel(arguments["wavelength_nm"])
+    a = np.broadcast_to(arguments[spec.uniform], nm.shape)
     surfaces = {name: value for name, value in arguments.items() if name != spec.uniform}
     largest = largest_uniform_beside(
         spec, radians(lights.theta_i_deg), reflected.largest - a, surfaces, BOUND_TOLERANCE
     )
-    nm = np.ravel(arguments["wavelength_nm"])
     return UniformBound(
         wavelength_nm=nm.tolist(),
         largest=numbers(np.round(largest, 9)),
-        preset=[a] * nm.size,
+        preset=a.tolist(),
         keeps=bool(np.all(a <= largest + BOUND_TOLERANCE)),
     )

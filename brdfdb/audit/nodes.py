@@ -87,6 +87,7 @@ def nodes_of(table: Table, source: Source) -> Nodes:
         table.spectra,
         bits,
         table.attrs.get("reason", ""),
+        table.part_nm,
     )
     if layout.shape != table.values.shape:
         raise ParameterError(
@@ -158,10 +159,13 @@ def _refraction(table: Table, source: Source) -> Iterator[str]:
 
 def _uniform(table: Table, layout: Layout) -> Iterator[str]:
     """Yield a sentence on the uniform part of f_r [1/sr] if it is not that of the parameters."""
-    expected = 0.0 if layout.uniform is None else float(layout.uniform[0])
+    expected = np.zeros(1) if layout.uniform is None else layout.uniform
     stored = np.zeros(1) if table.uniform is None else table.uniform
-    if not np.all(np.abs(stored - expected) <= SAME * max(expected, FLOOR / np.pi)):
-        yield f"the uniform part is stored as {float(np.ravel(stored)[0]):.5g} 1/sr, the parameters make {expected:.5g}"
+    off = np.abs(stored - expected) / np.maximum(expected, FLOOR / np.pi)
+    if not np.all(off <= SAME):
+        worst = int(np.argmax(np.where(np.isfinite(off), off, np.inf)))
+        was, right = (float(np.broadcast_to(values, off.shape)[worst]) for values in (stored, expected))
+        yield f"the uniform part is stored as {was:.5g} 1/sr, the parameters make {right:.5g}"
 
 
 def _specular(table: Table, layout: Layout) -> Iterator[str]:

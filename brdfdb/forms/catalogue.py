@@ -194,7 +194,8 @@ def _tables(
         layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
         yield _table(layout, key, f"{table}, planned for {percent} %")
         if layout.spectra is not None and tolerance == _UNFACTORED:
-            yield _table(replace(layout, spectra=None), f"{key}-unfactored", f"the {percent} % table, spectra whole")
+            whole = replace(layout, spectra=None, part_nm=None)
+            yield _table(whole, f"{key}-unfactored", f"the {percent} % table, spectra whole")
     for halves, key, title in (
         (False, "table-even", "even angles"),
         (True, "table-halves", "half vectors"),

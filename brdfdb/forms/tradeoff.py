@@ -94,7 +94,7 @@ def chart(
         material=source.name,
         title=source.title,
         model=source.model if isinstance(source, Material) else "function",
-        parameters=source.file_parameters() if isinstance(source, Material) else {},
+        parameters=source.attributes()["parameters"] if isinstance(source, Material) else {},
         wavelength_nm=None if wavelength_nm is None else wavelength_nm.tolist(),
         directions=int(np.count_nonzero(drawn.above)),
         truth=forms[0].key,

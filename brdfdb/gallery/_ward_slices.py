@@ -39,13 +39,13 @@ def in_form(model: str, material: Material) -> Material:
 
 def isotropic(material: Material) -> Material:
     """Return the material of eq. 4 with the same peak: alpha is the geometric mean."""
-    alpha = float(np.sqrt(material.parameters["alpha_x"] * material.parameters["alpha_y"]))
-    return material.model_copy(update={"parameters": {**material.parameters, "alpha_x": alpha, "alpha_y": alpha}})
+    alpha = float(np.sqrt(material.numbers["alpha_x"] * material.numbers["alpha_y"]))
+    return material.model_copy(update={"parameters": {**material.numbers, "alpha_x": alpha, "alpha_y": alpha}})
 
 
 def diffuse(material: Material) -> float:
     """Return the diffuse part [1/sr] of f_r."""
-    return material.parameters["rho_d"] / np.pi
+    return material.numbers["rho_d"] / np.pi
 
 
 def half_width_deg(material: Material, phi: float) -> float:
@@ -68,13 +68,13 @@ def _expected_half_width_deg(alpha: float) -> float:
 
 def half_widths_deg(material: Material) -> tuple[list[float], list[float]]:
     """Return the half widths [degree] of the lobe along x and y: as measured, and as expected from alpha."""
-    expected = [_expected_half_width_deg(material.parameters[f"alpha_{axis}"]) for axis, _ in PLANES]
+    expected = [_expected_half_width_deg(material.numbers[f"alpha_{axis}"]) for axis, _ in PLANES]
     return [half_width_deg(material, phi) for _, phi in PLANES], expected
 
 
 def parameters_text(material: Material) -> str:
     """Return the parameters of a material as captions write them."""
-    p = material.parameters
+    p = material.numbers
     return (
         f"{material.title}: rho_d = {p['rho_d']:g}, rho_s = {p['rho_s']:g}, "
         f"alpha_x = {p['alpha_x']:g}, alpha_y = {p['alpha_y']:g} (section 6)"

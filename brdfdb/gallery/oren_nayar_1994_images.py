@@ -81,7 +81,7 @@ def _pixels() -> NDArray[np.float64]:
 
 def _vase(light_deg: float) -> dict[str, Floats]:
     """Return the radiance [1] across the clay vase by the functional approximation, by the integral, and by Lambert."""
-    material = presets()["clay-vase"].parameters
+    material = presets()["clay-vase"].numbers
     rho, sigma = material["rho"], material["sigma"]
     return {
         "functional": cylinder(oren_nayar_vectors, ACROSS, light_deg, **material),
@@ -92,7 +92,7 @@ def _vase(light_deg: float) -> dict[str, Floats]:
 
 def fig_22() -> Figure:
     """Draw Fig. 22: the clay vase by Lambert's model and by the paper's."""
-    material = presets()["clay-vase"].parameters
+    material = presets()["clay-vase"].numbers
     row = _pixels()
     lines = [
         cylinder(lambert_vectors, row, 0.0, rho=material["rho"]),
@@ -248,7 +248,7 @@ def _peaks(lines: dict[str, Floats]) -> Statement:
 def spheres() -> Figure:
     """Draw spheres of four roughnesses, with the light at the camera."""
     sigmas_deg = [0, 10, 20, 40]
-    materials = [presets()[f"rendered-sphere-{sigma_deg}deg"].parameters for sigma_deg in sigmas_deg]
+    materials = [presets()[f"rendered-sphere-{sigma_deg}deg"].numbers for sigma_deg in sigmas_deg]
     images = [sphere(oren_nayar_vectors, **{**material, "interreflection": False}) for material in materials]
     varies = [variation(_disc(image)) for image in images]
     with_bounce = variation(_disc(sphere(oren_nayar_vectors, **materials[-1])))
@@ -298,7 +298,7 @@ def scenes() -> Figure:
     lights_deg = [0.0, ASIDE_DEG]
     smooth, rough = (
         [
-            cylinder(oren_nayar_vectors, ACROSS, light, **presets()[f"scene-object-{name}"].parameters)
+            cylinder(oren_nayar_vectors, ACROSS, light, **presets()[f"scene-object-{name}"].numbers)
             for light in lights_deg
         ]
         for name in ("smooth", "rough")

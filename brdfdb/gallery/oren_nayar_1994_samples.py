@@ -71,7 +71,7 @@ def _panel(theta_i_deg: float, lines: _Lines, where: str = "") -> Panel:
 
 def _rough(material: Material, theta_i_deg: float, delta_phi_deg: float = 0.0) -> _Lines:
     """Return the normalised radiance [1] of a sample without a surface part."""
-    rho, sigma = material.parameters["rho"], material.parameters["sigma"]
+    rho, sigma = material.numbers["rho"], material.numbers["sigma"]
     models = evaluated, oren_nayar_gaussian, oren_nayar
     return _Lines(*(_normalised(across(model, theta_i_deg, delta_phi_deg, rho=rho, sigma=sigma)) for model in models))
 
@@ -173,8 +173,8 @@ def fig_18() -> Figure:
 def _with_surface(number: int, sample: str) -> Figure:
     """Draw one of samples D to F: body and surface, eq. 32."""
     material = presets()[sample]
-    rho, sigma = material.parameters["rho"], material.parameters["sigma"]
-    sums = [across(oren_nayar_body_surface, light, **material.parameters) for light in LIGHTS_DEG]
+    rho, sigma = material.numbers["rho"], material.numbers["sigma"]
+    sums = [across(oren_nayar_body_surface, light, **material.numbers) for light in LIGHTS_DEG]
     bodies = [across(oren_nayar, light, rho=rho, sigma=sigma, interreflection=False) for light in LIGHTS_DEG]
     return Figure(
         key=f"oren-nayar-1994-fig-{number}",
@@ -204,10 +204,14 @@ def _with_surface(number: int, sample: str) -> Figure:
 
 def _sum_by_hand(material: Material, theta_i_deg: float, theta_r_deg: float) -> float:
     """Return f_r [1/sr] of eq. 32 by hand in the plane of incidence, with k_b = 1 and E_0 = pi."""
-    printed = material.file_parameters()
-    body = by_hand.fit(theta_i_deg, theta_r_deg, float(printed["rho"]), float(printed["sigma_deg"])).direct
-    surface = by_hand.surface(theta_i_deg, theta_r_deg, float(printed["sigma_deg"]))
-    return body + float(printed["k_s"]) * surface / np.pi
+    printed, sigma_deg = material.numbers, _sigma_deg(material)
+    body = by_hand.fit(theta_i_deg, theta_r_deg, printed["rho"], sigma_deg).direct
+    return body + printed["k_s"] * by_hand.surface(theta_i_deg, theta_r_deg, sigma_deg) / np.pi
+
+
+def _sigma_deg(material: Material) -> float:
+    """Return the standard deviation of the slopes [degree] as the paper prints it."""
+    return float(f"{material.file_parameters()['sigma_deg']}")
 
 
 def _approaching(number: int, sums: list[Floats], material: Material) -> Statement:
@@ -262,8 +266,7 @@ def _lobes(theta_i_deg: float) -> dict[float, Floats]:
     """Return f_r [1/sr] of eq. 31 of the samples that have a surface, by their σ [degree]."""
     samples = [presets()[name] for name in ("foam", "wood-shavings", "cotton-towel")]
     return {
-        sample.file_parameters()["sigma_deg"]: across(torrance_sparrow, theta_i_deg, sigma=sample.parameters["sigma"])
-        for sample in samples
+        _sigma_deg(sample): across(torrance_sparrow, theta_i_deg, sigma=sample.numbers["sigma"]) for sample in samples
     }
 
 

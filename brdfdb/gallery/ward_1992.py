@@ -118,9 +118,9 @@ def _slices() -> Figure:
     beyond_deg, expected_deg = _peak_beyond_mirror(aluminum, SLICES_DEG[-1])
     asymmetry = _asymmetry(aluminum)
     total = float(directional_albedo(aluminum.model, 0.0, tolerance=1e-6, **aluminum.arguments()).albedo)
-    reflectances = aluminum.parameters["rho_d"] + aluminum.parameters["rho_s"]
-    missing = (reflectances - total) / aluminum.parameters["rho_s"]
-    first_order = 1.5 * (aluminum.parameters["alpha_x"] ** 2 + aluminum.parameters["alpha_y"] ** 2)
+    reflectances = aluminum.numbers["rho_d"] + aluminum.numbers["rho_s"]
+    missing = (reflectances - total) / aluminum.numbers["rho_s"]
+    first_order = 1.5 * (aluminum.numbers["alpha_x"] ** 2 + aluminum.numbers["alpha_y"] ** 2)
     return Figure(
         key="ward-1992-fig-06",
         paper="ward1992",
@@ -169,7 +169,7 @@ def _peak_beyond_mirror(material: Material, theta_i_deg: float) -> tuple[list[fl
     for axis, phi in PLANES:
         peak_deg = float(viewers_deg[np.argmax(slice_of(material, theta_i_deg, phi, viewers_deg))])
         beyond.append(peak_deg - theta_i_deg)
-        slope2 = material.parameters[f"alpha_{axis}"] ** 2
+        slope2 = material.numbers[f"alpha_{axis}"] ** 2
         expected.append(float(degrees(slope2 * np.tan(radians(peak_deg)))))
     return beyond, expected
 

@@ -32,7 +32,7 @@ def _turned(across: Array, swing_deg: float) -> Array:
 
 def _radiance(x: Array, y: Array, swing_deg: float, alphas: tuple[float, float]) -> Array:
     """Return the radiance [irradiance / sr] of points of the lid under all four lights, eq. 6 without its samples."""
-    surface = presets()["rolled-brass"].parameters
+    surface = presets()["rolled-brass"].numbers
     points = np.stack([x, y, np.zeros(x.shape)], axis=-1)
     turn = _turned(x, swing_deg)
     along = np.stack([np.cos(turn), np.sin(turn), np.zeros(x.shape)], axis=-1)
@@ -63,7 +63,7 @@ def _radiance(x: Array, y: Array, swing_deg: float, alphas: tuple[float, float])
 
 def _forms() -> dict[str, tuple[float, tuple[float, float]]]:
     """Return the swing of the brushing [degree] and both alphas [1] of the drawn lids."""
-    surface = presets()["rolled-brass"].parameters
+    surface = presets()["rolled-brass"].numbers
     both = surface["alpha_x"], surface["alpha_y"]
     mean = float(np.sqrt(both[0] * both[1]))
     return {

@@ -61,14 +61,14 @@ def lobes() -> Figure:
     (narrow, wide), expected = half_widths_deg(brass)
     (even, _), (expected_even, _) = half_widths_deg(round_brass)
     mirror = [float(slice_of(brass, 60.0, phi, np.array([60.0]))[0]) - diffuse(brass) for _, phi in PLANES]
-    p = brass.parameters
+    p = brass.numbers
     expected_mirror = p["rho_s"] / (4.0 * np.pi * p["alpha_x"] * p["alpha_y"] * np.cos(radians(60.0)))
     return Figure(
         key="ward-1992-lobes",
         paper="ward1992",
         title="The elliptical lobe of rolled brass along its two axes",
         caption=f"{parameters_text(brass)}; eq. 4 with alpha = sqrt(alpha_x alpha_y) = "
-        f"{round_brass.parameters['alpha_x']:.4f}, the round lobe of the same peak.",
+        f"{round_brass.numbers['alpha_x']:.4f}, the round lobe of the same peak.",
         panels=list(panels),
         statements=[
             Statement(

@@ -38,7 +38,7 @@ CORRECT = 0.05  # relative error for "correctly reproduce"
 
 def _lobe() -> dict[str, Any]:
     """Return the parameters of the lobe of rolled brass."""
-    surface = presets()["rolled-brass"].parameters
+    surface = presets()["rolled-brass"].numbers
     return {name: surface[name] for name in ("rho_s", "alpha_x", "alpha_y")}
 
 
@@ -92,7 +92,7 @@ def _closed(points: Points) -> Array:
 
 def _diffuse(points: Points) -> Array:
     """Return the diffuse part of eq. 6 [1/sr], for the source and a constant ambient level; all pictures share it."""
-    rho_d = presets()["rolled-brass"].parameters["rho_d"]
+    rho_d = presets()["rolled-brass"].numbers["rho_d"]
     return np.asarray(rho_d / np.pi * (np.maximum(points.light[..., 2], 0.0) + np.pi * (AMBIENT + STRIPES) / 2.0))
 
 

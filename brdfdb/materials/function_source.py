@@ -148,10 +148,9 @@ class FunctionSource(FunctionRecord, Lookups):
         """Return False, because a specular part is no function of two directions."""
         return False
 
-    @property
-    def uniform(self) -> None:
+    def uniform_at(self, _wavelength_nm: NDArray[np.float64] | None) -> None:
         """Return None, because the uniform part of a function is unknown."""
-        return None
+        return
 
     @property
     def lossless(self) -> Lossless | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -22,8 +23,10 @@ from pydantic_core import ErrorDetails
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.geometry import degrees
 from brdfdb.lobes import Lobe
+from brdfdb.materials.evaluation import each, evaluations, summed
 from brdfdb.materials.provenance import MOST_NAME, NAME_PATTERN, Assumption, KnownExcess, Number, Text, Words
 from brdfdb.materials.source import Evaluate, FourAngles, Lookups, Lossless, check_wavelengths
+from brdfdb.materials.spectrum import Spectrum, assumptions, made_lossless
 from brdfdb.materials.written_parameters import completed, from_file, written_name
 from brdfdb.models import MODELS
 from brdfdb.notebook import card, listed, spectrum
@@ -48,7 +51,8 @@ class Material(BaseModel, Lookups):
     model : str
         Key of `brdfdb.models.MODELS`.
     parameters : dict
-        All parameters of the model in its units (angles in radians), with defaults for missing ones.
+        All parameters of the model in its units (angles in radians), with defaults for missing ones. A reflectance is
+        a number or a `Spectrum`.
     source : str
         Paper and table, figure or section of every value that is not in `sources`.
     sources : dict
@@ -58,7 +62,8 @@ class Material(BaseModel, Lookups):
     refractive_index : str or None
         ``shelf/book/page`` for `brdfdb.spectra.refractive_index`; spectral models have one, no other model has.
     wavelengths_nm : tuple of float or None
-        Wavelengths [nm] for which the paper states the parameters; None if the model may be used at any wavelength.
+        Wavelengths [nm] for which the parameters are stated; None if the material may be used at any wavelength. A
+        grey material has none.
     known_excess : KnownExcess or None
         The published excess, if the published parameters are known to violate energy conservation.
 
@@ -75,7 +80,7 @@ class Material(BaseModel, Lookups):
     name: str = Field(pattern=NAME_PATTERN, max_length=MOST_NAME)
     title: Text
     model: str
-    parameters: dict[str, Number]
+    parameters: dict[str, Number | Spectrum]
     source: Text
     sources: dict[str, Text] = {}
     assumed: dict[str, Assumption] = {}
@@ -85,20 +90,21 @@ class Material(BaseModel, Lookups):
     known_excess: KnownExcess | None = None
 
     # Arguments of the model that replace those of the material: for its lossless form, or without its uniform part
-    _changed: dict[str, float] = PrivateAttr(default_factory=dict)
+    _changed: dict[str, float | Spectrum] = PrivateAttr(default_factory=dict)
 
     @classmethod
-    def from_table(cls, name: str, table: Mapping[str, Any]) -> Material:
+    def from_table(cls, name: str, table: Mapping[str, Any], folder: Path | None = None) -> Material:
         """Return the material that a TOML table describes; MaterialError if it describes none.
 
         Parameters, and their names in sources and assumed, are read as `file_parameters` writes them: angles are in
-        degrees, under names that end in ``_deg``.
+        degrees, under names that end in ``_deg``. A reflectance may be a spectrum, in one of the ways of
+        `brdfdb.materials.written_spectra.spectrum_of`; paths of CSV files begin at `folder`.
         """
         fields = {**table, "name": name}
         model, parameters = table.get("model"), table.get("parameters", {})
         try:
             if isinstance(model, str) and model in MODELS and isinstance(parameters, Mapping):
-                fields["parameters"] = from_file(MODELS[model], parameters)
+                fields["parameters"] = from_file(MODELS[model], parameters, table.get("wavelengths_nm"), folder)
                 own = {written_name(parameter): parameter.name for parameter in MODELS[model].parameters}
                 most = len(own) + len(_SOURCED)
                 for field in ("sources", "assumed"):
@@ -111,6 +117,8 @@ class Material(BaseModel, Lookups):
                                 (0, most),
                             )
                         fields[field] = {own.get(written, written): value for written, value in stated.items()}
+                if isinstance(stated := fields.get("assumed", {}), Mapping):
+                    fields["assumed"] = assumptions(fields["parameters"]) | dict(stated)
             return cls.model_validate(fields)
         except ValidationError as error:
             (field, sentence), *others = map(_field_and_sentence, error.errors())
@@ -130,7 +138,9 @@ class Material(BaseModel, Lookups):
 
     @field_validator("parameters")
     @classmethod
-    def _check_parameters(cls, parameters: dict[str, Number], info: ValidationInfo) -> dict[str, Number]:
+    def _check_parameters(
+        cls, parameters: dict[str, Number | Spectrum], info: ValidationInfo
+    ) -> dict[str, Number | Spectrum]:
         if "model" not in info.data:  # an unknown model has been reported already
             return parameters
         return completed(MODELS[info.data["model"]], parameters)
@@ -139,12 +149,17 @@ class Material(BaseModel, Lookups):
 
     @model_validator(mode="after")
     def _check_provenance(self) -> Material:
-        if self.spectral and self.refractive_index is None:
+        if self.spec.spectral and self.refractive_index is None:
             raise ParameterError("refractive_index", f"the spectral model {self.model} needs an entry, shelf/book/page")
-        if not self.spectral and (self.refractive_index, self.wavelengths_nm) != (None, None):
+        if not self.spec.spectral and self.refractive_index is not None:
+            raise ParameterError("refractive_index", f"the model {self.model} takes none")
+        if not self.spectral and self.wavelengths_nm is not None:
             raise ParameterError(
-                "refractive_index, wavelengths_nm", f"the model {self.model} is not spectral and has neither"
+                "wavelengths_nm", f"the model {self.model} is grey, and no parameter is a spectrum; leave them out"
             )
+        for name, value in self.parameters.items():
+            if isinstance(value, Spectrum) and self.wavelengths_nm is not None:
+                value.at(name, np.array(self.wavelengths_nm))
         values = (*self.parameters, *_SOURCED)
         alternatives = (
             name
@@ -172,6 +187,11 @@ class Material(BaseModel, Lookups):
         return MODELS[self.model]
 
     @property
+    def numbers(self) -> dict[str, Number]:
+        """Return the parameters that are numbers, in the units of the model: all but the spectra."""
+        return {name: value for name, value in self.parameters.items() if not isinstance(value, Spectrum)}
+
+    @property
     def provenance(self) -> str:
         """Return the paper and table, figure or section of the values."""
         return self.source
@@ -179,7 +199,7 @@ class Material(BaseModel, Lookups):
     @property
     def spectral(self) -> bool:
         """Return True if f_r depends on the wavelength."""
-        return self.spec.spectral
+        return self.spec.spectral or any(isinstance(value, Spectrum) for value in self.parameters.values())
 
     @property
     def anisotropic(self) -> bool:
@@ -209,10 +229,14 @@ class Material(BaseModel, Lookups):
         """Return True if the model has a specular part (a Dirac delta)."""
         return self.spec.specular is not None
 
-    @property
-    def uniform(self) -> float | None:
-        """Return the uniform part of f_r [1/sr]; None if the model names no uniform part."""
-        return None if self.spec.uniform is None else self.parameters[self.spec.uniform] / np.pi
+    def uniform_at(self, wavelength_nm: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+        """Return the uniform part of f_r [1/sr]: shape (L,) if it is a spectrum, else (1,); None if none is named."""
+        if self.spec.uniform is None:
+            return None
+        value = self.parameters[self.spec.uniform]
+        if isinstance(value, Spectrum):
+            value = self.arguments(wavelength_nm)[self.spec.uniform]
+        return np.atleast_1d(np.asarray(value) / np.pi)
 
     def without_uniform(self) -> Material:
         """Return the material without its uniform part."""
@@ -223,10 +247,10 @@ class Material(BaseModel, Lookups):
         """Return the material with nothing absorbed; None if no parameters of the model do that."""
         if self.spec.lossless is None:
             return None
-        changes = self.spec.lossless(self.parameters)
+        changes = made_lossless(self.spec.lossless, self.parameters)
         return Lossless(self._with(changes), changes)
 
-    def _with(self, changes: Mapping[str, float]) -> Material:
+    def _with(self, changes: Mapping[str, float | Spectrum]) -> Material:
         changed = self.model_copy()
         changed._changed = {**self._changed, **changes}
         return changed
@@ -246,29 +270,37 @@ class Material(BaseModel, Lookups):
         Parameters
         ----------
         wavelength_nm : array_like [nm], optional
-            Wavelengths for a spectral model. The default is the wavelengths for which the parameters are stated. Other
-            models ignore them.
+            Wavelengths for a spectral material. The default is the wavelengths for which the parameters are stated.
+            Grey materials ignore them.
 
         Returns
         -------
         dict
-            The parameters. A spectral model also has ``wavelength_nm`` [nm], ``n`` and ``k`` [1], float64 arrays of one
-            shape.
+            The parameters; a spectrum has an array in the shape of the wavelengths. A spectral model also has
+            ``wavelength_nm`` [nm], ``n`` and ``k`` [1], float64 arrays of that shape.
 
         Raises
         ------
         ParameterError
-            If a spectral model has no wavelengths, or its refractive index is not known at one of them.
+            If a spectral material has no wavelengths, or its refractive index or a spectrum is not known at one.
         """
-        if self.refractive_index is None:
-            return {**self.parameters, **self._changed}
+        given = {**self.parameters, **self._changed}
+        if not self.spectral:
+            return given
         if wavelength_nm is None:
             wavelength_nm = self.wavelengths_nm
         if wavelength_nm is None:
-            raise ParameterError("wavelength_nm", f"{self.name} needs wavelengths, its model {self.model} is spectral")
+            reason = f"its model {self.model} is spectral" if self.spec.spectral else "a parameter is a spectrum"
+            raise ParameterError("wavelength_nm", f"{self.name} needs wavelengths, {reason}")
         wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+        arguments: dict[str, Any] = {
+            name: value.at(name, wavelength) if isinstance(value, Spectrum) else value for name, value in given.items()
+        }
+        if self.refractive_index is None:
+            return arguments
         n, k = refractive_index(self.refractive_index, wavelength)
-        return {**self.parameters, "wavelength_nm": wavelength, "n": n, "k": k, **self._changed}
+        indices = {"wavelength_nm": wavelength, "n": n, "k": k}
+        return arguments | {name: value for name, value in indices.items() if name not in self._changed}
 
     def brdf_at(
         self, wavelength_nm: NDArray[np.float64] | None, vectors: Callable[..., Floats] | None = None
@@ -278,7 +310,7 @@ class Material(BaseModel, Lookups):
         Parameters
         ----------
         wavelength_nm : array of shape (L,) [nm], or None
-            Wavelengths of a spectral model, and only of such a model.
+            Wavelengths of a spectral material, and only of such a one.
         vectors : callable, optional
             A function with the arguments of the model that replaces it, such as an approximation.
 
@@ -291,12 +323,15 @@ class Material(BaseModel, Lookups):
         Raises
         ------
         ParameterError
-            If the refractive index is not known at one of the wavelengths.
+            If the refractive index or a spectrum is not known at one of the wavelengths.
         """
         f_r, together = vectors or self.spec.vectors, self.arguments(wavelength_nm)
         if wavelength_nm is None:
             return lambda wi, wr: f_r(wi, wr, **together)[:, np.newaxis]
-        separate = _each(together)
+        separate = each(together, wavelength_nm.size)
+        if self.refractive_index is None:
+            sets, weights = (separate, None) if vectors else evaluations(self.spec, together, wavelength_nm.size)
+            return summed(f_r, sets, weights)
 
         def brdf(wi: Floats, wr: Floats) -> Floats:
             if len(separate) > 1 and len(wi) < _MANY:
@@ -333,9 +368,10 @@ class Material(BaseModel, Lookups):
             return np.repeat(np.asarray(value)[..., np.newaxis], np.size(wavelength_nm), axis=-1)
         given = self.arguments(wavelength_nm)
         used = given if names is None else {name: given[name] for name in names}
-        if given["wavelength_nm"].ndim == 0:
+        shape = np.shape(self.wavelengths_nm or () if wavelength_nm is None else wavelength_nm)
+        if shape == ():
             return function(*angles, **used)
-        return np.stack([function(*angles, **arguments) for arguments in _each(used)], axis=-1)
+        return np.stack([function(*angles, **arguments) for arguments in each(used, shape[0])], axis=-1)
 
     def lobe(self, cos_i: Floats, wavelength_nm: NDArray[np.float64] | None) -> Lobe | None:
         """Return the lobe for lights with the cosine cos_i, which broadcasts with wavelengths [nm]; None if diffuse."""
@@ -350,11 +386,13 @@ class Material(BaseModel, Lookups):
         arguments = self.arguments(wavelength_nm)
         return arguments["n"], arguments["k"]
 
-    def file_parameters(self) -> dict[str, Number]:
+    def file_parameters(self) -> dict[str, Number | Spectrum]:
         """Return the parameters as files write them: angles in degrees, under names ending in ``_deg``."""
         return {
             # Twelve digits, because the conversion from degrees to radians and back changes the last ones
-            written_name(parameter): float(f"{degrees(value):.12g}") if parameter.unit == "rad" else value
+            written_name(parameter): float(f"{degrees(value):.12g}")
+            if parameter.unit == "rad" and not isinstance(value, Spectrum)
+            else value
             for parameter in self.spec.parameters
             for value in [self.parameters[parameter.name]]
         }
@@ -362,6 +400,8 @@ class Material(BaseModel, Lookups):
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of the material in its table, with angles in degrees."""
         spec, written = self.spec, {p.name: written_name(p) for p in self.spec.parameters}
+        origins = {name: value.origin for name, value in self.parameters.items() if isinstance(value, Spectrum)}
+        sources = origins | self.sources
         return {
             "title": self.title,
             "material": self.name,
@@ -370,8 +410,11 @@ class Material(BaseModel, Lookups):
             "model_title": spec.title,
             "model_equation": spec.equation,
             "model_reference": spec.reference,
-            "parameters": self.file_parameters(),
-            "parameter_sources": {in_file: self.sources.get(name, self.source) for name, in_file in written.items()},
+            "parameters": {
+                name: value.model_dump(mode="json") if isinstance(value, Spectrum) else value
+                for name, value in self.file_parameters().items()
+            },
+            "parameter_sources": {in_file: sources.get(name, self.source) for name, in_file in written.items()},
             "source": self.source,
             "assumed": {written.get(n, n): value.model_dump(mode="json") for n, value in self.assumed.items()},
             "note": self.note,
@@ -395,14 +438,6 @@ class Material(BaseModel, Lookups):
     def document(self) -> dict[str, Any]:
         """Return the material as JSON, parameters in the units of the model; `brdfdb.materials.source_of` reads it."""
         return {"model_version": self.spec.version, "material": self.model_dump(mode="json")}
-
-
-def _each(arguments: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the arguments of a spectral model at each wavelength."""
-    return [
-        {name: value[w] if np.ndim(value) else value for name, value in arguments.items()}
-        for w in range(arguments["wavelength_nm"].size)
-    ]
 
 
 def _field_and_sentence(error: ErrorDetails) -> tuple[str, str]:

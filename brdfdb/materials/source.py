@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.lobes import Lobe
+from brdfdb.materials.spectrum import Spectrum
 from brdfdb.parameters import Floats
 
 # Function of unit vectors (N, 3) of light and viewer that gives f_r [1/sr] of shape (N, L)
@@ -81,7 +82,7 @@ class Lossless(NamedTuple):
     """A source with nothing absorbed, and the parameters that were changed for it, by name."""
 
     source: Source
-    changes: dict[str, float]
+    changes: dict[str, float | Spectrum]
 
 
 class Source(Protocol):
@@ -138,9 +139,11 @@ class Source(Protocol):
     def has_specular(self) -> bool:
         """Return True if there is a specular part (a Dirac delta)."""
 
-    @property
-    def uniform(self) -> float | None:
-        """Return the uniform part of f_r [1/sr]; None if none is known."""
+    def uniform_at(self, wavelength_nm: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+        """Return the uniform part of f_r [1/sr] at wavelengths (L,) [nm]; None if none is known.
+
+        Its shape is (1,) if it is the same at all wavelengths, else (L,).
+        """
 
     @property
     def lossless(self) -> Lossless | None:

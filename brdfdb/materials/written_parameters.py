@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import degrees, radians
 from brdfdb.materials.provenance import Number
+from brdfdb.materials.spectrum import Spectrum
+from brdfdb.materials.written_spectra import spectrum_of
 from brdfdb.parameters import ModelSpec, Parameter
 
 
@@ -31,17 +34,29 @@ def _as_written(parameter: Parameter) -> Parameter:
     )
 
 
-def from_file(spec: ModelSpec, written: Mapping[str, Any]) -> dict[str, Number]:
-    """Return the parameters of a file in the units of the model; ParameterError if one is not allowed."""
+def from_file(
+    spec: ModelSpec, written: Mapping[str, Any], wavelengths_nm: Any = None, folder: Path | None = None
+) -> dict[str, Number | Spectrum]:
+    """Return the parameters of a file in the units of the model; ParameterError if one is not allowed.
+
+    `wavelengths_nm` and `folder` are those of `spectrum_of`.
+    """
     file_spec = replace(spec, parameters=tuple(_as_written(parameter) for parameter in spec.parameters))
-    values = completed(file_spec, written).values()
+    reflectances = {parameter.name for parameter in spec.parameters if parameter.reflectance}
+    read = {
+        name: spectrum_of(name, value, wavelengths_nm, folder)
+        if name in reflectances and isinstance(value, list | Mapping)
+        else value
+        for name, value in written.items()
+    }
+    values = completed(file_spec, read).values()
     return {
-        parameter.name: float(radians(value)) if parameter.unit == "rad" else value
+        parameter.name: float(radians(value)) if parameter.unit == "rad" and isinstance(value, float | int) else value
         for parameter, value in zip(spec.parameters, values, strict=True)
     }
 
 
-def completed(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Number]:
+def completed(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Number | Spectrum]:
     """Return checked parameters in the order of the model, with defaults; ParameterError if one is not allowed."""
     names = [parameter.name for parameter in spec.parameters]
     for name, value in parameters.items():
@@ -53,7 +68,7 @@ def completed(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Numbe
                 value,
                 tuple(names),
             )
-    complete: dict[str, Number] = {}
+    complete: dict[str, Number | Spectrum] = {}
     for parameter in spec.parameters:
         value = parameters.get(parameter.name, parameter.default)
         if value is None:
@@ -62,6 +77,17 @@ def completed(spec: ModelSpec, parameters: Mapping[str, Any]) -> dict[str, Numbe
                 f"missing, {spec.name} needs a value in {parameter.interval}",
                 None,
                 (parameter.low, parameter.high),
+            )
+        if isinstance(value, Spectrum) and parameter.reflectance:
+            parameter.check(value.values)
+            complete[parameter.name] = value
+            continue
+        if isinstance(value, Spectrum | list | Mapping):
+            reflectances = ", ".join(p.name for p in spec.parameters if p.reflectance) or "none"
+            raise ParameterError(
+                parameter.name,
+                f"a number is needed; parameters of {spec.name} that may be spectra: {reflectances}",
+                value,
             )
         switch = isinstance(parameter.default, bool)
         if not isinstance(value, int | float) or isinstance(value, bool) != switch:

@@ -33,7 +33,7 @@ def lowest_cosine(arguments: Arguments) -> float:
 
 def limits(arguments: Arguments) -> list[StatedLimit]:
     """Return the limits of validity of He et al. 1991, with the standing of the arguments at their wavelengths."""
-    sigma, tau, a = (float(arguments[name]) for name in ("sigma_0_um", "tau_um", "a"))
+    sigma, tau, a = (float(np.min(arguments[name])) for name in ("sigma_0_um", "tau_um", "a"))
     longest = float(np.max(arguments["wavelength_nm"])) / 1000.0
     slope, k = sigma / tau, float(np.min(arguments["k"]))
     # The second derivative along a line of Gaussian heights with eq. 48 has the variance 12 sigma_0^2 / tau^4

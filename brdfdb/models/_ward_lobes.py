@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,8 +16,10 @@ from brdfdb.lobes import Lobe
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.parameters import Floats, Parameter
 
-RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "diffuse reflectance")
-RHO_S = Parameter("rho_s", "ρ_s", "1", 0.0, 1.0, "specular reflectance; the tables of the paper call it ρ_r")
+RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "diffuse reflectance", reflectance=True)
+RHO_S = Parameter(
+    "rho_s", "ρ_s", "1", 0.0, 1.0, "specular reflectance; the tables of the paper call it ρ_r", reflectance=True
+)
 ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "width of the slopes along x, exp(-(s / alpha)^2)")
 ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "width of the slopes along y")
 
@@ -191,11 +194,12 @@ def lobe(
     return Lobe(share, np.asarray(alpha_x, dtype=np.float64), np.asarray(alpha_y, dtype=np.float64))
 
 
-def lossless(parameters: Mapping[str, float]) -> dict[str, float]:
+def lossless(parameters: Mapping[str, ArrayLike]) -> dict[str, Any]:
     """Return both reflectances [1] scaled to a sum of 1. A black surface gets a diffuse reflectance of 1."""
-    rho_d, rho_s = parameters["rho_d"], parameters["rho_s"]
-    total = rho_d + rho_s
-    return {"rho_d": rho_d / total, "rho_s": rho_s / total} if total > 0.0 else {"rho_d": 1.0, "rho_s": 0.0}
+    total = np.add(parameters["rho_d"], parameters["rho_s"])
+    rho_s = np.divide(parameters["rho_s"], total, out=np.zeros(np.shape(total)), where=total > 0.0)
+    rho_d = np.divide(parameters["rho_d"], total, out=np.ones(np.shape(total)), where=total > 0.0)
+    return {"rho_d": rho_d[()], "rho_s": rho_s[()]}
 
 
 def wide_lobe(cos_i: Floats, **parameters: ArrayLike) -> Lobe:

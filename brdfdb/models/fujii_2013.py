@@ -11,7 +11,7 @@ from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows_of_vectors
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
-RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of the unnormalised lobe")
+RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of the unnormalised lobe", reflectance=True)
 SIGMA = Parameter("sigma", "σ'", "1", 0.0, 1.0, "ratio of the non-diffuse to the diffuse term; 0 is Lambert")
 
 
@@ -107,6 +107,7 @@ SPEC = ModelSpec(
     parameters=(RHO, SIGMA),
     evaluate=oren_nayar_fujii,
     vectors=oren_nayar_fujii_vectors,
+    degree=1,
     grazing_pole=True,
     lossless=white,
 )

@@ -33,7 +33,7 @@ SIGMA_0_UM = Parameter("sigma_0_um", "σ_0", "µm", 0.0, 1e4, "rms roughness; 0 
 TAU_UM = Parameter("tau_um", "τ", "µm", 1e-6, 1e6, "autocorrelation length")
 N = Parameter("n", "n", "1", 1e-3, 100.0, "refractive index")
 K = Parameter("k", "k", "1", 0.0, 1e4, "extinction coefficient")
-A = Parameter("a", "a", "1", 0.0, 1.0, "albedo of the uniform diffuse part", default=0.0)
+A = Parameter("a", "a", "1", 0.0, 1.0, "albedo of the uniform diffuse part", default=0.0, reflectance=True)
 
 _STEEPEST, _ALPHA_RANGE = 1e-3, (1e-6, 2.0)  # least cosine and range of alpha in `lobe`
 

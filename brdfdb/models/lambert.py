@@ -10,7 +10,7 @@ from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.models._rows import by_rows_of_vectors
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
-RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo")
+RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo", reflectance=True)
 
 
 @kernel
@@ -71,5 +71,6 @@ SPEC = ModelSpec(
     parameters=(RHO,),
     evaluate=lambert,
     vectors=lambert_vectors,
+    degree=1,
     lossless=white,
 )

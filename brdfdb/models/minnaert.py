@@ -12,7 +12,7 @@ from brdfdb.geometry import Directions, checked_angles, checked_vectors, finishe
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
 K = Parameter("k", "k", "1", 0.0, 1.0, "limb darkening exponent; 1 is Lambert")
-RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "scale; the albedo at k = 1", default=1.0)
+RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "scale; the albedo at k = 1", default=1.0, reflectance=True)
 
 
 @kernel
@@ -94,6 +94,7 @@ SPEC = ModelSpec(
     parameters=(K, RHO),
     evaluate=minnaert,
     vectors=minnaert_vectors,
+    degree=1,
     grazing_pole=True,
     excess=_EXCESS,
     lossless=white,

@@ -14,7 +14,7 @@ from brdfdb.geometry import HALF_PI, Directions, checked_angles, checked_vectors
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
 from brdfdb.parameters import Floats, Parameter
 
-RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a facet")
+RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a facet", reflectance=True)
 SIGMA = Parameter("sigma", "σ", "rad", 0.0, np.pi / 2, "standard deviation of the facets' slope angle")
 INTERREFLECTION = Parameter("interreflection", "L²", "1", 0.0, 1.0, "add the second bounce of eq. 28", default=True)
 OFFSET = Parameter(

@@ -14,8 +14,8 @@ from brdfdb.models.oren_nayar_1994 import INTERREFLECTION, oren_nayar, oren_naya
 from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow, torrance_sparrow_vectors
 from brdfdb.parameters import Floats, Parameter
 
-K_B = Parameter("k_b", "k_b", "1", 0.0, 1.0, "weight of the body's reflection", default=1.0)
-K_S = Parameter("k_s", "k_s", "1", 0.0, 1.0, "weight of the surface's reflection, eq. 31 as printed")
+K_B = Parameter("k_b", "k_b", "1", 0.0, 1.0, "weight of the body's reflection", default=1.0, reflectance=True)
+K_S = Parameter("k_s", "k_s", "1", 0.0, 1.0, "weight of the surface's reflection, eq. 31 as printed", reflectance=True)
 E_0 = Parameter(
     "e_0", "E_0", "1", 1.0, 10.0, "irradiance of a facet facing the light, in the unit of eq. 31", default=1.0
 )

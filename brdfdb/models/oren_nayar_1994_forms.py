@@ -30,7 +30,7 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
     The integrated facets come first. Forms with a bounce approximate facets with a bounce. Forms without it approximate
     facets in direct light.
     """
-    own = {"rho": float(arguments["rho"]), "sigma": float(arguments["sigma"])}
+    sigma = float(arguments["sigma"])
     bounces = bool(arguments.get("interreflection", True))
 
     def form(
@@ -43,12 +43,12 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
         single: bool = False,
         **more: Any,
     ) -> ModelForm:
-        def vectors(wi: Floats, wr: Floats, **_: Any) -> Floats:
-            f_r = body(wi, wr, **own, **more)
-            if "k_s" in arguments:
-                surface = torrance_sparrow_vectors(wi, wr, sigma=own["sigma"])
+        def vectors(wi: Floats, wr: Floats, **given: Any) -> Floats:
+            f_r = body(wi, wr, rho=given["rho"], sigma=sigma, **more)
+            if "k_s" in given:
+                surface = torrance_sparrow_vectors(wi, wr, sigma=sigma)
                 # Eq. (32)
-                f_r = arguments["k_b"] * f_r + arguments["k_s"] / arguments["e_0"] * surface
+                f_r = given["k_b"] * f_r + given["k_s"] / given["e_0"] * surface
             return f_r
 
         return ModelForm(key, title, kind, f"models.{python}", vectors, 8 * (2 + len(more) + constants), single)
@@ -81,7 +81,7 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
     ):
         rough = oren_nayar_qualitative_vectors
         yield form(key, title, "approximation", "oren_nayar_qualitative", rough, offset=offset)
-    if own["sigma"] <= 1.0:
+    if sigma <= 1.0:
         yield form("fujii", "Fujii's form", "approximation", "oren_nayar_fujii", oren_nayar_fujii_vectors)
         yield form("eon", "energy preserving (EON)", "other model", "oren_nayar_energy_preserving", _eon)
     yield form("lambert", "Lambert, no roughness", "approximation", "lambert", _smooth)

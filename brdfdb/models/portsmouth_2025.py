@@ -10,7 +10,7 @@ from brdfdb._numba import elementwise, kernel
 from brdfdb.geometry import Directions, checked_angles, checked_vectors, finished
 from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 
-RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a single scattering; the albedo at 1")
+RHO = Parameter("rho", "ρ", "1", 0.0, 1.0, "albedo of a single scattering; the albedo at 1", reflectance=True)
 ROUGHNESS = Parameter("roughness", "r", "1", 0.0, 1.0, "Fujii's mixing ratio; 0 is Lambert")
 
 _C1 = 0.5 - 2.0 / (3.0 * np.pi)  # A = 1 / (1 + C1 r)

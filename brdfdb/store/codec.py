@@ -152,5 +152,5 @@ def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, 
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": arrays},
         "node_type": "group",
     }
-    files[METADATA] = json.dumps(metadata, indent=1, allow_nan=False).encode()
+    files[METADATA] = json.dumps(metadata, allow_nan=False).encode()
     return files

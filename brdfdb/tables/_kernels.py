@@ -23,20 +23,11 @@ PHI_MAX = 1e15
 class Rule(NamedTuple):
     """The way from numbers on a grid to f_r.
 
-    Attributes
-    ----------
-    half_difference : bool
-        True for the axes of half and difference vectors.
-    copies : int
-        Number of times that the azimuth of an anisotropic grid goes into a full turn: 1, 2 or 4.
-    logarithm : bool
-        True if the numbers are logarithms.
-    offset : float
-        Added to values before the logarithm was taken.
-    power : float
-        Power of cos theta_i cos theta_r that f_r was multiplied by.
-    overshoots : bool
-        True if interpolated values may fall below 0 between nodes; they are set to 0.
+    `half_difference` is True for the axes of half and difference vectors. `copies` is the number of times that the
+    azimuth of an anisotropic grid goes into a full turn: 1, 2 or 4. Numbers are logarithms if `logarithm` is True;
+    `offset` was added to values before, which had been multiplied by cos theta_i cos theta_r to the `power`.
+    Interpolated values below 0 are set to 0 if `overshoots` is True. Spectra mix f_r of the channels if `mixed` is
+    True, else numbers.
     """
 
     half_difference: bool
@@ -45,6 +36,7 @@ class Rule(NamedTuple):
     offset: float
     power: float
     overshoots: bool
+    mixed: bool
 
 
 @kernel
@@ -240,9 +232,9 @@ def finished(
 ) -> None:
     """Write f_r [1/sr] at the wavelengths asked for, point after point, from what was interpolated over the angles.
 
-    `spectra` of shape (channels, L) says how the channels make up L wavelengths. If it is empty, the channels are the
-    wavelengths. `nodes` and `weight`, of shape (wavelengths, 4), say which of the L count: between them the numbers
-    that are stored are interpolated, not f_r.
+    `spectra` of shape (channels, L) says how the channels make up L wavelengths: as numbers, or as f_r if the rule is
+    mixed. If it is empty, the channels are the wavelengths. `nodes` and `weight`, of shape (wavelengths, 4), say which
+    of the L count: between them the numbers that are stored are interpolated, not f_r.
     """
     if rule.power == 0.5:
         for j in range(count):
@@ -265,13 +257,18 @@ def finished(
         for j in range(count):
             out[j] = numbers[j] * mu[j] + uniform[0]
         return
+    if rule.mixed:
+        for j in range(count * channels):
+            value = numbers[j]
+            value = exp(value) - rule.offset if rule.logarithm else value
+            numbers[j] = 0.0 if rule.overshoots and value < 0.0 else value  # nan stays nan
     total, column = np.empty(BLOCK), np.empty(channels)
     for m in range(wavelengths):
         apart, overshoots = 0.0, True
         for side in range(4):
             apart += weight[m, side] * uniform[nodes[m, side]]
             overshoots = overshoots and weight[m, side] != 1.0  # on a node nothing is interpolated
-        overshoots = overshoots or rule.overshoots
+        overshoots = overshoots or rule.overshoots or rule.mixed
         for j in range(count):
             total[j] = 0.0
         if spectra.size > 0:
@@ -288,7 +285,7 @@ def finished(
                 if part != 0.0:  # what does not count may be nan
                     for j in range(count):
                         total[j] += part * numbers[j * channels + w]
-        if rule.logarithm:
+        if rule.logarithm and not rule.mixed:
             for j in range(count):
                 total[j] = exp(total[j]) - rule.offset
         for j in range(count):

@@ -18,7 +18,7 @@ from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
 from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.layout import PLAIN, Interpolation, Layout
 from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.stated_error import Between, Error, Overall, Places
 from brdfdb.tables.table import Table, points
@@ -179,9 +179,8 @@ def _between(
     """Measure the error between wavelengths, at some of the directions that it was measured at on them."""
     assert layout.wavelength_nm is not None
     few = _first(drawn.band, min(count, _SEARCHED_AT)) & drawn.above
-    at = worst_wavelengths(
-        layout.source, layout.wavelength_nm, layout.interpolation, drawn.wi[few], drawn.wr[few], floor
-    )
+    how = layout.interpolation if layout.part_nm is None else PLAIN  # a mixture interpolates f_r itself
+    at = worst_wavelengths(layout.source, layout.wavelength_nm, how, drawn.wi[few], drawn.wr[few], floor)
     some = _first(drawn.band, math.ceil(count * _BETWEEN)) & drawn.above
     fewer = pairs.some(_first(pairs.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
     wi, wr = np.concatenate([drawn.wi[some], fewer.wi]), np.concatenate([drawn.wr[some], fewer.wr])

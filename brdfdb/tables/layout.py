@@ -100,7 +100,10 @@ class Layout:
     interpolation : Interpolation
         The way from the numbers of the table to f_r; by default they are f_r, and linear.
     spectra : array of shape (parts, L), optional
-        Basis of a factored spectrum of logarithms: orthonormal rows. Nodes then store coefficients.
+        Basis of a factored spectrum. Without `part_nm` its rows are orthonormal and make logarithms: nodes store
+        coefficients. With `part_nm` the rows say how f_r at those wavelengths makes f_r at all.
+    part_nm : array of shape (parts,) [nm], optional
+        Wavelengths of the parts of a table whose spectra mix f_r itself: nodes store the numbers at these wavelengths.
     bits : int
         Bits of the mantissa to keep, in [1, 23].
     reason : str
@@ -121,6 +124,7 @@ class Layout:
     spectra: NDArray[np.float64] | None = None
     bits: int = 23
     reason: str = ""
+    part_nm: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         source = self.source
@@ -150,8 +154,8 @@ class Layout:
 
     @property
     def uniform(self) -> NDArray[np.float64] | None:
-        """The uniform part [1/sr], of shape (1,), where it is beside the table and not in it."""
-        return None if self.plain or self.source.uniform is None else np.array([self.source.uniform])
+        """The uniform part [1/sr] where it is beside the table, not in it: (1,), or (L,) if it is a spectrum."""
+        return None if self.plain else self.source.uniform_at(self.wavelength_nm)
 
     @property
     def variable(self) -> str:
@@ -204,6 +208,7 @@ class Layout:
             "spectra": None if self.spectra is None else self.spectra.tolist(),
             "bits": self.bits,
             "reason": self.reason,
+            **({} if self.part_nm is None else {"part_nm": self.part_nm.tolist()}),
         }
 
     @classmethod
@@ -222,7 +227,8 @@ class Layout:
                 "with brdfdb.store.publication.publish"
             )
         arrays = {
-            name: None if document[name] is None else np.array(document[name]) for name in ("wavelength_nm", "spectra")
+            name: None if document.get(name) is None else np.array(document[name])
+            for name in ("wavelength_nm", "spectra", "part_nm")
         }
         return cls(
             source,

@@ -9,6 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSeriali
 
 from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.materials.provenance import Assumption, KnownExcess
+from brdfdb.materials.spectrum import Spectrum
 from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.stated_error import Error
 
@@ -46,8 +47,10 @@ class TableMetadata(BaseModel):
     model_title: str | None = Field(default=None, description="authors and subject of the model")
     model_equation: str | None = Field(default=None, description="equations of the paper that are evaluated")
     model_reference: str | None = Field(default=None, description="key of the paper in references.bib")
-    parameters: dict[str, bool | float] = Field(
-        default_factory=dict, description="of the model, as files write them: angles in degrees, under names in _deg"
+    parameters: dict[str, bool | float | Spectrum] = Field(
+        default_factory=dict,
+        description="of the model, as files write them: angles in degrees, under names in _deg; a reflectance may be a "
+        "spectrum",
     )
     parameter_sources: dict[str, str] = Field(default_factory=dict, description="where each parameter is printed")
     source: str | None = Field(default=None, description="paper and table, figure or section of the parameters")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bisect
 import math
 from collections import Counter
 from collections.abc import Iterator
@@ -12,22 +11,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import ParameterError
-from brdfdb.geometry import radians, unit_vector
+from brdfdb.errors import ParameterError, counted
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
-from brdfdb.tables import error_measurement, tabulation
-from brdfdb.tables._interpolation import weights_of_nodes
+from brdfdb.tables import axis_needs, error_measurement, tabulation
+from brdfdb.tables.axis_needs import LINE, Need
 from brdfdb.tables.grids import (
     ANISOTROPIC_AXES,
     ANISOTROPIC_HALF_DIFFERENCE_AXES,
     HALF_DIFFERENCE_AXES,
     ISOTROPIC_AXES,
-    Axis,
     Grid,
 )
 from brdfdb.tables.layout import Interpolation, Layout
-from brdfdb.tables.table import Table, points
+from brdfdb.tables.mixture import Mixture, mixture_of
+from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import POLE_END_DEG
 
 PLAN_VERSION = 1
@@ -41,83 +39,28 @@ _OF_A_BAND = 30.0  # times the tolerance is what the 99th percentile of a band o
 _WAVELENGTHS = 4  # that the axes are chosen for; the finished table is measured at all
 _DRAWS, _FINAL_DRAWS = 700, 2000  # directions of a band of theta_i, for the axes and for the finished table
 _SEED = 1994
-_LINES = 100
-_POINTS = 145  # of a line
-_COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112, 137)  # nodes of an axis
-_MOST_NODES = 400  # of an axis
 _BEYOND = 4.0  # safety factor on the node count where the grid extends below the horizon
 _HOPELESS = 8.0  # times the fewest values of another kind: a kind that takes so many is not looked into
-_SMOOTHED = 9  # points of a line that the density of nodes is averaged over
-_EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
 _BITS = range(9, 24)
 _WORTH_ROUNDING = 4096  # values: of smaller tables nothing is rounded
 
-# Where the points of a line lie, s in [0, 1]: (end [degree], power); a power p > 0 crowds them at 0 as s**p, p < 0 at
-# the end
-_LINE = {
-    "theta_i": (90.0, -2.0),
-    "theta_r": (90.0, -2.0),
-    "delta_phi": (180.0, -1.5),
-    "phi_i": (180.0, 1.0),
-    "phi_r": (360.0, 1.0),
-    "theta_h": (90.0, 2.0),
-    "theta_d": (90.0, -1.5),
-    "phi_h": (180.0, 1.0),
-    "phi_d": (90.0, 1.0),
-}
-
-
-class _Need:
-    """The need of an axis: the density of its nodes, and the error that so many of them leave on lines along it."""
-
-    def __init__(self, layout: Layout, axis: int, numbers: Floats, weight: Floats) -> None:
-        order = 4 if layout.interpolation.cubic else 2
-        count, size, wavelengths = numbers.shape
-        self.layout, self.axis, self.order = layout, axis, order
-        self.rows = np.moveaxis(numbers, 2, 1).reshape(count * wavelengths, size)
-        self.weights = np.moveaxis(weight, 2, 1).reshape(count * wavelengths, size)
-        self.known: dict[int, float] = {}
-        left = np.abs(np.diff(self.rows, order, axis=1)) * self.weights[:, order // 2 : size - order // 2]
-        peak = np.pad(np.percentile(left, 98, axis=0) ** (1.0 / order), order // 2, mode="edge")
-        smooth = np.convolve(
-            np.pad(peak, _SMOOTHED // 2, mode="edge"), np.full(_SMOOTHED, 1.0 / _SMOOTHED), mode="valid"
-        )
-        density = smooth + _EASED * smooth.mean() + 1e-30
-        self.density = density / density.sum()
-        self.counts = [n for n in _COUNTS if _spread(self.density, n) is not None]
-
-    def left(self, count: int) -> float:
-        """Return the error that a number of nodes leaves."""
-        if count not in self.known:
-            at = _spread(self.density, count)
-            assert at is not None
-            self.known[count] = _left(self.layout, self.axis, at, self.rows, self.weights)
-        return self.known[count]
-
-    def count(self, error: float) -> float:
-        """Return the smallest number of nodes that leaves no more than an error; infinite if no sensible one does.
-
-        More nodes than lines have points are guessed, from the order of the interpolation.
-        """
-        at = bisect.bisect_left(self.counts, True, key=lambda count: self.left(count) <= error)
-        if at < len(self.counts):
-            return self.counts[at]
-        guessed = math.ceil(self.counts[-1] * (self.left(self.counts[-1]) / error) ** (1.0 / self.order))
-        return guessed if guessed <= _MOST_NODES else math.inf
-
 
 # Likely number of values, layout at a coarse grid, needs of its axes: none where the number is only a bound
-_TableKind = tuple[float, Layout, dict[str, _Need]]
+_TableKind = tuple[float, Layout, dict[str, Need]]
 
 
 class _Task(NamedTuple):
-    """A plan to make: a source at a few wavelengths, directions, f_r there, and the tolerance."""
+    """A plan to make: a source at a few wavelengths, directions, f_r there, and the tolerance.
+
+    `mixture` says how a few wavelengths make f_r at these, if they do; None: each is tabulated.
+    """
 
     source: Source
     wavelength_nm: NDArray[np.float64] | None
     drawn: error_measurement.Draw
     truth: Floats
     tolerance: float
+    mixture: Mixture | None
 
 
 def check_tolerance(tolerance: float) -> None:
@@ -158,7 +101,8 @@ def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: f
     that promise the fewest values are tabulated, measured, and made coarser or finer until they keep to the tolerance.
     """
     check_tolerance(tolerance)
-    task = _task(source, wavelength_nm, tolerance)
+    mixture = mixture_of(source, wavelength_nm)
+    task = _task(source, wavelength_nm, tolerance, mixture)
     if not task.truth.any():
         return Layout(source, coarsest(source), wavelength_nm, reason="f_r is 0: all light is in the specular part")
     table_kinds = tried = list(_table_kinds(task))
@@ -166,7 +110,7 @@ def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: f
         layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
         if layout is not None:
             tried = [kind for kind in table_kinds if _kind(kind[1]) == _kind(layout)]
-        finished = None if layout is None else _finished(layout, wavelength_nm, tolerance)
+        finished = None if layout is None else _finished(layout, wavelength_nm, tolerance, mixture)
         if finished is not None:
             return replace(finished, reason=_reason(finished, tolerance, table_kinds))
     raise ParameterError(
@@ -212,7 +156,7 @@ def _reason(layout: Layout, tolerance: float, table_kinds: list[_TableKind]) -> 
             bound = "about" if needs else "more than"
             clauses.append(f"{_kind(other)} was expected to take {bound} {min(size, MOST_VALUES):.2g}")
     if layout.spectra is not None:
-        clauses.append(f"{layout.spectra.shape[1]} wavelengths are made of {len(layout.spectra)} parts")
+        clauses.append(f"{layout.spectra.shape[1]} wavelengths are made of {counted(len(layout.spectra), 'part')}")
     return "; ".join(clauses)
 
 
@@ -223,21 +167,31 @@ def _kind(layout: Layout) -> str:
     return f"{how.method} in {what}{weight} over {', '.join(layout.grid.names)}"
 
 
-def _task(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> _Task:
+def _task(
+    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
+) -> _Task:
     some = wavelength_nm
     if wavelength_nm is not None and wavelength_nm.size > _WAVELENGTHS:
-        some = wavelength_nm[np.round(np.linspace(0, wavelength_nm.size - 1, _WAVELENGTHS)).astype(int)]
+        chosen = np.round(np.linspace(0, wavelength_nm.size - 1, _WAVELENGTHS)).astype(int)
+        if mixture is not None:
+            chosen = np.union1d(chosen, mixture.extremes)
+            mixture = mixture._replace(spectra=mixture.spectra[:, chosen])
+        some = wavelength_nm[chosen]
     drawn = error_measurement.draw(source, some, _DRAWS, _SEED)
-    return _Task(source, some, drawn, error_measurement.model_values(source, some, drawn.wi, drawn.wr), tolerance)
+    truth = error_measurement.model_values(source, some, drawn.wi, drawn.wr)
+    return _Task(source, some, drawn, truth, tolerance, mixture)
 
 
 def offset_of(source: Source, wavelength_nm: NDArray[np.float64] | None) -> float:
     """Return the offset [1/sr] of f_r before logarithms are taken: half the floor of its relative error."""
-    return _offset(_task(source, wavelength_nm, 0.01))
+    return _offset(_task(source, wavelength_nm, 0.01, None))
 
 
 def _offset(task: _Task) -> float:
-    return float(max(0.5 * error_measurement.floor_of(task.truth, task.drawn).min(), 1e-12))
+    floor = error_measurement.floor_of(task.truth, task.drawn)
+    if task.mixture is not None:  # an error of a part counts as much as its weight
+        floor = floor / np.maximum(np.abs(task.mixture.spectra).max(axis=0), 1e-12)
+    return float(max(0.5 * floor.min(), 1e-12))
 
 
 def coarsest(source: Source) -> Grid:
@@ -260,13 +214,13 @@ def _end(source: Source, name: str) -> float:
         return 90.0 if source.elliptical else 360.0
     if name == "phi_d" and source.anisotropic:
         return 180.0
-    return _LINE[name][0]
+    return LINE[name][0]
 
 
 def _table_kinds(task: _Task) -> Iterator[_TableKind]:
     """Yield kinds of tables, each with the number of values that it is likely to take; simple ones first."""
     source = task.source
-    offset = _offset(task)
+    offset, floor = _offset(task), error_measurement.floor_of(task.truth, task.drawn)
     kinds: list[tuple[str, ...]]
     if source.anisotropic:
         kinds = [ANISOTROPIC_HALF_DIFFERENCE_AXES] if source.elliptical else [ANISOTROPIC_AXES]
@@ -280,18 +234,20 @@ def _table_kinds(task: _Task) -> Iterator[_TableKind]:
                 grid = _grid(source, names, pole=source.grazing_pole and power == 0.0)
                 how = Interpolation("linear", logarithm, offset if logarithm else 0.0, power)
                 layout = Layout(source, grid, task.wavelength_nm, how)
+                if task.mixture is not None:
+                    layout = replace(layout, spectra=task.mixture.spectra, part_nm=task.mixture.part_nm)
                 lines: dict[str, tuple[Floats, Floats]] = {}
                 for method in ("cubic", "linear"):
                     chosen = replace(layout, interpolation=replace(layout.interpolation, method=method))
-                    needs: dict[str, _Need] = {}
+                    needs: dict[str, Need] = {}
                     size = 1.0
                     for axis, name in enumerate(names):
                         if name == "theta_r" and not source.anisotropic:
                             needs[name] = needs["theta_i"]  # reciprocity
                         else:
                             if name not in lines:
-                                lines[name] = _lines(task, layout, axis)
-                            needs[name] = _Need(chosen, axis, *lines[name])
+                                lines[name] = axis_needs.lines(layout, axis, task.drawn, floor)
+                            needs[name] = Need(chosen, axis, *lines[name])
                         size *= needs[name].count(task.tolerance)
                         if name == "theta_h" and power == 0.0:
                             size *= _BEYOND
@@ -302,83 +258,14 @@ def _table_kinds(task: _Task) -> Iterator[_TableKind]:
                     yield size, chosen, needs
 
 
-def _points(name: str, end: float, s: Floats) -> Axis:
-    """Return the place on an axis [degree] of the point s of a line, in [0, 1]."""
-    power = _LINE[name][1]
-    return np.asarray(end * (s**power if power > 0.0 else 1.0 - (1.0 - s) ** -power), dtype=np.float64)
-
-
-def _lines(task: _Task, layout: Layout, axis: int) -> tuple[Floats, Floats]:
-    """Numbers along lines of one axis through directions of the draw, (lines, points, L), and the error of f_r that an
-    error of one in them makes, relative to f_r or its floor; 0 below the horizon."""
-    grid = layout.grid
-    above = np.flatnonzero(task.drawn.above)
-    chosen = above[:: max(1, above.size // _LINES)][:_LINES]
-    wi, wr = task.drawn.wi[chosen], task.drawn.wr[chosen]
-    x = points(grid, wi, wr)
-    name = grid.names[axis]
-    coordinates = [np.repeat(column[:, np.newaxis], _POINTS, axis=1) for column in x]
-    coordinates[axis][:] = radians(_points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, _POINTS)))
-    if grid.half_difference:
-        theta_h, *others = coordinates
-        phi_h, theta_d, phi_d = others if grid.anisotropic else (np.zeros_like(theta_h), *others)
-        numbers = tabulation.continued(layout, theta_h, phi_h, theta_d, phi_d)
-        cos_h, sin_h = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
-        lowest, mu = cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h)
-    else:
-        theta_i, *others = coordinates
-        phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros_like(theta_i), *others)
-        numbers = tabulation.numbers(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
-        lowest, mu = np.minimum(np.cos(theta_i), np.cos(theta_r)), np.cos(theta_i) * np.cos(theta_r)
-    how = layout.interpolation
-    factor = np.maximum(mu, 1e-12)[..., np.newaxis] ** -how.power
-    floor = error_measurement.floor_of(task.truth, task.drawn)
-    uniform = 0.0 if layout.uniform is None else layout.uniform
-    if how.logarithm:
-        shifted = np.exp(numbers)
-        f_r, slope = (shifted - how.offset) * factor + uniform, shifted * factor
-    else:
-        f_r, slope = numbers * factor + uniform, factor
-    weight = np.where((lowest > 1e-3)[..., np.newaxis], slope / np.maximum(f_r, floor), 0.0)
-    return numbers, weight
-
-
-def _spread(density: Floats, count: int) -> NDArray[np.int64] | None:
-    """Return the points of a line that are nodes of an axis with so many; None if two would be the same."""
-    at = np.round(_quantiles(density, count) * (density.size - 1)).astype(np.int64)
-    return at if np.all(np.diff(at) > 0) else None
-
-
-def _quantiles(density: Floats, count: int) -> Floats:
-    """Return places s in [0, 1] between which the density of nodes has equal integrals."""
-    steps = 0.5 * (density[1:] + density[:-1])
-    total = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.interp(np.linspace(0.0, total[-1], count), total, np.linspace(0.0, 1.0, density.size))
-
-
-def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weights: Floats) -> float:
-    """Return the 99th percentile of the error on lines that are interpolated between some of their points."""
-    grid = layout.grid
-    name = grid.names[axis]
-    x = _points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, rows.shape[1]))
-    nodes = x[at]
-    index, weight = weights_of_nodes(nodes, x, grid.ends[axis], cubic=layout.interpolation.cubic)
-    matrix = np.zeros((x.size, nodes.size))
-    np.add.at(matrix, (np.arange(x.size)[:, np.newaxis], index), weight)
-    error = np.abs(rows[:, at] @ matrix.T - rows) * weights
-    return float(np.percentile(error[weights > 0.0], 99)) if np.any(weights > 0.0) else 0.0
-
-
-def _with_axes(layout: Layout, needs: dict[str, _Need], error: float) -> Layout | None:
+def _with_axes(layout: Layout, needs: dict[str, Need], error: float) -> Layout | None:
     """Return the layout whose axes leave the same error each; None if no known number of nodes does."""
     axes = {}
     for name, need in needs.items():
         count = need.count(error)
         if count == math.inf:
             return None
-        end = layout.grid.axes[name][-1]
-        nodes = _points(name, end, _quantiles(need.density, int(count)))
-        axes[name] = np.append(np.round(nodes[:-1], 4), end)
+        axes[name] = need.nodes(int(count))
     return replace(layout, grid=Grid(axes))
 
 
@@ -404,7 +291,7 @@ def _values(layout: Layout) -> NDArray[np.float32]:
     return np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
 
 
-def _refined(task: _Task, layout: Layout, needs: dict[str, _Need], most: float) -> Layout | None:
+def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float) -> Layout | None:
     """Return the coarsest axes of those tried that keep to the tolerance with fewer than `most` values; or None."""
     goal, error, best = _MARGIN * task.tolerance, task.tolerance, None
     known: dict[tuple[int, ...], float] = {}
@@ -423,15 +310,18 @@ def _refined(task: _Task, layout: Layout, needs: dict[str, _Need], most: float) 
     return best
 
 
-def _finished(layout: Layout, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout | None:
+def _finished(
+    layout: Layout, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
+) -> Layout | None:
     """Return the layout at all wavelengths, with as few coefficients and bits as the error allows; None if none do."""
     drawn = error_measurement.draw(layout.source, wavelength_nm, _FINAL_DRAWS, _SEED + 1)
     truth = error_measurement.model_values(layout.source, wavelength_nm, drawn.wi, drawn.wr)
     goal = _MARGIN * tolerance
     reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
-    layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason)
+    spectra = None if mixture is None else mixture.spectra
+    layout = replace(layout, wavelength_nm=wavelength_nm, reason=reason, spectra=spectra)
     whole = _values(layout)
-    if layout.interpolation.logarithm and wavelength_nm is not None and wavelength_nm.size > 2:
+    if mixture is None and layout.interpolation.logarithm and wavelength_nm is not None and wavelength_nm.size > 2:
         rows = whole.reshape(-1, wavelength_nm.size).astype(np.float64)
         floor = error_measurement.floor_of(truth, drawn)
         significance = np.max(np.minimum(np.exp(rows) / floor, 1.0), axis=1, keepdims=True)

@@ -377,8 +377,8 @@ def albedo_shares(table: Plotted, phi_i: float, wavelength_nm: float | None) -> 
             most_panels=_MOST_PANELS,
             mirrored=not table.anisotropic,
         ).albedo[0]
-    known = source.uniform if isinstance(source, Material) else None
-    uniform = np.minimum(np.full(theta_i.size, np.pi * (known or 0.0)), total)
+    known = source.uniform_at(at) if isinstance(source, Material) else None
+    uniform = np.minimum(np.full(theta_i.size, 0.0 if known is None else np.pi * float(known[0])), total)
     rest = "lobe" if isinstance(source, Material) and source.has_lobe else "reflected"
     specular = np.asarray(table.specular_reflectance(theta_i, wavelength_nm), dtype=np.float64)
     return {"uniform part": uniform, rest: total - uniform, "specular part": specular}

@@ -53,7 +53,9 @@ class Table(BaseTable):
     interpolation : Interpolation
         The way from the numbers to f_r between nodes; by default they are f_r, interpolated linearly.
     spectra : array (coefficients, L) or None
-        The basis of a factored spectrum.
+        The basis of a factored spectrum: of logarithms, or of f_r itself if `part_nm` is given.
+    part_nm : array (coefficients,) [nm] or None
+        Wavelengths at which the parts of such a table are f_r.
     uniform : array (L,) or (1,) [1/sr]
         The uniform part of f_r, which is not in `values`.
     digest : str
@@ -75,6 +77,7 @@ class Table(BaseTable):
     spectra: NDArray[np.float64] | None = field(default=None, repr=False)
     uniform: NDArray[np.float64] | None = field(default=None, repr=False)
     digest: str = ""
+    part_nm: Axis | None = field(default=None, repr=False)
     n: Axis | None = field(default=None, repr=False)
     k: Axis | None = field(default=None, repr=False)
 
@@ -92,6 +95,7 @@ class Table(BaseTable):
             interpolation=layout.interpolation,
             spectra=layout.spectra,
             uniform=layout.uniform,
+            part_nm=layout.part_nm,
         )
 
     @property
@@ -110,7 +114,10 @@ class Table(BaseTable):
         if self.values_are_brdf:
             return self.values
         numbers = self.values.reshape(*self.grid.shape, -1)
-        f_r = rebuilt(numbers, self.interpolation, self.spectra, self.uniform, *self.grid.directions()[::2])
+        mixed = self.part_nm is not None
+        f_r = rebuilt(
+            numbers, self.interpolation, self.spectra, self.uniform, *self.grid.directions()[::2], mixed=mixed
+        )
         return f_r.astype(np.float32).reshape(self.grid.shape if self.wavelength_nm is None else f_r.shape)
 
     def _sketch(self) -> str:
@@ -170,7 +177,13 @@ class Table(BaseTable):
         # a cubic, and what continues beyond the horizon; a sum of positive numbers does not
         overshoots = how.logarithm or how.cubic or grid.half_difference
         rule = _kernels.Rule(
-            grid.half_difference, grid.copies, how.logarithm, float(how.offset), float(how.power), overshoots
+            grid.half_difference,
+            grid.copies,
+            how.logarithm,
+            float(how.offset),
+            float(how.power),
+            overshoots,
+            self.part_nm is not None,
         )
         axes = prepared([radians(nodes) for nodes in grid.axes.values()], grid.ends, cubic=how.cubic)
         channels = self.values.size // int(np.prod(grid.shape))
@@ -214,14 +227,20 @@ def rebuilt(
     uniform: Floats | None,
     theta_i: Floats,
     theta_r: Floats,
+    *,
+    mixed: bool,
 ) -> Floats:
     """Return f_r [1/sr] at nodes, shape (..., L), from the numbers there, shape (..., coefficients or L).
 
-    theta_i and theta_r [rad] broadcast to the shape of the nodes. It is 0 below the horizon.
+    theta_i and theta_r [rad] broadcast to the shape of the nodes. It is 0 below the horizon. `mixed` says that the
+    spectra mix f_r, not logarithms.
     """
-    wavelengths = numbers if spectra is None else numbers.astype(np.float64) @ spectra
+    wavelengths = numbers if spectra is None or mixed else numbers.astype(np.float64) @ spectra
     mu = np.maximum(np.cos(theta_i), COS_HORIZON) * np.maximum(np.cos(theta_r), COS_HORIZON)
-    f_r = interpolation.f_r(wavelengths, mu) + (0.0 if uniform is None else uniform)
+    f_r = interpolation.f_r(wavelengths, mu)
+    if mixed and spectra is not None:
+        f_r = np.maximum(f_r @ spectra, 0.0)
+    f_r = f_r + (0.0 if uniform is None else uniform)
     return np.asarray(np.where((np.maximum(theta_i, theta_r) > HALF_PI)[..., np.newaxis], 0.0, f_r))
 
 
@@ -236,7 +255,7 @@ def _flat(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDAr
 def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
     """Return the coordinates [rad] on a grid, of shape (axes, N), of unit vectors of shape (N, 3)."""
     x, mu, scratch = np.empty((len(grid.axes), len(wi))), np.empty(len(wi)), np.empty((4, len(wi)))
-    rule = _kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False)
+    rule = _kernels.Rule(grid.half_difference, grid.copies, False, 0.0, 0.0, False, False)
     flat = [_flat(w, np.shape(w), np.float64) for w in (wi, wr)]
     _kernels.points_of_vectors(rule, flat[0], flat[1], len(wi), x, mu, scratch)
     return x
@@ -250,15 +269,19 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
     grid = Grid({axis: arrays[axis] for axis in axes_among(arrays)})
     specular, uniform = arrays.get("specular_reflectance"), arrays.get("uniform")
-    wavelength_nm, spectra = arrays.get("wavelength"), arrays.get("spectra")
+    wavelength_nm, part_nm = arrays.get("wavelength"), arrays.get("part_wavelength")
+    basis = "mixture" if "mixture" in arrays else "spectra"
+    spectra = arrays.get(basis)
     spectrum = () if wavelength_nm is None else check_wavelengths(wavelength_nm).shape
     channels = spectrum if spectra is None else spectra.shape[:1]
     if arrays[variable].shape != (*grid.shape, *channels):  # kernels do not look
         raise ParameterError(variable, f"shape {arrays[variable].shape} is not {(*grid.shape, *channels)}, of its axes")
     if spectra is not None and spectra.shape != (*channels, *spectrum):
-        raise ParameterError(
-            "spectra", f"shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths"
-        )
+        raise ParameterError(basis, f"shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths")
+    if (part_nm is not None) != ("mixture" in arrays) or (part_nm is not None and part_nm.shape != channels):
+        raise ParameterError("part_wavelength", "it goes with mixture, one wavelength for each part")
+    if uniform is not None and uniform.size not in (1, *spectrum):
+        raise ParameterError("uniform", f"{uniform.size} values are neither one nor one for each wavelength")
     return Table(
         name=name,
         revision=revision,
@@ -271,6 +294,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
         interpolation=interpolation,
         spectra=spectra,
         uniform=None if uniform is None else np.atleast_1d(uniform).astype(np.float64),
+        part_nm=part_nm,
         n=arrays.get("n"),
         k=arrays.get("k"),
     )

@@ -48,12 +48,12 @@ def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
         some = slice(start, min(start + step, rows.stop))
         at = slice(some.start - rows.start, some.stop - rows.start)
         if layout.plain and not layout.grid.half_difference:
-            for number, wavelength in enumerate(_wavelengths(layout)):
+            for number, wavelength in enumerate(_node_wavelengths(layout)):
                 index: tuple[Any, ...] = (at, ...) if wavelength is None else (at, ..., number)
                 values[index] = _evaluated(layout, some, wavelength)
         else:
             numbers = node_numbers(layout, some)
-            if layout.spectra is not None:
+            if layout.spectra is not None and layout.part_nm is None:
                 # a BLAS sums in an order that depends on where a row stands: what was symmetric would not stay it
                 numbers = np.einsum("...w,pw->...p", numbers, layout.spectra)
             values[at] = numbers.reshape(some.stop - some.start, *layout.shape[1:])
@@ -69,9 +69,10 @@ def rounded(values: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
     return ((whole + np.uint32(1 << (drop - 1))) >> np.uint32(drop) << np.uint32(drop)).view(np.float32)
 
 
-def _wavelengths(layout: Layout) -> list[float | None]:
-    """Return the wavelengths [nm] of a table, one by one; None stands for those of a grey one."""
-    return [None] if layout.wavelength_nm is None else list(layout.wavelength_nm)
+def _node_wavelengths(layout: Layout) -> list[float | None]:
+    """Return the wavelengths [nm] at which nodes are evaluated, one by one; None stands for those of a grey table."""
+    at = layout.wavelength_nm if layout.part_nm is None else layout.part_nm
+    return [None] if at is None else list(at)
 
 
 def _evaluated(layout: Layout, rows: slice, wavelength_nm: float | None) -> Floats:
@@ -101,7 +102,9 @@ def _spread(theta_i: Axis, theta_r: Axis, delta_phi: Axis) -> tuple[Axis, ...]:
 
 
 def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
-    """Return the numbers of a table at any directions, shape (..., L), before a spectrum is factored.
+    """Return the numbers of a table at any directions, shape (..., L), before a spectrum of logarithms is factored.
+
+    If spectra mix f_r itself, they are those of the parts, shape (..., parts).
 
     Parameters
     ----------
@@ -116,7 +119,7 @@ def numbers(layout: Layout, wi: Floats, wr: Floats) -> Floats:
 
 def _numbers(layout: Layout, evaluate: Callable[[float | None], Floats], mu: Floats) -> Floats:
     """Return numbers from f_r at the wavelengths of a layout, mu = cos theta_i cos theta_r."""
-    f_r = [evaluate(wavelength) for wavelength in _wavelengths(layout)]
+    f_r = [evaluate(wavelength) for wavelength in _node_wavelengths(layout)]
     return layout.interpolation.numbers(np.stack(f_r, axis=-1).astype(np.float64), mu)
 
 
@@ -185,9 +188,14 @@ def frame(layout: Layout) -> xr.Dataset:
     if layout.spectra is not None:
         parts = np.arange(float(len(layout.spectra)))
         coordinates["part"] = ("part", parts, {"units": "1", "long_name": "number of a part"})
-        variables["spectra"] = (("part", "wavelength"), layout.spectra, VARIABLES["spectra"])
+        name = "spectra" if layout.part_nm is None else "mixture"
+        variables[name] = (("part", "wavelength"), layout.spectra, VARIABLES[name])
+    if layout.part_nm is not None:
+        variables["part_wavelength"] = ("part", layout.part_nm, VARIABLES["part_wavelength"])
     if layout.uniform is not None:
-        variables["uniform"] = ((), layout.uniform[0], VARIABLES["uniform"])
+        of_each = layout.uniform.size > 1
+        value = layout.uniform if of_each else layout.uniform[0]
+        variables["uniform"] = (("wavelength",) if of_each else (), value, VARIABLES["uniform"])
     if source.has_specular:
         theta_i_deg = specular_nodes(layout)
         name = "specular_theta_i" if theta_i_deg is SPECULAR_THETA_DEG else "theta_i"
@@ -216,8 +224,10 @@ def _reconstruction(layout: Layout) -> str:
     if layout.plain:
         return f"brdf is f_r; between nodes {layout.interpolation.method}{spectrum}"
     how = layout.interpolation
-    number = "parts @ spectra" if layout.spectra is not None else "parts"
+    mixed = layout.part_nm is not None
+    number = "parts @ spectra" if layout.spectra is not None and not mixed else "parts"
     value = f"max(exp({number}) - {how.offset!r}, 0)" if how.logarithm else number
+    value = f"max({value} @ mixture, 0)" if mixed else value
     if how.power != 0.0:
         value = f"{value} / (cos(theta_i) * cos(theta_r))**{how.power:g}"
     value = f"uniform + {value}" if layout.uniform is not None else value
@@ -263,5 +273,7 @@ VARIABLES = {
     "brdf": {"units": "sr-1", "long_name": "bidirectional reflectance f_r"},
     "parts": {"units": "1", "long_name": "what f_r is rebuilt from, as the attribute reconstruction says"},
     "spectra": {"units": "1", "long_name": "how the parts make up each wavelength"},
+    "mixture": {"units": "1", "long_name": "how f_r of the parts makes f_r at each wavelength"},
+    "part_wavelength": {"units": "nm", "long_name": "wavelength of a part"},
     "uniform": {"units": "sr-1", "long_name": "the part of f_r that is the same in all directions"},
 }

@@ -83,7 +83,9 @@ class _Rebuilt(BackendArray):
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._parts = dataset["parts"]
-        self._spectra = dataset["spectra"].values if "spectra" in dataset else None
+        self._mixed = "mixture" in dataset
+        basis = "mixture" if self._mixed else "spectra"
+        self._spectra = dataset[basis].values if basis in dataset else None
         self._uniform = np.atleast_1d(dataset["uniform"].values) if "uniform" in dataset else None
         self._interpolation = TableMetadata.read(dataset.attrs).known_interpolation()
         self._names = axes_among(self._parts.dims)
@@ -108,7 +110,10 @@ class _Rebuilt(BackendArray):
             spectra = spectra[:, kept["wavelength"]]
         nodes = [nodes[kept[name]] for name, nodes in zip(self._names, self._nodes, strict=True)]
         theta_i, _, theta_r, _ = directions(self._names, nodes)
-        f_r = rebuilt(parts, self._interpolation, spectra, self._uniform, theta_i, theta_r)
+        uniform = self._uniform
+        if uniform is not None and uniform.size > 1:
+            uniform = uniform[kept["wavelength"]]
+        f_r = rebuilt(parts, self._interpolation, spectra, uniform, theta_i, theta_r, mixed=self._mixed)
         f_r = f_r.reshape([kept[name].size for name in self.dims])
         scalars = tuple(
             axis

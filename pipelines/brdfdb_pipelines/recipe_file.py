@@ -13,7 +13,17 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Discriminator, FailFast, Field, Tag, TypeAdapter, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    FailFast,
+    Field,
+    PrivateAttr,
+    Tag,
+    TypeAdapter,
+    ValidationError,
+)
 
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.materials import Material, presets, written_name
@@ -220,6 +230,8 @@ class Recipe(BaseModel):
         default={}, description="families of materials: written like a material, with lists as values of parameters"
     )
 
+    _folder: Path | None = PrivateAttr(default=None)  # that relative paths of CSV files begin at
+
     def jobs(self) -> list[Job]:
         """Return a job for each table that the recipe asks for.
 
@@ -301,7 +313,7 @@ class Recipe(BaseModel):
             if name in known:
                 raise RecipeError(f"define.{name}", "is the name of a preset; give yours another")
             try:
-                known[name] = Material.from_table(name, table), None
+                known[name] = Material.from_table(name, table, self._folder), None
             except MaterialError as error:
                 raise RecipeError(f"define.{name}", f"{error.parameter}: {error.sentence}") from None
         families: dict[str, list[str]] = {}
@@ -315,7 +327,7 @@ class Recipe(BaseModel):
                     "families of a recipe may have",
                 )
         for name, table in self.sweep.items():
-            members = {material.name: (material, family) for material, family in _members(name, table)}
+            members = {material.name: (material, family) for material, family in _members(name, table, self._folder)}
             for taken in (name, *members):
                 if taken in known or taken in families:
                     raise RecipeError(f"sweep.{name}", f"{taken!r} is the name of another material or family")
@@ -361,7 +373,7 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
     return axes
 
 
-def _members(name: str, table: Mapping[str, Any]) -> list[tuple[Material, dict[str, Any]]]:
+def _members(name: str, table: Mapping[str, Any], folder: Path | None) -> list[tuple[Material, dict[str, Any]]]:
     """Return the materials of a sweep, the last parameter varying fastest, each with its place in the family."""
     axes = _swept(name, table)
     width = max(3, len(str(math.prod(map(len, axes.values())))))
@@ -372,7 +384,7 @@ def _members(name: str, table: Mapping[str, Any]) -> list[tuple[Material, dict[s
         if isinstance(title := table.get("title"), str) and title:
             fields["title"] = ", ".join([title, *(f"{x} {value:.12g}" for x, value in at.items())])
         try:
-            members.append((Material.from_table(member, fields), {"name": name, "parameters": at}))
+            members.append((Material.from_table(member, fields, folder), {"name": name, "parameters": at}))
         except MaterialError as error:
             written = (
                 [written_name(p) for p in MODELS[table["model"]].parameters] if table.get("model") in MODELS else []
@@ -395,6 +407,8 @@ def load(path: Path | None = None) -> Recipe:
     try:
         content = toml_file.read(source)
         recipe = Recipe.model_validate(content)
+        if path is not None:
+            recipe._folder = path.parent
         recipe.jobs()
     except OSError as error:
         refusal = RecipeError("", error.strerror or str(error))

@@ -119,10 +119,9 @@ def test_the_layout_of_a_function_says_that_it_cannot_leave_the_process() -> Non
 def test_a_material_without_its_uniform_part_is_short_of_that_part() -> None:
     brass = presets()["rolled-brass"]
     angles = (0.3, 0.0, 0.5, 2.0)
-    assert brass.uniform == brass.parameters["rho_d"] / np.pi
-    np.testing.assert_allclose(
-        brass.without_uniform().lookup(*angles) + brass.uniform, brass.lookup(*angles), rtol=1e-14
-    )
+    uniform = brass.uniform_at(None)
+    assert uniform == brass.numbers["rho_d"] / np.pi
+    np.testing.assert_allclose(brass.without_uniform().lookup(*angles) + uniform, brass.lookup(*angles), rtol=1e-14)
     assert brass.without_uniform().without_uniform().lookup(*angles) == brass.without_uniform().lookup(*angles)
 
 

@@ -405,7 +405,7 @@ NAMES = f"{', '.join(MODELS)}; --models FILE adds yours"
         (
             "plaster",
             plaster(refractive_index="main/Al/Rakic"),
-            "plaster: refractive_index, wavelengths_nm: the model oren_nayar is not spectral and has neither",
+            "plaster: refractive_index: the model oren_nayar takes none",
         ),
         (
             "rod",

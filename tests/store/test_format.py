@@ -14,7 +14,8 @@ import zarr
 
 import brdfdb
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import presets
+from brdfdb.materials import Material, presets
+from brdfdb.materials.spectrum import Spectrum
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
@@ -172,8 +173,12 @@ class Reader:
         copies = round(360.0 / self.nodes[1][-1])
         x = coordinates(self.names, self.nodes, wi, wr)
         spectrum, on_node = self.over_wavelengths(wavelength)
-        basis = self.arrays["spectra"] @ spectrum if "spectra" in self.arrays else spectrum
-        numbers = np.empty(len(wi))
+        mixture = self.arrays.get("mixture")
+        if mixture is not None:
+            basis = np.eye(len(mixture))
+        else:
+            basis = (self.arrays["spectra"] @ spectrum if "spectra" in self.arrays else spectrum)[:, np.newaxis]
+        numbers = np.empty((len(wi), basis.shape[1]))
         for point in range(len(wi)):
             value = self.numbers
             for name, nodes, at in zip(self.names, self.nodes, x, strict=True):
@@ -182,8 +187,10 @@ class Reader:
         value = np.exp(numbers) - self.offset if self.logarithm else numbers
         if self.logarithm or self.cubic or self.names in KINDS[:2] or not on_node:
             value = np.maximum(value, 0.0)
+        value = value[:, 0] if mixture is None else np.maximum(value @ (mixture @ spectrum), 0.0)
         mu = np.maximum(wi[:, 2], C) * np.maximum(wr[:, 2], C)
-        f_r = value / mu**self.power + float(self.arrays.get("uniform", 0.0))
+        uniform = np.ravel(self.arrays.get("uniform", 0.0))
+        f_r = value / mu**self.power + (uniform[0] if uniform.size == 1 else uniform @ spectrum)
         return np.where((wi[:, 2] < 0.0) | (wr[:, 2] < 0.0), 0.0, f_r)
 
     def specular(self, theta_i_deg: float, wavelength: float) -> float:
@@ -197,6 +204,7 @@ class Reader:
 
 # Tables of every kind, against the library
 
+GREEN = Spectrum(wavelengths_nm=(380.0, 520.0, 540.0, 780.0), values=(0.1, 0.7, 0.6, 0.05), origin="a test")
 VISIBLE = np.array([400.0, 450.0, 520.0, 600.0, 700.0])
 POLAR = {"theta_i": [0, 25, 60, 89], "theta_r": [0, 30, 62, 89], "delta_phi": [0, 45, 120, 180]}
 # the symmetries of the surface map these onto themselves, else f_r jumps by rounding where phi_i is folded
@@ -207,6 +215,9 @@ HALF_TURNED = {"theta_h": [0, 3, 10, 60], "phi_h": [0, 45, 90], "theta_d": [0, 4
 HALF_TURN = {**HALF_TURNED, "phi_h": [0, 45, 120, 180]}
 ROOT = Interpolation("cubic", True, 1e-3, 0.5)
 COPPER, BRASS = presets()["scene-copper-sphere"], presets()["rolled-brass"]
+PAPER = presets()["glossy-grey-paper"]
+PAINTED = PAPER.model_copy(update={"parameters": PAPER.parameters | {"rho_d": GREEN, "rho_s": GREEN}})
+CLAY = Material(name="clay", title="Clay", model="oren_nayar", parameters={"rho": GREEN, "sigma": 0.5}, source="a test")
 LAYOUTS = {
     "plain": lambda: Layout(presets()["clay-vase"], Grid(POLAR)),
     "specular": lambda: Layout(COPPER, Grid(POLAR), VISIBLE),
@@ -216,6 +227,8 @@ LAYOUTS = {
     "half": lambda: Layout(presets()["glossy-grey-paper"], Grid(HALF), interpolation=ROOT),
     "half-anisotropic": lambda: Layout(BRASS, Grid(HALF_TURNED), interpolation=ROOT),
     "half-turn": lambda: Layout(BRASS, Grid(HALF_TURN), interpolation=ROOT),
+    "mixed": lambda: plan(CLAY, VISIBLE, 0.2),
+    "mixed-lobe": lambda: plan(PAINTED, VISIBLE, 0.2),
     "planned-factored": lambda: plan(COPPER, VISIBLE, 0.2),
 }
 

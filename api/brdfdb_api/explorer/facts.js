@@ -83,6 +83,9 @@ function pairs(rows) {
   ]));
 }
 
-const value = ({ value: of, unit }) => `${typeof of === "number" ? short(of) : of}${["1", ""].includes(unit) ? "" : ` ${unit === "degree" ? "°" : unit}`}`;
+const shown = (of) => (typeof of === "number" ? short(of)
+  : of.values ? `${short(Math.min(...of.values))} to ${short(Math.max(...of.values))}, a spectrum` : of);
+
+const value = ({ value: of, unit }) => `${shown(of)}${["1", ""].includes(unit) ? "" : ` ${unit === "degree" ? "°" : unit}`}`;
 
 const range = (at) => (at === null ? "grey" : at.length === 1 ? `at ${at[0]} nm` : `${at[0]} to ${at.at(-1)} nm`);

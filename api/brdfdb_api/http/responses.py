@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, WithJsonSchema
 from starlette.responses import Response
 
+from brdfdb.materials.spectrum import Spectrum
+
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
@@ -81,7 +83,7 @@ class ParameterDocument(BaseModel):
     """A parameter of a model."""
 
     name: str
-    value: float | bool
+    value: float | bool | Spectrum
     unit: str
     meaning: str
     source: str

@@ -1,0 +1,150 @@
+"""Spectra as files write them: a list, a CSV file, an sRGB colour, or a measured reflectance of colour-science."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from brdfdb.errors import ParameterError, sentence_of
+from brdfdb.materials.spectrum import MOST_VALUES, UPSAMPLED, Spectrum
+from brdfdb.parameters import closest
+from brdfdb.spectra import ILLUMINANT, OBSERVER, colour_science
+
+WAYS = "wavelengths_nm and values, csv, srgb, or measured"
+
+_HEX = re.compile(r"#[0-9a-fA-F]{6}")
+_SHAPE_NM = (360.0, 780.0, 5.0)  # wavelengths of the spectrum of a colour
+_MOST_BYTES = 1 << 20  # of a CSV file
+
+
+def spectrum_of(name: str, written: Any, wavelengths_nm: Any = None, folder: Path | None = None) -> Spectrum:
+    """Return the spectrum that a file writes as the value of a parameter.
+
+    Parameters
+    ----------
+    name : str
+        The parameter, for messages.
+    written : list or mapping
+        A list has one value for each of `wavelengths_nm`. A mapping has ``wavelengths_nm`` and ``values``, with
+        ``origin`` if it is known; or ``csv``, a file of lines ``wavelength_nm, value``; or ``srgb``, three numbers in
+        [0, 1] or ``"#rrggbb"``, encoded as displays take them; or ``measured``, ``CHECKER/PATCH`` of colour-science.
+    wavelengths_nm : list of float [nm]
+        Wavelengths of the material, for a list.
+    folder : Path
+        Folder that a relative path of a CSV file begins at; by default the working directory.
+
+    Returns
+    -------
+    Spectrum
+        It is checked for order and number, not yet for the range of the parameter.
+
+    Raises
+    ------
+    ParameterError
+        If the value is written in another way, a file cannot be read, or a name is unknown.
+    """
+    if isinstance(written, list | tuple):
+        if not isinstance(wavelengths_nm, list | tuple) or len(wavelengths_nm) != len(written):
+            given = f"{len(wavelengths_nm)} are given" if isinstance(wavelengths_nm, list | tuple) else "none are given"
+            raise ParameterError(
+                name, f"a list of {len(written)} values needs as many wavelengths_nm, {given}", written
+            )
+        return _spectrum(name, wavelengths_nm, written, "listed with the material")
+    if not isinstance(written, Mapping):
+        raise ParameterError(name, f"{written!r} is neither a number nor a spectrum; a spectrum has {WAYS}", written)
+    fields = set(written)
+    if fields == {"csv"}:
+        return _of_csv(name, written["csv"], folder)
+    if fields == {"srgb"}:
+        return _of_srgb(name, written["srgb"])
+    if fields == {"measured"}:
+        return _of_measured(name, written["measured"])
+    if {"wavelengths_nm", "values"} <= fields <= {"wavelengths_nm", "values", "origin"}:
+        origin = written.get("origin", "listed with the material")
+        return _spectrum(name, written["wavelengths_nm"], written["values"], origin)
+    raise ParameterError(
+        name, f"a spectrum with {', '.join(sorted(map(str, fields))) or 'nothing'}; it has {WAYS}", dict(written)
+    )
+
+
+def _spectrum(name: str, wavelengths_nm: Any, values: Any, origin: Any) -> Spectrum:
+    try:
+        return Spectrum(wavelengths_nm=wavelengths_nm, values=values, origin=origin)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(map(str, first["loc"]))
+        raise ParameterError(name, f"{field}: {sentence_of(first)}" if field else sentence_of(first)) from None
+
+
+def _of_csv(name: str, path: Any, folder: Path | None) -> Spectrum:
+    if not isinstance(path, str):
+        raise ParameterError(name, f"csv: {path!r} is not the path of a file", path)
+    file = (folder or Path()) / path
+    try:
+        if file.stat().st_size > _MOST_BYTES:
+            raise ParameterError(name, f"{path} has more than {_MOST_BYTES} bytes", path)
+        text = file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise ParameterError(name, f"{path}: {error.strerror or error}", path) from None
+    except UnicodeDecodeError:
+        raise ParameterError(name, f"{path} is not text in UTF-8", path) from None
+    rows: list[tuple[float, float]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        cells = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
+        if not cells:
+            continue
+        try:
+            wavelength, value = map(float, cells)
+        except ValueError:
+            if rows or any(cell[0].isdigit() for cell in cells):  # a line of words before the first numbers is a header
+                raise ParameterError(
+                    name, f"{path}, line {number}: {line[:40]!r} is not a wavelength [nm] and a value", line
+                ) from None
+            continue
+        rows.append((wavelength, value))
+    if not 2 <= len(rows) <= MOST_VALUES:
+        raise ParameterError(name, f"{path} has {len(rows)} lines of values; allowed are 2 to {MOST_VALUES}", path)
+    wavelengths, values = zip(*rows, strict=True)
+    return _spectrum(name, wavelengths, values, f"file {Path(path).name}")
+
+
+def _of_srgb(name: str, written: Any) -> Spectrum:
+    code = written
+    if isinstance(written, str) and _HEX.fullmatch(written):
+        code = [int(written[at : at + 2], 16) / 255.0 for at in (1, 3, 5)]
+    if not (isinstance(code, Sequence) and len(code) == 3 and all(_within(value) for value in code)):
+        raise ParameterError(name, f'srgb: {written!r} is not three numbers in [0, 1] or "#rrggbb"', written)
+    encoded = np.array(code, dtype=np.float64)
+    # IEC 61966-2-1: the decoding of sRGB
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    colour = colour_science()
+    shape = colour.SpectralShape(*_SHAPE_NM)
+    made = colour.recovery.XYZ_to_sd_Jakob2019(
+        colour.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ @ linear,
+        colour.MSDS_CMFS[OBSERVER].copy().align(shape),
+        colour.SDS_ILLUMINANTS[ILLUMINANT].copy().align(shape),
+    )
+    words = written if isinstance(written, str) else ", ".join(f"{value:g}" for value in code)
+    values = [float(f"{value:.6g}") for value in made.values]  # a colour has fewer digits
+    return _spectrum(name, made.wavelengths.tolist(), values, f"sRGB {words}, {UPSAMPLED}")
+
+
+def _within(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 <= value <= 1.0
+
+
+def _of_measured(name: str, written: Any) -> Spectrum:
+    checkers = colour_science().SDS_COLOURCHECKERS
+    known = {f"{checker}/{patch}": (checker, patch) for checker in checkers for patch in checkers[checker]}
+    if not isinstance(written, str) or written not in known:
+        near = closest(str(written), known)
+        raise ParameterError(name, f"measured: {written!r} is not CHECKER/PATCH of colour-science{near}", written)
+    checker, patch = known[written]
+    sd = checkers[checker][patch]
+    origin = f"{patch} of the colour checker {checker}, measured; colour-science"
+    return _spectrum(name, sd.wavelengths.tolist(), sd.values.tolist(), origin)

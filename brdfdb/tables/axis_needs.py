@@ -1,0 +1,159 @@
+"""Needs of axes: how many nodes an axis of a table takes for an error, and where they lie."""
+
+from __future__ import annotations
+
+import bisect
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.parameters import Floats
+from brdfdb.tables import error_measurement, tabulation
+from brdfdb.tables._interpolation import weights_of_nodes
+from brdfdb.tables.grids import Axis
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.table import points
+
+_LINES = 100
+_POINTS = 145  # of a line
+_COUNTS = (2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 61, 75, 92, 112, 137)  # nodes of an axis
+_MOST_NODES = 400  # of an axis
+_SMOOTHED = 9  # points of a line that the density of nodes is averaged over
+_EASED = 0.15  # of the mean density of nodes is what the emptiest part of an axis gets
+
+# Where the points of a line lie, s in [0, 1]: (end [degree], power); a power p > 0 crowds them at 0 as s**p, p < 0 at
+# the end
+LINE = {
+    "theta_i": (90.0, -2.0),
+    "theta_r": (90.0, -2.0),
+    "delta_phi": (180.0, -1.5),
+    "phi_i": (180.0, 1.0),
+    "phi_r": (360.0, 1.0),
+    "theta_h": (90.0, 2.0),
+    "theta_d": (90.0, -1.5),
+    "phi_h": (180.0, 1.0),
+    "phi_d": (90.0, 1.0),
+}
+
+
+class Need:
+    """The need of an axis: the density of its nodes, and the error that so many of them leave on lines along it."""
+
+    def __init__(self, layout: Layout, axis: int, numbers: Floats, weight: Floats) -> None:
+        order = 4 if layout.interpolation.cubic else 2
+        count, size, wavelengths = numbers.shape
+        self.layout, self.axis, self.order = layout, axis, order
+        self.rows = np.moveaxis(numbers, 2, 1).reshape(count * wavelengths, size)
+        self.weights = np.moveaxis(weight, 2, 1).reshape(count * wavelengths, size)
+        self.known: dict[int, float] = {}
+        left = np.abs(np.diff(self.rows, order, axis=1)) * self.weights[:, order // 2 : size - order // 2]
+        peak = np.pad(np.percentile(left, 98, axis=0) ** (1.0 / order), order // 2, mode="edge")
+        smooth = np.convolve(
+            np.pad(peak, _SMOOTHED // 2, mode="edge"), np.full(_SMOOTHED, 1.0 / _SMOOTHED), mode="valid"
+        )
+        density = smooth + _EASED * smooth.mean() + 1e-30
+        self.density = density / density.sum()
+        self.counts = [n for n in _COUNTS if _spread(self.density, n) is not None]
+
+    def left(self, count: int) -> float:
+        """Return the error that a number of nodes leaves."""
+        if count not in self.known:
+            at = _spread(self.density, count)
+            assert at is not None
+            self.known[count] = _left(self.layout, self.axis, at, self.rows, self.weights)
+        return self.known[count]
+
+    def count(self, error: float) -> float:
+        """Return the smallest number of nodes that leaves no more than an error; infinite if no sensible one does.
+
+        More nodes than lines have points are guessed, from the order of the interpolation.
+        """
+        at = bisect.bisect_left(self.counts, True, key=lambda count: self.left(count) <= error)
+        if at < len(self.counts):
+            return self.counts[at]
+        guessed = math.ceil(self.counts[-1] * (self.left(self.counts[-1]) / error) ** (1.0 / self.order))
+        return guessed if guessed <= _MOST_NODES else math.inf
+
+    def nodes(self, count: int) -> Axis:
+        """Return so many nodes of the axis [degree], spread by the density."""
+        grid = self.layout.grid
+        name = grid.names[self.axis]
+        end = grid.axes[name][-1]
+        return np.append(np.round(_points(name, end, _quantiles(self.density, count))[:-1], 4), end)
+
+
+def _points(name: str, end: float, s: Floats) -> Axis:
+    """Return the place on an axis [degree] of the point s of a line, in [0, 1]."""
+    power = LINE[name][1]
+    return np.asarray(end * (s**power if power > 0.0 else 1.0 - (1.0 - s) ** -power), dtype=np.float64)
+
+
+def lines(layout: Layout, axis: int, drawn: error_measurement.Draw, floor: Floats) -> tuple[Floats, Floats]:
+    """Return numbers along lines of one axis through directions of a draw, and what an error in them makes of f_r.
+
+    Both have the shape (lines, points, L). The second is the error of f_r that an error of one makes, relative to f_r
+    or to its floor [1/sr]; it is 0 below the horizon. Of a mixture, there are parts in place of wavelengths.
+    """
+    grid = layout.grid
+    above = np.flatnonzero(drawn.above)
+    chosen = above[:: max(1, above.size // _LINES)][:_LINES]
+    wi, wr = drawn.wi[chosen], drawn.wr[chosen]
+    x = points(grid, wi, wr)
+    name = grid.names[axis]
+    coordinates = [np.repeat(column[:, np.newaxis], _POINTS, axis=1) for column in x]
+    coordinates[axis][:] = radians(_points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, _POINTS)))
+    if grid.half_difference:
+        theta_h, *others = coordinates
+        phi_h, theta_d, phi_d = others if grid.anisotropic else (np.zeros_like(theta_h), *others)
+        numbers = tabulation.continued(layout, theta_h, phi_h, theta_d, phi_d)
+        cos_h, sin_h = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
+        lowest, mu = cos_h - np.abs(sin_h), (cos_h + sin_h) * (cos_h - sin_h)
+    else:
+        theta_i, *others = coordinates
+        phi_i, theta_r, phi_r = others if grid.anisotropic else (np.zeros_like(theta_i), *others)
+        numbers = tabulation.numbers(layout, unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+        lowest, mu = np.minimum(np.cos(theta_i), np.cos(theta_r)), np.cos(theta_i) * np.cos(theta_r)
+    how = layout.interpolation
+    factor = np.maximum(mu, 1e-12)[..., np.newaxis] ** -how.power
+    uniform = 0.0 if layout.uniform is None else layout.uniform
+    if how.logarithm:
+        shifted = np.exp(numbers)
+        f_r, slope = (shifted - how.offset) * factor, shifted * factor
+    else:
+        f_r, slope = numbers * factor, factor
+    if layout.part_nm is None or layout.spectra is None:
+        share = slope / np.maximum(f_r + uniform, floor)
+    else:  # of a part at the wavelength where its error counts most
+        mixed = np.maximum(f_r @ layout.spectra + uniform, floor)
+        counts = [np.max(np.abs(row) / mixed, axis=-1) for row in layout.spectra]
+        share = slope * np.stack(counts, axis=-1)
+    weight = np.where((lowest > 1e-3)[..., np.newaxis], share, 0.0)
+    return numbers, weight
+
+
+def _spread(density: Floats, count: int) -> NDArray[np.int64] | None:
+    """Return the points of a line that are nodes of an axis with so many; None if two would be the same."""
+    at = np.round(_quantiles(density, count) * (density.size - 1)).astype(np.int64)
+    return at if np.all(np.diff(at) > 0) else None
+
+
+def _quantiles(density: Floats, count: int) -> Floats:
+    """Return places s in [0, 1] between which the density of nodes has equal integrals."""
+    steps = 0.5 * (density[1:] + density[:-1])
+    total = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.interp(np.linspace(0.0, total[-1], count), total, np.linspace(0.0, 1.0, density.size))
+
+
+def _left(layout: Layout, axis: int, at: NDArray[np.int64], rows: Floats, weights: Floats) -> float:
+    """Return the 99th percentile of the error on lines that are interpolated between some of their points."""
+    grid = layout.grid
+    name = grid.names[axis]
+    x = _points(name, grid.axes[name][-1], np.linspace(0.0, 1.0, rows.shape[1]))
+    nodes = x[at]
+    index, weight = weights_of_nodes(nodes, x, grid.ends[axis], cubic=layout.interpolation.cubic)
+    matrix = np.zeros((x.size, nodes.size))
+    np.add.at(matrix, (np.arange(x.size)[:, np.newaxis], index), weight)
+    error = np.abs(rows[:, at] @ matrix.T - rows) * weights
+    return float(np.percentile(error[weights > 0.0], 99)) if np.any(weights > 0.0) else 0.0

@@ -1,0 +1,96 @@
+"""Mixtures: tables of coloured materials that hold a few wavelengths and make the others of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb.audit.nodes import nodes_of
+from brdfdb.materials import Material, presets
+from brdfdb.materials.spectrum import Spectrum
+from brdfdb.store.publication import publish
+from brdfdb.tables import error_measurement
+from brdfdb.tables.mixture import mixture_of
+from brdfdb.tables.planner import plan
+
+NM = np.linspace(400.0, 700.0, 41)
+RED = Spectrum(wavelengths_nm=(380.0, 550.0, 600.0, 780.0), values=(0.05, 0.1, 0.5, 0.55), origin="a test")
+BLUE = Spectrum(wavelengths_nm=(380.0, 500.0, 780.0), values=(0.4, 0.2, 0.1), origin="a test")
+BRASS, CLAY = presets()["rolled-brass"], presets()["clay-vase"]
+
+
+def changed(material: Material, **parameters: Spectrum | float) -> Material:
+    return material.model_copy(update={"parameters": material.parameters | parameters})
+
+
+PAINTED = changed(BRASS, rho_d=BLUE, rho_s=RED)
+OCHRE = Material(
+    name="ochre", title="Ochre", model="oren_nayar", parameters={"rho": RED, "sigma": 0.5}, source="a test"
+)
+
+
+@pytest.mark.parametrize(
+    ("material", "parts"),
+    [(PAINTED, 1), (changed(BRASS, rho_d=BLUE), 1), (OCHRE, 2), (presets()["scene-copper-sphere"], None)],
+    ids=["lobe-and-diffuse", "diffuse-only", "direct-and-bounce", "refractive-index"],
+)
+def test_a_mixture_takes_as_many_parts_as_the_model_has(material: Material, parts: int | None) -> None:
+    mixture = mixture_of(material, NM)
+    if parts is None:
+        assert mixture is None
+        return
+    assert mixture is not None
+    assert mixture.spectra.shape == (parts, NM.size)
+    at = np.searchsorted(NM, mixture.part_nm)
+    np.testing.assert_array_equal(mixture.spectra[:, at], np.eye(parts))
+
+
+def test_lookups_of_a_coloured_table_keep_the_stated_error(tmp_path: object) -> None:
+    publish(f"{tmp_path}/store", PAINTED, wavelengths_nm=NM, tolerance=0.02)
+    table = brdfdb.open(f"{tmp_path}/store")[PAINTED.name]
+    assert table.part_nm is not None
+    assert table.error is not None
+    assert table.error.overall.p99 < 0.02
+    drawn = error_measurement.draw(PAINTED, NM, 300, 7)
+    above = drawn.above
+    wi, wr = drawn.wi[above], drawn.wr[above]
+    between = np.array([411.0, 549.0, 604.0])
+    for wavelengths, kept in ((NM[::8], 0.985), (between, 0.97)):
+        values, error = table.lookup_vectors_with_error(wi, wr, wavelengths)
+        truth = PAINTED.lookup_vectors(wi, wr, wavelengths)
+        assert np.all(np.mean(np.abs(values - truth) <= error, axis=0) > kept)
+    assert nodes_of(table, PAINTED).verdict == "passes"
+    grey = plan(BRASS, None, 0.02)
+    assert table.nbytes < 2 * 4 * grey.size  # the grey table holds float32 alone
+
+
+def test_nodes_hold_the_f_r_of_lookups(tmp_path: object) -> None:
+    publish(f"{tmp_path}/store", OCHRE, wavelengths_nm=NM[::4], tolerance=0.1)
+    store = brdfdb.open(f"{tmp_path}/store")
+    table, dataset = store["ochre"], store.dataset("ochre")
+    theta = np.deg2rad(table.axes_deg["theta_i"][1:4])
+    light, viewer = theta[:, np.newaxis], theta[np.newaxis, :]
+    expected = table.lookup(light, 0.0, viewer, 0.0)
+    np.testing.assert_allclose(table.brdf[1:4, 1:4, 0], expected, rtol=1e-6)
+    lazy = dataset["brdf"].isel(theta_i=slice(1, 4), theta_r=slice(1, 4), delta_phi=0, wavelength=[2, 5]).values
+    np.testing.assert_allclose(lazy, expected[..., [2, 5]], rtol=1e-6)
+
+
+def test_a_uniform_spectrum_lies_beside_a_factored_table() -> None:
+    copper = presets()["scene-copper-sphere"]
+    painted = changed(copper, a=RED)
+    layout = plan(painted, NM[::8], 0.1)
+    assert layout.uniform is not None
+    np.testing.assert_allclose(layout.uniform * np.pi, RED.at("a", NM[::8]))
+
+
+def test_a_damaged_uniform_spectrum_is_found(tmp_path: object) -> None:
+    publish(f"{tmp_path}/store", PAINTED, wavelengths_nm=NM[::8], tolerance=0.1)
+    table = brdfdb.open(f"{tmp_path}/store")[PAINTED.name]
+    assert table.uniform is not None
+    wrong = table.uniform.copy()
+    wrong[3] *= 1.01
+    found = nodes_of(replace(table, uniform=wrong), PAINTED)
+    assert found.verdict == "violates"
+    assert "uniform part" in " ".join(found.beside)
