@@ -270,8 +270,9 @@ def lobe_of_painted(distribution: SlopeDistribution) -> Callable[..., Lobe]:
 
     def lobe(cos_i: Floats, *, rho_d: ArrayLike, f_0: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike) -> Lobe:
         """Return the lobe of the facets. Its share follows from the reflectances, and its widths are the alphas."""
-        reflected = f_0 + (1.0 - np.asarray(f_0)) * (1.0 - np.clip(cos_i, 0.0, 1.0)) ** 5
-        total = reflected + np.asarray(rho_d)
+        f_0, rho_d = np.asarray(f_0, np.float64), np.asarray(rho_d, np.float64)
+        reflected = f_0 + (1.0 - f_0) * (1.0 - np.clip(cos_i, 0.0, 1.0)) ** 5
+        total = reflected + rho_d
         share = np.divide(_SHARE * reflected, total, where=total > 0.0, out=np.zeros(np.shape(total)))
         return Lobe(share, np.asarray(alpha_x, np.float64), np.asarray(alpha_y, np.float64), distribution)
 

@@ -84,8 +84,8 @@ def ggx(
 
     Examples
     --------
-    >>> copper = dict(n=0.95, k=2.6)
-    >>> round(float(ggx(0.3, 0.0, 0.4, np.pi, alpha_x=0.2, alpha_y=0.3, **copper)), 4)
+    >>> import numpy as np
+    >>> round(float(ggx(0.3, 0.0, 0.4, np.pi, alpha_x=0.2, alpha_y=0.3, n=0.95, k=2.6)), 4)
     0.8565
     """
     facets = metal(alpha_x, alpha_y, n, k, wavelength_nm)
@@ -149,6 +149,7 @@ def ggx_schlick(
 
     Examples
     --------
+    >>> import numpy as np
     >>> round(float(ggx_schlick(0.3, 0.0, 0.4, np.pi, rho_d=0.1, f_0=0.05, alpha_x=0.2, alpha_y=0.3)), 4)
     0.0987
     """
@@ -204,6 +205,7 @@ def beckmann(
 
     Examples
     --------
+    >>> import numpy as np
     >>> round(float(beckmann(0.3, 0.0, 0.4, np.pi, alpha_x=0.2, alpha_y=0.3, n=0.95, k=2.6)), 4)
     0.9109
     """
@@ -265,6 +267,7 @@ def beckmann_schlick(
 
     Examples
     --------
+    >>> import numpy as np
     >>> round(float(beckmann_schlick(0.3, 0.0, 0.4, np.pi, rho_d=0.1, f_0=0.05, alpha_x=0.2, alpha_y=0.3)), 4)
     0.103
     """

@@ -71,6 +71,7 @@ def ggx_separable(
 
     Examples
     --------
+    >>> import numpy as np
     >>> round(float(ggx_separable(0.3, 0.0, 0.4, np.pi, alpha_x=0.2, alpha_y=0.3, n=0.95, k=2.6)), 4)
     0.8565
     """
@@ -134,6 +135,7 @@ def beckmann_separable(
 
     Examples
     --------
+    >>> import numpy as np
     >>> round(float(beckmann_separable(0.3, 0.0, 0.4, np.pi, alpha_x=0.2, alpha_y=0.3, n=0.95, k=2.6)), 4)
     0.9109
     """

@@ -276,8 +276,8 @@ PAINTED_TABLE = table(
     "rho_d=0.3 f_0=0.05 alpha_x=0.1 alpha_y=0.2",
     "rho_d=0 f_0=1 alpha_x=1e-4 alpha_y=1e-4",
     "rho_d=1 f_0=0 alpha_x=1e-4 alpha_y=2",
-    "rho_d=1 f_0=1 alpha_x=2 alpha_y=2",
     "rho_d=0 f_0=0 alpha_x=1e-2 alpha_y=1e-3",
+    "rho_d=1 f_0=1 alpha_x=2 alpha_y=2",
 )
 
 
