@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb._elementary import cosine, erfcx, exp
 from brdfdb._numba import kernel
-from brdfdb.fresnel import reflectance
+from brdfdb.fresnel import reflectance_quotient
 from brdfdb.geometry import checked_angles, checked_vectors, finished
 from brdfdb.lobes import Lobe, SlopeDistribution
 from brdfdb.models._rows import by_rows, by_rows_of_vectors
@@ -56,14 +56,22 @@ def _reach(distribution: int, shadowing: int, cos: float, t2: float) -> float:
 
 
 @kernel
-def _fresnel(kind: int, u: float, sin2: float, first: float, second: float) -> float:
-    """Return the reflectance [1] of a facet lit at an angle of cosine u and sine squared sin2, of f_0 or n and k."""
+def _reflected(kind: int, u: float, sin2: float, first: float, second: float, above: float, below: float) -> float:
+    """Return F above / below, with the reflectance F [1] of a facet, of f_0 or of n and k.
+
+    u is the cosine of the angle on the facet and sin2 the square of its sine. There is a single division, because a
+    division takes as long as many products.
+    """
     if kind == EXACT:
-        return reflectance(u, first, second)
-    # 1 - u, which keeps its digits near normal incidence
-    m = sin2 / (1.0 + u)
+        numerator, denominator = reflectance_quotient(u, first, second)
+        numerator = denominator if numerator > denominator else numerator  # by rounding
+        return numerator * above / (denominator * below)
+    # 1 - u is sin2 / (1 + u), which keeps its digits near normal incidence
+    one_plus_u = 1.0 + u
+    inverse = 1.0 / (one_plus_u * below)
+    m = sin2 * (below * inverse)
     m2 = m * m
-    return first + (1.0 - first) * (m2 * m2 * m)
+    return (first + (1.0 - first) * (m2 * m2 * m)) * above * (one_plus_u * inverse)
 
 
 @kernel
@@ -89,7 +97,7 @@ def _lobe(
     length2 = h_x * h_x + h_y * h_y + h_z2
     u = 0.5 * math.sqrt(length2)
     sin2 = 0.25 * ((i[0] - r[0]) ** 2 + (i[1] - r[1]) ** 2 + (cos_i - cos_r) ** 2)
-    F = _fresnel(fresnel, 1.0 if u > 1.0 else u, sin2, index[0], index[1])
+    u = 1.0 if u > 1.0 else u
     s2 = (h_x * u_x) ** 2 + (h_y * u_y) ** 2
     # G / (4 cos_i cos_r)
     if shadowing == SEPARABLE:
@@ -102,8 +110,10 @@ def _lobe(
     # D of the slopes over cos^4 of h
     if distribution == GGX:
         q = h_z2 + s2
-        return F * peak * (length2 * length2 / (q * q * below))
-    return F * peak * exp(-s2 / h_z2) * (length2 * length2 / (h_z2 * h_z2 * below))
+        above, below = peak, q * q * below
+    else:
+        above, below = peak * exp(-s2 / h_z2), h_z2 * h_z2 * below
+    return _reflected(fresnel, u, sin2, index[0], index[1], above * (length2 * length2), below)
 
 
 @kernel
