@@ -62,8 +62,9 @@ def ggx_separable(
     -----
     Eq. (20) with D of eq. (33), G of eqs. (23) and (34), and the exact reflectance of unpolarised light. For two alphas
     it takes alpha^2 = (alpha_x cos phi)^2 + (alpha_y sin phi)^2 towards each direction, as Heitz 2014 does. Programs
-    evaluate this form, for example Mitsuba's `roughconductor`. Light that is not shadowed is counted as shadowed twice
-    where the same hills hide the facet from both directions, so it loses more than `ggx`, most at grazing.
+    evaluate this form, for example Mitsuba's `roughconductor`. A facet low in
+    the surface is hidden from both directions. This form counts that twice, so it loses more than `ggx`, most at
+    grazing: its albedo is 0.60 at 89 degrees for F = 1 and an alpha of 1, and that of `ggx` is 0.93.
 
     References
     ----------
@@ -127,7 +128,7 @@ def beckmann_separable(
     Notes
     -----
     Eq. (20) with D of eq. (25), G of eq. (23) and the rational approximation of G_1 in eq. (27). Its value is up to
-    0.4 % from that with the error function. At a = 1 / (alpha tan theta) = 1.6, where it becomes 1, it jumps by 6e-5.
+    0.3 % from that with the error function. At a = 1 / (alpha tan theta) = 1.6, where it becomes 1, it jumps by 6e-5.
 
     References
     ----------
