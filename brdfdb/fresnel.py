@@ -37,8 +37,8 @@ def _interface(cos_theta: float, n: float, k: float) -> tuple[float, float, floa
 
 
 @kernel
-def reflectance(cos_theta: float, n: float, k: float) -> float:
-    """Return |F|^2 = (|F_s|^2 + |F_p|^2) / 2 [1] at an interface from vacuum to the complex index n + ik.
+def reflectance_quotient(cos_theta: float, n: float, k: float) -> tuple[float, float]:
+    """Return numerator and denominator of |F|^2 = (|F_s|^2 + |F_p|^2) / 2 at an interface from vacuum to n + ik.
 
     With w and q of `_interface`, F_s = -w / (cos + q)^2 and F_p = w (cos^2 (1 + w) - sin^2) / ((1 + w) cos + q)^2.
     These equal the textbook quotients but do not cancel as n -> 1.
@@ -58,9 +58,16 @@ def reflectance(cos_theta: float, n: float, k: float) -> float:
     den_im = w_im * cos_theta + b
     d_p = den_re * den_re + den_im * den_im
     d_p2 = d_p * d_p
-    both = 0.5 * w_abs2 * (d_p2 + num2 * d_s2) / (d_s2 * d_p2)
-    # n = 1, k = 0 is no interface, and 0 / 0 at grazing. Rounding exceeds 1 by 4e-16 in total reflection
-    return 0.0 if w_abs2 == 0.0 else 1.0 if both > 1.0 else both
+    # n = 1, k = 0 is no interface, and 0 / 0 at grazing
+    return 0.5 * w_abs2 * (d_p2 + num2 * d_s2), 1.0 if w_abs2 == 0.0 else d_s2 * d_p2
+
+
+@kernel
+def reflectance(cos_theta: float, n: float, k: float) -> float:
+    """Return |F|^2 [1] of unpolarised light at an interface from vacuum to the complex index n + ik."""
+    above, below = reflectance_quotient(cos_theta, n, k)
+    both = above / below
+    return 1.0 if both > 1.0 else both  # rounding exceeds 1 by 4e-16 in total reflection
 
 
 @kernel
@@ -79,7 +86,7 @@ def _half_sum_and_difference(cos_theta: float, n: float, k: float) -> tuple[comp
 
 @kernel
 def _amplitudes(cos_theta: float, n: float, k: float) -> tuple[complex, complex]:
-    """Return F_s and F_p [1] as in `reflectance`."""
+    """Return F_s and F_p [1] as in `reflectance_quotient`."""
     w_re, w_im, e_re, a, b = _interface(cos_theta, n, k)
     if w_re == 0.0 and w_im == 0.0:  # no interface, and 0 / 0 at grazing
         return complex(0.0, 0.0), complex(0.0, 0.0)

@@ -45,7 +45,17 @@ def _gaussian_density(t2: Array) -> Array:
     return np.asarray(np.where(t2 > _EXPONENT, 0.0, np.exp(-t2)))
 
 
+def _ggx_radius(u: Array) -> Array:
+    # Trowbridge and Reitz 1975: as many slopes exceed t as 1 / (1 + t^2)
+    return np.asarray(np.sqrt(1.0 / u - 1.0))
+
+
+def _ggx_density(t2: Array) -> Array:
+    return np.asarray((1.0 + t2) ** -2)
+
+
 GAUSSIAN = SlopeDistribution("Gaussian", _gaussian_radius, _gaussian_density)
+GGX = SlopeDistribution("GGX", _ggx_radius, _ggx_density)
 
 
 class Lobe(NamedTuple):

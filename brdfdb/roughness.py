@@ -18,6 +18,9 @@ OpenPBR, OSL, MaterialX,      roughness of a specular lobe, 0 to 1      roughnes
 Disney, glTF
 ============================  ========================================  =====================================
 
+The alpha of GGX is no width of a Gaussian. It is the t at which half of the slopes are steeper, and its slopes have no
+rms value. Ward's alpha put into GGX gives another surface: docs/explanation/microfacets.md measures the error.
+
 The roughness of a *diffuse* lobe is a different quantity, which is not squared and widens no lobe. The
 `oren_nayar_diffuse_bsdf` of OSL and MaterialX takes it as Oren and Nayar's sigma in radians (1 is 57 degrees) in the
 qualitative model. With energy compensation, and in OpenPBR's `base_diffuse_roughness`, it is the parameter of Fujii's

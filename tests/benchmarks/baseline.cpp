@@ -63,6 +63,41 @@ struct WardSurface {
         : diffuse(p[0] / PI), peak(p[1] / (4.0 * PI * p[2] * p[3])), ux(1.0 / p[2]), uy(1.0 / p[3]) {}
 };
 
+// ---- GGX facets, correlated shadowing, and the reflectance of a metal or Schlick's
+
+struct FacetSurface {
+    double diffuse, f_0, n, k, ax, ay, ux, uy, peak;
+    bool schlick;
+    FacetSurface(const Parameters& p, bool schlick) : schlick(schlick) {
+        diffuse = schlick ? p[0] / PI : 0.0, f_0 = schlick ? p[1] : 0.0;
+        ax = p[schlick ? 2 : 0], ay = p[schlick ? 3 : 1];
+        n = schlick ? 1.0 : p[2], k = schlick ? 0.0 : p[3];
+        ux = 1.0 / ax, uy = 1.0 / ay, peak = 0.5 / (PI * ax * ay);
+    }
+};
+
+inline double metal(double cos, double n, double k) {
+    const double cos2 = cos * cos, sin2 = 1.0 - cos2, d = n * n - k * k - sin2;
+    const double a2b2 = std::sqrt(d * d + 4.0 * n * n * k * k), a = std::sqrt(0.5 * (a2b2 + std::abs(d)));
+    const double re = d >= 0.0 ? a : n * k / a;
+    const double t = a2b2 + cos2, u = 2.0 * cos * re, v = cos2 * a2b2 + sin2 * sin2, w = u * sin2;
+    const double s = (t - u) / (t + u);
+    return 0.5 * s * (1.0 + (v - w) / (v + w));
+}
+
+template <bool Schlick>
+inline double facets(double xi, double yi, double zi, double xr, double yr, double zr, const FacetSurface& s) {
+    const double hx = xi + xr, hy = yi + yr, hz = zi + zr, length2 = hx * hx + hy * hy + hz * hz;
+    const double tx = hx * s.ux, ty = hy * s.uy, q = hz * hz + tx * tx + ty * ty, u = 0.5 * std::sqrt(length2);
+    const double ix = s.ax * xi, iy = s.ay * yi, rx = s.ax * xr, ry = s.ay * yr;
+    const double reach_i = std::sqrt(zi * zi + ix * ix + iy * iy), reach_r = std::sqrt(zr * zr + rx * rx + ry * ry);
+    const double dx = xi - xr, dy = yi - yr, dz = zi - zr;
+    const double m = 0.25 * (dx * dx + dy * dy + dz * dz) / (1.0 + u), m2 = m * m;  // 1 - u with its digits
+    const double fresnel = Schlick ? s.f_0 + (1.0 - s.f_0) * m2 * m2 * m : metal(u, s.n, s.k);
+    const double lobe = fresnel * s.peak * length2 * length2 / (q * q * (zr * reach_i + zi * reach_r));
+    return zi < 0.0 || zr < 0.0 ? 0.0 : s.diffuse + lobe;
+}
+
 // ---- Oren-Nayar, eqs (27) and (28)
 
 struct OrenNayarSurface {
@@ -217,6 +252,12 @@ void six(const Inputs& in, const Surface& s, double* __restrict f, F value) {
 const auto ward_value = [](double xi, double yi, double zi, double xr, double yr, double zr, const WardSurface& s) {
     return ward(xi, yi, zi, xr, yr, zr, s.diffuse, s.peak, s.ux, s.uy);
 };
+const auto metal_value = [](double xi, double yi, double zi, double xr, double yr, double zr, const FacetSurface& s) {
+    return facets<false>(xi, yi, zi, xr, yr, zr, s);
+};
+const auto schlick_value = [](double xi, double yi, double zi, double xr, double yr, double zr, const FacetSurface& s) {
+    return facets<true>(xi, yi, zi, xr, yr, zr, s);
+};
 const auto oren_nayar_value = [](double xi, double yi, double zi, double xr, double yr, double zr,
                                  const OrenNayarSurface& s) { return oren_nayar(xi, yi, zi, xr, yr, zr, s); };
 const auto qualitative_value = [](double xi, double yi, double zi, double xr, double yr, double zr,
@@ -249,6 +290,18 @@ void ward_grid(const Inputs& in, const Parameters& p, double* __restrict f) {
                 f[j] = s.diffuse + peak * std::exp(-(hx * hx + hy * hy));
             }
         }
+}
+
+template <bool Schlick>
+void facets_grid(const Inputs& in, const Parameters& p, double* __restrict f) {
+    const Axes axes(in);
+    const FacetSurface s(p, Schlick);
+    const double *__restrict c = axes.cos_phi.data(), *__restrict d = axes.sin_phi.data();
+    for (std::size_t i = 0; i < axes.polar; ++i)
+        for (std::size_t r = 0; r < axes.polar; ++r, f += axes.azimuths)
+            for (std::size_t j = 0; j < axes.azimuths; ++j)
+                f[j] = facets<Schlick>(axes.sin[i], 0.0, axes.cos[i], axes.sin[r] * c[j], axes.sin[r] * d[j],
+                                       axes.cos[r], s);
 }
 
 void oren_nayar_grid(const Inputs& in, const Parameters& p, double* __restrict f) {
@@ -297,6 +350,15 @@ const std::map<std::string, Kernel> kernels = {
     {"ward", [](const Inputs& in, const Parameters& p, double* f) { interleaved(in, WardSurface(p), f, ward_value); }},
     {"ward_six", [](const Inputs& in, const Parameters& p, double* f) { six(in, WardSurface(p), f, ward_value); }},
     {"ward_grid", ward_grid},
+    {"ggx",
+     [](const Inputs& in, const Parameters& p, double* f) { interleaved(in, FacetSurface(p, false), f, metal_value); }},
+    {"ggx_six", [](const Inputs& in, const Parameters& p, double* f) { six(in, FacetSurface(p, false), f, metal_value); }},
+    {"ggx_grid", facets_grid<false>},
+    {"ggx_schlick",
+     [](const Inputs& in, const Parameters& p, double* f) { interleaved(in, FacetSurface(p, true), f, schlick_value); }},
+    {"ggx_schlick_six",
+     [](const Inputs& in, const Parameters& p, double* f) { six(in, FacetSurface(p, true), f, schlick_value); }},
+    {"ggx_schlick_grid", facets_grid<true>},
     {"oren_nayar",
      [](const Inputs& in, const Parameters& p, double* f) {
          interleaved(in, OrenNayarSurface(p), f, oren_nayar_value);

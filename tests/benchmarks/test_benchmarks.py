@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,10 @@ HELPERS = {"picture_judge", "plain", "planted_tables", "recording", "sound_mater
 SCRIPTS = sorted({path.stem for path in FOLDER.glob("*.py")} - HELPERS)
 SIGNED = {"difference"}  # columns whose numbers may be negative
 
-needs = {"against_cpp": pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")}
+needs = {
+    "against_cpp": pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed"),
+    "mitsuba_microfacet": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
+}
 
 
 def test_helpers_are_no_scripts_and_all_others_are() -> None:

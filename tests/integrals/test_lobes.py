@@ -11,14 +11,12 @@ from brdfdb.audit import sampling as audit_sampling
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
 from brdfdb.integrals.sampling import lobe_of, pdf, sample
-from brdfdb.lobes import GAUSSIAN, Lobe, SlopeDistribution
+from brdfdb.lobes import GAUSSIAN, GGX, Lobe, SlopeDistribution
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec, Parameter
 from brdfdb.tables import error_measurement
 
-# Trowbridge and Reitz 1975: as many slopes exceed t as 1 / (1 + t^2)
-GGX = SlopeDistribution("GGX", lambda u: np.sqrt(1.0 / u - 1.0), lambda t2: 1.0 / (1.0 + t2) ** 2)
 ALPHA = Parameter("alpha", "α", "1", 1e-4, 1.0, "width of the slopes")
 
 CHANCE = 1e-4  # below this p, samples are not those of the density

@@ -1,5 +1,6 @@
 """Ordinary and cornered arguments for any model of the registry."""
 
+import inspect
 import itertools
 import re
 from typing import Any
@@ -26,7 +27,10 @@ Arguments = dict[str, Any]
 
 
 def parameters_of(spec: ModelSpec) -> tuple[Parameter, ...]:
-    return (*spec.parameters, *LIGHT) if spec.spectral else spec.parameters
+    """The parameters of the model, and those of the light that it reads: some need no wavelength beside n and k."""
+    signature = inspect.signature(spec.evaluate).parameters
+    light = [each for each in LIGHT if spec.spectral and signature[each.name].default is not None]
+    return (*spec.parameters, *light)
 
 
 every_parameter = pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from brdfdb import models
 from brdfdb.reference import mp
+from tests.models.hazard_branches import BRANCHES
 from tests.models.hazard_twins import (
     EPSILON,
     FORMS,
@@ -28,7 +29,6 @@ from tests.models.hazard_twins import (
     scales,
 )
 from tests.models.hazards import (
-    BRANCHES,
     BY_NAME,
     EXACT,
     HALF_PI,

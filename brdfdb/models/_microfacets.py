@@ -1,0 +1,299 @@
+"""Mirror facets of Walter 2007 and Heitz 2014: two distributions of slopes, two shadowings, two reflectances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb._elementary import cosine, erfcx, exp
+from brdfdb._numba import kernel
+from brdfdb.fresnel import reflectance_quotient
+from brdfdb.geometry import checked_angles, checked_vectors, finished
+from brdfdb.lobes import Lobe, SlopeDistribution
+from brdfdb.models._rows import by_rows, by_rows_of_vectors
+from brdfdb.models.he_torrance_1991 import WAVELENGTH_NM, K, N
+from brdfdb.parameters import Floats, Parameter
+
+ALPHA_X = Parameter("alpha_x", "α_x", "1", 1e-6, 2.0, "width of the facets' slopes along x")
+ALPHA_Y = Parameter("alpha_y", "α_y", "1", 1e-6, 2.0, "width of the facets' slopes along y")
+F_0 = Parameter("f_0", "F_0", "1", 0.0, 1.0, "reflectance of a facet at normal incidence", reflectance=True)
+RHO_D = Parameter("rho_d", "ρ_d", "1", 0.0, 1.0, "albedo of the uniform part", reflectance=True)
+
+Rows = NDArray[np.float64]
+
+GGX, BECKMANN = range(2)  # distributions of slopes
+CORRELATED, SEPARABLE = range(2)  # shadowing
+SCHLICK, EXACT = range(2)  # reflectance of a facet
+
+_SQRT_PI = 1.7724538509055160
+_TINY = 1e-100  # guard against 0 / 0 at normal incidence, where nothing is shadowed
+_NEVER = 1.6  # a of Walter's eq. (27) from which on nothing is shadowed
+
+
+@kernel
+def _reach(distribution: int, shadowing: int, cos: float, t2: float) -> float:
+    """Return a function of one direction from which `_lobe` makes its shadowing.
+
+    t is the width of the slopes towards the direction, times its sine: alpha tan(theta) is t / cos. With Smith's
+    Lambda, cos (1 + 2 Lambda) of GGX, cos Lambda of Beckmann, or cos / G_1 where the shadowing is separable.
+    """
+    if distribution == GGX:
+        # Walter 2007, eq. (34); Heitz 2014: Lambda = (sqrt(1 + 1 / a^2) - 1) / 2
+        root = math.sqrt(cos * cos + t2)
+        return root if shadowing == CORRELATED else 0.5 * (cos + root)
+    t = math.sqrt(t2) + _TINY
+    a = cos / t
+    if shadowing == CORRELATED:
+        # Heitz 2014: Lambda = (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)), without the difference erf(a) - 1
+        return 0.5 * exp(-a * a) * (t / _SQRT_PI - cos * erfcx(a))
+    # Walter 2007, eq. (27), cos / G_1
+    above = t * (1.0 + a * (2.276 + a * 2.577)) / (3.535 + a * 2.181)
+    return cos if a >= _NEVER else above
+
+
+@kernel
+def _reflected(kind: int, u: float, sin2: float, first: float, second: float, above: float, below: float) -> float:
+    """Return F above / below, with the reflectance F [1] of a facet, of f_0 or of n and k.
+
+    u is the cosine of the angle on the facet and sin2 the square of its sine. There is a single division, because a
+    division takes as long as many products.
+    """
+    if kind == EXACT:
+        numerator, denominator = reflectance_quotient(u, first, second)
+        numerator = denominator if numerator > denominator else numerator  # by rounding
+        return numerator * above / (denominator * below)
+    # 1 - u is sin2 / (1 + u), which keeps its digits near normal incidence
+    one_plus_u = 1.0 + u
+    inverse = 1.0 / (one_plus_u * below)
+    m = sin2 * (below * inverse)
+    m2 = m * m
+    return (first + (1.0 - first) * (m2 * m2 * m)) * above * (one_plus_u * inverse)
+
+
+@kernel
+def _lobe(
+    distribution: int,
+    shadowing: int,
+    fresnel: int,
+    i: tuple[float, float, float],
+    r: tuple[float, float, float],
+    reach: tuple[float, float],
+    slopes: tuple[float, float, float],
+    index: tuple[float, float],
+) -> float:
+    """Return f_r [1/sr] of the facets: F D G / (4 cos_i cos_r), Walter 2007, eq. (20).
+
+    i and r are unit vectors, reach is `_reach` of each, slopes is 1 / alpha along x and y and 1 / (pi alpha_x alpha_y),
+    and index is f_0 or n and k.
+    """
+    cos_i, cos_r, reach_i, reach_r = i[2], r[2], reach[0], reach[1]
+    h_x, h_y, h_z = i[0] + r[0], i[1] + r[1], cos_i + cos_r
+    u_x, u_y, peak = slopes
+    h_z2 = h_z * h_z
+    length2 = h_x * h_x + h_y * h_y + h_z2
+    u = 0.5 * math.sqrt(length2)
+    sin2 = 0.25 * ((i[0] - r[0]) ** 2 + (i[1] - r[1]) ** 2 + (cos_i - cos_r) ** 2)
+    u = 1.0 if u > 1.0 else u
+    s2 = (h_x * u_x) ** 2 + (h_y * u_y) ** 2
+    # G / (4 cos_i cos_r)
+    if shadowing == SEPARABLE:
+        below = 4.0 * (reach_i * reach_r)
+    elif distribution == GGX:
+        # Heitz 2014, eq. (99): 1 / (1 + Lambda_i + Lambda_r)
+        below = 2.0 * (cos_r * reach_i + cos_i * reach_r)
+    else:
+        below = 4.0 * (cos_i * cos_r + cos_r * reach_i + cos_i * reach_r)
+    # D of the slopes over cos^4 of h
+    if distribution == GGX:
+        q = h_z2 + s2
+        above, below = peak, q * q * below
+    else:
+        above, below = peak * exp(-s2 / h_z2), h_z2 * h_z2 * below
+    return _reflected(fresnel, u, sin2, index[0], index[1], above * (length2 * length2), below)
+
+
+@kernel
+def _angle_rows(
+    distribution: int, shadowing: int, fresnel: int, cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows
+) -> None:
+    for row in range(f_r.shape[0]):
+        s, f = scalars[row], f_r[row]
+        x_i, y_i, cos_i, sin_r, cos_r = s[0], s[1], s[2], s[3], s[4]
+        uniform, first, second, alpha_x, alpha_y = s[5] / np.pi, s[6], s[7], s[8], s[9]
+        slopes = 1.0 / alpha_x, 1.0 / alpha_y, 1.0 / (np.pi * alpha_x * alpha_y)
+        c_phi, s_phi = cos_phi[min(row, cos_phi.shape[0] - 1)], sin_phi[min(row, sin_phi.shape[0] - 1)]
+        reach_i = _reach(distribution, shadowing, cos_i, (x_i * alpha_x) ** 2 + (y_i * alpha_y) ** 2)
+        for j in range(f.shape[0]):
+            x_r, y_r = sin_r * c_phi[j], sin_r * s_phi[j]
+            reach_r = _reach(distribution, shadowing, cos_r, (x_r * alpha_x) ** 2 + (y_r * alpha_y) ** 2)
+            i, r = (x_i, y_i, cos_i), (x_r, y_r, cos_r)
+            f[j] = uniform + _lobe(distribution, shadowing, fresnel, i, r, (reach_i, reach_r), slopes, (first, second))
+
+
+@kernel
+def _vector_rows(
+    distribution: int, shadowing: int, fresnel: int, w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats
+) -> None:
+    for row in range(f_r.shape[0]):
+        s, f = scalars[row], f_r[row]
+        uniform, first, second, alpha_x, alpha_y = s[0] / np.pi, s[1], s[2], s[3], s[4]
+        slopes = 1.0 / alpha_x, 1.0 / alpha_y, 1.0 / (np.pi * alpha_x * alpha_y)
+        v, w = w_i[min(row, w_i.shape[0] - 1)].reshape(-1), w_r[min(row, w_r.shape[0] - 1)].reshape(-1)
+        for j in range(f.shape[0]):
+            x_i, y_i, z_i = np.float64(v[3 * j]), np.float64(v[3 * j + 1]), np.float64(v[3 * j + 2])
+            x_r, y_r, z_r = np.float64(w[3 * j]), np.float64(w[3 * j + 1]), np.float64(w[3 * j + 2])
+            cos_i, cos_r = cosine(z_i), cosine(z_r)
+            reach_i = _reach(distribution, shadowing, cos_i, (x_i * alpha_x) ** 2 + (y_i * alpha_y) ** 2)
+            reach_r = _reach(distribution, shadowing, cos_r, (x_r * alpha_x) ** 2 + (y_r * alpha_y) ** 2)
+            i, r = (x_i, y_i, cos_i), (x_r, y_r, cos_r)
+            lobe = _lobe(distribution, shadowing, fresnel, i, r, (reach_i, reach_r), slopes, (first, second))
+            f[j] = (uniform + lobe) * (0.0 if z_i < 0.0 or z_r < 0.0 else 1.0)  # nan stays nan
+
+
+# Each form has a loop of its own: where the form is known there is no branch, and the loop vectorises. Each is compiled
+# when it is first called.
+
+
+@kernel
+def _ggx_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
+    _angle_rows(GGX, CORRELATED, EXACT, cos_phi, sin_phi, scalars, f_r)
+
+
+@kernel
+def _ggx_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+    _vector_rows(GGX, CORRELATED, EXACT, w_i, w_r, scalars, f_r)
+
+
+@kernel
+def _ggx_schlick_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
+    _angle_rows(GGX, CORRELATED, SCHLICK, cos_phi, sin_phi, scalars, f_r)
+
+
+@kernel
+def _ggx_schlick_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+    _vector_rows(GGX, CORRELATED, SCHLICK, w_i, w_r, scalars, f_r)
+
+
+@kernel
+def _beckmann_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
+    _angle_rows(BECKMANN, CORRELATED, EXACT, cos_phi, sin_phi, scalars, f_r)
+
+
+@kernel
+def _beckmann_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+    _vector_rows(BECKMANN, CORRELATED, EXACT, w_i, w_r, scalars, f_r)
+
+
+@kernel
+def _beckmann_schlick_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
+    _angle_rows(BECKMANN, CORRELATED, SCHLICK, cos_phi, sin_phi, scalars, f_r)
+
+
+@kernel
+def _beckmann_schlick_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+    _vector_rows(BECKMANN, CORRELATED, SCHLICK, w_i, w_r, scalars, f_r)
+
+
+@kernel
+def _ggx_separable_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
+    _angle_rows(GGX, SEPARABLE, EXACT, cos_phi, sin_phi, scalars, f_r)
+
+
+@kernel
+def _ggx_separable_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+    _vector_rows(GGX, SEPARABLE, EXACT, w_i, w_r, scalars, f_r)
+
+
+@kernel
+def _beckmann_separable_angles(cos_phi: Rows, sin_phi: Rows, scalars: Rows, f_r: Rows) -> None:
+    _angle_rows(BECKMANN, SEPARABLE, EXACT, cos_phi, sin_phi, scalars, f_r)
+
+
+@kernel
+def _beckmann_separable_vectors(w_i: Floats, w_r: Floats, scalars: Rows, f_r: Floats) -> None:
+    _vector_rows(BECKMANN, SEPARABLE, EXACT, w_i, w_r, scalars, f_r)
+
+
+_LOOPS = {
+    (GGX, CORRELATED, EXACT): (_ggx_angles, _ggx_vectors),
+    (GGX, CORRELATED, SCHLICK): (_ggx_schlick_angles, _ggx_schlick_vectors),
+    (BECKMANN, CORRELATED, EXACT): (_beckmann_angles, _beckmann_vectors),
+    (BECKMANN, CORRELATED, SCHLICK): (_beckmann_schlick_angles, _beckmann_schlick_vectors),
+    (GGX, SEPARABLE, EXACT): (_ggx_separable_angles, _ggx_separable_vectors),
+    (BECKMANN, SEPARABLE, EXACT): (_beckmann_separable_angles, _beckmann_separable_vectors),
+}
+
+Form = tuple[int, int, int]  # distribution, shadowing, reflectance of a facet
+Facets = tuple[Floats, Floats, Floats, Floats, Floats]
+
+
+def metal(
+    alpha_x: ArrayLike, alpha_y: ArrayLike, n: ArrayLike, k: ArrayLike, wavelength_nm: ArrayLike | None
+) -> Facets:
+    """Return checked parameters of facets of a material with the index n + ik.
+
+    The wavelength is that of n and k. It is checked, and the formulas do not read it.
+    """
+    if wavelength_nm is not None:
+        WAVELENGTH_NM.check(wavelength_nm)
+    return np.zeros(()), N.check(n), K.check(k), ALPHA_X.check(alpha_x), ALPHA_Y.check(alpha_y)
+
+
+def painted(rho_d: ArrayLike, f_0: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike) -> Facets:
+    """Return checked parameters of facets with Schlick's reflectance over a uniform part."""
+    return RHO_D.check(rho_d), F_0.check(f_0), np.zeros(()), ALPHA_X.check(alpha_x), ALPHA_Y.check(alpha_y)
+
+
+def by_angles(form: Form, angles: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike], facets: Facets) -> Floats:
+    """Return f_r [1/sr] of one form for angles (theta_i, phi_i, theta_r, phi_r) [rad]."""
+    checked = checked_angles(*angles)
+    columns = (np.cos(checked.phi_r), np.sin(checked.phi_r))
+    scalars = (checked.x_i, checked.y_i, checked.cos_i, checked.sin_r, checked.cos_r, *facets)
+    return finished(by_rows(_LOOPS[form][0], columns, scalars), checked)
+
+
+def by_vectors(form: Form, wi: ArrayLike, wr: ArrayLike, facets: Facets) -> Floats:
+    """Return f_r [1/sr] of one form for unit vectors."""
+    return by_rows_of_vectors(_LOOPS[form][1], checked_vectors(wi, wr), facets)
+
+
+_SHARE = 0.9  # share of samples in the lobe: the rest bounds the weights at grazing
+
+
+def lobe_of_metal(distribution: SlopeDistribution) -> Callable[..., Lobe]:
+    """Return the `lobe` of a model without a uniform part, for one distribution of slopes."""
+
+    def lobe(cos_i: Floats, *, alpha_x: ArrayLike, alpha_y: ArrayLike, n: ArrayLike, **_: ArrayLike) -> Lobe:
+        """Return the lobe of the facets. Its widths are the alphas."""
+        share = np.full(np.broadcast_shapes(np.shape(cos_i), np.shape(n)), _SHARE)
+        return Lobe(share, np.asarray(alpha_x, np.float64), np.asarray(alpha_y, np.float64), distribution)
+
+    return lobe
+
+
+def lobe_of_painted(distribution: SlopeDistribution) -> Callable[..., Lobe]:
+    """Return the `lobe` of a model with a uniform part, for one distribution of slopes."""
+
+    def lobe(cos_i: Floats, *, rho_d: ArrayLike, f_0: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike) -> Lobe:
+        """Return the lobe of the facets. Its share follows from the reflectances, and its widths are the alphas."""
+        f_0, rho_d = np.asarray(f_0, np.float64), np.asarray(rho_d, np.float64)
+        reflected = f_0 + (1.0 - f_0) * (1.0 - np.clip(cos_i, 0.0, 1.0)) ** 5
+        total = reflected + rho_d
+        share = np.divide(_SHARE * reflected, total, where=total > 0.0, out=np.zeros(np.shape(total)))
+        return Lobe(share, np.asarray(alpha_x, np.float64), np.asarray(alpha_y, np.float64), distribution)
+
+    return lobe
+
+
+def lossless_metal(_: Mapping[str, Any]) -> dict[str, float]:
+    """Return the n and k of a metal that absorbs next to nothing, at most n / k of the light."""
+    return {"n": N.low, "k": K.high}
+
+
+def lossless_painted(_: Mapping[str, Any]) -> dict[str, float]:
+    """Return facets that reflect all light, without a uniform part."""
+    return {"rho_d": 0.0, "f_0": 1.0}
