@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.forms.catalogue import Kind
 from brdfdb.materials.provenance import Number
+from brdfdb.materials.spectrum import Spectrum
 
 
 class _Record(BaseModel):
@@ -103,7 +104,7 @@ class Chart(_Record):
     material: str
     title: str
     model: str
-    parameters: dict[str, Number] = Field(description="angles in degrees, under names that end in _deg")
+    parameters: dict[str, Number | Spectrum] = Field(description="angles in degrees, under names that end in _deg")
     wavelength_nm: list[float] | None
     directions: int = Field(description="number of directions at which errors are measured")
     truth: str = Field(description="key of the point that the others are compared with")

@@ -32,7 +32,7 @@ def _section(spec: ModelSpec) -> str:
             f"{parameter.low:g} to {parameter.high:g}",
             parameter.unit,
             "required" if parameter.default is None else f"`{parameter.default}`",
-            plain(parameter.meaning),
+            plain(parameter.meaning) + ("; may be a spectrum" if parameter.reflectance else ""),
         )
         for parameter in spec.parameters
     ]
