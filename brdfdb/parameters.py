@@ -92,6 +92,8 @@ class ModelForm(NamedTuple):
         Size of the numbers that an evaluation reads: parameters, spectra, and constants that kernels look up.
     single : bool
         Chart it with float32 in and out, too.
+    degree : int or None
+        As `ModelSpec.degree`, of this form.
     """
 
     key: str
@@ -101,6 +103,7 @@ class ModelForm(NamedTuple):
     vectors: Callable[..., Floats]
     bytes: int
     single: bool = False
+    degree: Literal[1, 2] | None = None
 
 
 class StatedLimit(NamedTuple):

@@ -133,9 +133,10 @@ def _of_model(material: Material, wavelength_nm: NDArray[np.float64] | None) -> 
         spec.vectors,
         bytes_of(arguments),
         single=True,
+        degree=spec.degree,
     )
     for form in (itself,) if spec.forms is None else spec.forms(arguments):
-        evaluate = material.brdf_at(wavelength_nm, form.vectors)
+        evaluate = material.brdf_at(wavelength_nm, form.vectors, form.degree)
         double = Form(form.key, form.title, form.kind, form.python, evaluate, form.bytes)
         yield double
         if form.single:

@@ -13,7 +13,7 @@ from brdfdb.parameters import Floats, ModelSpec
 
 
 def evaluations(
-    spec: ModelSpec, arguments: Mapping[str, Any], count: int
+    spec: ModelSpec, arguments: Mapping[str, Any], count: int, degree: int | None
 ) -> tuple[list[dict[str, Any]], NDArray[np.float64] | None]:
     """Return the arguments to evaluate a model at, and the weights that make the values at all wavelengths.
 
@@ -25,6 +25,8 @@ def evaluations(
         Its arguments: numbers, or arrays (L,) of reflectances.
     count : int
         Number of wavelengths, L.
+    degree : int or None
+        Degree of f_r as a polynomial in the reflectances; None: it is none.
 
     Returns
     -------
@@ -40,10 +42,10 @@ def evaluations(
     low = {name: spec.parameter(name).low for name in spectra}
     high = {name: spec.parameter(name).high for name in spectra}
     share = {name: (value - low[name]) / (high[name] - low[name]) for name, value in spectra.items()}
-    if spec.degree == 1 and count > len(spectra) + 1:
+    if degree == 1 and count > len(spectra) + 1:
         corners = [numbers | low, *(numbers | low | {name: high[name]} for name in spectra)]
         return corners, np.stack([1.0 - sum(share.values()), *share.values()])
-    if spec.degree == 2 and len(spectra) == 1 and count > 3:
+    if degree == 2 and len(spectra) == 1 and count > 3:
         ((name, s),) = share.items()
         sets = [numbers | {name: low[name] + at * (high[name] - low[name])} for at in (0.0, 0.5, 1.0)]
         # Lagrange's polynomials through 0, 1/2 and 1

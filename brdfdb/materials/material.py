@@ -303,7 +303,10 @@ class Material(BaseModel, Lookups):
         return arguments | {name: value for name, value in indices.items() if name not in self._changed}
 
     def brdf_at(
-        self, wavelength_nm: NDArray[np.float64] | None, vectors: Callable[..., Floats] | None = None
+        self,
+        wavelength_nm: NDArray[np.float64] | None,
+        vectors: Callable[..., Floats] | None = None,
+        degree: int | None = None,
     ) -> Evaluate:
         """Return f_r [1/sr] of the model as a function of directions alone, with the refractive index looked up once.
 
@@ -313,6 +316,8 @@ class Material(BaseModel, Lookups):
             Wavelengths of a spectral material, and only of such a one.
         vectors : callable, optional
             A function with the arguments of the model that replaces it, such as an approximation.
+        degree : int, optional
+            Its degree as a polynomial in the reflectances, if it is one, as `ModelSpec.degree`.
 
         Returns
         -------
@@ -328,10 +333,11 @@ class Material(BaseModel, Lookups):
         f_r, together = vectors or self.spec.vectors, self.arguments(wavelength_nm)
         if wavelength_nm is None:
             return lambda wi, wr: f_r(wi, wr, **together)[:, np.newaxis]
-        separate = each(together, wavelength_nm.size)
         if self.refractive_index is None:
-            sets, weights = (separate, None) if vectors else evaluations(self.spec, together, wavelength_nm.size)
+            of = degree if vectors else self.spec.degree
+            sets, weights = evaluations(self.spec, together, wavelength_nm.size, of)
             return summed(f_r, sets, weights)
+        separate = each(together, wavelength_nm.size)
 
         def brdf(wi: Floats, wr: Floats) -> Floats:
             if len(separate) > 1 and len(wi) < _MANY:

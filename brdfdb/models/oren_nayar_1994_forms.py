@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
         body: Callable[..., Floats],
         constants: int = 0,
         single: bool = False,
+        degree: Literal[1, 2] | None = 2,
         **more: Any,
     ) -> ModelForm:
         def vectors(wi: Floats, wr: Floats, **given: Any) -> Floats:
@@ -51,7 +52,7 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
                 f_r = given["k_b"] * f_r + given["k_s"] / given["e_0"] * surface
             return f_r
 
-        return ModelForm(key, title, kind, f"models.{python}", vectors, 8 * (2 + len(more) + constants), single)
+        return ModelForm(key, title, kind, f"models.{python}", vectors, 8 * (2 + len(more) + constants), single, degree)
 
     facets = functools.partial(gaussian_rung, nodes=NODES, bounce=bounces)
     title = "facets integrated, eqs 8-20 and 47"
@@ -83,7 +84,7 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
         yield form(key, title, "approximation", "oren_nayar_qualitative", rough, offset=offset)
     if sigma <= 1.0:
         yield form("fujii", "Fujii's form", "approximation", "oren_nayar_fujii", oren_nayar_fujii_vectors)
-        yield form("eon", "energy preserving (EON)", "other model", "oren_nayar_energy_preserving", _eon)
+        yield form("eon", "energy preserving (EON)", "other model", "oren_nayar_energy_preserving", _eon, degree=None)
     yield form("lambert", "Lambert, no roughness", "approximation", "lambert", _smooth)
 
 

@@ -180,7 +180,7 @@ def forms(arguments: Arguments) -> Iterator[ModelForm]:
             return vectors(wi, wr, **given | changed)
 
         single = model in ("ward", "ward_half_vector") and not changed
-        return ModelForm(key, title, kind, f"models.{model}", changed_vectors, bytes_of(arguments), single)
+        return ModelForm(key, title, kind, f"models.{model}", changed_vectors, bytes_of(arguments), single, degree=1)
 
     yield form("elliptical", "elliptical Gaussian, eq. 5a", "exact", "ward", ward_vectors)
     half = ward_half_vector_vectors

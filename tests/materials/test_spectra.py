@@ -139,7 +139,7 @@ def test_a_polynomial_model_is_one(name: str) -> None:
     }
     spectra = {p.name: rng.uniform(p.low, p.high, 9) for p in spec.parameters if p.reflectance}
     assert spectra
-    sets, weights = evaluations(spec, middle | spectra, 9)
+    sets, weights = evaluations(spec, middle | spectra, 9, spec.degree)
     assert weights is not None
     assert len(sets) < 9
     wi, wr = directions(20)
@@ -176,3 +176,21 @@ def test_limits_and_forms_take_spectra() -> None:
     wi, wr = directions(5)
     for form in spec.forms(arguments):
         assert material.brdf_at(NM, form.vectors)(wi, wr).shape == (5, NM.size), form.key
+
+
+@pytest.mark.parametrize("model", ["ward", "oren_nayar"])
+def test_a_form_that_says_it_is_a_polynomial_is_one(model: str) -> None:
+    spectrum = {"wavelengths_nm": [400, 550, 700], "values": [0.05, 0.8, 0.3]}
+    parameters = {"rho": spectrum, "sigma_deg": 35} if model == "oren_nayar" else WARD | {"rho_d": spectrum}
+    table = {"title": "A test", "model": model, "source": "a test", "parameters": parameters}
+    material = Material.from_table("test", table)
+    assert material.spec.forms is not None
+    wi, wr = directions(12)
+    few = np.linspace(400.0, 700.0, 5)
+    judged = 0
+    for form in material.spec.forms(material.arguments(few)):
+        if form.degree is not None:
+            made, direct = (material.brdf_at(few, form.vectors, degree)(wi, wr) for degree in (form.degree, None))
+            np.testing.assert_allclose(made, direct, rtol=1e-11, err_msg=form.key)
+            judged += 1
+    assert judged > 4
