@@ -186,14 +186,15 @@ class Unseen(NamedTuple):
     overlooked: list[str]
 
 
-def unseen_of(baseline: Baseline, mutants: Iterable[Mutant]) -> Unseen:
+def unseen_of(baseline: Baseline, mutants: Sequence[Mutant]) -> Unseen:
     """Return what `Matrix` calls blind and overlooked, without the figures that can change neither.
 
     A figure is drawn with a mutant if one of its statements holds with every mutant so far, or while fewer than two
-    statements notice the mutant.
+    statements notice the mutant. The order changes the time and not the result: the last mutants of the lists touch
+    few figures, decide most of them, and take the least time.
     """
     blind, overlooked = set(baseline.holding), []
-    for mutant in mutants:
+    for mutant in reversed(mutants):
         undecided = {sentence.figure for sentence in blind}
         failing: set[Sentence] = set()
         for key in sorted(baseline.calls, key=lambda key: key not in undecided):
