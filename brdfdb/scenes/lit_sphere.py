@@ -248,17 +248,22 @@ def _tabulated(light: Light) -> _Sky:
     sharp = light(grid(_ROWS, _COLUMNS)[1])
     coarse = sharp[::_COARSE, ::_COARSE]
     theta, towards = grid(*coarse.shape)
-    towards = towards.reshape(-1, 3)
-    area = np.broadcast_to(np.sin(theta), coarse.shape).reshape(-1)
-    cosine = towards @ towards.T
+    area = np.sin(theta)
+    # Directions of the first column stand for all: those of another column see the same light, turned
+    cosine = np.einsum("ri,sci->rsc", towards[:, 0], towards)
+    turned = np.stack([np.roll(coarse, -column, axis=1) for column in range(coarse.shape[1])], axis=-1)
+
+    def summed(weight: Array) -> Array:
+        return np.asarray(np.tensordot(weight * area, turned, axes=2))
+
     places = np.stack(np.meshgrid(np.arange(_ROWS) / _COARSE, np.arange(_COLUMNS) / _COARSE, indexing="ij"))
     blurred = []
     for width in radians(_BLURS_DEG):
-        spread = np.exp((cosine - 1.0) / width**2) * area
-        mean = spread @ coarse.reshape(-1) / spread.sum(axis=1)
-        blurred.append(_interpolated(mean.reshape(coarse.shape), places))
-    seen = np.maximum(cosine[towards[:, 2] >= 0.0], 0.0) * area
-    brightest = np.max(seen @ coarse.reshape(-1)) / (area.sum() / 4.0)
+        spread = np.exp((cosine - 1.0) / width**2)
+        mean = summed(spread) / (spread * area).sum(axis=(1, 2))[:, np.newaxis]
+        blurred.append(_interpolated(mean, places))
+    seen = np.maximum(cosine[towards[:, 0, 2] >= 0.0], 0.0)
+    brightest = np.max(summed(seen)) / (area.sum() * coarse.shape[1] / 4.0)
     return _Sky(sharp, blurred, float(brightest))
 
 

@@ -164,13 +164,46 @@ def baseline_of(keys: Sequence[str], mutants: Iterable[Mutant]) -> Baseline:
     return Baseline(frozenset(holding), calls)
 
 
-def noticing(baseline: Baseline, mutant: Mutant) -> frozenset[Sentence]:
-    """Draw the figures that a mutant touches, and return the statements that hold with the right models alone."""
-    touched = [key for key, called in baseline.calls.items() if called & mutant.functions.keys()]
+def noticing(baseline: Baseline, mutant: Mutant, keys: Iterable[str] | None = None) -> frozenset[Sentence]:
+    """Draw the figures that a mutant touches, and return the statements that hold with the right models alone.
+
+    All figures are drawn, or those of `keys`.
+    """
+    among = baseline.calls if keys is None else keys
+    touched = [key for key in among if baseline.calls[key] & mutant.functions.keys()]
+    if not touched:
+        return frozenset()
     with planted(mutant), np.errstate(all="ignore"):
         wrong = verdicts(touched)
     undrawn = {sentence for sentence in wrong if sentence.says == UNDRAWN}
     return frozenset(sentence for sentence in baseline.holding if not wrong.get(sentence, True)) | undrawn
+
+
+class Unseen(NamedTuple):
+    """The statements that hold with every mutant, and the mutants that fewer than two statements notice."""
+
+    blind: set[Sentence]
+    overlooked: list[str]
+
+
+def unseen_of(baseline: Baseline, mutants: Sequence[Mutant]) -> Unseen:
+    """Return what `Matrix` calls blind and overlooked, without the figures that can change neither.
+
+    A figure is drawn with a mutant if one of its statements holds with every mutant so far, or while fewer than two
+    statements notice the mutant. The order changes the time and not the result: the last mutants of the lists touch
+    few figures, decide most of them, and take the least time.
+    """
+    blind, overlooked = set(baseline.holding), []
+    for mutant in reversed(mutants):
+        undecided = {sentence.figure for sentence in blind}
+        failing: set[Sentence] = set()
+        for key in sorted(baseline.calls, key=lambda key: key not in undecided):
+            if key in undecided or len(failing) < 2:
+                failing |= noticing(baseline, mutant, [key])
+        blind -= failing
+        if len(failing) < 2:
+            overlooked.append(mutant.name)
+    return Unseen(blind, overlooked)
 
 
 def matrix_of(keys: Sequence[str], mutants: Sequence[Mutant]) -> Matrix:
@@ -194,8 +227,14 @@ class MutantTests:
 
     @classmethod
     @cache
+    def unseen(cls) -> Unseen:
+        """Return the statements that never fail, and the mutants that nothing notices."""
+        return unseen_of(cls.baseline(), cls.mutants)
+
+    @classmethod
+    @cache
     def matrix(cls) -> Matrix:
-        """Return the statements that notice each mutant."""
+        """Return the statements that notice each mutant: the whole list, for a test that failed."""
         return Matrix(cls.baseline().holding, {mutant.name: noticing(cls.baseline(), mutant) for mutant in cls.mutants})
 
     def test_the_twins_that_mutants_change_are_the_models(self) -> None:
@@ -204,7 +243,7 @@ class MutantTests:
             assert not noticing(self.baseline(), twin)
 
     def test_every_statement_fails_for_a_wrong_model(self) -> None:
-        assert not self.matrix().blind, str(self.matrix())
+        assert not self.unseen().blind, str(self.matrix())
 
     def test_every_wrong_model_is_noticed_by_two_statements(self) -> None:
-        assert not self.matrix().overlooked, str(self.matrix())
+        assert not self.unseen().overlooked, str(self.matrix())
