@@ -322,8 +322,7 @@ class Material(BaseModel, Lookups):
         Returns
         -------
         callable
-            ``brdf(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors of shape (N, 3). L is 1 for a grey
-            material.
+            ``brdf(wi, wr)`` gives f_r [1/sr] of shape (N, L) for unit vectors (N, 3). L is 1 for a grey material.
 
         Raises
         ------
@@ -375,9 +374,9 @@ class Material(BaseModel, Lookups):
         given = self.arguments(wavelength_nm)
         used = given if names is None else {name: given[name] for name in names}
         shape = np.shape(self.wavelengths_nm or () if wavelength_nm is None else wavelength_nm)
-        if shape == ():
-            return function(*angles, **used)
-        return np.stack([function(*angles, **arguments) for arguments in each(used, shape[0])], axis=-1)
+        sets = each(used, shape[0]) if shape else [used]
+        values = [function(*angles, **arguments) for arguments in sets]
+        return np.stack(values, axis=-1) if shape else values[0]
 
     def lobe(self, cos_i: Floats, wavelength_nm: NDArray[np.float64] | None) -> Lobe | None:
         """Return the lobe for lights with the cosine cos_i, which broadcasts with wavelengths [nm]; None if diffuse."""
@@ -406,8 +405,7 @@ class Material(BaseModel, Lookups):
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of the material in its table, with angles in degrees."""
         spec, written = self.spec, {p.name: written_name(p) for p in self.spec.parameters}
-        origins = {name: value.origin for name, value in self.parameters.items() if isinstance(value, Spectrum)}
-        sources = origins | self.sources
+        sources = {n: v.origin for n, v in self.parameters.items() if isinstance(v, Spectrum)} | self.sources
         return {
             "title": self.title,
             "material": self.name,
