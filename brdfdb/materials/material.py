@@ -386,10 +386,8 @@ class Material(BaseModel, Lookups):
         self, wavelength_nm: NDArray[np.float64] | None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Return n and k [1] at wavelengths [nm]; None if the model is not spectral."""
-        if self.refractive_index is None:
-            return None
-        arguments = self.arguments(wavelength_nm)
-        return arguments["n"], arguments["k"]
+        arguments = {} if self.refractive_index is None else self.arguments(wavelength_nm)
+        return (arguments["n"], arguments["k"]) if arguments else None
 
     def file_parameters(self) -> dict[str, Number | Spectrum]:
         """Return the parameters as files write them: angles in degrees, under names ending in ``_deg``."""
