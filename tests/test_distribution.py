@@ -29,7 +29,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the sdist of the repository, the wheel made from that sdist, and both unpacked."""
     folder = tmp_path_factory.mktemp("distribution")
     with tarfile.open(_hatch(ROOT, folder, "sdist")) as archive:
-        archive.extractall(folder / "source", filter="data")
+        archive.extraction_filter = getattr(tarfile, "data_filter", None)  # Python 3.11.4 and later
+        archive.extractall(folder / "source")
     (source,) = (folder / "source").iterdir()
     with zipfile.ZipFile(_hatch(source, folder, "wheel")) as archive:
         archive.extractall(folder / "wheel")

@@ -31,6 +31,7 @@ SCHLICK, EXACT = range(2)  # reflectance of a facet
 
 _SQRT_PI = 1.7724538509055160
 _TINY = 1e-100  # guard against 0 / 0 at normal incidence, where nothing is shadowed
+_FLAT = 30.0  # a from which on exp(-a^2) is 0
 _NEVER = 1.6  # a of Walter's eq. (27) from which on nothing is shadowed
 
 
@@ -47,6 +48,7 @@ def _reach(distribution: int, shadowing: int, cos: float, t2: float) -> float:
         return root if shadowing == CORRELATED else 0.5 * (cos + root)
     t = math.sqrt(t2) + _TINY
     a = cos / t
+    a = _FLAT if a > _FLAT else a
     if shadowing == CORRELATED:
         # Heitz 2014: Lambda = (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)), without the difference erf(a) - 1
         return 0.5 * exp(-a * a) * (t / _SQRT_PI - cos * erfcx(a))

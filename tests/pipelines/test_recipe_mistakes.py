@@ -134,7 +134,12 @@ BAD = [
     changed("[0.2, 0.4]", "[0.2, true]", "sweep.mine.parameters.rho_s.1: True is not a number", SWEPT),
     changed("[0.2, 0.4]", "[0.2, [0.4]]", "sweep.mine.parameters.rho_s.1: ", SWEPT),
     changed("[0.2, 0.4]", "[0.2, 1.4]", "sweep.mine.parameters.rho_s: 1.4 is outside [0, 1]", SWEPT),
-    changed("[0.2, 0.4]", "{ start = 0.2, stop = 0.4, step = 0.1 }", "sweep.mine.parameters.rho_s: {'start'", SWEPT),
+    changed(
+        "[0.2, 0.4]",
+        "{ start = 0.2, stop = 0.4, step = 0.1 }",
+        "sweep.mine.parameters.rho_s: a spectrum with start",
+        SWEPT,
+    ),
     changed("step = 0.1", "step = 0.07", "sweep.mine.parameters.alpha_x: steps of 0.07 from 0.2 do not end", SWEPT),
     changed("step = 0.1", "steps = 2", "sweep.mine.parameters.alpha_x.1.step: is missing", SWEPT),
     changed("step = 0.1", "step = 1e-7", "sweep.mine.parameters.alpha_x: steps of 1e-07 make more than the", SWEPT),
