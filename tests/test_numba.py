@@ -23,11 +23,15 @@ import json, threading
 import numpy as np
 from brdfdb.models import MODELS
 
+NAMES = set(MODELS)
+
 def values():
     theta, phi = np.array([0.0, 0.3, 1.2, np.pi / 2]), np.array([0.0, 1.0, np.pi])
     result = {}
     every = theta, phi
     for name, spec in MODELS.items():
+        if name not in NAMES:
+            continue
         # an integral: a tenth of a second a value in Python
         theta, phi = (each[1:3] for each in every) if name == "oren_nayar_gaussian" else every
         for share in (0.02, 0.5, 1.0):
@@ -99,7 +103,9 @@ def test_models_run_without_compilation(compiled: dict[str, list[float]]) -> Non
 
 def test_two_threads_may_come_first_together(compiled: dict[str, list[float]], tmp_path: Path) -> None:
     cache = tmp_path / "cache"
-    assert_same(run(EVALUATE_ALL + TWO_THREADS, NUMBA_CACHE_DIR=str(cache)), compiled)
+    names = ("lambert", "oren_nayar", "torrance_sparrow", "ward", "he_torrance")  # each way to run a kernel
+    values = run(f"{EVALUATE_ALL}\nNAMES = {names}\n{TWO_THREADS}", NUMBA_CACHE_DIR=str(cache))
+    assert_same(values, {row: value for row, value in compiled.items() if row.split()[0] in names})
     assert any(cache.rglob("*.nbi"))  # it did start from an empty cache, and has filled it
 
 
