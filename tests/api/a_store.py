@@ -41,7 +41,8 @@ def publish(root: Path, name: str, model: str, grid: Grid = GREY, *, error: bool
     """Tabulate a material and publish it; returns its revision. What is neither of these names is a parameter."""
     beside = {key: entries.pop(key) for key in ("refractive_index",) if key in entries}
     about = {"title": f"Test {name}", "model": model, "source": f"no paper, {name}", **beside, "parameters": entries}
-    layout = Layout(Material.from_table(name, about), grid, VISIBLE_NM if beside else None)
+    material = Material.from_table(name, about)
+    layout = Layout(material, grid, VISIBLE_NM if material.spectral else None)
     dataset = tabulate(layout)
     if error:
         found = measure(layout, lambda rows: dataset["brdf"].values[rows], count=64)

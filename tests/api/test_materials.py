@@ -156,6 +156,19 @@ def test_grey_material(client: Client) -> None:
     assert material["specular"] is False
 
 
+def test_a_material_with_a_colour(own: Path) -> None:
+    given = {"wavelengths_nm": [400.0, 500.0, 700.0], "values": [0.2, 0.6, 0.4]}
+    publish(own, "green-tile", "lambert", error=True, rho=given)
+    client, green = client_of(own), "/v1/materials/green-tile"
+    (parameter,) = client.get(green).json()["parameters"]
+    assert {key: parameter["value"][key] for key in given} == given
+    for source in ("table", "model"):
+        query = f"/lookup?theta_i=20&theta_r=70&wavelength_nm=440&wavelength_nm=600&from={source}"
+        assert client.get(green + query).json()["brdf"] == pytest.approx([0.36 / np.pi, 0.5 / np.pi], rel=1e-6)
+    for rest in ("/albedo", "/lobe?theta_i=30", "/export/exr", "/lookup?theta_i=1&theta_r=2&output=linear-srgb"):
+        assert client.get(green + rest).status_code == 200, rest
+
+
 @pytest.mark.parametrize("address", ["", "/lookup?theta_i=1&theta_r=2"])
 def test_unknown_material_names_the_closest(client: Client, address: str) -> None:
     problem = client.problem("GET", f"/v1/materials/copper-foul{address}", 404)

@@ -204,6 +204,7 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
 def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
     """Return the parameters as recipes write them: value, unit, meaning, source."""
     from brdfdb.materials import written_name
+    from brdfdb.materials.spectrum import Spectrum
     from brdfdb.models import MODELS
 
     spec = MODELS.get(metadata.model or "")
@@ -211,7 +212,7 @@ def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
     return [
         {
             "name": name,
-            "value": value,
+            "value": value.model_dump() if isinstance(value, Spectrum) else value,
             "unit": ("degree" if meanings[name].unit == "rad" else meanings[name].unit) if name in meanings else "",
             "meaning": meanings[name].meaning if name in meanings else "",
             "source": metadata.parameter_sources.get(name, metadata.source or ""),
