@@ -17,6 +17,7 @@ from brdfdb.models import (
     heitz_2014,
     oren_nayar_1994_specs,
     portsmouth_2025,
+    rahman_1993,
     torrance_sparrow_1967,
     walter_2007,
     ward_1992,
@@ -85,6 +86,7 @@ from brdfdb.models.oren_nayar_1994_surfaces import (
     oren_nayar_unidirectional_vectors,
 )
 from brdfdb.models.portsmouth_2025 import oren_nayar_energy_preserving, oren_nayar_energy_preserving_vectors
+from brdfdb.models.rahman_1993 import rpv, rpv_vectors
 from brdfdb.models.registry import Registry
 from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow, torrance_sparrow_vectors
 from brdfdb.models.walter_2007 import (
@@ -120,6 +122,7 @@ MODELS.add(
         heitz_2014.BECKMANN_SCHLICK_SPEC,
         walter_2007.GGX_SPEC,
         walter_2007.BECKMANN_SPEC,
+        rahman_1993.SPEC,
     ),
     "brdfdb",
 )
@@ -186,6 +189,8 @@ __all__ = [
     "oren_nayar_unidirectional_parts_vectors",
     "oren_nayar_unidirectional_vectors",
     "oren_nayar_vectors",
+    "rpv",
+    "rpv_vectors",
     "torrance_sparrow",
     "torrance_sparrow_vectors",
     "ward",

@@ -16,6 +16,7 @@ from brdfdb.reference import (
     mp,
     oren_nayar_1994,
     portsmouth_2025,
+    rahman_1993,
     torrance_sparrow_1967,
     walter_2007,
     ward_1992,
@@ -281,6 +282,24 @@ PAINTED_TABLE = table(
 )
 
 
+RPV = ("rho_0", "k", "asymmetry", "rho_c")
+# k at both ends, and next to 1; the phase function at its narrowest, back and forward. The last row has no hot spot:
+# where both directions are at 90 degrees, that of the twin is 1e-32 wide
+RPV_TABLE = table(
+    "rho_0=0.06 k=0.7 asymmetry=-0.2 rho_c=0.3",
+    "rho_0=1 k=0 asymmetry=-0.99 rho_c=0",
+    "rho_0=1 k=2 asymmetry=0.99 rho_c=0",
+    "rho_0=0 k=0.5 asymmetry=0.5 rho_c=0.5",
+    "rho_0=0.5 k=1.000000000001 asymmetry=1e-12 rho_c=0",
+    "rho_0=1 k=1 asymmetry=0 rho_c=1",
+)
+
+
+def held(twin: Callable[..., Any]) -> Callable[..., Any]:
+    """A model with a pole is held at `LARGEST`."""
+    return lambda *angles, **parameters: min(twin(*angles, **parameters), mp.mpf(LARGEST))
+
+
 def with_albedo(rows: tuple[Arguments, ...], a: float) -> tuple[Arguments, ...]:
     return (*rows[:-1], rows[-1] | {"a": a})
 
@@ -368,6 +387,7 @@ SUBJECTS = (
     Subject("beckmann", anisotropic(heitz_2014.beckmann, *FACETS), FACETS_TABLE),
     Subject("beckmann_schlick", anisotropic(heitz_2014.beckmann_schlick, *PAINTED), PAINTED_TABLE),
     Subject("beckmann_separable", anisotropic(walter_2007.beckmann_separable, *FACETS), FACETS_TABLE),
+    Subject("rpv", held(isotropic(rahman_1993.rpv, *RPV)), RPV_TABLE),
     Subject("he_torrance", he_torrance, with_albedo(HE_TORRANCE_TABLE, 1.0), HE_TORRANCE_SLOW, HE_TORRANCE_VERY_SLOW),
     Subject("he_torrance_parts", he_torrance_parts, with_albedo(HE_TORRANCE_TABLE[3:5], 0.5)),
     Subject("he_torrance_mueller", he_torrance_mueller, with_albedo(HE_TORRANCE_TABLE[1:6], 0.5)),
