@@ -12,6 +12,7 @@ from brdfdb.reference import (
     he_torrance_1991,
     heitz_2014,
     lambert,
+    lucht_2000,
     minnaert,
     mp,
     oren_nayar_1994,
@@ -293,11 +294,21 @@ RPV_TABLE = table(
     "rho_0=0.5 k=1.000000000001 asymmetry=1e-12 rho_c=0",
     "rho_0=1 k=1 asymmetry=0 rho_c=1",
 )
+# weights of the kernels at both ends; f_iso is above 0, because the kernels are 0 at the normal
+ROSS_LI = ("f_iso", "f_vol", "f_geo")
+ROSS_LI_TABLE = table(
+    "f_iso=0.2097 f_vol=0.0814 f_geo=0.0041",
+    "f_iso=1 f_vol=1 f_geo=0",
+    "f_iso=1 f_vol=0 f_geo=0.5",
+    "f_iso=0.5 f_vol=1e-12 f_geo=1e-12",
+    "f_iso=0 f_vol=0 f_geo=0",
+    "f_iso=0.3 f_vol=0.5 f_geo=0",
+)
 
 
 def held(twin: Callable[..., Any]) -> Callable[..., Any]:
-    """A model with a pole is held at `LARGEST`."""
-    return lambda *angles, **parameters: min(twin(*angles, **parameters), mp.mpf(LARGEST))
+    """A model with a pole is held at `LARGEST`, and one with negative values at 0."""
+    return lambda *angles, **parameters: max(mp.zero, min(twin(*angles, **parameters), mp.mpf(LARGEST)))
 
 
 def with_albedo(rows: tuple[Arguments, ...], a: float) -> tuple[Arguments, ...]:
@@ -388,6 +399,7 @@ SUBJECTS = (
     Subject("beckmann_schlick", anisotropic(heitz_2014.beckmann_schlick, *PAINTED), PAINTED_TABLE),
     Subject("beckmann_separable", anisotropic(walter_2007.beckmann_separable, *FACETS), FACETS_TABLE),
     Subject("rpv", held(isotropic(rahman_1993.rpv, *RPV)), RPV_TABLE),
+    Subject("ross_li", held(isotropic(lucht_2000.ross_li, *ROSS_LI)), ROSS_LI_TABLE),
     Subject("he_torrance", he_torrance, with_albedo(HE_TORRANCE_TABLE, 1.0), HE_TORRANCE_SLOW, HE_TORRANCE_VERY_SLOW),
     Subject("he_torrance_parts", he_torrance_parts, with_albedo(HE_TORRANCE_TABLE[3:5], 0.5)),
     Subject("he_torrance_mueller", he_torrance_mueller, with_albedo(HE_TORRANCE_TABLE[1:6], 0.5)),
