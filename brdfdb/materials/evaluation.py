@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -45,11 +46,15 @@ def evaluations(
     if degree == 1 and count > len(spectra) + 1:
         corners = [numbers | low, *(numbers | low | {name: high[name]} for name in spectra)]
         return corners, np.stack([1.0 - sum(share.values()), *share.values()])
-    if degree == 2 and len(spectra) == 1 and count > 3:
-        ((name, s),) = share.items()
-        sets = [numbers | {name: low[name] + at * (high[name] - low[name])} for at in (0.0, 0.5, 1.0)]
-        # Lagrange's polynomials through 0, 1/2 and 1
-        return sets, np.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)])
+    pairs = list(itertools.combinations_with_replacement(range(len(spectra) + 1), 2))
+    if degree == 2 and count > len(pairs):
+        # Lagrange's polynomials through the corners of the simplex and the middles between them
+        names, corner = [*spectra], np.eye(len(spectra) + 1)[:, 1:]
+        middles = [dict(zip(names, 0.5 * (corner[a] + corner[b]), strict=True)) for a, b in pairs]
+        sets = [numbers | {name: low[name] + m[name] * (high[name] - low[name]) for name in names} for m in middles]
+        s = np.stack([1.0 - sum(share.values()), *share.values()])
+        weights = [s[a] * (2.0 * s[a] - 1.0) if a == b else 4.0 * s[a] * s[b] for a, b in pairs]
+        return sets, np.stack(weights)
     return [numbers | {name: value[w] for name, value in spectra.items()} for w in range(count)], None
 
 

@@ -78,6 +78,7 @@ ANALYTIC: dict[str, dict[str, float]] = {
     "ward": {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": 0.15, "alpha_y": 0.3},
     "ggx": {"alpha_x": 0.15, "alpha_y": 0.3, "n": 0.95, "k": 2.6},
     "ggx_schlick": {"rho_d": 0.1, "f_0": 0.33, "alpha_x": 0.15, "alpha_y": 0.3},
+    "rpv": {"rho_0": 0.1, "k": 0.7, "asymmetry": -0.2, "rho_c": 0.3},
     "oren_nayar": {"rho": 0.9, "sigma": 0.5, "interreflection": 1.0},
     "oren_nayar_qualitative": {"rho": 0.9, "sigma": 0.5, "offset": 0.33},
 }

@@ -144,6 +144,22 @@ inline double qualitative(double xi, double yi, double zi, double xr, double yr,
     return zi < 0.0 || zr < 0.0 ? 0.0 : f;
 }
 
+// ---- RPV
+
+struct RpvSurface {
+    double scale, power, one, twice, hot;
+    explicit RpvSurface(const Parameters& p)
+        : scale(p[0] / PI * (1.0 - p[2] * p[2])), power(p[1] - 1.0), one(1.0 + p[2] * p[2]), twice(2.0 * p[2]),
+          hot(1.0 - p[3]) {}
+};
+
+inline double rpv(double xi, double yi, double zi, double xr, double yr, double zr, const RpvSurface& s) {
+    const double q = s.one + s.twice * (xi * xr + yi * yr + zi * zr);
+    const double gx = xi / zi - xr / zr, gy = yi / zi - yr / zr, g = std::sqrt(gx * gx + gy * gy);
+    const double f = s.scale * std::pow(zi * zr * (zi + zr), s.power) / (q * std::sqrt(q)) * (1.0 + s.hot / (1.0 + g));
+    return zi < 0.0 || zr < 0.0 ? 0.0 : f;
+}
+
 // ---- He-Torrance, eqs (71), (72), (75)-(84); the sum of (78) direction by direction until it has converged
 
 struct Logs {
@@ -263,6 +279,10 @@ const auto oren_nayar_value = [](double xi, double yi, double zi, double xr, dou
 const auto qualitative_value = [](double xi, double yi, double zi, double xr, double yr, double zr,
                                   const QualitativeSurface& s) { return qualitative(xi, yi, zi, xr, yr, zr, s); };
 
+const auto rpv_value = [](double xi, double yi, double zi, double xr, double yr, double zr, const RpvSurface& s) {
+    return rpv(xi, yi, zi, xr, yr, zr, s);
+};
+
 // theta_i x theta_r x delta_phi from axes; what does not depend on the azimuth is outside the innermost loop
 struct Axes {
     std::size_t polar, azimuths;
@@ -338,6 +358,24 @@ void qualitative_grid(const Inputs& in, const Parameters& p, double* __restrict 
         }
 }
 
+void rpv_grid(const Inputs& in, const Parameters& p, double* __restrict f) {
+    const Axes axes(in);
+    const RpvSurface s(p);
+    const double* __restrict c = axes.cos_phi.data();
+    for (std::size_t i = 0; i < axes.polar; ++i)
+        for (std::size_t r = 0; r < axes.polar; ++r, f += axes.azimuths) {
+            const double zi = axes.cos[i], zr = axes.cos[r], ti = axes.sin[i] / zi, tr = axes.sin[r] / zr;
+            const double level = s.scale * std::pow(zi * zr * (zi + zr), s.power);
+            const double q = s.one + s.twice * zi * zr, across = s.twice * axes.sin[i] * axes.sin[r];
+            const double squares = ti * ti + tr * tr, product = 2.0 * ti * tr;
+            for (std::size_t j = 0; j < axes.azimuths; ++j) {
+                const double phase = q + across * c[j];
+                const double g = std::sqrt(std::max(0.0, squares - product * c[j]));
+                f[j] = level / (phase * std::sqrt(phase)) * (1.0 + s.hot / (1.0 + g));
+            }
+        }
+}
+
 double processor_seconds() {
     timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -373,6 +411,9 @@ const std::map<std::string, Kernel> kernels = {
     {"oren_nayar_qualitative_six",
      [](const Inputs& in, const Parameters& p, double* f) { six(in, QualitativeSurface(p), f, qualitative_value); }},
     {"oren_nayar_qualitative_grid", qualitative_grid},
+    {"rpv", [](const Inputs& in, const Parameters& p, double* f) { interleaved(in, RpvSurface(p), f, rpv_value); }},
+    {"rpv_six", [](const Inputs& in, const Parameters& p, double* f) { six(in, RpvSurface(p), f, rpv_value); }},
+    {"rpv_grid", rpv_grid},
     // the first p.back() directions only
     {"he_torrance",
      [](const Inputs& in, const Parameters& p, double* f) {

@@ -56,6 +56,11 @@ def middle(spec: ModelSpec) -> dict[str, float]:
     return {parameter.name: 0.5 * (parameter.low + min(parameter.high, 1.0)) for parameter in spec.parameters}
 
 
+def beyond(parameter: Parameter) -> float:
+    """Return a value above the range of a parameter."""
+    return parameter.high + max(0.5 * abs(parameter.high), 0.125)
+
+
 def drawn_angles(rng: np.random.Generator, count: int) -> tuple[NDArray[np.float64], ...]:
     theta_i, theta_r = rng.uniform(0.0, HALF_PI, (2, count))
     phi_i, phi_r = rng.uniform(-np.pi, np.pi, (2, count))

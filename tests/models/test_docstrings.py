@@ -75,7 +75,7 @@ def test_the_docstring_states_the_range_of_every_parameter(spec: ModelSpec) -> N
 
 def written(end: float) -> str:
     """A bound as the docstrings write it: 1e7, 1e-3."""
-    if end and not 0.01 <= end < 1e4:
+    if end and not 0.01 <= abs(end) < 1e4:
         return f"1e{round(np.log10(end))}"
     return f"{end:g}"
 

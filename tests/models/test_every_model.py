@@ -31,6 +31,7 @@ RECIPROCITY = 1e-12  # 0: each formula is symmetric to the last bit; the rest is
 AZIMUTH = 1e-13  # 8.6e-14 (parallel cavities): what the rounding of phi + 2 pi does
 # Of a lobe without a uniform part the exponent multiplies that rounding: 5.3e-12, where the lobe is down to 1e-142
 AZIMUTH_OF = {"torrance_sparrow": 6e-12, "beckmann": 6e-12, "beckmann_separable": 6e-12}
+AZIMUTH_OF["ross_li"] = 2e-11  # 1.2e-11, where kernels of both signs add up to next to nothing
 
 
 # Values

@@ -16,6 +16,7 @@ from tests.models.draws import (
     LIGHT,
     ROWS,
     TINY,
+    beyond,
     drawn,
     drawn_angles,
     every_model,
@@ -223,7 +224,7 @@ def test_refuses_a_phi_that_float64_does_not_resolve(spec: ModelSpec, position: 
 @every_parameter
 def test_refuses_a_parameter_outside_its_range(spec: ModelSpec, parameter: Parameter) -> None:
     assert parameter.interval.startswith(f"[{parameter.low:g}, {parameter.high:g}]")
-    for wrong in (parameter.low - 0.125, parameter.high * 1.5, np.inf, -np.inf, np.nan):
+    for wrong in (parameter.low - 0.125, beyond(parameter), np.inf, -np.inf, np.nan):
         expected = f"{parameter.name}: {wrong:.16g} is outside {parameter.interval}"
         assert refused(spec, parameter, wrong) == expected
         assert refused(spec, parameter, [parameter.low, wrong, parameter.high]) == expected

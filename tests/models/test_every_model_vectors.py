@@ -15,6 +15,7 @@ from tests.models.draws import (
     ROWS,
     TINY,
     Arguments,
+    beyond,
     corner_parameters,
     drawn,
     drawn_angles,
@@ -151,8 +152,8 @@ def test_refuses_what_is_no_unit_vector(spec: ModelSpec, position: int, wrong: A
 
 @every_parameter
 def test_vectors_refuse_a_parameter_in_the_words_of_the_angles(spec: ModelSpec, parameter: Parameter) -> None:
-    parameters = drawn(spec, np.random.default_rng(28)) | {parameter.name: parameter.high * 1.5}
-    with pytest.raises(ValueError, match=f"^{re.escape(refused(spec, parameter, parameter.high * 1.5))}$"):
+    parameters = drawn(spec, np.random.default_rng(28)) | {parameter.name: beyond(parameter)}
+    with pytest.raises(ValueError, match=f"^{re.escape(refused(spec, parameter, beyond(parameter)))}$"):
         spec.vectors([0.0, 0.6, 0.8], [0.0, 0.6, 0.8], **parameters)
 
 

@@ -24,29 +24,29 @@ from brdfdb.parameters import ModelSpec
 from tests.api.a_store import client_of
 from tests.pipelines.command import run
 
-PACKAGE = Path(__file__).parent / "rpv_package"
-FILE = PACKAGE / "rpv_1993.py"
+PACKAGE = Path(__file__).parent / "rim_package"
+FILE = PACKAGE / "rim_light.py"
 FLOAT32 = 1e-6  # of a node
 RECIPE = """
-materials = ["savanna"]
+materials = ["peach"]
 wavelengths_nm = [550]
 [grids]
 isotropic = { theta_i_deg = [0, 30, 60, 80], theta_r_deg = [0, 30, 60, 80], delta_phi_deg = [0, 60, 120, 180] }
 spectral = { theta_i_deg = [0, 80], theta_r_deg = [0, 80], delta_phi_deg = [0, 180] }
 anisotropic = { theta_i_deg = [0, 80], phi_i_deg = [0, 360], theta_r_deg = [0, 80], phi_r_deg = [0, 360] }
-[define.savanna]
-title = "Savanna"
-model = "rpv"
+[define.peach]
+title = "Peach"
+model = "rim_light"
 source = "made up"
-parameters = { rho_0 = 0.06, k = 0.7, Theta = -0.2, rho_c = 0.3 }
+parameters = { rho = 0.4, power = 2, rim = 0.5 }
 """
-PARAMETERS = {"rho_0": 0.06, "k": 0.7, "Theta": -0.2, "rho_c": 0.3}
+PARAMETERS = {"rho": 0.4, "power": 2.0, "rim": 0.5}
 
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store that another process built, with a worker process of its own; both were told of the file."""
-    root = tmp_path_factory.mktemp("rpv")
+    root = tmp_path_factory.mktemp("others")
     (root / "recipe.toml").write_text(RECIPE, encoding="utf-8")
     command = [sys.executable, "-c", "import sys; from brdfdb_pipelines import cli; sys.exit(cli.main())"]
     command += ["--models", str(FILE), "build", "recipe.toml", "--store", "store", "--processes", "--jobs", "1"]
@@ -60,8 +60,8 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModelSpec]:
     """The model of the package, which Python finds as it finds what pip installs."""
     monkeypatch.syspath_prepend(str(PACKAGE))
     MODELS.add_packages()
-    yield MODELS["rpv"]
-    del MODELS["rpv"], sys.modules["rpv_1993"]
+    yield MODELS["rim_light"]
+    del MODELS["rim_light"], sys.modules["rim_light"]
 
 
 @pytest.fixture
@@ -75,22 +75,21 @@ def registry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Registry]:
             del sys.modules[name]
 
 
-# rho_0, k, Theta, rho_c; light and viewer [degree]; pi f_r, worked out by hand:
-# 0.1 / sqrt(0.5 * 1.5) * (1 + 1 / (1 + sqrt 3)), and 0.2 * 2 * 0.75 / 0.5^3 * 1.5
-HAND = [((0.1, 0.5, 0.0, 0.0), (60.0, 0.0), 0.157735027), ((0.2, 2.0, -0.5, 0.5), (0.0, 0.0), 3.6)]
+# rho, power, rim; light and viewer [degree]; pi f_r, worked out by hand: 0.4 (1 + 2 / 16), and 0.5
+HAND = [((0.4, 2.0, 2.0), (60.0, 60.0), 0.45), ((0.5, 1.0, 4.0), (0.0, 60.0), 0.5)]
 
 
 @pytest.mark.parametrize(("parameters", "theta_deg", "expected"), HAND)
-def test_rpv_has_the_values_that_a_hand_works_out(
+def test_their_model_has_the_values_that_a_hand_works_out(
     installed: ModelSpec, parameters: tuple[float, ...], theta_deg: tuple[float, float], expected: float
 ) -> None:
-    named = dict(zip(("rho_0", "k", "Theta", "rho_c"), parameters, strict=True))
+    named = dict(zip(("rho", "power", "rim"), parameters, strict=True))
     theta_i, theta_r = np.deg2rad(theta_deg)
     assert np.pi * installed.evaluate(theta_i, 0.0, theta_r, 0.0, **named) == pytest.approx(expected, rel=1e-8)
 
 
 def test_a_table_of_their_model_is_that_of_the_model(store: Path, installed: ModelSpec) -> None:
-    table = brdfdb.open(store)["savanna"]
+    table = brdfdb.open(store)["peach"]
     angles = np.deg2rad([30.0, 0.0, 60.0, 120.0])
     expected = installed.evaluate(*angles, **PARAMETERS)
     assert table.lookup(*angles) == pytest.approx(expected, rel=FLOAT32)
@@ -101,7 +100,7 @@ def test_their_model_is_audited(store: Path, tmp_path: Path) -> None:
     report = tmp_path / "audit.json"
     assert run("audit", "--no-figures", "--store", store, "--report", report) == 0
     (entry,) = json.loads(report.read_bytes())["materials"]
-    assert (entry["model"], entry["verdict"]) == ("rpv", "passes")
+    assert (entry["model"], entry["verdict"]) == ("rim_light", "passes")
     judged = ("reciprocity", "nodes", "smoothness", "sampling")
     assert {entry["findings"][finding]["verdict"] for finding in judged} == {"passes"}
     assert entry["findings"]["validity"]["limits"] == []
@@ -110,32 +109,32 @@ def test_their_model_is_audited(store: Path, tmp_path: Path) -> None:
 def test_their_model_is_served(store: Path, installed: ModelSpec) -> None:
     client = client_of(store)
     asked = {"theta_i": 37.0, "phi_i": 0.0, "theta_r": 51.0, "phi_r": 100.0, "from": "model"}
-    answer = client.get("/v1/materials/savanna/lookup", params=asked)
+    answer = client.get("/v1/materials/peach/lookup", params=asked)
     assert answer.status_code == 200, answer.text
     values = installed.evaluate(*np.deg2rad([37.0, 0.0, 51.0, 100.0]), **PARAMETERS)
     np.testing.assert_allclose(np.ravel(answer.json()["brdf"]), values, rtol=1e-12)
 
 
 def test_their_model_is_charted_by_itself(installed: ModelSpec) -> None:
-    material = Material(name="savanna", title="Savanna", model="rpv", parameters=PARAMETERS, source="made up")
+    material = Material(name="peach", title="Peach", model="rim_light", parameters=PARAMETERS, source="made up")
     exact, single = catalogue.forms(material, None, ())
-    assert (exact.title, exact.python) == (f"{installed.title}, {installed.equation}", "models.rpv")
+    assert (exact.title, exact.python) == (f"{installed.title}, {installed.equation}", "models.rim_light")
     assert single.dtype is np.float32
 
 
 def test_a_process_without_the_model_says_so(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(ParameterError, match=r"^model: 'rpv' is not one of lambert, "):
-        MODELS["rpv"]
+    with pytest.raises(ParameterError, match=r"^model: 'rim_light' is not one of lambert, "):
+        MODELS["rim_light"]
     assert run("list", "--store", store) == 0
-    assert "savanna" in capsys.readouterr().out
+    assert "peach" in capsys.readouterr().out
 
 
 def test_a_file_is_added_once_and_named_to_processes_that_come_later(registry: Registry) -> None:
     registry.add_files([FILE, FILE])
-    assert list(registry) == ["rpv"]
+    assert list(registry) == ["rim_light"]
     assert os.environ[VARIABLE] == str(FILE)
     registry.add_environment()
-    assert list(registry) == ["rpv"]
+    assert list(registry) == ["rim_light"]
 
 
 CLASH = "from dataclasses import replace\nfrom brdfdb.models.lambert import SPEC\nMINE = replace(SPEC, version=9)\n"
