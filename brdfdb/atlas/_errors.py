@@ -47,7 +47,13 @@ PROOFS: Mapping[str, Proof] = {
 LEADS: Mapping[Kind, str] = {"printed": "Printed", "customary": "Customary", "words": "In words alone"}
 LABELS: Mapping[Kind, str] = {"printed": "as printed", "customary": "as is customary", "words": "as the words say"}
 ROLES: Mapping[Kind, Role] = {"printed": "printed", "customary": "textbook", "words": "printed"}
-PAPERS = {"orennayar1994": "Oren and Nayar 1994", "he1991": "He et al. 1991", "ward1992": "Ward 1992"}
+PAPERS = {
+    "orennayar1994": "Oren and Nayar 1994",
+    "he1991": "He et al. 1991",
+    "ward1992": "Ward 1992",
+    "rahman1993": "Rahman et al. 1993",
+    "lucht2000": "Lucht et al. 2000",
+}
 
 
 @dataclass(frozen=True)

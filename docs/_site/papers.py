@@ -26,7 +26,7 @@ PAPERS = {
     "ward1992": Paper("ward", "Ward 1992", "Measured, anisotropic surfaces"),
     "orennayar1994": Paper("oren-nayar", "Oren and Nayar 1994", "Rough diffuse surfaces"),
     "he1991": Paper("he-torrance", "He, Torrance, Sillion and Greenberg 1991", "Physical optics"),
-    "": Paper("others", "Lambert and Minnaert", "Checks of the quadrature itself"),
+    "": Paper("others", "Other models", "Lambert, Minnaert, and surfaces seen from satellites"),
 }
 
 

@@ -19,6 +19,8 @@ PAPERS = {
     "ward1992": "Ward 1992: Measuring and modeling anisotropic reflection",
     "orennayar1994": "Oren and Nayar 1994: Generalization of Lambert's reflectance model",
     "he1991": "He, Torrance, Sillion and Greenberg 1991: A comprehensive physical model for light reflection",
+    "rahman1993": "Rahman, Pinty and Verstraete 1993: A semiempirical model of land surfaces",
+    "lucht2000": "Lucht, Schaaf and Strahler 2000: Kernels of the MODIS albedo product",
 }
 # Mark of each word, beside its colour
 _MARKS: dict[Word, str] = {

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb.atlas import _errors, he_torrance_1991, he_torrance_1991_vectors, oren_nayar_1994, ward_1992
+from brdfdb.atlas import _errors, he_torrance_1991, he_torrance_1991_vectors, hot_spots, oren_nayar_1994, ward_1992
 from brdfdb.atlas._errors import Form
 from brdfdb.figure import Curve, Figure, Map, Panel, Role
 from brdfdb.misprints import MISPRINTS
 
-MODULES = (oren_nayar_1994, he_torrance_1991, he_torrance_1991_vectors, ward_1992)
+MODULES = (oren_nayar_1994, he_torrance_1991, he_torrance_1991_vectors, ward_1992, hot_spots)
 FIGURES: dict[str, Callable[[], Figure]] = {key: made for module in MODULES for key, made in module.FIGURES.items()}
 every_figure = pytest.mark.parametrize("key", FIGURES)
 
@@ -53,9 +53,11 @@ def test_keys_are_those_of_one_figure() -> None:
 
 @every_figure
 def test_a_figure_has_the_key_and_the_paper_that_it_is_listed_under(key: str) -> None:
-    papers = dict(zip(MODULES, ("orennayar1994", "he1991", "he1991", "ward1992"), strict=True))
+    lists = (("orennayar1994",), ("he1991",), ("he1991",), ("ward1992",), ("rahman1993", "lucht2000"))
+    papers = dict(zip(MODULES, lists, strict=True))
     (module,) = [module for module in MODULES if key in module.FIGURES]
-    assert (figure(key).key, figure(key).paper) == (key, papers[module])
+    assert figure(key).key == key
+    assert figure(key).paper in papers[module]
     assert re.fullmatch(r"[a-z0-9-]+", key)
     bibliography = (Path(__file__).parents[2] / "references.bib").read_text(encoding="utf-8")
     assert f"{{{figure(key).paper}," in bibliography
