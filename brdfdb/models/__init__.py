@@ -19,6 +19,7 @@ from brdfdb.models import (
     harvey_1976,
     he_torrance_1991,
     heitz_2014,
+    kulla_conty_2017,
     lucht_2000,
     oren_nayar_1994_specs,
     pfisterer_2011,
@@ -70,6 +71,7 @@ from brdfdb.models.heitz_2014 import (
     ggx_schlick_vectors,
     ggx_vectors,
 )
+from brdfdb.models.kulla_conty_2017 import ggx_compensated, ggx_compensated_vectors
 from brdfdb.models.lambert import lambert, lambert_vectors
 from brdfdb.models.lucht_2000 import ross_li, ross_li_vectors
 from brdfdb.models.minnaert import minnaert, minnaert_vectors
@@ -101,6 +103,7 @@ from brdfdb.models.portsmouth_2025 import oren_nayar_energy_preserving, oren_nay
 from brdfdb.models.rahman_1993 import rpv, rpv_vectors
 from brdfdb.models.registry import Registry
 from brdfdb.models.torrance_sparrow_1967 import torrance_sparrow, torrance_sparrow_vectors
+from brdfdb.models.turquin_2019 import ggx_scaled, ggx_scaled_vectors
 from brdfdb.models.walter_2007 import (
     beckmann_separable,
     beckmann_separable_vectors,
@@ -141,6 +144,7 @@ MODELS.add(
         hapke_1984.SPEC,
         pfisterer_2011.SPEC,
         harvey_1976.SPEC,
+        kulla_conty_2017.SPEC,
     ),
     "brdfdb",
 )
@@ -158,6 +162,10 @@ __all__ = [
     "beckmann_separable_vectors",
     "beckmann_vectors",
     "ggx",
+    "ggx_compensated",
+    "ggx_compensated_vectors",
+    "ggx_scaled",
+    "ggx_scaled_vectors",
     "ggx_schlick",
     "ggx_schlick_vectors",
     "ggx_separable",
