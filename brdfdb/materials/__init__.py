@@ -8,15 +8,17 @@ from pydantic import ValidationError
 from brdfdb.errors import BrdfdbError, sentence_of
 from brdfdb.materials.function_source import FunctionRecord, FunctionSource
 from brdfdb.materials.material import Material
-from brdfdb.materials.preset_files import presets
+from brdfdb.materials.preset_files import PAPERS, libraries, presets
 from brdfdb.materials.source import Source
 from brdfdb.materials.written_parameters import written_name
 
 __all__ = [
+    "PAPERS",
     "FunctionRecord",
     "FunctionSource",
     "Material",
     "Source",
+    "libraries",
     "presets",
     "source_of",
     "written_name",

@@ -7,13 +7,13 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Discriminator,
@@ -26,14 +26,13 @@ from pydantic import (
 )
 
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
-from brdfdb.materials import Material, presets, written_name
+from brdfdb.materials import PAPERS, Material, presets, written_name
 from brdfdb.models import MODELS
-from brdfdb.parameters import closest
 from brdfdb.store.family import Sweep
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, plan
-from brdfdb_pipelines import toml_file
+from brdfdb_pipelines import preset_names, toml_file
 
 _STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 _MOST_NODES = 100_000  # of an axis: far above any that is used, far below what fills the memory
@@ -217,6 +216,9 @@ class Recipe(BaseModel):
     materials: Annotated[list[str], FailFast()] = Field(
         min_length=1, max_length=_MOST_PATTERNS, description="names or shell patterns"
     )
+    library: Annotated[str, AfterValidator(preset_names.checked)] = Field(
+        default=PAPERS, description="library of presets that the names mean"
+    )
     wavelengths_nm: Nodes = Field(default=[], description="of spectral materials that state none themselves")
     tolerance: float | None = Field(
         default=None, ge=1e-4, le=0.5, description="99th percentile of the relative error, instead of grids"
@@ -308,7 +310,8 @@ class Recipe(BaseModel):
 
     def _selected(self) -> list[tuple[Material, dict[str, Any] | None]]:
         """Return the selected materials, each with the family that it is a member of, or None."""
-        known: dict[str, tuple[Material, dict[str, Any] | None]] = {n: (m, None) for n, m in presets().items()}
+        known: dict[str, tuple[Material, dict[str, Any] | None]]
+        known = {name: (material, None) for name, material in presets(self.library).items()}
         for name, table in self.define.items():
             if name in known:
                 raise RecipeError(f"define.{name}", "is the name of a preset; give yours another")
@@ -339,9 +342,8 @@ class Recipe(BaseModel):
             for family in fnmatch.filter(families, pattern):
                 matches += families[family]
             if not matches:
-                near = closest(pattern, [*known, *families])
                 raise RecipeError(
-                    "materials", f"{pattern!r} matches no material{near}; `brdfdb list --presets` names them"
+                    "materials", preset_names.sentence_without(pattern, [*known, *families], self.library)
                 )
             chosen |= {name: known[name] for name in matches}
         return list(chosen.values())
@@ -395,15 +397,17 @@ def _members(name: str, table: Mapping[str, Any], folder: Path | None) -> list[t
     return members
 
 
-def load(path: Path | None = None) -> Recipe:
-    """Read a recipe file, by default the one that comes with the program, and see that it can be built.
+def load(path: Path | None = None, library: str = PAPERS) -> Recipe:
+    """Read a recipe file, by default that of a library of presets, and see that it can be built.
 
     Raises
     ------
     RecipeError
         If the file cannot be read, is not TOML, or is not a recipe; the message names the file and the field.
+    ParameterError
+        If there is no such library.
     """
-    source = resources.files("brdfdb_pipelines") / "recipes" / "default.toml" if path is None else path
+    source = preset_names.recipe_of(library) if path is None else path
     try:
         content = toml_file.read(source)
         recipe = Recipe.model_validate(content)

@@ -125,7 +125,8 @@ def test_list_presets_needs_no_store_and_cuts_nothing(tmp_path: Path, capsys: Ca
     out, _ = capsys.readouterr()
     lines = out.splitlines()
     assert lines[0].strip() == "59 presets"
-    assert [line.split()[0] for line in lines[2:]] == list(presets())
+    assert [line.split()[0] for line in lines[2:-1]] == list(presets())
+    assert lines[-1].startswith("other libraries: metals, ")
     assert all(material.source in out for material in presets().values())
 
 

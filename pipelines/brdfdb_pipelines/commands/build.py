@@ -24,6 +24,9 @@ HELP = "Tabulate the materials of a recipe that the store does not have yet."
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recipe, the store, and where the work is done."""
     parser.add_argument("recipe", type=Path, nargs="?", help="a TOML file (default: every material of the papers)")
+    parser.add_argument(
+        "--library", metavar="NAME", help="in place of a file: the recipe of a library of presets, such as metals"
+    )
     add_store(parser)
     add_jobs(parser, "threads or processes")
     where = parser.add_mutually_exclusive_group()
@@ -57,12 +60,16 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _build(options: argparse.Namespace) -> None:
+    from brdfdb.errors import ParameterError
+    from brdfdb.materials import PAPERS
     from brdfdb_pipelines import build_resources, recipe_file, workers
     from brdfdb_pipelines.build import build
     from brdfdb_pipelines.build_progress import Bars, Lines
     from brdfdb_pipelines.compilation import compile_kernels
 
-    recipe = recipe_file.load(options.recipe)
+    if options.recipe is not None and options.library is not None:
+        raise ParameterError("--library", f"goes without a recipe file, and {options.recipe} is given", options.library)
+    recipe = recipe_file.load(options.recipe, options.library or PAPERS)
     start = time.perf_counter()
     memory: int | None = options.memory
     at: AbstractContextManager[Workers]

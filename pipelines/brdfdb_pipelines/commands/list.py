@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import brdfdb
-from brdfdb.errors import StoreError, counted
+from brdfdb.errors import ParameterError, StoreError, counted
 from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 
 if TYPE_CHECKING:
@@ -20,14 +20,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the store and the choice of presets."""
     add_store(parser)
     parser.add_argument("--presets", action="store_true", help="list the presets, which recipes can name")
+    parser.add_argument(
+        "--library", metavar="NAME", help="with --presets, the library to list, such as metals (default: papers)"
+    )
     add_snapshot(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print a line for each material and family."""
     if options.presets:
-        _print_presets()
+        _print_presets(options.library)
         return 0
+    if options.library is not None:
+        raise ParameterError("--library", "goes with --presets", options.library)
     root: Path = options.store
     store = brdfdb.open(root, snapshot=options.snapshot)
     damaged = _print_materials(store, root) + _print_families(store)
@@ -36,12 +41,19 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _print_presets() -> None:
-    from brdfdb.materials import presets
+def _print_presets(library: str | None) -> None:
+    """Print a line for each material of a library, and the names of the other libraries."""
+    from brdfdb.materials import PAPERS, libraries, presets
     from brdfdb_pipelines import terminal
 
-    rows = [(m.name, m.title, m.model, m.source) for m in presets().values()]
-    terminal.print_table(f"{len(rows)} presets", ("material", "title", "model", "source"), rows)
+    name = PAPERS if library is None else library
+    rows = [(m.name, m.title, m.model, m.source) for m in presets(name).values()]
+    title = f"{len(rows)} presets" if name == PAPERS else f"{len(rows)} presets of the library {name}"
+    terminal.print_table(title, ("material", "title", "model", "source"), rows)
+    if library is not None:
+        print(f"{name}: {libraries()[name]}")
+    others = [other for other in libraries() if other != name]
+    print(f"other libraries: {', '.join(others)}; `brdfdb list --presets --library NAME`")
 
 
 def _print_materials(store: Store, root: Path) -> list[str]:
