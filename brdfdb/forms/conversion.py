@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.forms.conversion_document import Conversion, Peak, WorstView
+from brdfdb.forms.conversion_document import Conversion, Peak, WorstView, percent, toml_of
 from brdfdb.forms.conversion_nodes import (
     COARSE,
     FINER,
@@ -46,6 +46,7 @@ VIEWS_DEG = np.arange(0.0, 90.0, 5.0)  # theta_r of the viewers among whom the w
 STEP_DEG = 15.0  # between phi_r of these viewers, for an anisotropic source
 PEAK_DEG = 45.0  # theta_i of the mirror direction whose f_r is stated
 DIGITS = 6  # significant digits of the parameters; what is left is measured with these
+_ZERO = 1e-12  # parameters that are not larger are 0
 STEPS = _SEARCH_STEPS + 1  # calls of `tick` in a conversion
 
 
@@ -263,7 +264,8 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
     left = Left(views(sides.lobe, finer, request.symmetry), *sides[:3])
     l1, p99 = float(np.mean(left.l1)), _p99(request, sides)
     was = f" ({source.model})" if isinstance(source, Material) else ""
-    table["source"] = f"converted from {source.name}{was}; l1 {100.0 * l1:.2g} %, p99 {100.0 * p99:.2g} %"
+    table["source"] = f"converted from {source.name}{was}; l1 {percent(l1)}, p99 {percent(p99)}"
+    largest, worst = _views(request, sides, finer)
     searched = fit.result.numbers if target.searched_index else {}
     conversion = Conversion(
         source=source.name,
@@ -271,8 +273,8 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
         model=spec.name,
         weigh=request.weigh,
         parameters=material.parameters,
-        n=searched.get("n"),
-        k=searched.get("k"),
+        n=_rounded(searched["n"]) if searched else None,
+        k=_rounded(searched["k"]) if searched else None,
         fixed=sorted(target.fixed),
         refractive_index=target.entry,
         wavelengths_nm=None if request.at is None else request.at.tolist(),
@@ -283,11 +285,13 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
         reflected=float(np.mean(left.reflected)),
         specular_share=float(np.mean(left.specular)),
         peak=_peak(sides),
-        worst_view=_worst_view(request, sides, finer),
+        worst_view=worst,
+        views_deg=VIEWS_DEG.tolist(),
+        l1_of_views=largest,
         as_good=fit.result.as_good,
         evaluations=fit.result.evaluations,
         material=Material.from_table(name, table),
-        table=table,
+        recipe=toml_of(name, table),
         remarks=[],
     )
     return conversion.model_copy(update={"remarks": remarks(source, conversion)})
@@ -324,7 +328,7 @@ def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+    return float(f"{value:.{DIGITS}g}") if abs(value) > _ZERO else 0.0
 
 
 class _Sides(NamedTuple):
@@ -375,23 +379,28 @@ def _p99(request: _Request, sides: _Sides) -> float:
     return error_measurement.compare(values, truth, drawn).overall.p99
 
 
-def _worst_view(request: _Request, sides: _Sides, counts: Counts) -> WorstView:
-    """Return the viewer for whom most of the light is in the wrong place, at its worst wavelength."""
+def _views(request: _Request, sides: _Sides, counts: Counts) -> tuple[list[float], WorstView]:
+    """Return the largest l1 of viewers at each theta_r, and the viewer with the largest of all."""
     anisotropic, elliptical = request.symmetry
     end_deg = 90.0 if elliptical else 345.0
     phis_deg = np.arange(0.0, end_deg + 1.0, STEP_DEG) if anisotropic else np.zeros(1)
+    largest: list[float] = []
     worst: tuple[float, int, ViewError] | None = None
     for theta_deg in VIEWS_DEG.tolist():
+        of_theta = 0.0
         for phi_deg in phis_deg.tolist():
             view = view_of(sides.lobe, float(radians(theta_deg)), float(radians(phi_deg)), counts, request.symmetry)
             error = ViewError(view, *sides[:3])
             column = int(np.argmax(error.l1))
-            if worst is None or error.l1[column] > worst[0]:
-                worst = float(error.l1[column]), column, error
+            l1 = float(error.l1[column])
+            of_theta = max(of_theta, l1)
+            if worst is None or l1 > worst[0]:
+                worst = l1, column, error
+        largest.append(of_theta)
     assert worst is not None
     l1, column, error = worst
     (theta_i_deg, phi_i_deg), before, after = error.largest(column)
-    return WorstView(
+    return largest, WorstView(
         theta_r_deg=round(float(degrees(error.view.theta)), 6),
         phi_r_deg=round(float(degrees(error.view.phi)), 6),
         l1=l1,

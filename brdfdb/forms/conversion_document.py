@@ -62,6 +62,8 @@ class Conversion(_Record):
     specular_share: float = Field(description="share of the specular part (a Dirac delta) in the light of the source")
     peak: Peak
     worst_view: WorstView
+    views_deg: list[float] = Field(description="theta_r of the viewers among whom the worst one was looked for")
+    l1_of_views: list[float] = Field(description="l1 of each, the largest of all phi_r and wavelengths")
     as_good: dict[str, tuple[float, float]] = Field(
         description="range of each number among the sets of parameters that were tried and are within 1 % of the "
         "least distance: a wide range is that of a parameter that hardly matters"
@@ -69,17 +71,17 @@ class Conversion(_Record):
     remarks: list[str] = Field(description="sentences on what the model cannot carry")
     evaluations: int = Field(description="sets of parameters that were tried")
     material: Material = Field(description="the result as a material")
-    table: dict[str, Any] = Field(description="the material as a recipe writes it")
+    recipe: str = Field(description="the material as a part of a recipe, [define.NAME] in TOML")
 
     @property
     def name(self) -> str:
         """The name of the material."""
         return self.material.name
 
-    @property
-    def recipe(self) -> str:
-        """The material as a part of a recipe, ``[define.NAME]`` in TOML."""
-        return toml_of(self.name, self.table)
+
+def percent(share: float) -> str:
+    """Return a share as text in percent: whole from 10 % on, of two digits below."""
+    return f"{100.0 * share:.0f} %" if share >= 0.0995 else f"{100.0 * share:.2g} %"
 
 
 def toml_of(name: str, table: dict[str, Any]) -> str:

@@ -20,7 +20,7 @@ Specular = Callable[[Array], Floats]  # reflectance (V, L) of the specular part 
 Weigh = Literal["light", "lightness"]  # what is compared: f_r, or its cube root
 WEIGHS: tuple[Weigh, ...] = ("light", "lightness")
 
-COARSE, FITTED = Counts(8, 3, 12, 4), Counts(16, 6, 20, 8)
+COARSE, FITTED = Counts(8, 3, 12, 4), Counts(14, 5, 18, 7)
 FINER = 1.75  # nodes along each axis of the rule that measures what is left, relative to the rule that was fitted
 
 

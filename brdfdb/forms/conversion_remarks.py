@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from brdfdb.forms.conversion_document import Conversion
+from brdfdb.forms.conversion_document import Conversion, percent
 from brdfdb.materials import Material, Source
 from brdfdb.models import MODELS
 from brdfdb.parameters import closest
@@ -17,7 +17,7 @@ def remarks(source: Source, conversion: Conversion) -> list[str]:
     spec, made = MODELS[conversion.model], conversion.material
     sentences = []
     if conversion.specular_share > _SEEN:
-        share = f"{100.0 * conversion.specular_share:.2g} % of the light of {source.name} is its specular part"
+        share = f"{percent(conversion.specular_share)} of the light of {source.name} is its specular part"
         lacks = "has one, too" if spec.specular else "has none: that light counts as error"
         sentences.append(f"{share} (a Dirac delta); {spec.name} {lacks}.")
     if isinstance(source, Material) and source.spec.uniform and spec.uniform is None and spec.lobe is not None:
@@ -39,5 +39,5 @@ def remarks(source: Source, conversion: Conversion) -> list[str]:
             f"{peak.before:.3g} to {peak.after:.3g} /sr. Weighing lightness instead of light keeps it."
         )
     if conversion.quadrature > _UNSURE * conversion.l1:
-        sentences.append(f"l1 is known to {100.0 * conversion.quadrature:.2g} % only: the lobe is hard to integrate.")
+        sentences.append(f"l1 is known to within {percent(conversion.quadrature)} of the light.")
     return sentences

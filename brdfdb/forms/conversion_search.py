@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from brdfdb.forms.conversion_nodes import Nodes
 from brdfdb.forms.conversion_target import Target
 from brdfdb.forms.search import best_apart, downhill, spread
+from brdfdb.integrals.pairs import WIDTHS
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,11 @@ STEPS = 1 + 2 * BEGINNINGS  # calls of `tick` in a search, at most
 _COARSE, _FINE = 1e-4, 1e-7  # tolerances of simplexes at coarse and at all nodes
 _COLOURS = 1e-6  # tolerance of the simplexes of colours, below that of the shared parameters
 _PROMISING = 1.03  # times the least distance at coarse nodes: the nodes themselves change less
+# Lobes narrower than this, relative to the lobe that nodes follow, are not tried: nodes would miss them
+_NARROWEST = 0.25
+# Share by which the distance rises, at most four times less, from the middle of ranges to their ends. It decides where
+# nothing else does, as between surfaces of He and Torrance with the same slopes
+_LOOSE = 1e-3
 _AS_GOOD = 1.01  # times the least distance
 
 
@@ -53,20 +59,25 @@ class Distance:
     The colours of each column are searched inside, from where the last search ended.
     """
 
-    def __init__(self, target: Target, nodes: Nodes, columns: NDArray[np.int64]) -> None:
+    def __init__(self, target: Target, nodes: Nodes, columns: NDArray[np.int64], alpha: float = math.nan) -> None:
         self.target, self.nodes, self.columns = target, nodes, columns
+        self.narrowest = _NARROWEST * (WIDTHS[1] if math.isnan(alpha) else alpha)
+        self.loose = np.array([variable.loose for variable in target.shape], dtype=bool)
         self.colours = np.full((columns.size, len(target.colours)), 0.5)
         self.record: list[tuple[float, dict[str, float]]] = []
 
     def __call__(self, shape: Array) -> float:
-        """Return the distance [1]; infinity where the model has no finite values."""
+        """Return the distance [1], with a trifle for loose variables; infinity where nodes do not resolve the lobe."""
         numbers = self.target.numbers(shape)
+        if self.target.lobe_alpha(numbers) < self.narrowest:
+            return math.inf
         total = 0.0
         for row, column in enumerate(self.columns.tolist()):
             best, self.colours[row] = self.of_column(numbers, row, column)
             total += best
         mean = total / self.columns.size
         mean = mean if math.isfinite(mean) else math.inf
+        mean *= 1.0 + _LOOSE * float(np.mean((shape[self.loose] - 0.5) ** 2)) if self.loose.any() else 1.0
         self.record.append((mean, numbers))
         return mean
 
@@ -121,7 +132,7 @@ def search(
     at coarse nodes. Ends within 3 % of the best go on, twice, at all nodes: the second time with new edges, in case
     that the first collapsed.
     """
-    distances = Distance(target, coarse, columns), Distance(target, fitted, columns)
+    distances = Distance(target, coarse, columns, alpha), Distance(target, fitted, columns, alpha)
     steps = np.array([variable.step for variable in target.shape])
     if not target.shape:
         distances[1](np.zeros(0))

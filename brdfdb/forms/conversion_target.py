@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 _DECADES = 1e3  # ratio of the ends of a range from which on a variable is searched in logarithms
 _LEAST = 1e-7  # share of the upper end at which a logarithmic range begins that has 0 as its lower end
 _NORMAL, _EDGE = "reflectance at normal incidence", "edge"
+_LEAST_K = 1e-6  # below it, k is 0
 _MOST_N = 100.0  # n that models take, and 1 / n
 _REFLECTANCES = 1e-4, 0.9999  # of facets whose n and k are searched
 
@@ -32,6 +33,7 @@ class Variable:
     low: float
     high: float
     logarithmic: bool
+    loose: bool = False  # other values may be as good
 
     def value(self, u: float) -> float:
         """Return the value at u in [0, 1]."""
@@ -50,7 +52,7 @@ def _variable(parameter: Parameter) -> Variable:
     logarithmic = high > _DECADES * low if low > 0.0 else high > 100.0
     if logarithmic and low <= 0.0:
         low = high * _LEAST
-    return Variable(parameter.name, low, high, logarithmic)
+    return Variable(parameter.name, low, high, logarithmic, loose=logarithmic)
 
 
 def index_of(normal: float, edge: float) -> tuple[float, float]:
@@ -102,7 +104,7 @@ class Target:
         self.colours = [_variable(p) for p in free if several and p.reflectance]
         self.searched_index = spec.spectral and entry is None
         if self.searched_index:
-            self.shape += [Variable(_NORMAL, *_REFLECTANCES, False), Variable(_EDGE, 0.0, 1.0, False)]
+            self.shape += [Variable(_NORMAL, *_REFLECTANCES, False), Variable(_EDGE, 0.0, 1.0, False, loose=True)]
         self.indices = self._indices()
         if not self.shape and not self.colours:
             raise ParameterError("fixed", f"no parameter of {spec.name} is left to search", tuple(fixed))
@@ -124,6 +126,7 @@ class Target:
             values[self.tied[1]] = values[self.tied[0]]
         if self.searched_index:
             n, k = index_of(values.pop(_NORMAL), values.pop(_EDGE))
+            k = k if k > _LEAST_K else 0.0
             values |= {"n": n, "k": k}
         return values
 

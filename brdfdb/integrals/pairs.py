@@ -14,7 +14,8 @@ from brdfdb.lobes import Lobe
 
 Array = NDArray[np.float64]
 
-WIDTHS = 1e-5, 1.0  # the least and the largest width [1] that nodes follow; lobes beyond count as these
+# The least and the largest width [1] that nodes follow: lobes beyond count as these. A diffuse f_r has the latter
+WIDTHS = 1e-5, 0.5
 
 
 class Counts(NamedTuple):

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 import brdfdb
 from brdfdb.errors import ParameterError
 from brdfdb.forms.conversion import STEPS, convert
-from brdfdb.forms.conversion_document import Conversion
+from brdfdb.forms.conversion_document import Conversion, percent
+from brdfdb.forms.conversion_figure import figure_of
 from brdfdb.forms.conversion_nodes import Weigh
 from brdfdb.geometry import radians
 from brdfdb.materials import Source, written_name
@@ -35,6 +36,7 @@ def run(
     refractive_index: str | None = None,
     weigh: Weigh = "light",
     json: bool = False,
+    picture: Path | None = None,
 ) -> Conversion:
     """Convert a material to another model and print the result.
 
@@ -56,6 +58,8 @@ def run(
         As of `brdfdb.forms.conversion.convert`.
     json : bool
         Print the whole document as JSON.
+    picture : Path, optional
+        A file to draw both models in, whose name ends in .svg or .png.
 
     Returns
     -------
@@ -79,8 +83,12 @@ def run(
             bar.update(task, advance=1, visible=time.monotonic() - began > PATIENCE_S)
 
         conversion = convert(source, model, at, fixed=values, refractive_index=refractive_index, weigh=weigh, tick=tick)
+    if picture is not None:
+        from brdfdb_pipelines import conversion_picture
+
+        conversion_picture.write(picture, figure_of(source, conversion))
     if json:
-        print(conversion.model_dump_json(exclude={"table"}, indent=1))
+        print(conversion.model_dump_json(indent=1))
     else:
         print(terminal.plain("\n".join(lines(conversion))))
     return conversion
@@ -143,7 +151,7 @@ def lines(conversion: Conversion) -> list[str]:
             text.append(f"    {name:<16}{index:<12.6g}{_as_good(conversion, name)}".rstrip())
     if conversion.n is None and conversion.refractive_index:
         text.append(f"    {'n, k':<16}{conversion.refractive_index}")
-    view, percent = conversion.worst_view, terminal.error
+    view = conversion.worst_view
     text.append(f"  left        l1 {percent(conversion.l1)}, p99 {percent(conversion.p99)}")
     text.append(f"  reflected   {100.0 * conversion.reflected:.3g} % of the light of {conversion.source}")
     peak = conversion.peak

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from brdfdb import models
 from brdfdb.errors import ParameterError
+from brdfdb.figure import Panel
 from brdfdb.forms.conversion import convert
 from brdfdb.forms.conversion_document import Conversion
+from brdfdb.forms.conversion_figure import figure_of
 from brdfdb.forms.conversion_target import index_of
 from brdfdb.forms.search import spread
 from brdfdb.fresnel import unpolarised
@@ -133,6 +135,22 @@ def test_n_and_k_have_the_reflectance_at_normal_incidence() -> None:
         assert ((n - 1.0) ** 2 + k**2) / ((n + 1.0) ** 2 + k**2) == pytest.approx(normal)
         assert k == pytest.approx(0.0, abs=1e-6) or 0.0 < edge < 1.0
     assert index_of(0.04, 1.0)[0] == pytest.approx(1.5)  # glass: ((n - 1) / (n + 1))^2
+
+
+def test_the_figure_has_both_models_at_their_peaks() -> None:
+    found = brass()
+    figure = figure_of(presets()["rolled-brass"], found)
+    (panel,) = [panel for panel in figure.panels if panel.title == "theta_i = 45 degrees"]
+    assert isinstance(panel, Panel)
+    curves = {curve.label: curve for curve in panel.curves}
+    assert curves.keys() == {f"{name} along {axis}" for name in ("rolled-brass", "ggx") for axis in "xy"}
+    # the half vector of the mirror direction is the normal: rho_s / (4 pi alpha_x alpha_y cos) + rho_d / pi
+    for axis in "xy":
+        curve = curves[f"rolled-brass along {axis}"]
+        peak = curve.y[curve.x.index(45.0)]
+        assert peak == pytest.approx(0.33 * np.sqrt(2.0) / (4.0 * np.pi * 0.05 * 0.16) + 0.1 / np.pi, rel=1e-4)
+    curve = curves["ggx along x"]
+    assert curve.y[curve.x.index(45.0)] == pytest.approx(found.peak.after, rel=1e-4)
 
 
 # Recipes and requests

@@ -30,6 +30,22 @@ def test_the_snippet_is_a_recipe_that_builds(tmp_path: Path, capsys: Captured) -
     assert document["material"]["parameters"].keys() == {"rho"}
 
 
+def test_both_models_are_drawn(tmp_path: Path, capsys: Captured) -> None:
+    first, again, bitmap = tmp_path / "new" / "clay.svg", tmp_path / "again.svg", tmp_path / "clay.png"
+    for file in (first, again, bitmap):
+        assert run(*CLAY, "--picture", file) == 0
+    text = first.read_text(encoding="utf-8")
+    assert text == again.read_text(encoding="utf-8")
+    assert text.startswith("<svg ")
+    for words in ("clay-vase as oren_nayar_fujii", "theta_i = 75 degrees", "light in the wrong place", "f_r [1/sr]"):
+        assert words in text
+    assert bitmap.read_bytes().startswith(b"\x89PNG")
+    capsys.readouterr()
+    with pytest.raises(SystemExit):
+        run(*CLAY, "--picture", tmp_path / "clay.pdf")
+    assert "does not end in .svg or .png" in capsys.readouterr().err
+
+
 def test_a_fixed_angle_is_in_degrees(capsys: Captured) -> None:
     assert run("convert", "clay-vase", "--to", "oren_nayar_qualitative", "--fix", "sigma_deg=20") == 0
     assert "sigma_deg       20          fixed" in capsys.readouterr().out

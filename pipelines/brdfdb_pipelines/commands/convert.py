@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_store
+from brdfdb_pipelines.commands._arguments import add_store, picture_file
 
 HELP = "Convert a material to another model: its closest parameters, and the error that is left."
 
@@ -40,12 +40,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what is made least: l1, or a difference of cube roots, to keep faint highlights (default: %(default)s)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument(
+        "--picture", type=picture_file, metavar="FILE", help="write a picture of both, FILE.svg or FILE.png"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Search, and print the parameters with what is left."""
+    from brdfdb.errors import import_extra
     from brdfdb_pipelines import convert
 
+    if options.picture is not None:
+        import_extra("matplotlib")  # before the time is spent
     convert.run(
         options.name,
         options.to,
@@ -56,5 +62,6 @@ def run(options: argparse.Namespace) -> int:
         refractive_index=options.refractive_index,
         weigh=options.weigh,
         json=options.json,
+        picture=options.picture,
     )
     return 0
