@@ -9,42 +9,35 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.forms.conversion_document import Conversion, Peak, WorstView, percent, toml_of
-from brdfdb.forms.conversion_nodes import (
-    COARSE,
-    FINER,
-    FITTED,
-    WEIGHS,
-    Evaluate,
-    Left,
-    Nodes,
-    Specular,
-    ViewError,
-    Weigh,
-    specular_of,
+from brdfdb.forms.conversion_document import Conversion, percent, toml_of
+from brdfdb.forms.conversion_measurement import (
+    VIEWS_DEG,
+    l1_at,
+    left_by,
+    lobe_of,
+    p99_of,
+    peak_of,
+    sides_of,
+    worst_view,
 )
+from brdfdb.forms.conversion_nodes import COARSE, FINER, FITTED, WEIGHS, Nodes, Weigh, specular_of
 from brdfdb.forms.conversion_remarks import remarks
 from brdfdb.forms.conversion_search import STEPS as _SEARCH_STEPS
 from brdfdb.forms.conversion_search import Distance, Result, search
 from brdfdb.forms.conversion_target import Target
-from brdfdb.geometry import degrees, radians, unit_vector
-from brdfdb.integrals.pairs import Counts, Symmetry, view_of, views
+from brdfdb.geometry import degrees
+from brdfdb.integrals.pairs import Counts, Symmetry
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material, Source, written_name
 from brdfdb.materials.provenance import MOST_NAME
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec, closest
-from brdfdb.tables import error_measurement
 
 Array = NDArray[np.float64]
 
 FIT = "fit"  # the refractive index that asks for a search of n and k
 SEARCHED = 5  # wavelengths at most at which shared parameters are searched
 ASSUMED_NM = 550.0  # wavelength of the n and k that are searched for a grey source
-DIRECTIONS, SEED = 1000, 1992  # of p99: those of charts
-VIEWS_DEG = np.arange(0.0, 90.0, 5.0)  # theta_r of the viewers among whom the worst one is looked for
-STEP_DEG = 15.0  # between phi_r of these viewers, for an anisotropic source
-PEAK_DEG = 45.0  # theta_i of the mirror direction whose f_r is stated
 DIGITS = 6  # significant digits of the parameters; what is left is measured with these
 _ZERO = 1e-12  # parameters that are not larger are 0
 STEPS = _SEARCH_STEPS + 1  # calls of `tick` in a conversion
@@ -132,6 +125,48 @@ def convert(
     return _measured(request, fit)
 
 
+class Difference(NamedTuple):
+    """The distance of two materials, l1 and p99 as in `Conversion`."""
+
+    l1: float
+    p99: float
+
+
+def compare(source: Source, other: Material, wavelength_nm: ArrayLike | None = None) -> Difference:
+    """Return the error of a material in the place of a source, such as one with a copied alpha.
+
+    Parameters
+    ----------
+    source : Source
+        The truth.
+    other : Material
+        A material that is compared with it.
+    wavelength_nm : array_like [nm], optional
+        Wavelengths, as of `convert`.
+
+    Returns
+    -------
+    Difference
+        l1 [1] and p99 [1].
+
+    Raises
+    ------
+    ParameterError
+        If one of them does not hold at the wavelengths.
+
+    Examples
+    --------
+    >>> from brdfdb.materials import presets
+    >>> tile, paper = presets()["white-ceramic-tile"], presets()["glossy-grey-paper"]
+    >>> round(compare(tile, paper).l1, 2)
+    0.55
+    """
+    at = _wavelengths(source, other, wavelength_nm)
+    sides = sides_of(source, other, at)
+    left = left_by(sides, FITTED.finer(FINER), _symmetry(source, other))
+    return Difference(float(np.mean(left.l1)), p99_of(source, at if source.spectral else None, sides))
+
+
 class _Request(NamedTuple):
     """A checked request: the source, its wavelengths, and those of the target."""
 
@@ -186,12 +221,11 @@ def _request(
             entry,
         )
     target = Target(spec, source, at, fixed, entry)
-    symmetry = Symmetry(source.anisotropic, source.elliptical)
     counts = COARSE if spec.slow else FITTED
-    return _Request(source, at if source.spectral else None, at, target, symmetry, counts, weigh)
+    return _Request(source, at if source.spectral else None, at, target, target.symmetry, counts, weigh)
 
 
-def _wavelengths(source: Source, spec: ModelSpec, wavelength_nm: ArrayLike | None) -> Array | None:
+def _wavelengths(source: Source, other: ModelSpec | Material, wavelength_nm: ArrayLike | None) -> Array | None:
     """Return the wavelengths of the comparison; None where source and model are grey."""
     if wavelength_nm is not None:
         at = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
@@ -203,18 +237,26 @@ def _wavelengths(source: Source, spec: ModelSpec, wavelength_nm: ArrayLike | Non
         raise ParameterError("wavelength_nm", f"missing; f_r of {source.name} depends on the wavelength")
     else:
         at = np.array([ASSUMED_NM])
-    if source.spectral or spec.spectral:
+    if source.spectral or other.spectral:
         return at
     if wavelength_nm is not None:
-        raise ParameterError("wavelength_nm", f"{source.name} and {spec.name} have none; leave it out", wavelength_nm)
+        raise ParameterError("wavelength_nm", f"{source.name} and {other.name} have none; leave it out", wavelength_nm)
     return None
+
+
+def _symmetry(source: Source, other: Material) -> Symmetry:
+    """Return the symmetry that two have in common."""
+    return Symmetry(
+        source.anisotropic or other.anisotropic,
+        (source.elliptical or not source.anisotropic) and (other.elliptical or not other.anisotropic),
+    )
 
 
 def _searched(request: _Request, tick: Callable[[], None]) -> _Fit:
     """Search the shared parameters at a few wavelengths, then the colours at all of them."""
     source, target, columns = request.source, request.target, request.columns
     some = None if request.before is None else request.before[columns]
-    lobe = _lobe_of(source, some)
+    lobe = lobe_of(source, some)
     coarse, fitted = (_nodes(request, lobe, counts, some) for counts in (COARSE, request.counts))
     result = search(target, coarse, fitted, columns, _alpha(lobe), tick)
     if target.count == columns.size and not target.colours:
@@ -239,10 +281,6 @@ def _nodes(
     return nodes
 
 
-def _lobe_of(source: Source, wavelength_nm: Array | None) -> Callable[[Array], Lobe | None]:
-    return lambda cosine: source.lobe(cosine, wavelength_nm) if source.has_lobe else None
-
-
 def _alpha(lobe: Callable[[Array], Lobe | None]) -> float:
     """Return the width [1] of a lobe at normal incidence, at the wavelength where it is narrowest; nan without one."""
     normal = lobe(np.asarray(1.0))
@@ -259,13 +297,13 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
     table = _table(request, fit, f"converted from {source.name}")
     name = f"{source.name}-as-{spec.name.replace('_', '-').lower()}"[:MOST_NAME].rstrip("-")
     material = Material.from_table(name, table)
-    sides = _sides(request, material)
+    sides = sides_of(source, material, request.at)
     finer = request.counts.finer(FINER)
-    left = Left(views(sides.lobe, finer, request.symmetry), *sides[:3])
-    l1, p99 = float(np.mean(left.l1)), _p99(request, sides)
+    left = left_by(sides, finer, request.symmetry)
+    l1, p99 = float(np.mean(left.l1)), p99_of(source, request.before, sides)
     was = f" ({source.model})" if isinstance(source, Material) else ""
     table["source"] = f"converted from {source.name}{was}; l1 {percent(l1)}, p99 {percent(p99)}"
-    largest, worst = _views(request, sides, finer)
+    largest, worst = worst_view(sides, finer, request.symmetry, request.at)
     searched = fit.result.numbers if target.searched_index else {}
     conversion = Conversion(
         source=source.name,
@@ -280,11 +318,11 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
         wavelengths_nm=None if request.at is None else request.at.tolist(),
         l1=l1,
         l1_of=left.l1.tolist(),
-        quadrature=abs(l1 - _at_nodes(request, material, fit.nodes)),
+        quadrature=abs(l1 - l1_at(fit.nodes, sides)),
         p99=p99,
         reflected=float(np.mean(left.reflected)),
         specular_share=float(np.mean(left.specular)),
-        peak=_peak(sides),
+        peak=peak_of(sides),
         worst_view=worst,
         views_deg=VIEWS_DEG.tolist(),
         l1_of_views=largest,
@@ -329,84 +367,3 @@ def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
 
 def _rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}") if abs(value) > _ZERO else 0.0
-
-
-class _Sides(NamedTuple):
-    """Source and model as functions: f_r (N, L) of both, their specular parts, and the narrower of their lobes."""
-
-    truth: Evaluate
-    model: Evaluate
-    mirrors: tuple[Specular | None, Specular | None]
-    lobe: Callable[[Array], Lobe | None]
-
-
-def _sides(request: _Request, material: Material) -> _Sides:
-    source, before = request.source, request.before
-    after = request.at if material.spectral else None
-    lobes = _lobe_of(source, before), _lobe_of(material, after)
-
-    def narrower(cosine: Array) -> Lobe | None:
-        both = [lobe for lobe in (one(cosine) for one in lobes) if lobe is not None]
-        if not both:
-            return None
-        alpha_x = min(np.min(lobe.alpha_x) for lobe in both)
-        alpha_y = min(np.min(lobe.alpha_y) for lobe in both)
-        return Lobe(np.asarray(1.0), np.asarray(alpha_x), np.asarray(alpha_y))
-
-    mirrors = specular_of(source, before), specular_of(material, after)
-    return _Sides(source.brdf_at(before), material.brdf_at(after), mirrors, narrower)
-
-
-def _at_nodes(request: _Request, material: Material, nodes: Nodes) -> float:
-    """Return the mean l1 at the nodes of the search, of all wavelengths that these have."""
-    after = request.at if material.spectral else None
-    values, mirror = material.brdf_at(after)(nodes.wi, nodes.wr), specular_of(material, after)
-    specular = np.zeros(nodes.specular.shape) if mirror is None else mirror(nodes.theta)
-    wrong = nodes.weight @ np.abs(values - nodes.truth) + nodes.theta_weight @ np.abs(specular - nodes.specular)
-    return float(np.mean(wrong / nodes.total))
-
-
-def _peak(sides: _Sides) -> Peak:
-    """Return f_r of both in the mirror direction at `PEAK_DEG`, at the middle wavelength."""
-    wi, wr = (unit_vector(radians(PEAK_DEG), phi)[np.newaxis] for phi in (0.0, np.pi))
-    before, after = (np.ravel(one(wi, wr)) for one in (sides.truth, sides.model))
-    return Peak(theta_deg=PEAK_DEG, before=float(before[before.size // 2]), after=float(after[after.size // 2]))
-
-
-def _p99(request: _Request, sides: _Sides) -> float:
-    drawn = error_measurement.draw(request.source, request.before, DIRECTIONS, SEED)
-    truth, values = sides.truth(drawn.wi, drawn.wr), sides.model(drawn.wi, drawn.wr)
-    return error_measurement.compare(values, truth, drawn).overall.p99
-
-
-def _views(request: _Request, sides: _Sides, counts: Counts) -> tuple[list[float], WorstView]:
-    """Return the largest l1 of viewers at each theta_r, and the viewer with the largest of all."""
-    anisotropic, elliptical = request.symmetry
-    end_deg = 90.0 if elliptical else 345.0
-    phis_deg = np.arange(0.0, end_deg + 1.0, STEP_DEG) if anisotropic else np.zeros(1)
-    largest: list[float] = []
-    worst: tuple[float, int, ViewError] | None = None
-    for theta_deg in VIEWS_DEG.tolist():
-        of_theta = 0.0
-        for phi_deg in phis_deg.tolist():
-            view = view_of(sides.lobe, float(radians(theta_deg)), float(radians(phi_deg)), counts, request.symmetry)
-            error = ViewError(view, *sides[:3])
-            column = int(np.argmax(error.l1))
-            l1 = float(error.l1[column])
-            of_theta = max(of_theta, l1)
-            if worst is None or l1 > worst[0]:
-                worst = l1, column, error
-        largest.append(of_theta)
-    assert worst is not None
-    l1, column, error = worst
-    (theta_i_deg, phi_i_deg), before, after = error.largest(column)
-    return largest, WorstView(
-        theta_r_deg=round(float(degrees(error.view.theta)), 6),
-        phi_r_deg=round(float(degrees(error.view.phi)), 6),
-        l1=l1,
-        wavelength_nm=None if request.at is None else float(request.at[column]),
-        theta_i_deg=round(theta_i_deg, 2),
-        phi_i_deg=round(phi_i_deg, 2),
-        before=before,
-        after=after,
-    )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
+from brdfdb.integrals.pairs import Symmetry
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats, ModelSpec, Parameter, closest
 from brdfdb.spectra import refractive_index
@@ -80,6 +81,8 @@ class Target:
         Reflectances with a value at each of several wavelengths; empty where there is one.
     wavelength_nm : array (L,) [nm] or None
         Wavelengths of the model, None for a grey one.
+    symmetry : Symmetry
+        Symmetry that source and model have in common.
     entry : str or None
         The refractive index of a spectral model; None where n and k are searched, and for other models.
     """
@@ -95,9 +98,14 @@ class Target:
         self.spec, self.wavelength_nm, self.entry = spec, wavelength_nm, entry
         self.count = 1 if wavelength_nm is None else wavelength_nm.size
         self.fixed = {**_switches(spec), **_checked(spec, fixed)}
-        tied = spec.lobe_axes if spec.lobe_axes and not source.anisotropic else None
-        # An isotropic source has an isotropic likeness: one width stands for both
-        self.tied = tied if tied and not set(tied) & set(self.fixed) else None
+        self.tied = None
+        if spec.lobe_axes and not source.anisotropic:  # an isotropic source has an isotropic likeness
+            given = [self.fixed[name] for name in spec.lobe_axes if name in self.fixed]
+            if len(given) == 1:
+                self.fixed |= dict.fromkeys(spec.lobe_axes, given[0])
+            elif not given:
+                self.tied = spec.lobe_axes
+        self.symmetry = self._symmetry(source)
         free = [p for p in spec.parameters if p.name not in self.fixed and not (self.tied and p.name == self.tied[1])]
         several = self.count > 1
         self.shape = [_variable(p) for p in free if not (several and p.reflectance)]
@@ -108,6 +116,15 @@ class Target:
         self.indices = self._indices()
         if not self.shape and not self.colours:
             raise ParameterError("fixed", f"no parameter of {spec.name} is left to search", tuple(fixed))
+
+    def _symmetry(self, source: Source) -> Symmetry:
+        """Return the symmetry that the source and every set of parameters have."""
+        if self.spec.anisotropic is not None:
+            return Symmetry(True, False)
+        if source.anisotropic:
+            return Symmetry(True, source.elliptical)
+        fixed = {self.fixed.get(name) for name in self.spec.lobe_axes or ()}
+        return Symmetry(len(fixed) > 1, True)
 
     def _indices(self) -> list[dict[str, float]]:
         if not self.spec.spectral:
