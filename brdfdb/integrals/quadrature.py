@@ -329,27 +329,53 @@ def _over_the_slopes(reflected: Callable[[Array], Array], wi: Array, lobe: Lobe)
     alpha_x, alpha_y = (float(np.clip(alpha, 1e-9, 10.0)) for alpha in (lobe.alpha_x, lobe.alpha_y))
 
     def integrand(x: Array, psi: Array) -> Array:
-        s_x, s_y = alpha_x * np.cos(psi), alpha_y * np.sin(psi)  # slopes of the half vector, divided by t
-        s2 = s_x**2 + s_y**2
-        # cos theta_r = 0 at cos_i s2 t^2 - 2 p t - cos_i = 0
-        p = x_i * s_x + y_i * s_y
-        root = np.sqrt(p * p + cos_i * cos_i * s2)
-        t_horizon = np.where(p > 0.0, (p + root) / (cos_i * s2), cos_i / np.where(p > 0.0, 1.0, root - p))
-        stretch = np.arcsinh(t_horizon)
-        t = np.sinh(x * stretch)
-        # dt / dx
-        jacobian = np.sqrt(1.0 + t * t) * stretch
-        cos_h = 1.0 / np.sqrt(1.0 + t * t * s2)
-        h = np.stack([t * s_x * cos_h, t * s_y * cos_h, cos_h], axis=-1)
-        h_i = (cos_i + t * p) * cos_h
-        wr = 2.0 * h_i[..., np.newaxis] * h - wi
-        # d omega_r = 4 (h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
-        measure = 4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian
+        wr, measure = mirrored_on_rays((x_i, y_i, cos_i), alpha_x, alpha_y, x, psi)
         return np.asarray(reflected(wr) * measure[..., np.newaxis])
 
     # At grazing the horizon leaps a quarter turn away from the light, so panels end there
     across = np.arctan2(alpha_x * x_i, -alpha_y * y_i) if sin2_i > 0.0 else HALF_PI  # p = 0
     return integrand, _panels(np.linspace(0.0, 1.0, 5), across + HALF_PI * np.arange(5)), float(across) + HALF_PI
+
+
+def mirrored_on_rays(
+    i: tuple[Floats, Floats, Floats], alpha_x: float | Array, alpha_y: float | Array, x: Array, psi: Array
+) -> tuple[Array, Array]:
+    """Return directions mirrored in half vectors on rays of slopes, and the solid angle [sr] for dx dpsi.
+
+    Parameters
+    ----------
+    i : three arrays
+        The components of the unit vector that is mirrored.
+    alpha_x, alpha_y : float or array [1]
+        Widths of the lobe. The slopes on a ray are t (alpha_x cos psi, alpha_y sin psi).
+    x : array [1]
+        Position on the ray, in [0, 1]: 0 is the mirror direction, and 1 the horizon. It is stretched near the lobe.
+    psi : array [rad]
+        Azimuth of the ray on the ellipse of the lobe.
+
+    Returns
+    -------
+    array (..., 3), array (...)
+        Unit vectors, and their solid angle, in the broadcast shape of the arguments.
+    """
+    x_i, y_i, cos_i = i
+    s_x, s_y = alpha_x * np.cos(psi), alpha_y * np.sin(psi)  # slopes of the half vector, divided by t
+    s2 = s_x**2 + s_y**2
+    # cos theta_r = 0 at cos_i s2 t^2 - 2 p t - cos_i = 0
+    p = x_i * s_x + y_i * s_y
+    root = np.sqrt(p * p + cos_i * cos_i * s2)
+    t_horizon = np.where(p > 0.0, (p + root) / (cos_i * s2), cos_i / np.where(p > 0.0, 1.0, root - p))
+    stretch = np.arcsinh(t_horizon)
+    t = np.sinh(x * stretch)
+    # dt / dx
+    jacobian = np.sqrt(1.0 + t * t) * stretch
+    cos_h = 1.0 / np.sqrt(1.0 + t * t * s2)
+    h = np.stack([t * s_x * cos_h, t * s_y * cos_h, cos_h], axis=-1)
+    h_i = (cos_i + t * p) * cos_h
+    wi = np.stack(np.broadcast_arrays(*i), axis=-1)
+    wr = 2.0 * h_i[..., np.newaxis] * h - wi
+    # d omega_r = 4 (h.i) d omega_h, d omega_h = cos^3 d(slopes), d(slopes) = alpha_x alpha_y t dt dpsi
+    return wr, np.asarray(4.0 * h_i * cos_h**3 * (alpha_x * alpha_y) * t * jacobian)
 
 
 def _panels(first: Floats, second: Floats) -> Array:

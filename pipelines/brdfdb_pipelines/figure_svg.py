@@ -116,6 +116,12 @@ def svg(drawing: Drawing, key: str) -> str:
 
 def _curves(panel: Panel) -> Canvas:
     canvas, axes = _canvas(panel.title, [curve.label for curve in panel.curves], _PLOT_HEIGHT)
+    _legend(canvas, curves_on(axes, panel), bool(panel.title))
+    return canvas
+
+
+def curves_on(axes: Axes, panel: Panel) -> list[Line2D]:
+    """Draw the curves of a panel, its axes and their labels; return the lines, for a legend."""
     lines = _lines(panel.curves)
     for index, (curve, line) in enumerate(zip(panel.curves, lines, strict=True)):
         line.set_data(curve.x, _array(curve.y).tolist())
@@ -127,8 +133,7 @@ def _curves(panel: Panel) -> Canvas:
     axes.set_xlabel(panel.x_label)
     axes.set_ylabel(panel.y_label)
     axes.spines[["top", "right"]].set_visible(False)
-    _legend(canvas, lines, bool(panel.title))
-    return canvas
+    return lines
 
 
 def _polar(panel: Panel) -> Canvas:

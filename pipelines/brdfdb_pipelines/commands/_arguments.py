@@ -82,11 +82,20 @@ def whole_number(most: int | None = None) -> Callable[[str], int]:
 
 def png_file(text: str) -> Path:
     """Return the path of a PNG to write; a directory and other suffixes are refused, before time is spent."""
+    return _file_to_write(text, ".png")
+
+
+def picture_file(text: str) -> Path:
+    """Return the path of an SVG or PNG to write, as `png_file` does."""
+    return _file_to_write(text, ".svg", ".png")
+
+
+def _file_to_write(text: str, *suffixes: str) -> Path:
     path = Path(text)
     if path.is_dir():
         raise argparse.ArgumentTypeError(f"{text!r} is a directory; name a file in it")
-    if path.suffix.lower() != ".png":
-        raise argparse.ArgumentTypeError(f"{text!r} does not end in .png")
+    if path.suffix.lower() not in suffixes:
+        raise argparse.ArgumentTypeError(f"{text!r} does not end in {' or '.join(suffixes)}")
     return path
 
 

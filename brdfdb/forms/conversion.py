@@ -1,0 +1,369 @@
+"""Conversion from one model to another: the parameters that come closest, and the error that is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.forms.conversion_document import Conversion, percent, toml_of
+from brdfdb.forms.conversion_measurement import (
+    VIEWS_DEG,
+    l1_at,
+    left_by,
+    lobe_of,
+    p99_of,
+    peak_of,
+    sides_of,
+    worst_view,
+)
+from brdfdb.forms.conversion_nodes import COARSE, FINER, FITTED, WEIGHS, Nodes, Weigh, specular_of
+from brdfdb.forms.conversion_remarks import remarks
+from brdfdb.forms.conversion_search import STEPS as _SEARCH_STEPS
+from brdfdb.forms.conversion_search import Distance, Result, search
+from brdfdb.forms.conversion_target import Target
+from brdfdb.geometry import degrees
+from brdfdb.integrals.pairs import Counts, Symmetry
+from brdfdb.lobes import Lobe
+from brdfdb.materials import Material, Source, written_name
+from brdfdb.materials.provenance import MOST_NAME
+from brdfdb.models import MODELS
+from brdfdb.parameters import ModelSpec, closest
+
+Array = NDArray[np.float64]
+
+FIT = "fit"  # the refractive index that asks for a search of n and k
+SEARCHED = 5  # wavelengths at most at which shared parameters are searched
+ASSUMED_NM = 550.0  # wavelength of the n and k that are searched for a grey source
+DIGITS = 6  # significant digits of the parameters; what is left is measured with these
+_ZERO = 1e-12  # parameters that are not larger are 0
+STEPS = _SEARCH_STEPS + 1  # calls of `tick` in a conversion
+
+
+def convert(
+    source: Source,
+    model: str,
+    wavelength_nm: ArrayLike | None = None,
+    *,
+    fixed: Mapping[str, float] | None = None,
+    refractive_index: str | None = None,
+    weigh: Weigh = "light",
+    tick: Callable[[], None] = lambda: None,
+) -> Conversion:
+    """Search the parameters of a model that come closest to a source, and measure the error that is left.
+
+    Parameters
+    ----------
+    source : Source
+        A material of any other model, or a function.
+    model : str
+        Name of a model in `brdfdb.models.MODELS`.
+    wavelength_nm : array_like [nm], optional
+        Wavelengths of a spectral source, by default those for which it is stated. For a grey source and a model with n
+        and k, the wavelength of these, by default 550 nm.
+    fixed : mapping of str to float, optional
+        Parameters that are not searched, in the units of the model (angles in radians).
+    refractive_index : str, optional
+        For a model with n and k, the entry ``shelf/book/page`` that has them, or "fit". By default it is the entry of
+        the source. Without one, n and k are searched.
+    weigh : {"light", "lightness"}
+        What the search makes least: l1, or the root mean square difference of cube roots of f_r, with the same cosines,
+        as the eye weighs light. The latter keeps a highlight that carries little of the light.
+    tick : callable
+        A function that is called `STEPS` times at most, to show progress.
+
+    Returns
+    -------
+    Conversion
+        Parameters, l1, p99, the worst view, and the result as a material and as a part of a recipe.
+
+    Raises
+    ------
+    ParameterError
+        If the model is that of the source or unknown, if n and k would have to be searched at several wavelengths, if
+        a fixed parameter is unknown or out of range, or if the source reflects nothing.
+
+    Notes
+    -----
+    The distance between f, the source, and g, the model, is
+
+        l1 = integral of abs(g - f) cos theta_i cos theta_r / integral of f cos theta_i cos theta_r
+
+    over all lights and viewers above the horizon: the light in the wrong place under light from everywhere, counted
+    where it is missing and where it is too much. It is 0 for the same surface, and 2 for one that reflects as much to
+    other places alone. Specular parts (Dirac deltas) count with their reflectance, abs(S_g - S_f). Of several
+    wavelengths it is the mean. The mean square would follow the largest values, next to grazing, and give up the
+    uniform part of brass; a specular part has none. l1 has a price, too: a highlight with a few hundredths of the light
+    may go, if the model cannot put it right. `Conversion.peak` shows that.
+
+    All numbers of the model are searched within their ranges, as in `brdfdb.forms.conversion_search`. A reflectance has
+    a value at each wavelength; the others are shared, and searched at five wavelengths. Switches keep their defaults.
+    An isotropic source gives one alpha. n and k are searched as the reflectance at normal incidence, which the light
+    fixes well, and the place between the two n of k = 0, which matters little: `Conversion.as_good` shows that.
+
+    Integrals are sums at nodes that follow the lobe of the source (`brdfdb.integrals.pairs`). The stated l1 is measured
+    at five times as many nodes as the search has, or more. `Conversion.quadrature` is the difference of the two.
+    `brdfdb.roughness` has the conversions that are exact.
+
+    References
+    ----------
+    neldermead1965
+
+    Examples
+    --------
+    >>> from brdfdb.materials import presets
+    >>> brass = convert(presets()["rolled-brass"], "ward_duer")
+    >>> round(brass.parameters["alpha_x"], 2), round(brass.l1, 2)
+    (0.05, 0.14)
+    """
+    request = _request(source, model, wavelength_nm, fixed or {}, refractive_index, weigh)
+    fit = _searched(request, tick)
+    tick()
+    return _measured(request, fit)
+
+
+class Difference(NamedTuple):
+    """The distance of two materials, l1 and p99 as in `Conversion`."""
+
+    l1: float
+    p99: float
+
+
+def compare(source: Source, other: Material, wavelength_nm: ArrayLike | None = None) -> Difference:
+    """Return the error of a material in the place of a source, such as one with a copied alpha.
+
+    Parameters
+    ----------
+    source : Source
+        The truth.
+    other : Material
+        A material that is compared with it.
+    wavelength_nm : array_like [nm], optional
+        Wavelengths, as of `convert`.
+
+    Returns
+    -------
+    Difference
+        l1 [1] and p99 [1].
+
+    Raises
+    ------
+    ParameterError
+        If one of them does not hold at the wavelengths.
+
+    Examples
+    --------
+    >>> from brdfdb.materials import presets
+    >>> tile, paper = presets()["white-ceramic-tile"], presets()["glossy-grey-paper"]
+    >>> round(compare(tile, paper).l1, 2)
+    0.55
+    """
+    at = _wavelengths(source, other, wavelength_nm)
+    sides = sides_of(source, other, at)
+    left = left_by(sides, FITTED.finer(FINER), _symmetry(source, other))
+    return Difference(float(np.mean(left.l1)), p99_of(source, at if source.spectral else None, sides))
+
+
+class _Request(NamedTuple):
+    """A checked request: the source, its wavelengths, and those of the target."""
+
+    source: Source
+    before: Array | None  # wavelengths of the source, None for a grey one
+    at: Array | None  # wavelengths of the comparison, None where both are grey
+    target: Target
+    symmetry: Symmetry
+    counts: Counts  # of the search
+    weigh: Weigh
+
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """Return the wavelengths at which shared parameters are searched."""
+        several = min(SEARCHED, self.target.count)
+        return np.unique(np.linspace(0, self.target.count - 1, several).round().astype(np.int64))
+
+
+class _Fit(NamedTuple):
+    """The result of a search: colours (L, C) of all wavelengths in the unit cube, and the truth at nodes."""
+
+    result: Result
+    colours: Array
+    nodes: Nodes
+
+
+def _request(
+    source: Source,
+    model: str,
+    wavelength_nm: ArrayLike | None,
+    fixed: Mapping[str, float],
+    entry: str | None,
+    weigh: Weigh,
+) -> _Request:
+    if weigh not in WEIGHS:
+        raise ParameterError("weigh", f"{weigh!r} is not one of {', '.join(WEIGHS)}", weigh, WEIGHS)
+    if model not in MODELS:
+        raise ParameterError("model", f"{model!r} is unknown{closest(model, MODELS)}", model, tuple(MODELS))
+    spec = MODELS[model]
+    if isinstance(source, Material) and source.model == model:
+        raise ParameterError("model", f"{source.name} is of the model {model} itself; name another one", model)
+    at = _wavelengths(source, spec, wavelength_nm)
+    if entry is not None and not spec.spectral:
+        raise ParameterError("refractive_index", f"the model {model} takes none", entry)
+    if entry is None and spec.spectral and isinstance(source, Material):
+        entry = source.refractive_index
+    entry = None if entry == FIT else entry
+    if spec.spectral and entry is None and at is not None and at.size > 1:
+        raise ParameterError(
+            "refractive_index",
+            f"missing; {model} takes n and k, which are searched at one wavelength alone, and {at.size} are given",
+            entry,
+        )
+    target = Target(spec, source, at, fixed, entry)
+    counts = COARSE if spec.slow else FITTED
+    return _Request(source, at if source.spectral else None, at, target, target.symmetry, counts, weigh)
+
+
+def _wavelengths(source: Source, other: ModelSpec | Material, wavelength_nm: ArrayLike | None) -> Array | None:
+    """Return the wavelengths of the comparison; None where source and model are grey."""
+    if wavelength_nm is not None:
+        at = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
+        if at.ndim != 1 or not at.size or not np.all(at > 0.0) or not np.all(np.diff(at) > 0.0):
+            raise ParameterError("wavelength_nm", "they must be positive and increasing", wavelength_nm)
+    elif source.spectral and source.wavelengths_nm is not None:
+        at = np.array(source.wavelengths_nm, dtype=np.float64)
+    elif source.spectral:
+        raise ParameterError("wavelength_nm", f"missing; f_r of {source.name} depends on the wavelength")
+    else:
+        at = np.array([ASSUMED_NM])
+    if source.spectral or other.spectral:
+        return at
+    if wavelength_nm is not None:
+        raise ParameterError("wavelength_nm", f"{source.name} and {other.name} have none; leave it out", wavelength_nm)
+    return None
+
+
+def _symmetry(source: Source, other: Material) -> Symmetry:
+    """Return the symmetry that two have in common."""
+    return Symmetry(
+        source.anisotropic or other.anisotropic,
+        (source.elliptical or not source.anisotropic) and (other.elliptical or not other.anisotropic),
+    )
+
+
+def _searched(request: _Request, tick: Callable[[], None]) -> _Fit:
+    """Search the shared parameters at a few wavelengths, then the colours at all of them."""
+    source, target, columns = request.source, request.target, request.columns
+    some = None if request.before is None else request.before[columns]
+    lobe = lobe_of(source, some)
+    coarse, fitted = (_nodes(request, lobe, counts, some) for counts in (COARSE, request.counts))
+    result = search(target, coarse, fitted, columns, _alpha(lobe), tick)
+    if target.count == columns.size and not target.colours:
+        return _Fit(result, np.zeros((target.count, 0)), fitted)
+    nodes = _nodes(request, lobe, request.counts, request.before)
+    every = Distance(target, nodes, np.arange(target.count, dtype=np.int64))
+    ends = [every.of_column(result.numbers, column, column)[1] for column in range(target.count)]
+    return _Fit(result, np.stack(ends), nodes)
+
+
+def _nodes(
+    request: _Request, lobe: Callable[[Array], Lobe | None], counts: Counts, wavelength_nm: Array | None
+) -> Nodes:
+    """Return the truth at nodes, of a source that reflects something at each wavelength."""
+    f_r, mirror = request.source.brdf_at(wavelength_nm), specular_of(request.source, wavelength_nm)
+    nodes = Nodes(lobe, counts, request.symmetry, f_r, mirror, request.weigh)
+    dark = ~(nodes.total > 0.0)
+    if np.any(dark):
+        where = "" if wavelength_nm is None else f" at {wavelength_nm[dark][0]:g} nm"
+        name = request.source.name
+        raise ParameterError("source", f"{name} reflects nothing{where}, so that no model is close to it", name)
+    return nodes
+
+
+def _alpha(lobe: Callable[[Array], Lobe | None]) -> float:
+    """Return the width [1] of a lobe at normal incidence, at the wavelength where it is narrowest; nan without one."""
+    normal = lobe(np.asarray(1.0))
+    return np.nan if normal is None else float(np.sqrt(np.min(normal.alpha_x) * np.min(normal.alpha_y)))
+
+
+# What is left
+
+
+def _measured(request: _Request, fit: _Fit) -> Conversion:
+    """Measure what a material with the parameters that were found leaves, at more nodes."""
+    source, target = request.source, request.target
+    spec = target.spec
+    table = _table(request, fit, f"converted from {source.name}")
+    name = f"{source.name}-as-{spec.name.replace('_', '-').lower()}"[:MOST_NAME].rstrip("-")
+    material = Material.from_table(name, table)
+    sides = sides_of(source, material, request.at)
+    finer = request.counts.finer(FINER)
+    left = left_by(sides, finer, request.symmetry)
+    l1, p99 = float(np.mean(left.l1)), p99_of(source, request.before, sides)
+    was = f" ({source.model})" if isinstance(source, Material) else ""
+    table["source"] = f"converted from {source.name}{was}; l1 {percent(l1)}, p99 {percent(p99)}"
+    largest, worst = worst_view(sides, finer, request.symmetry, request.at)
+    searched = fit.result.numbers if target.searched_index else {}
+    conversion = Conversion(
+        source=source.name,
+        source_model=source.model if isinstance(source, Material) else "",
+        model=spec.name,
+        weigh=request.weigh,
+        parameters=material.parameters,
+        n=_rounded(searched["n"]) if searched else None,
+        k=_rounded(searched["k"]) if searched else None,
+        fixed=sorted(target.fixed),
+        refractive_index=target.entry,
+        wavelengths_nm=None if request.at is None else request.at.tolist(),
+        l1=l1,
+        l1_of=left.l1.tolist(),
+        quadrature=abs(l1 - l1_at(fit.nodes, sides)),
+        p99=p99,
+        reflected=float(np.mean(left.reflected)),
+        specular_share=float(np.mean(left.specular)),
+        peak=peak_of(sides),
+        worst_view=worst,
+        views_deg=VIEWS_DEG.tolist(),
+        l1_of_views=largest,
+        as_good=fit.result.as_good,
+        evaluations=fit.result.evaluations,
+        material=Material.from_table(name, table),
+        recipe=toml_of(name, table),
+        remarks=[],
+    )
+    return conversion.model_copy(update={"remarks": remarks(source, conversion)})
+
+
+def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
+    """Return the material as a recipe writes it, with rounded parameters."""
+    target, at = request.target, request.at
+    values: dict[str, Any] = {}
+    for parameter in target.spec.parameters:
+        name = parameter.name
+        column = next((i for i, variable in enumerate(target.colours) if variable.name == name), None)
+        if column is not None and at is not None:
+            colour = [_rounded(target.colours[column].value(u)) for u in fit.colours[:, column].tolist()]
+            values[name] = {"wavelengths_nm": at.tolist(), "values": colour, "origin": origin}
+            continue
+        value = {**target.fixed, **fit.result.numbers}[name]
+        in_file = float(degrees(value)) if parameter.unit == "rad" else value
+        values[written_name(parameter)] = value if isinstance(value, bool) else _rounded(in_file)
+    table: dict[str, Any] = {
+        "title": f"{request.source.title}, as {target.spec.title}",
+        "model": target.spec.name,
+        "source": origin,
+    }
+    if target.searched_index:
+        n, k = (_rounded(fit.result.numbers[name]) for name in ("n", "k"))
+        table["refractive_index"] = f"constant/{n!r}/{k!r}"
+    elif target.entry is not None:
+        table["refractive_index"] = target.entry
+    stated = target.searched_index or request.source.wavelengths_nm is not None
+    if at is not None and stated and (target.spec.spectral or target.colours):
+        table["wavelengths_nm"] = at.tolist()
+    return {**table, "parameters": values}
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}") if abs(value) > _ZERO else 0.0

@@ -1,0 +1,102 @@
+"""The figure of a conversion: f_r of source and model in the plane of incidence, and the error of each view."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.figure import Curve, Figure, Panel, curve_of
+from brdfdb.forms.conversion_document import Conversion, percent
+from brdfdb.geometry import degrees, radians, unit_vector
+from brdfdb.materials import Source
+from brdfdb.parameters import Floats
+
+Array = NDArray[np.float64]
+
+LIGHTS_DEG = (15.0, 45.0, 75.0)  # theta_i of the panels
+_EVERY_DEG, _ACROSS = 1.0, 40  # step of theta_r, and angles on either side of the mirror direction
+_OCTAVES = 20.0  # widths of the lobe up to which angles crowd around the mirror direction
+_LEAST = 1e-5  # share of the largest value below which a curve has a gap
+
+
+def figure_of(source: Source, conversion: Conversion) -> Figure:
+    """Return the figure of a conversion.
+
+    Parameters
+    ----------
+    source : Source
+        The source that was converted.
+    conversion : Conversion
+        The result.
+
+    Returns
+    -------
+    Figure
+        A panel for each of three lights, with f_r of both over the angle of the viewer in the plane of incidence, from
+        the side of the light (negative) to that of the mirror direction. An anisotropic source has two such planes.
+        The last panel has the l1 of each view. Spectra are shown at their middle wavelength.
+    """
+    at = conversion.wavelengths_nm
+    middle = None if at is None else np.array(at[len(at) // 2 :][:1])
+    panels = [_of_light(source, conversion, theta_deg, middle) for theta_deg in LIGHTS_DEG]
+    views = curve_of("worst view at this angle", conversion.views_deg, conversion.l1_of_views, "ours")
+    mean = curve_of("over all pairs", [0.0, conversion.views_deg[-1]], [conversion.l1] * 2, "truth")
+    panels.append(
+        Panel(
+            title="light in the wrong place",
+            x_label="theta_r [degree]",
+            y_label="l1 [1]",
+            curves=[views, mean],
+        )
+    )
+    where = "" if middle is None else f" at {middle[0]:g} nm"
+    left = f"l1 {percent(conversion.l1)}, p99 {percent(conversion.p99)}"
+    return Figure(
+        key=conversion.name,
+        paper=conversion.material.spec.reference,
+        title=f"{conversion.source} as {conversion.model}",
+        caption=f"f_r in the plane of incidence{where}. {left}.",
+        panels=list(panels),
+        statements=[],
+    )
+
+
+def _of_light(source: Source, conversion: Conversion, theta_deg: float, middle: Array | None) -> Panel:
+    """Return the panel of one light."""
+    made = conversion.material
+    sides = ((conversion.source, source, "truth"), (conversion.model, made, "ours"))
+    planes = {"along x": 0.0, "along y": 90.0} if source.anisotropic else {"": 0.0}
+    curves: list[Curve] = []
+    largest = 0.0
+    drawn = []
+    for plane, phi_deg in planes.items():
+        wi = unit_vector(radians(theta_deg), radians(phi_deg))
+        theta_r_deg = _angles(source, theta_deg, middle)
+        wr = unit_vector(np.abs(radians(theta_r_deg)), radians(phi_deg + np.where(theta_r_deg > 0.0, 180.0, 0.0)))
+        for name, side, role in sides:
+            values = side.lookup_vectors(np.broadcast_to(wi, wr.shape), wr, middle if side.spectral else None)
+            values = np.asarray(values, dtype=np.float64).reshape(-1)
+            largest = max(largest, float(values.max()))
+            drawn.append((f"{name} {plane}".strip(), theta_r_deg, values, role))
+    for label, x, values, role in drawn:
+        shown = np.where(values > _LEAST * largest, values, np.nan)
+        curves.append(curve_of(label, x, shown, "truth" if role == "truth" else "ours"))
+    return Panel(
+        title=f"theta_i = {theta_deg:g} degrees",
+        x_label="theta_r [degree], mirror side positive",
+        y_label="f_r [1/sr]",
+        curves=curves,
+        log_y=True,
+    )
+
+
+def _angles(source: Source, theta_deg: float, middle: Array | None) -> Floats:
+    """Return angles of the viewer [degree], crowded around the mirror direction of a lobe."""
+    plain = np.arange(-89.0, 89.5, _EVERY_DEG)
+    if not source.has_lobe:
+        return plain
+    lobe = source.lobe(np.cos(radians(theta_deg)), middle if source.spectral else None)
+    alpha = 0.1 if lobe is None else float(min(np.min(lobe.alpha_x), np.min(lobe.alpha_y)))
+    slopes = alpha * np.sinh(np.linspace(-1.0, 1.0, 2 * _ACROSS + 1) * np.arcsinh(_OCTAVES))
+    near = theta_deg + 2.0 * degrees(np.arctan(slopes))
+    return np.unique(np.concatenate([plain, near[np.abs(near) <= 89.0]]))

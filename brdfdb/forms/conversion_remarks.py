@@ -1,0 +1,43 @@
+"""Sentences on what the model of a conversion cannot carry."""
+
+from __future__ import annotations
+
+from brdfdb.forms.conversion_document import Conversion, percent
+from brdfdb.materials import Material, Source
+from brdfdb.models import MODELS
+from brdfdb.parameters import closest
+
+_SEEN = 0.01  # share of the light from which on a part is worth a sentence
+_LOST = 0.5  # share of the peak below which a highlight is lost
+_UNSURE = 0.01  # error of l1, relative to l1, that is worth a sentence
+
+
+def remarks(source: Source, conversion: Conversion) -> list[str]:
+    """Return sentences on parts of the source that the model lacks, a lost highlight, and an inexact l1."""
+    spec, made = MODELS[conversion.model], conversion.material
+    sentences = []
+    if conversion.specular_share > _SEEN:
+        share = f"{percent(conversion.specular_share)} of the light of {source.name} is its specular part"
+        lacks = "has one, too" if spec.specular else "has none: that light counts as error"
+        sentences.append(f"{share} (a Dirac delta); {spec.name} {lacks}.")
+    if isinstance(source, Material) and source.spec.uniform and spec.uniform is None and spec.lobe is not None:
+        uniform = source.parameters[source.spec.uniform]
+        if not isinstance(uniform, float) or uniform > 0.0:
+            others = closest(
+                spec.name, [name for name, other in MODELS.items() if other.uniform and name != source.model]
+            )
+            with_one = others.replace("; closest: ", "; models with one: ")
+            sentences.append(
+                f"{source.name} has a uniform part ({source.spec.uniform} = {uniform}); {spec.name} has none{with_one}."
+            )
+    if source.anisotropic and not made.anisotropic:
+        sentences.append(f"{source.name} is anisotropic; {made.name} is not.")
+    peak = conversion.peak
+    if conversion.weigh == "light" and source.has_lobe and peak.after < _LOST * peak.before:
+        sentences.append(
+            f"The highlight is lost: f_r in the mirror direction at {peak.theta_deg:g} degrees falls from "
+            f"{peak.before:.3g} to {peak.after:.3g} /sr. Weighing lightness instead of light keeps it."
+        )
+    if conversion.quadrature > _UNSURE * conversion.l1:
+        sentences.append(f"l1 is known to within {percent(conversion.quadrature)} of the light.")
+    return sentences

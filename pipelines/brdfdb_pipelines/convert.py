@@ -1,0 +1,176 @@
+"""The convert job: searches the parameters of another model, and prints them with the error that is left."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import brdfdb
+from brdfdb.errors import ParameterError
+from brdfdb.forms.conversion import STEPS, convert
+from brdfdb.forms.conversion_document import Conversion, percent
+from brdfdb.forms.conversion_figure import figure_of
+from brdfdb.forms.conversion_nodes import Weigh
+from brdfdb.geometry import radians
+from brdfdb.materials import Source, written_name
+from brdfdb.models import MODELS
+from brdfdb.parameters import closest
+from brdfdb.tables.table_source import source_of_table
+from brdfdb_pipelines import recipe_file, terminal
+
+PATIENCE_S = 2.0  # time [s] after which the bar of progress appears
+
+
+def run(
+    name: str,
+    model: str,
+    *,
+    store: Path | None = None,
+    recipe_path: Path | None = None,
+    wavelength_nm: Sequence[float] | None = None,
+    fixed: Sequence[str] = (),
+    refractive_index: str | None = None,
+    weigh: Weigh = "light",
+    json: bool = False,
+    picture: Path | None = None,
+) -> Conversion:
+    """Convert a material to another model and print the result.
+
+    Parameters
+    ----------
+    name : str
+        A material of the recipe (by default every preset) or of the store.
+    model : str
+        The model to convert to.
+    store : Path, optional
+        Store whose materials are known as well; it need not exist.
+    recipe_path : Path, optional
+        A recipe that defines materials, and the wavelengths of spectral ones.
+    wavelength_nm : sequence of float [nm], optional
+        Wavelengths in place of those of the recipe.
+    fixed : sequence of str
+        Parameters that are not searched, ``name=value`` as recipes write them.
+    refractive_index, weigh
+        As of `brdfdb.forms.conversion.convert`.
+    json : bool
+        Print the whole document as JSON.
+    picture : Path, optional
+        A file to draw both models in, whose name ends in .svg or .png.
+
+    Returns
+    -------
+    Conversion
+        The document.
+
+    Raises
+    ------
+    ParameterError
+        If the material is unknown, or the conversion is refused.
+    """
+    source, at = _source(name, store, recipe_path)
+    if wavelength_nm is not None:
+        at = np.array(wavelength_nm, dtype=np.float64)
+    values = _values(model, fixed)
+    began = time.monotonic()
+    with terminal.progress(counted=False, transient=True) as bar:
+        task = bar.add_task(f"{name} to {model}", total=STEPS, visible=False)
+
+        def tick() -> None:
+            bar.update(task, advance=1, visible=time.monotonic() - began > PATIENCE_S)
+
+        conversion = convert(source, model, at, fixed=values, refractive_index=refractive_index, weigh=weigh, tick=tick)
+    if picture is not None:
+        from brdfdb_pipelines import conversion_picture
+
+        conversion_picture.write(picture, figure_of(source, conversion))
+    if json:
+        print(conversion.model_dump_json(indent=1))
+    else:
+        print(terminal.plain("\n".join(lines(conversion))))
+    return conversion
+
+
+def _source(name: str, root: Path | None, recipe_path: Path | None) -> tuple[Source, NDArray[np.float64] | None]:
+    """Return a material of the recipe or the store, with its wavelengths."""
+    jobs = {job.material.name: job for job in recipe_file.load(recipe_path).jobs()}
+    if name in jobs:
+        return jobs[name].material, jobs[name].wavelength_nm
+    store = brdfdb.open(root) if root is not None and root.exists() else None
+    if store is not None and name in store:
+        return source_of_table(store[name]), store[name].wavelength_nm
+    names = [*jobs, *(store or ())]
+    raise ParameterError(name, f"no such material, neither in the store nor in the recipe{closest(name, names)}", name)
+
+
+def _values(model: str, settings: Sequence[str]) -> dict[str, float]:
+    """Return parameters from ``name=value``, as recipes write them, in the units of the model."""
+    if model not in MODELS:
+        return {}  # the conversion refuses it
+    parameters = {written_name(parameter): parameter for parameter in MODELS[model].parameters}
+    values: dict[str, float] = {}
+    for setting in settings:
+        name, _, text = setting.partition("=")
+        if name not in parameters:
+            raise ParameterError(
+                f"--fix {setting}", f"the parameters of {model} are {', '.join(parameters)}", name, tuple(parameters)
+            )
+        parameter = parameters[name]
+        if text in ("true", "false"):
+            values[parameter.name] = text == "true"
+            continue
+        try:
+            value = float(text)
+        except ValueError:
+            raise ParameterError(f"--fix {setting}", f"{text!r} is not a number, true or false", text) from None
+        values[parameter.name] = float(radians(value)) if parameter.unit == "rad" else value
+    return values
+
+
+def lines(conversion: Conversion) -> list[str]:
+    """Return the lines that the command prints."""
+    made, was = conversion.material, conversion.source_model or "a function"
+    text = [f"{conversion.source} ({was}) as {conversion.model}", "  parameters"]
+    in_file = made.file_parameters()
+    fixed = set(conversion.fixed)
+    for parameter in made.spec.parameters:
+        name = written_name(parameter)
+        note = (
+            "fixed"
+            if parameter.name in fixed
+            else _as_good(conversion, parameter.name, in_degrees=parameter.unit == "rad")
+        )
+        value = in_file[name]
+        shown = f"{value:.6g}" if isinstance(value, float) else str(value)
+        text.append(f"    {name:<16}{shown:<12}{note}".rstrip())
+    for name, index in (("n", conversion.n), ("k", conversion.k)):
+        if index is not None:
+            text.append(f"    {name:<16}{index:<12.6g}{_as_good(conversion, name)}".rstrip())
+    if conversion.n is None and conversion.refractive_index:
+        text.append(f"    {'n, k':<16}{conversion.refractive_index}")
+    view = conversion.worst_view
+    text.append(f"  left        l1 {percent(conversion.l1)}, p99 {percent(conversion.p99)}")
+    text.append(f"  reflected   {100.0 * conversion.reflected:.3g} % of the light of {conversion.source}")
+    peak = conversion.peak
+    at_peak = f"in the mirror direction of {peak.theta_deg:g}°"
+    text.append(f"  peak        f_r {peak.before:.3g} -> {peak.after:.3g} /sr {at_peak}")
+    several = len(conversion.wavelengths_nm or ()) > 1
+    text.append(
+        f"  worst view  l1 {percent(view.l1)} from theta_r {view.theta_r_deg:g}°, phi_r {view.phi_r_deg:g}°"
+        + (f" at {view.wavelength_nm:g} nm" if several else "")
+    )
+    light = f"theta_i {view.theta_i_deg:g}°, phi_i {view.phi_i_deg:g}°"
+    text.append(f"              most for {light}: f_r {view.before:.3g} -> {view.after:.3g} /sr")
+    text += [f"  note        {sentence}" for sentence in conversion.remarks]
+    return [*text, "", *conversion.recipe.splitlines()]
+
+
+def _as_good(conversion: Conversion, name: str, *, in_degrees: bool = False) -> str:
+    """Return the range of values that are as good, in words."""
+    if name not in conversion.as_good:
+        return ""
+    low, high = (np.rad2deg(value) if in_degrees else value for value in conversion.as_good[name])
+    return f"{low:.3g} to {high:.3g} are within 1 %"

@@ -1,0 +1,69 @@
+"""The command `brdfdb convert`: what it prints, its JSON, and its snippet in a recipe."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from brdfdb_pipelines import recipe_file
+from tests.pipelines.command import Captured, run
+
+CLAY = ("convert", "clay-vase", "--to", "oren_nayar_fujii")
+
+
+def test_the_snippet_is_a_recipe_that_builds(tmp_path: Path, capsys: Captured) -> None:
+    assert run(*CLAY) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("clay-vase (oren_nayar) as oren_nayar_fujii\n  parameters\n    rho ")
+    assert "  worst view  l1 " in printed
+    recipe = tmp_path / "recipe.toml"
+    recipe.write_text(
+        'materials = ["clay-*-as-*"]\ntolerance = 0.05\n\n' + printed[printed.index("[define") :], encoding="utf-8"
+    )
+    (job,) = recipe_file.load(recipe).jobs()
+    assert job.material.model == "oren_nayar_fujii"
+    assert run("convert", "clay-vase-as-oren-nayar-fujii", "--recipe", recipe, "--to", "lambert", "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["source_model"] == "oren_nayar_fujii"
+    assert document["material"]["parameters"].keys() == {"rho"}
+
+
+def test_both_models_are_drawn(tmp_path: Path, capsys: Captured) -> None:
+    first, again, bitmap = tmp_path / "new" / "clay.svg", tmp_path / "again.svg", tmp_path / "clay.png"
+    for file in (first, again, bitmap):
+        assert run(*CLAY, "--picture", file) == 0
+    text = first.read_text(encoding="utf-8")
+    assert text == again.read_text(encoding="utf-8")
+    assert text.startswith("<svg ")
+    for words in ("clay-vase as oren_nayar_fujii", "theta_i = 75 degrees", "light in the wrong place", "f_r [1/sr]"):
+        assert words in text
+    assert bitmap.read_bytes().startswith(b"\x89PNG")
+    capsys.readouterr()
+    with pytest.raises(SystemExit):
+        run(*CLAY, "--picture", tmp_path / "clay.pdf")
+    assert "does not end in .svg or .png" in capsys.readouterr().err
+
+
+def test_a_fixed_angle_is_in_degrees(capsys: Captured) -> None:
+    assert run("convert", "clay-vase", "--to", "oren_nayar_qualitative", "--fix", "sigma_deg=20") == 0
+    assert "sigma_deg       20          fixed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (
+            ("clay-vas", "--to", "lambert"),
+            "clay-vas: no such material, neither in the store nor in the recipe; closest",
+        ),
+        (("clay-vase", "--to", "lamber"), "model: 'lamber' is unknown; closest: lambert"),
+        (("clay-vase", "--to", "lambert", "--fix", "r=1"), "--fix r=1: the parameters of lambert are rho"),
+        (("clay-vase", "--to", "lambert", "--fix", "rho=x"), "--fix rho=x: 'x' is not a number, true or false"),
+        (("clay-vase", "--to", "lambert", "--fix", "rho=true"), "rho: True is not a number"),
+    ],
+)
+def test_a_wrong_request_gets_a_sentence(arguments: tuple[str, ...], sentence: str, capsys: Captured) -> None:
+    assert run("convert", *arguments) == 2
+    assert capsys.readouterr().err.startswith(f"brdfdb: {sentence}")
