@@ -1,6 +1,6 @@
 // What is known of a material, beside the picture: parameters, stated error, what the audit found, links.
 
-import { chip, element, isGood, percent, short } from "./dom.js";
+import { QUESTIONS, chip, element, isGood, percent, short } from "./dom.js";
 import { nearest } from "./series.js";
 
 const aside = document.getElementById("facts");
@@ -59,7 +59,8 @@ function audited(audit) {
   const found = audit.sentences.filter(({ quote }) => !quote);
   return [
     pairs([
-      ["verdict", chip(audit.verdict)],
+      ...(audit.as_published && audit.conserves_energy ? Object.entries(QUESTIONS).map(([key, question]) =>
+        [question, chip(audit[key].word, audit[key].text)]) : [["verdict", chip(audit.verdict)]]),
       ...found.map(({ title, word, text }) => [title.toLowerCase(), chip(word), isGood(word) ? "" : text]),
     ]),
     ...(audit.current ? [] : [element("p", {}, `This is of revision ${audit.revision}, not of the current one.`)]),

@@ -45,6 +45,14 @@ class Health(Alive):
     materials: int = Field(description="number of materials in the store")
 
 
+class Answer(BaseModel):
+    """The answer of an audit to one of its two questions."""
+
+    word: str = Field(description="verdict behind the answer")
+    text: str = Field(description="the answer in a few words")
+    reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
+
+
 class Summary(BaseModel):
     """One line of the catalogue; of a damaged material only `name`, `damaged` and `href`."""
 
@@ -61,8 +69,19 @@ class Summary(BaseModel):
     error_p99: float | None = Field(
         default=None, description="relative error that 99 of 100 values keep to; null: not measured"
     )
+    spectrum: Literal["grey", "one wavelength", "spectral"] | None = Field(
+        default=None, description="grey: no colour is known, all wavelengths are alike; one wavelength: shown as grey"
+    )
     verdict: str | None = Field(default=None, description="of the audit of this revision; null: it has none")
-    colour: str | None = Field(default=None, description="#rrggbb of its albedo under D65, at 45 degrees, to look at")
+    as_published: Answer | None = Field(
+        default=None, description="of that audit, about the table: is it what the paper says?"
+    )
+    conserves_energy: Answer | None = Field(
+        default=None, description="of that audit, about the model: does the published model conserve energy?"
+    )
+    colour: str | None = Field(
+        default=None, description="#rrggbb of its albedo under D65, at 45 degrees, to look at; see spectrum"
+    )
     revision: str = ""
     created: str | None = None
     bytes: int | None = None
@@ -100,6 +119,7 @@ class Material(BaseModel):
     parameters: list[ParameterDocument]
     anisotropic: bool
     wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")
+    spectrum: Literal["grey", "one wavelength", "spectral"] = Field(description="as in the catalogue")
     axes_deg: dict[str, list[float]] = Field(description="the grid of the table [degrees]")
     specular: bool = Field(description="whether there is a specular part: specular_reflectance is not 0 everywhere")
     error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
@@ -107,7 +127,8 @@ class Material(BaseModel):
     )
     incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
     audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
-        description="verdict of the audit, its findings in sentences, and whether it is of this revision; null: none"
+        description="verdict of the audit, its answers to the two questions, its findings in sentences, and whether it "
+        "is of this revision; null: none"
     )
     colour: str | None
     attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(
