@@ -43,6 +43,8 @@ def test_catalogue(client: Client, store: Store) -> None:
         "spectrum": "spectral",
         "incomplete": None,
         "error_p99": head["error_p99"],
+        "formula_error": head["formula_error"],
+        "largest_albedo": head["largest_albedo"],
         "verdict": None,
         "as_published": None,
         "conserves_energy": None,

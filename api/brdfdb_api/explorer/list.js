@@ -1,7 +1,7 @@
 // The list of materials: fetched page by page, searched, filtered, and walked with arrow keys.
 
 import { AGAIN_MS, json } from "./api.js";
-import { QUESTIONS, chip, element } from "./dom.js";
+import { QUESTIONS, chip, element, percent } from "./dom.js";
 
 const [search, model, paper, verdict, count, list] = ["search", "model", "paper", "verdict", "count", "list"].map((id) =>
   document.getElementById(id));
@@ -102,7 +102,8 @@ function option(each) {
   const swatch = element("span", { className: "swatch" });
   swatch.style.background = each.colour ?? "";
   const name = element("span", { className: "name" }, each.title || each.name, ...grey(each));
-  const made = element("li", { id: `m-${each.name}`, title: each.damaged ?? each.source }, swatch, name, answers(each));
+  const made = element("li", { id: `m-${each.name}`, title: each.damaged ?? each.source }, swatch, name, answers(each),
+    element("span", { className: "quiet" }, errors(each)));
   made.setAttribute("role", "option");
   made.setAttribute("aria-selected", each.name === chosen);
   Object.assign(made.dataset, {
@@ -110,6 +111,14 @@ function option(each) {
     text: `${each.name} ${each.title} ${each.model_title} ${each.source}`.toLowerCase(),
   });
   return made;
+}
+
+/** The error of the table and that of its formula, in a line. */
+function errors({ damaged, error_p99: table, formula_error: formula }) {
+  if (damaged) return "";
+  const rung = !formula ? "not measured" : formula.against === "measured" ? percent(formula.p99)
+    : formula.against === "highest rung" ? "0, highest rung" : "none known";
+  return `error: table ${table === null || table === undefined ? "not measured" : percent(table)}, formula ${rung}`;
 }
 
 /** A word beside the name of a material whose colour is not known. */

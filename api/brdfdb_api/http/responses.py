@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from starlette.responses import Response
 
 from brdfdb.materials.spectrum import Spectrum
+from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -53,6 +54,16 @@ class Answer(BaseModel):
     reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
 
 
+class FormulaRung(BaseModel):
+    """Standing of the formula of a table among the forms of its surface."""
+
+    against: Literal["measured", "highest rung", "none known"] = Field(
+        description="measured: against a higher rung; highest rung: it is that rung; none known: it is a fit"
+    )
+    rung: str = Field(description="name of the highest rung; empty: none is known")
+    p99: float | None = Field(description="relative error that 99 of 100 values keep to; null: no rung is known")
+
+
 class Summary(BaseModel):
     """One line of the catalogue; of a damaged material only `name`, `damaged` and `href`."""
 
@@ -67,7 +78,15 @@ class Summary(BaseModel):
         default=None, description="first and last wavelength [nm]; null: grey"
     )
     error_p99: float | None = Field(
-        default=None, description="relative error that 99 of 100 values keep to; null: not measured"
+        default=None,
+        description="of the table against its formula: relative error that 99 of 100 values keep to; "
+        "null: not measured",
+    )
+    formula_error: FormulaRung | None = Field(
+        default=None, description="error of that formula against the highest rung of its surface; null: not measured"
+    )
+    largest_albedo: LargestAlbedo | None = Field(
+        default=None, description="of the table, specular part included; null: not measured"
     )
     spectrum: Literal["grey", "one wavelength", "spectral"] | None = Field(
         default=None, description="grey: no colour is known, all wavelengths are alike; one wavelength: shown as grey"
@@ -125,6 +144,10 @@ class Material(BaseModel):
     error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
         description="the measured error of the table against its model, by bands of theta_i; null: not measured"
     )
+    formula_error: FormulaError | None = Field(
+        description="error of the model against the highest rung of its surface; null: not measured"
+    )
+    largest_albedo: LargestAlbedo | None = Field(description="of the table, specular part included; null: not measured")
     incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
     audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
         description="verdict of the audit, its answers to the two questions, its findings in sentences, and whether it "

@@ -185,6 +185,8 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,
         "error": None if table.error is None else table.attrs["error"],
+        "formula_error": table.attrs.get("formula_error"),
+        "largest_albedo": table.attrs.get("largest_albedo"),
         "incomplete": metadata.gaps or None,
         "audit": None if verdict is None else _verdicts(verdict.finding, verdict.when, table.revision),
         "colour": shelf.swatch(table),

@@ -229,6 +229,8 @@ def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> 
         "spectrum": spectrum_of(metadata.wavelength_range_nm),
         "incomplete": metadata.gaps or None,
         "error_p99": head.get("error_p99"),
+        "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
+        "largest_albedo": None if metadata.largest_albedo is None else metadata.largest_albedo.model_dump(mode="json"),
         "revision": group.name,
         "created": head.get("created"),
         "bytes": head.get("bytes"),
