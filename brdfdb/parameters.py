@@ -152,6 +152,8 @@ class ModelSpec:
     missing is lost by the model itself. None: no parameters do that.
 
     For charts, `forms` gives the forms of the model at some arguments, the exact one first; None: the model itself.
+    `highest_rung` names the formula of the model if no form of its surface is more exact, such as the whole sum of a
+    series. Empty: `forms` begin with a more exact one, or none is known, because the model is a fit itself.
     `exact_model` names another model of the registry, with its parameters, that this one approximates at some
     parameters, or None: charted tables hold that one. `diagnostic` is shown along the members of a family.
     For audits, `limits` gives the limits that a paper states, judged at some arguments. `slow` marks a model whose
@@ -181,6 +183,7 @@ class ModelSpec:
     lossless: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
     forms: Callable[[Arguments], Iterable[ModelForm]] | None = None
     exact_model: Callable[[Mapping[str, Any]], tuple[str, dict[str, Any]] | None] | None = None
+    highest_rung: str = ""
     diagnostic: Diagnostic | None = None
     limits: Callable[[Arguments], Iterable[StatedLimit]] | None = None
     slow: bool = False

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from importlib.metadata import version
 
+from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.finding import DECISIVE, Finding, NotJudged, Sentence, Subject, Verdict
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.report import AuditReport, MaterialAudit, explanations
@@ -37,7 +38,8 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
         parameters are those of a preset, and the albedos of model and table are within the excess that is recorded
         for the preset. It is "accepted excess" if the caller accepts the excess of the model, and "violates" if either
         albedo exceeds 1 otherwise. A table may exceed these limits by as much as its stated error explains. A model
-        that "loses" light which nothing absorbs is reported, and passes.
+        that "loses" or "gains" light where nothing absorbs is reported, and passes. `as_published` and
+        `conserves_energy` answer the two questions that a reader has, of the table and of its model.
 
     Raises
     ------
@@ -64,6 +66,8 @@ def audit(table: Table, *, source: Source | None = None, accept_excess: bool = F
         model=source.model if isinstance(source, Material) else "",
         findings=subject.findings,
         sentences=sentences,
+        as_published=as_published(subject.findings),
+        conserves_energy=conserves_energy(subject.findings),
         verdict=verdict,
     )
 

@@ -29,10 +29,13 @@ from brdfdb.tables.table import Table
 _SEVERITY: tuple[EnergyVerdict, ...] = (
     "conserves",
     "loses",
+    "gains",
     "known published excess",
     "accepted excess",
     "violates",
 )
+# Verdicts on models that reflect at most what arrives with the parameters of the material
+WITHIN_1: tuple[EnergyVerdict, ...] = ("conserves", "loses", "gains")
 _ACCEPTED = "accepted, not published"
 
 
@@ -49,7 +52,9 @@ class Energy(Finding):
         "white furnace is the surface in uniform light, with its parameters set so that nothing is absorbed. An ideal "
         "model then shows 1 at every angle. Less than 1 is light that single scattering loses, more than 1 is energy "
         "that the model creates. The table of all materials shows the mean over angles, which counts as a loss or a "
-        "gain beyond 1 %. The verdict is that a model loses light if it loses more than 1 % at any angle up to 85°."
+        "gain beyond 1 %. The verdict is that a model loses light if it loses more than 1 % at any angle up to 85°, "
+        "and that it gains light if it reflects more than arrives at any angle, although it reflects at most what "
+        "arrives with the material's own parameters."
     )
 
     model: ModelEnergy | None = Field(description="null: the source is not known")
@@ -90,7 +95,7 @@ class Energy(Finding):
 
     def problems(self) -> list[str]:
         """Return a sentence if an albedo exceeds 1, even if the stated error of the table explains it."""
-        reason = self.table.reason if self.verdict in ("conserves", "loses") else self.reason
+        reason = self.table.reason if self.verdict in WITHIN_1 else self.reason
         return [reason] if reason else []
 
     def cells(self) -> list[Cell]:
@@ -113,7 +118,7 @@ class Energy(Finding):
         energies = [finding for finding in findings if isinstance(finding, Energy)]
         sentences = []
         coarse = [energy for energy in energies if energy.table.verdict == "violates"]
-        if any(energy.model is None or energy.model.verdict in ("conserves", "loses") for energy in coarse):
+        if any(energy.model is None or energy.model.verdict in WITHIN_1 for energy in coarse):
             sentences.append(
                 "a table whose grid is too coarse for its lobe can exceed 1 where its model does not: try a finer grid"
             )
@@ -123,12 +128,13 @@ class Energy(Finding):
                 f"{counted(within, 'table')} above 1 by no more than the stated error, or that of the integration, "
                 f"{'passes' if within == 1 else 'pass'}"
             )
-        losing = sum(energy.verdict == "loses" for energy in energies)
-        if losing:
-            sentences.append(
-                f"{counted(losing, 'table')} of {'a model that loses' if losing == 1 else 'models that lose'} light "
-                "even where nothing absorbs it: the report says how much, and where"
-            )
+        for verdict, one, many in (("loses", "loses light", "lose light"), ("gains", "gains light", "gain light")):
+            count = sum(energy.verdict == verdict for energy in energies)
+            if count:
+                does = f"a model that {one}" if count == 1 else f"models that {many}"
+                sentences.append(
+                    f"{counted(count, 'table')} of {does} where nothing absorbs it: the report says how much, and where"
+                )
         return sentences
 
 

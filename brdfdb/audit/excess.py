@@ -43,6 +43,11 @@ def limit_of(known: KnownExcess | None, theta_i_deg: Axis) -> Axis:
     return one if known is None else np.where(theta_i_deg >= known.from_theta_i_deg, known.max_albedo, one)
 
 
+def place(theta_i_deg: float, wavelength_nm: float | None) -> str:
+    """Return the angle [degree] of an albedo in words, with its wavelength [nm] unless it is grey."""
+    return f"{theta_i_deg:.4g} degrees" + ("" if wavelength_nm is None else f" and {wavelength_nm:g} nm")
+
+
 def crossing(excess: Callable[[float], float], low: float, high: float) -> float:
     """Return the angle [degree] above which an excess is positive, by bisection to `ANGLE_TOLERANCE_DEG`.
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, Field
 
-from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of
+from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of, place
 from brdfdb.audit.finding import STRICT
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
@@ -18,7 +19,7 @@ from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import source_albedo
 from brdfdb.tables.grids import Axis
 
-EnergyVerdict = Literal["conserves", "loses", "known published excess", "accepted excess", "violates"]
+EnergyVerdict = Literal["conserves", "loses", "gains", "known published excess", "accepted excess", "violates"]
 
 TOLERANCE = 1e-6  # absolute tolerance of each albedo [1]
 MOST_PANELS = 1000  # number of panels at which the quadrature of one light stops
@@ -53,8 +54,10 @@ class Furnace(BaseModel):
     hemispherical: Numbers = Field(description="[wavelength], albedo in uniform light")
     smallest: float | None = Field(description="null: not finite")
     smallest_at_theta_i_deg: float
+    smallest_at_wavelength_nm: float | None = Field(default=None, description="null: grey")
     largest: float | None = Field(description="null: not finite")
     largest_at_theta_i_deg: float
+    largest_at_wavelength_nm: float | None = Field(default=None, description="null: grey")
 
 
 class UniformBound(BaseModel):
@@ -86,7 +89,7 @@ class ModelEnergy(BaseModel):
     furnace: Furnace | None = Field(description="null: the model has no lossless parameters")
     bound_on_a: UniformBound | None = Field(description="null: the model has no such part")
     verdict: EnergyVerdict
-    reason: str = Field(description="largest albedo and its angle; for a known excess the citation")
+    reason: str = Field(description="largest albedo, its angle and wavelength; for a known excess the citation")
 
 
 class _Lights(NamedTuple):
@@ -126,7 +129,7 @@ def model_energy_of(
     lights, reflected = _refined(source, wavelength_nm, lights, _reflected(source, wavelength_nm, lights))
     theta, wavelength = _worst(reflected.largest)
     first = _first_above_1(source, wavelength_nm, lights, reflected)
-    verdict, reason = _verdict(lights, reflected, furnace, known)
+    verdict, reason = _verdict(lights, wavelength_nm, reflected, furnace, known)
     if verdict == "violates" and first is not None:
         reason += _explained(source, reflected, first, known, claim)
         verdict = "accepted excess" if accept_excess and np.isfinite(reflected.largest).all() else verdict
@@ -209,38 +212,54 @@ def _finite(value: float) -> float | None:
 
 
 def _verdict(
-    lights: _Lights, reflected: _Reflected, furnace: Furnace | None, known: KnownExcess | None
+    lights: _Lights,
+    wavelength_nm: Axis | None,
+    reflected: _Reflected,
+    furnace: Furnace | None,
+    known: KnownExcess | None,
 ) -> tuple[EnergyVerdict, str]:
+    """Return the verdict on a model, and its reason with the angle and the wavelength."""
     theta_i_deg, certain = lights.theta_i_deg, reflected.largest - reflected.error
     if not np.isfinite(certain).all():
-        broken = theta_i_deg[~np.isfinite(certain).all(axis=1)]
-        return "violates", f"the model reflects no finite share of what arrives at {broken[0]:g} degrees"
+        broken, wavelength = np.argwhere(~np.isfinite(certain))[0]
+        at = place(theta_i_deg[broken], _nm(wavelength_nm, wavelength))
+        return "violates", f"the model reflects no finite share of what arrives at {at}"
+    worst, wavelength = _worst(reflected.largest)
     if np.any(certain > 1.0 + ENERGY_TOLERANCE):
         beyond = np.max(certain, axis=1) - limit_of(known, theta_i_deg) - ENERGY_TOLERANCE
-        worst, _ = _worst(reflected.largest)
-        if known is None or np.all(beyond <= 0.0):
-            share = f"{reflected.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
-            if known is not None:
-                return "known published excess", f"reflects {share}: {known.citation}"
-            return "violates", f"the model reflects {share}"
-        worst = int(np.argmax(beyond))
-        share = f"{reflected.largest[worst].max():.4g} of what arrives at {theta_i_deg[worst]:.4g} degrees"
+        published = known is not None and bool(np.all(beyond <= 0.0))
+        if known is not None and not published:
+            worst = int(np.argmax(beyond))
+            wavelength = int(np.argmax(reflected.largest[worst]))
+        at = place(theta_i_deg[worst], _nm(wavelength_nm, wavelength))
+        share = f"{reflected.largest[worst].max():.4g} of what arrives at {at}"
+        if known is not None and published:
+            return "known published excess", f"reflects {share}: {known.citation}"
         return "violates", f"the model reflects {share}"
-    largest = f"reflects at most {np.max(reflected.largest):.4g} of what arrives"
+    at = place(theta_i_deg[worst], _nm(wavelength_nm, wavelength))
+    largest = f"reflects at most {np.max(reflected.largest):.4g} of what arrives, at {at}"
     if furnace is None:
         return "conserves", f"{largest}; no parameters make the model lossless"
-    gains = ""
+    return _where_nothing_absorbs(furnace, largest)
+
+
+def _where_nothing_absorbs(furnace: Furnace, largest: str) -> tuple[EnergyVerdict, str]:
+    """Return the verdict on a model that reflects at most what arrives: by its lossless form, a gain before a loss."""
+    albedo = np.array(furnace.albedo, dtype=np.float64)[np.array(furnace.theta_i_deg) <= LOSS_UP_TO_DEG]
+    row, column = np.unravel_index(np.argmin(albedo), albedo.shape)
+    at = place(furnace.theta_i_deg[row], _nm(furnace.wavelength_nm, column))
+    least = f"{albedo[row, column]:.3g} of what arrives at {at}" if albedo[row, column] < LOSSLESS else ""
     if furnace.largest is not None and furnace.largest > 1.0 + GAIN:
-        where = "" if furnace.largest_at_theta_i_deg is None else f" at {furnace.largest_at_theta_i_deg:.4g} degrees"
-        gains = f"; lossless ({furnace.lossless}), it would reflect {furnace.largest:.4g}{where}"
-    albedo = np.array(furnace.albedo, dtype=np.float64).min(axis=1)
-    judged = np.array(furnace.theta_i_deg) <= LOSS_UP_TO_DEG
-    least = np.argmin(albedo[judged])
-    if albedo[judged][least] < LOSSLESS:
-        angle = np.array(furnace.theta_i_deg)[judged][least]
-        of_what = f"{albedo[judged][least]:.3g} of what arrives at {angle:.3g} degrees"
-        return "loses", f"lossless ({furnace.lossless}), the model reflects {of_what}{gains}"
-    return "conserves", f"{largest}{gains}"
+        at = place(furnace.largest_at_theta_i_deg, furnace.largest_at_wavelength_nm)
+        more = f"{furnace.largest:.5g} of what arrives at {at}" + (f", and {least}" if least else "")
+        return "gains", f"{largest}; lossless ({furnace.lossless}), the model would reflect {more}"
+    if least:
+        return "loses", f"lossless ({furnace.lossless}), the model reflects {least}"
+    return "conserves", largest
+
+
+def _nm(wavelength_nm: Axis | Sequence[float] | None, index: int | np.integer[Any]) -> float | None:
+    return None if wavelength_nm is None else float(wavelength_nm[int(index)])
 
 
 def _lights(source: Source) -> _Lights:
@@ -284,17 +303,21 @@ def _furnace(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> Fur
     if wavelength_nm is not None:
         wavelengths = wavelength_nm[np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])]
     reflected = _reflected(lossless.source, wavelengths, lights)
-    low, high = reflected.largest.min(axis=1), reflected.largest.max(axis=1)
+    low, high = (
+        np.unravel_index(extreme(reflected.largest), reflected.largest.shape) for extreme in (np.argmin, np.argmax)
+    )
     return Furnace(
         lossless=", ".join(f"{name} = {value:.4g}" for name, value in lossless.changes.items()),
         theta_i_deg=lights.theta_i_deg.tolist(),
         wavelength_nm=None if wavelengths is None else wavelengths.tolist(),
         albedo=rows(reflected.largest, DIGITS),
         hemispherical=numbers(lights.weights @ reflected.mean, 4),
-        smallest=_finite(low.min()),
-        smallest_at_theta_i_deg=float(lights.theta_i_deg[np.argmin(low)]),
-        largest=_finite(high.max()),
-        largest_at_theta_i_deg=float(lights.theta_i_deg[np.argmax(high)]),
+        smallest=_finite(reflected.largest[low]),
+        smallest_at_theta_i_deg=float(lights.theta_i_deg[low[0]]),
+        smallest_at_wavelength_nm=_nm(wavelengths, low[1]),
+        largest=_finite(reflected.largest[high]),
+        largest_at_theta_i_deg=float(lights.theta_i_deg[high[0]]),
+        largest_at_wavelength_nm=_nm(wavelengths, high[1]),
     )
 
 

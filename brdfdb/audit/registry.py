@@ -9,7 +9,7 @@ from pathlib import Path
 
 from brdfdb.audit.finding import Finding, NotJudged
 
-_OTHERS = {"finding", "registry", "report"}  # the interface, this module, and the module that reads the registry
+_OTHERS = {"answers", "finding", "registry", "report"}  # the interface, this module, and those that read the registry
 
 
 def _kinds() -> Iterator[type[Finding]]:

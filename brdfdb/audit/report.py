@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, Field, GetJsonSchemaHandler, SerializeAsAny
 from pydantic_core import CoreSchema
 
+from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, Answer
 from brdfdb.audit.finding import STRICT, F, Finding, NotJudged, Sentence, Verdict
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.errors import ParameterError
@@ -54,6 +55,8 @@ class MaterialAudit(BaseModel):
     model: str = Field(description="name of the model behind the table; empty: the table was audited alone")
     findings: Findings = Field(description="by key; the report explains each of them")
     sentences: list[Sentence] = Field(description="all findings in words, for programs without this library")
+    as_published: Answer = Field(description=f"{AS_PUBLISHED} Of the table, within the error that it states")
+    conserves_energy: Answer = Field(description=f"{CONSERVES_ENERGY} Of the model alone")
     verdict: Verdict = Field(
         description="worst of the findings. Validity, and findings that are not judged, do not count"
     )
@@ -102,7 +105,7 @@ class AuditReport(BaseModel):
     model_config = STRICT
 
     format: Literal["brdfdb-audit"] = "brdfdb-audit"
-    version: Literal[5] = 5
+    version: Literal[6] = 6
     store: str = Field(description="directory of the store")
     brdfdb: str = Field(description="version of the library")
     when: datetime

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from brdfdb.audit.excess import DIGITS, crossing, limit_of
+from brdfdb.audit.excess import DIGITS, crossing, limit_of, place
 from brdfdb.audit.finding import STRICT, Verdict
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
@@ -126,7 +126,8 @@ def table_energy_of(
     unexplained = theta_i[judge.unexplained(certain, one)]
     bands = None if table.error is None else _bands(table.error, judge.explained(one), judge.excess(certain, one))
     verdict: Verdict
-    reason = f"reflects {_share(largest)} of what arrives at {theta_i[worst_theta]:g} degrees"
+    worst_nm = None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength])
+    reason = f"reflects {_share(largest)} of what arrives at {place(theta_i[worst_theta], worst_nm)}"
     if unexplained.size == 0:
         verdict = "passes"
         cause = "its integration has" if bands is None else "the table states"
@@ -149,7 +150,7 @@ def table_energy_of(
         bands=bands,
         max_albedo=largest if np.isfinite(largest) else None,
         max_at_theta_i_deg=float(theta_i[worst_theta]),
-        max_at_wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[worst_wavelength]),
+        max_at_wavelength_nm=worst_nm,
         exceeds_1_from_theta_i_deg=first,
         exceeds_1_beyond_error_from_theta_i_deg=float(unexplained[0]) if unexplained.size else None,
         verdict=verdict,

@@ -387,6 +387,7 @@ SPEC = ModelSpec(
     lobe=lobe,
     lossless=lossless,
     forms=forms,
+    highest_rung="the whole sum of eq. 78",
     diagnostic=G_ALONG_NORMAL,
     limits=limits,
     uniform_bound_cosine=lowest_cosine,

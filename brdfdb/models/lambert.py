@@ -64,6 +64,7 @@ def lambert_vectors(wi: ArrayLike, wr: ArrayLike, *, rho: ArrayLike) -> Floats:
 
 SPEC = ModelSpec(
     name="lambert",
+    highest_rung="the definition of an ideal diffuser",
     version=1,
     title="Lambert",
     equation="rho / pi",

@@ -178,6 +178,7 @@ GAUSSIAN_SPEC = ModelSpec(
     grazing_pole=True,
     lossless=white,
     forms=forms,
+    highest_rung="facets integrated, eqs 8-20 and 47",
     limits=_limits,
     slow=True,
 )

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from types import NoneType
-from typing import Any, TypedDict, cast
+from typing import Any, NotRequired, TypedDict, cast
 
 from brdfdb.errors import (
     StoreError,
@@ -26,6 +27,9 @@ class Summary(TypedDict):
     error_p99: float | None
     created: str
     bytes: int
+    wavelength_range_nm: NotRequired[list[float]]  # these are missing from manifests of before version 4 of tables
+    formula_error: NotRequired[dict[str, Any] | None]
+    largest_albedo: NotRequired[dict[str, Any] | None]
 
 
 class Manifest(TypedDict):
@@ -46,6 +50,17 @@ SUMMARY_FIELDS: dict[str, Any] = {
     "created": str,
     "bytes": int,
 }
+# Facts that older manifests do not have
+_LATER: dict[str, Any] = {
+    "wavelength_range_nm": list,
+    "formula_error": (dict, NoneType),
+    "largest_albedo": (dict, NoneType),
+}
+
+
+def summary_fields(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the types of the fields of a summary: those that every one has, and those later ones that this one has."""
+    return SUMMARY_FIELDS | {key: kind for key, kind in _LATER.items() if key in content}
 
 
 def whole_revisions(material: Path) -> list[Path]:
@@ -82,7 +97,7 @@ def read_manifest(group: Path, digest: str | None) -> tuple[Manifest, str]:
     check_fields(manifest, {"material": str, "revision": str, "summary": dict, "files": dict}, where, path.name)
     if (manifest["material"], manifest["revision"]) != (group.parent.name, group.name):
         raise StoreError(f"{where} is damaged: {path.name} is that of {manifest['material']} {manifest['revision']}")
-    check_fields(manifest["summary"], SUMMARY_FIELDS, where, path.name)
+    check_fields(manifest["summary"], summary_fields(manifest["summary"]), where, path.name)
     for entry in manifest["files"].values():
         check_fields(entry, {"size": int, "sha256": str}, where, path.name)
     return cast(Manifest, manifest), actual

@@ -10,7 +10,7 @@ from brdfdb.errors import (
     StoreError,
 )
 from brdfdb.store.files import regular_bytes
-from brdfdb.store.manifest import SUMMARY_FIELDS, Manifest, Summary, read_manifest, whole_revisions
+from brdfdb.store.manifest import Manifest, Summary, read_manifest, summary_fields, whole_revisions
 from brdfdb.store.paths import HEAD, number_of, pointer_path, revision_of
 from brdfdb.store.sealed_json import check_fields, swap_sealed, unsealed
 
@@ -24,7 +24,7 @@ class Head(Summary):
     last: int
 
 
-_HEAD = {**SUMMARY_FIELDS, "material": str, "revision": str, "manifests": dict, "last": int}
+_HEAD = {"material": str, "revision": str, "manifests": dict, "last": int}
 
 
 class WrongSummaryError(StoreError):
@@ -35,7 +35,7 @@ def head_from(path: Path, data: bytes) -> Head:
     """Return the pointer of a material from the bytes of its file; StoreError if it is damaged or of another one."""
     name = path.parent.name
     content = unsealed(data, name, path.name)
-    check_fields(content, _HEAD, name, path.name)
+    check_fields(content, summary_fields(content) | _HEAD, name, path.name)
     if content["material"] != name:
         raise StoreError(f"{name} is damaged: {path.name} is that of {content['material']}")
     if not (number_of(content["revision"]) and isinstance(content["manifests"].get(content["revision"]), str)):

@@ -27,6 +27,7 @@ from brdfdb.store.paths import NAME, manifest_path, material_path, staged_path
 from brdfdb.store.pointer import known_manifests, newest, point_to
 from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement
+from brdfdb.tables.formula_measurement import first_numbers
 from brdfdb.tables.grids import check_wavelengths
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
@@ -99,7 +100,9 @@ def publish_layout(root: str | os.PathLike[str], name: str, layout: Layout) -> P
     dataset = tabulate(layout)
     values = dataset[layout.variable].to_numpy()
     error = error_measurement.measure(layout, lambda rows: values[rows])
-    return Published(*publish_dataset(root, name, dataset.assign_attrs(error=error.model_dump(mode="json"))), error)
+    stated = {"error": error, **first_numbers(layout, lambda rows: values[rows])}
+    written = {key: value.model_dump(mode="json") for key, value in stated.items()}
+    return Published(*publish_dataset(root, name, dataset.assign_attrs(written)), error)
 
 
 def publish_dataset(root: str | os.PathLike[str], name: str, dataset: xr.Dataset) -> tuple[str, int]:
@@ -192,6 +195,11 @@ def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Ent
             "error_p99": None if metadata.error is None else metadata.error.overall.p99,
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "bytes": stored,
+            "wavelength_range_nm": metadata.wavelength_range_nm,
+            "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
+            "largest_albedo": None
+            if metadata.largest_albedo is None
+            else metadata.largest_albedo.model_dump(mode="json"),
         }
         for directory, _, _ in os.walk(table, topdown=False):
             sync_directory(Path(directory))

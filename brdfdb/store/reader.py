@@ -15,7 +15,6 @@ rewrite a shared root file, and stale metadata hides groups.
 from __future__ import annotations
 
 import itertools
-import json
 import os
 import threading
 import weakref
@@ -50,6 +49,7 @@ from brdfdb.store.paths import (
 from brdfdb.store.pointer import Head, check_summary, head_from
 from brdfdb.store.sealed_json import read_sealed
 from brdfdb.store.snapshot_record import Snapshot, read_snapshot
+from brdfdb.store.summary_words import COLUMNS, colours, energy, formula_error, last_audit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,27 +97,27 @@ class Store(Mapping[str, "Table"]):
         _OPEN[next(_NUMBERS)] = self
 
     def _repr_html_(self) -> str:
-        """Return the store for notebooks: its materials, with the verdicts of its last audit."""
-        verdicts, rows = self._verdicts(), []
+        """Return the store for notebooks: its materials, with their errors and the answers of its last audit."""
+        audits, rows = last_audit(self.root), []
         for name in self:
             try:
                 head = self.summary(name)
             except StoreError as error:
-                rows.append((name, str(error), "", "", ""))
+                rows.append((name, str(error), *[""] * 6))
                 continue
-            verdict = verdicts.get((name, head["revision"]), "")
-            rows.append((name, head["title"], head["model"], percent(head.get("error_p99")), verdict))
+            audited = audits.get((name, head["revision"]))
+            rows.append(
+                (
+                    *(name, head["title"], head["model"], colours(head), percent(head.get("error_p99"))),
+                    formula_error(head, percent),
+                    "" if audited is None else audited.as_published,
+                    energy(head, audited),
+                )
+            )
         families = len(self.families())
         title = f"{len(rows)} materials" + (f", {families} families" if families else "")
-        return listing("Store", str(self.root), title, ("material", "title", "model", "error (p99)", "audit"), rows)
-
-    def _verdicts(self) -> dict[tuple[str, str], str]:
-        """Return the verdicts of the last audit by material and revision; none where there is no readable report."""
-        try:
-            report = json.loads((self.root / "audit.json").read_bytes())
-            return {(one["material"], one["revision"]): str(one["verdict"]) for one in report["materials"]}
-        except (OSError, ValueError, KeyError, TypeError):
-            return {}
+        columns = ("material", "title", "model", "colours", "table error (p99)", "formula error (p99)", *COLUMNS)
+        return listing("Store", str(self.root), title, columns, rows)
 
     def __iter__(self) -> Iterator[str]:
         if self.snapshot is not None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -35,7 +35,6 @@ from brdfdb.store.paths import METADATA, marker_path, materials_path, request_pa
 from brdfdb.store.sealed_json import read_sealed, sealed, write_json
 from brdfdb.tables import tabulation
 from brdfdb.tables.layout import Layout, digest
-from brdfdb.tables.stated_error import Error
 
 
 class Block(TypedDict):
@@ -169,14 +168,17 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
         If they cannot be written.
     """
     from brdfdb.store.codec import array_metadata, frame_files
+    from brdfdb.tables.error_measurement import measure
+    from brdfdb.tables.formula_measurement import first_numbers
 
     directory = Path(staging)
     table = _layout(layout)
     request = read_sealed(directory / "request.json", table.source.name)
     with writing(store_of_staged(directory), table.source.name):
         write_file(directory / "table" / table.variable / METADATA, array_metadata(table), directory)
-    measured = {"request": request, "request_sha256": digest(request), "error": _measured(table, directory / "table")}
-    metadata = tabulation.metadata_of(table).model_copy(update=measured)
+    read = _reader(table, directory / "table")
+    measured = {"request": request, "request_sha256": digest(request), "error": measure(table, read)}
+    metadata = tabulation.metadata_of(table).model_copy(update=measured | first_numbers(table, read))
     frame = tabulation.frame(table).assign_attrs(metadata.attributes())
     with writing(store_of_staged(directory), table.source.name):
         return {
@@ -185,10 +187,9 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
         }
 
 
-def _measured(layout: Layout, table: Path) -> Error:
-    """Return the error of a table against its model, from the finished blocks in the group `table`."""
+def _reader(layout: Layout, table: Path) -> Callable[[slice], NDArray[np.float32]]:
+    """Return a function that reads rows of a table from the finished blocks in the group `table`."""
     from brdfdb.store.codec import chunk_name, decoded
-    from brdfdb.tables.error_measurement import measure
 
     @lru_cache(maxsize=4)
     def block(number: int) -> NDArray[np.float32]:
@@ -200,4 +201,4 @@ def _measured(layout: Layout, table: Path) -> Error:
         blocks = np.concatenate([block(number) for number in range(first, last + 1)])
         return blocks[rows.start - start : rows.stop - start]
 
-    return measure(layout, read)
+    return read

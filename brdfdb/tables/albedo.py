@@ -11,11 +11,14 @@ from brdfdb.integrals.quadrature import MOST_PANELS, Albedo, reflected_share
 from brdfdb.lobes import narrowest
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
+from brdfdb.tables.first_numbers import LargestAlbedo
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.table import Table
 
 # Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
 QUADRATURE_TOLERANCE = 2e-5
+# Absolute, of the largest albedo that a table states: three digits are shown, and it takes a third of the time
+LARGEST_TOLERANCE = 1e-3
 _MOST_PANELS = 1000
 # Lights for which such a table is integrated [degree]; phi_i up to where the symmetry of its grid begins anew
 THETA_I_DEG = np.array([*range(0, 85, 5), 82.5, 85.0, 87.5, 89.0, 89.5], dtype=np.float64)
@@ -49,7 +52,7 @@ class TableAlbedo(NamedTuple):
         return np.asarray(np.einsum("tpw,p->tw", self.albedo, weights))
 
 
-def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAlbedo:
+def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance: float | None = None) -> TableAlbedo:
     """Integrate f_r cos theta_r over the hemisphere [1], as the table gives f_r between its nodes.
 
     Parameters
@@ -58,6 +61,8 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
         Any decoded table. Of those that are not f_r, linear over light and viewer, the attributes name the source.
     theta_i_deg : array (theta_i,) [degree], optional
         The lights, in [0, 90].
+    tolerance : float [1], optional
+        Absolute tolerance of the quadrature, where the integral is not exact; by default `QUADRATURE_TOLERANCE`.
 
     Returns
     -------
@@ -70,11 +75,12 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
     -----
     Exact for what `Table.lookup` returns where that is linear in each angle, so that the integral is a sum of the
     stored values with the integrals of the hat functions of their axes as weights. Other tables are looked up, by the
-    quadrature of `brdfdb.integrals.quadrature`, to `QUADRATURE_TOLERANCE`. It follows the lobe of the source if that
+    quadrature of `brdfdb.integrals.quadrature`, to the tolerance. It follows the lobe of the source if that
     is known.
     """
     if not linear_in_angles(table):
-        return _integrated(table, THETA_I_DEG if theta_i_deg is None else theta_i_deg)
+        within = QUADRATURE_TOLERANCE if tolerance is None else tolerance
+        return _integrated(table, THETA_I_DEG if theta_i_deg is None else theta_i_deg, within)
     nodes = table.axes_deg["theta_i"]
     theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
     if table.anisotropic:
@@ -94,6 +100,23 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None) -> TableAl
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
         nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
     return TableAlbedo(nodes, phi_i, np.asarray(albedo), np.zeros(nodes.size))
+
+
+def largest_albedo(table: Table, source: Source) -> LargestAlbedo:
+    """Return the largest directional albedo [1] of a table with the specular part of its source."""
+    integrated = directional_albedo(table, tolerance=LARGEST_TOLERANCE)
+    whole = integrated.albedo.max(axis=1)
+    if source.has_specular:
+        specular = source.specular_reflectance(radians(integrated.theta_i_deg), table.wavelength_nm)
+        whole = whole + np.reshape(specular, whole.shape)
+    row, column = np.unravel_index(int(np.argmax(np.where(np.isfinite(whole), whole, np.inf))), whole.shape)
+    largest = float(whole[row, column])
+    return LargestAlbedo(
+        albedo=float(f"{largest:.4g}") if np.isfinite(largest) else None,
+        theta_i_deg=float(integrated.theta_i_deg[row]),
+        wavelength_nm=None if table.wavelength_nm is None else float(table.wavelength_nm[column]),
+        tolerance=LARGEST_TOLERANCE,
+    )
 
 
 def hemispherical_albedo(theta_i_deg: Axis, albedo: Floats) -> Floats:
@@ -170,7 +193,7 @@ def wavelengths_of(table: Table) -> int:
     return 1 if table.wavelength_nm is None else table.wavelength_nm.size
 
 
-def _integrated(table: Table, theta_i_deg: Axis) -> TableAlbedo:
+def _integrated(table: Table, theta_i_deg: Axis, tolerance: float) -> TableAlbedo:
     """Return the albedo by quadrature of lookups, at all wavelengths at once."""
     width = wavelengths_of(table)
     phi_i_deg = np.zeros(1)
@@ -190,7 +213,7 @@ def _integrated(table: Table, theta_i_deg: Axis) -> TableAlbedo:
             theta_i,
             float(radians(phi_i_deg[p])),
             narrowest(lobe),
-            tolerance=QUADRATURE_TOLERANCE,
+            tolerance=tolerance,
             most_panels=_MOST_PANELS,
             width=width,
             mirrored=not table.anisotropic,

@@ -22,6 +22,7 @@ from brdfdb.tables.layout import PLAIN, Interpolation, Layout
 from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.stated_error import Between, Error, Overall, Places
 from brdfdb.tables.table import Table, points
+from brdfdb.tables.worst_pair import worst_pair
 
 FLOOR = 1e-3  # share of the Lambertian BRDF with the albedo of the source
 WIDTHS = (1.0, 2.0)  # widths of the lobes to draw directions from, relative to that of the source
@@ -160,8 +161,20 @@ def measure(
     own = len(drawn.wi)
     error = compare(values[:own], truth[:own], drawn, seed)
     floor = floor_of(truth[:own], drawn)
+    above = drawn.above
+    worst = worst_pair(
+        relative(values[:own], truth[:own], floor)[above],
+        truth[:own][above],
+        floor,
+        drawn.wi[above],
+        drawn.wr[above],
+        drawn.in_lobe[above],
+        layout.source,
+        layout.wavelength_nm,
+    )
     return error.model_copy(
         update={
+            "worst": worst,
             "places": _in_places(relative(truth[own:], values[own:], floor), pairs),
             "between": None if floor.size < 2 else _between(layout, read, drawn, pairs, floor, count),
         }

@@ -10,6 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSeriali
 from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.materials.provenance import Assumption, KnownExcess
 from brdfdb.materials.spectrum import Spectrum
+from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.stated_error import Error
 
@@ -88,6 +89,12 @@ class TableMetadata(BaseModel):
     request: dict[str, Any] | None = Field(default=None, description="the request of the build that made the table")
     request_sha256: str | None = Field(default=None, description="sha256 of the request")
     error: Error | None = Field(default=None, description="the stated error; null: not measured")
+    formula_error: FormulaError | None = Field(
+        default=None, description="error of the model against the highest rung of its surface; null: not measured"
+    )
+    largest_albedo: LargestAlbedo | None = Field(
+        default=None, description="largest directional albedo, specular part included; null: not measured"
+    )
 
     _strange: dict[str, str] = PrivateAttr(default_factory=dict)
 

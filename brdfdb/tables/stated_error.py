@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from brdfdb.geometry import Directions
 from brdfdb.parameters import Floats
 from brdfdb.tables import places
+from brdfdb.tables.worst_pair import WorstPair
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
@@ -84,6 +85,9 @@ class Error(BaseModel):
     p99: Numbers = Field(description="[band][wavelength]")
     max: Numbers = Field(description="[band][wavelength]")
     overall: Overall
+    worst: WorstPair | None = Field(
+        default=None, description="where the largest was met; none of a family, and of a table of before version 4"
+    )
     places: Places | None = Field(default=None, description="none of a family, and of a table of before version 3")
     between: Between | None = Field(default=None, description="none without two wavelengths, and before version 3")
 

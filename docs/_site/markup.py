@@ -66,6 +66,6 @@ def cards(shown: Iterable[Card]) -> str:
     return raw('<div class="cards">\n' + "\n".join(parts) + "\n</div>")
 
 
-def chip(word: Word) -> str:
-    """Return a verdict as HTML, in the colours of the audit's page."""
-    return f'<span class="chip {LEVELS[word]}">{html.escape(word)}</span>'
+def chip(word: Word, text: str = "") -> str:
+    """Return a verdict, or a text in its place, as HTML in the colours of the audit's page."""
+    return f'<span class="chip {LEVELS[word]}">{html.escape(text or word)}</span>'

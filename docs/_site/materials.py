@@ -11,6 +11,7 @@ from _site.files import remove_others, write_page
 from _site.markup import WIDE, Card, cards, chip, code, plain, raw, table, toctree
 from _site.papers import PAPERS, Paper, cited
 from brdfdb.audit import MaterialAudit
+from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import Sentence
 from brdfdb.figure import number
@@ -61,7 +62,9 @@ def _paper(material: Material) -> Paper:
 def _card(material: Material, judged: MaterialAudit) -> Card:
     size = f'width="{material_files.SIZE}" height="{material_files.SIZE}"'
     picture = f'<img class="dark-light" src="../../_images/{material.name}.png" alt="" loading="lazy" {size}>'
-    text = f"{material.spec.title}: {judged.verdict}"
+    grey = "" if material.spectral else ", grey"
+    text = f"{material.spec.title}{grey}. As the paper says: {judged.as_published.text}. "
+    text += f"Energy: {judged.conserves_energy.text}"
     return Card(f"{material.name}.html", material.title, text, picture)
 
 
@@ -74,7 +77,8 @@ def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[
     parts = [
         WIDE,
         f"# {plain(material.title)}\n",
-        raw(f'<p class="under"><code>{name}</code> {chip(judged.verdict)} {largest}</p>'),
+        raw(f'<p class="under"><code>{name}</code> {largest}</p>'),
+        raw(_answers(judged)),
         material_files.pictures(name, material.title),
         f"Model: {{py:obj}}`{spec.title} <brdfdb.models.{spec.name}>`, {plain(spec.equation)}, of "
         f"{cited(spec.reference)}.",
@@ -101,6 +105,15 @@ def _page(material: Material, stored: Table, judged: MaterialAudit, plots: list[
         ),
     ]
     return "\n".join(parts)
+
+
+def _answers(judged: MaterialAudit) -> str:
+    """Return the two questions of the audit with their answers, as HTML."""
+    both = {AS_PUBLISHED: judged.as_published, CONSERVES_ENERGY: judged.conserves_energy}
+    return "\n".join(
+        f'<p class="under">{question[0].upper()}{question[1:]} {chip(answer.word, answer.text)}</p>'
+        for question, answer in both.items()
+    )
 
 
 def _sentence(sentence: Sentence) -> str:

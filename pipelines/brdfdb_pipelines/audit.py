@@ -172,8 +172,15 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     audits, columns = audit_report.materials, audit_page.columns()
     terminal.print_table(
         f"Audit of {root}, the tables as interpolated",
-        ("material", "verdict", *columns),
-        [(a.material, a.verdict, *(cell.text for cell in audit_page.cells_of(a))) for a in audits],
+        ("material", *audit_page.QUESTIONS, *columns),
+        [
+            (
+                a.material,
+                *(answer.text for answer in audit_page.answers_of(a)),
+                *(cell.text for cell in audit_page.cells_of(a)),
+            )
+            for a in audits
+        ],
         numbers=columns,
     )
     for a in audits:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import jinja2
 
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
+from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, Answer
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, Finding, NotJudged, NumberTable, Word
 from brdfdb.figure import Figure
@@ -35,7 +36,10 @@ _MARKS: dict[Word, str] = {
     "accepted excess": "!",
     "violates": "✕",
 }
-_COUNTED: tuple[Word, ...] = ("conserves", "loses", "known published excess", "accepted excess", "violates")
+_COUNTED: tuple[Word, ...] = ("conserves", "loses", "gains", "known published excess", "accepted excess", "violates")
+
+
+QUESTIONS = (AS_PUBLISHED, CONSERVES_ENERGY)  # headings of the first two columns of terminal and page
 
 
 class Plot(NamedTuple):
@@ -50,6 +54,7 @@ class Row(NamedTuple):
 
     audit: MaterialAudit
     anchor: str
+    answers: list[Answer]
     cells: list[Cell]
     tables: list[NumberTable]
 
@@ -95,7 +100,7 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
     environment.filters |= {"level": LEVELS.__getitem__, "mark": _MARKS.__getitem__, "sentence": _sentence}
     environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": RANKS.__getitem__}
     energy = {a.material: a.findings[Energy.key].verdict for a in report.materials}
-    rows = [Row(a, anchor(a.material), cells_of(a), _tables(a)) for a in report.materials]
+    rows = [Row(a, anchor(a.material), answers_of(a), cells_of(a), _tables(a)) for a in report.materials]
     rows.sort(key=lambda row: (RANKS[row.audit.verdict], RANKS[energy[row.audit.material]], row.audit.material))
     if plots is None:
         subjects: list[MaterialAudit | Figure] = [*report.materials, *report.atlas, *report.gallery]
@@ -104,6 +109,7 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
         report=report,
         plots=plots,
         rows=rows,
+        questions=QUESTIONS,
         columns=columns(),
         counts=[(word, sum(verdict == word for verdict in energy.values())) for word in _COUNTED],
         gallery=_by_paper(report.gallery),
@@ -119,6 +125,11 @@ def anchor(name: str) -> str:
 def columns() -> tuple[str, ...]:
     """Return the headings of the cells of all findings."""
     return tuple(column for kind in FINDINGS.values() for column in kind.columns)
+
+
+def answers_of(a: MaterialAudit) -> list[Answer]:
+    """Return the answers to `QUESTIONS` on a material."""
+    return [a.as_published, a.conserves_energy]
 
 
 def cells_of(a: MaterialAudit) -> list[Cell]:

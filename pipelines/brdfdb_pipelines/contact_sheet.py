@@ -25,7 +25,8 @@ from brdfdb_pipelines import terminal
 Array = NDArray[np.float64]
 
 # Lengths in pixels
-WIDTH, _MARGIN, _CELL, SPHERE, _LABEL = 1400, 40, 132, 116, 50
+WIDTH, _MARGIN, _CELL, SPHERE, _LABEL = 1400, 40, 132, 116, 66
+_SIZE = 12.2  # of a name
 _HEADER, _SECTION, _BETWEEN, _CAPTION = 104, 46, 12, 96
 _DPI = 100
 _PLATE, _INK, _MUTED, _LINE = "#14171c", "#eef1f4", "#9aa4b0", "#2b3139"
@@ -37,7 +38,7 @@ Align = Literal["left", "center", "right"]
 CAPTION = (
     "Spheres with the values of the tables, all under the same light and at the same exposure: a white Lambertian "
     f"sphere has {100.0 * WHITE:g} % of the screen's white where it is\nbrightest. Brighter light is clipped. A "
-    "material whose source states no colour, or a single wavelength, is grey."
+    "material whose source states no colour, or a single wavelength, is grey, and says so."
 )
 
 
@@ -89,7 +90,10 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
             row, column = divmod(number, columns)
             left, upper = _MARGIN + column * _CELL, top + row * (SPHERE + _LABEL)
             corners[table.name] = (upper, left + (_CELL - SPHERE) // 2)
-            page.write(left + _CELL / 2, upper + SPHERE + 7, wrapped(table.name), 12.2, _INK, align="center")
+            name = wrapped(table.name)
+            page.write(left + _CELL / 2, upper + SPHERE + 7, name, _SIZE, _INK, align="center")
+            below = upper + SPHERE + 7 + _SIZE * _SPACING * len(name.splitlines())
+            page.write(left + _CELL / 2, below, colour_known(table), _SIZE - 1.0, _MUTED, align="center")
         top += lines * (SPHERE + _LABEL) + _BETWEEN
     page.write(_MARGIN, top + 16, CAPTION, 13.5, _MUTED)
     image = page.drawn()
@@ -98,6 +102,13 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
         colour, coverage = spheres[name][..., :3], spheres[name][..., 3:]
         part += coverage * (colour - part)
     return np.round(255.0 * image).astype(np.uint8)
+
+
+def colour_known(table: BaseTable) -> str:
+    """Return a word for a table whose colour is not known: grey, or its one wavelength; empty for a spectrum."""
+    if table.wavelength_nm is None:
+        return "grey"
+    return f"{table.wavelength_nm[0]:g} nm, grey" if table.wavelength_nm.size == 1 else ""
 
 
 def wrapped(name: str) -> str:

@@ -30,6 +30,8 @@ FOUND = {
     "revision": "r000001",
     "model": "ward",
     "findings": {"energy": {"verdict": "violates", "model": ALBEDO, "table": ALBEDO}},
+    "as_published": {"word": "passes", "text": "yes", "reason": "it keeps to its formulas"},
+    "conserves_energy": {"word": "violates", "text": "no: albedo 1.2 at 90°", "reason": "reflects 1.2 at 90 degrees"},
     "sentences": [dict(zip(("finding", "title", "word", "text", "quote"), each, strict=True)) for each in SENTENCES],
     "verdict": "violates",
 }

@@ -120,7 +120,7 @@ def test_verdicts_are_words_in_colours_beside_the_picture(chromium: Chromium, ad
     shown(chromium, "view=albedo")
     chips = "[...document.querySelectorAll('#facts .chip')]"
     assert chromium.evaluate(f"{chips}.map(each => each.innerText)") == [
-        *("violates", "violates", "passes", "at the edge")
+        *("yes", "no: albedo 1.2 at 90°", "violates", "passes", "at the edge")
     ]
     assert chromium.evaluate(f"new Set({chips}.map(each => getComputedStyle(each).color)).size") == 3
     assert "reflects 1.2 at 90 degrees" in chromium.evaluate("facts.innerText")

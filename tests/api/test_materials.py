@@ -40,9 +40,14 @@ def test_catalogue(client: Client, store: Store) -> None:
         "source": "no paper, copper-foil",
         "anisotropic": False,
         "wavelength_range_nm": [400.0, 700.0],
+        "spectrum": "spectral",
         "incomplete": None,
         "error_p99": head["error_p99"],
+        "formula_error": head["formula_error"],
+        "largest_albedo": head["largest_albedo"],
         "verdict": None,
+        "as_published": None,
+        "conserves_energy": None,
         "colour": materials["copper-foil"]["colour"],
         "revision": "r000001",
         "created": head["created"],
@@ -50,6 +55,12 @@ def test_catalogue(client: Client, store: Store) -> None:
         "href": FOIL,
     }
     assert materials["grey-felt"]["wavelength_range_nm"] is None
+    assert {name: line["spectrum"] for name, line in materials.items()} == {
+        "brushed-metal": "grey",
+        "copper-foil": "spectral",
+        "grey-felt": "grey",
+        "white-tile": "grey",
+    }
     assert materials["brushed-metal"]["anisotropic"] is True
     assert client.get(materials["grey-felt"]["href"]).status_code == 200
 

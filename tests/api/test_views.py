@@ -191,6 +191,12 @@ def test_a_bad_slice_names_the_parameter(client: Client, query: str) -> None:
 # Verdicts
 
 
+ANSWERS = {
+    key: {"word": word, "text": "yes", "reason": "it does"}
+    for key, word in (("as_published", "passes"), ("conserves_energy", "conserves"))
+}
+
+
 def report(root: Path, revision: str = "r000001", when: str = "2026-11-21T12:00:00Z") -> dict[str, Any]:
     """Write what an audit of the white tile would, as far as the service reads it."""
     sentence = {"finding": "energy", "title": "Energy", "word": "conserves", "text": "it reflects 1 at all angles"}
@@ -201,6 +207,7 @@ def report(root: Path, revision: str = "r000001", when: str = "2026-11-21T12:00:
         "verdict": "passes",
         "findings": {"energy": {"verdict": "conserves"}},
         "sentences": [sentence],
+        **ANSWERS,
     }
     document = {"format": "brdfdb-audit", "when": when, "materials": [finding]}
     (root / "audit.json").write_text(json.dumps(document), encoding="utf-8")
@@ -222,6 +229,7 @@ def test_the_verdict_of_the_last_audit(own: Path) -> None:
     assert client.get(f"{TILE}/revisions/r000001/audit").json() == answer
     assert client.get(TILE).json()["audit"] == {
         "verdict": "passes",
+        **ANSWERS,
         "model": "lambert",
         "sentences": finding["sentences"],
         "revision": "r000001",
@@ -230,7 +238,19 @@ def test_the_verdict_of_the_last_audit(own: Path) -> None:
     }
     lines = {line["name"]: line["verdict"] for line in client.get("/v1/materials").json()["materials"]}
     assert (lines["white-tile"], lines["grey-felt"]) == ("passes", None)
+    line = next(line for line in client.get("/v1/materials?q=white").json()["materials"])
+    assert {key: line[key] for key in ANSWERS} == ANSWERS
     client.problem("GET", f"{FELT}/audit", 404)
+
+
+def test_answers_that_an_older_audit_lacks_are_null(own: Path) -> None:
+    report(own)
+    document = json.loads((own / "audit.json").read_text(encoding="utf-8"))
+    del document["materials"][0]["conserves_energy"]
+    document["materials"][0]["as_published"] = {"word": 1}
+    (own / "audit.json").write_text(json.dumps(document), encoding="utf-8")
+    line = next(line for line in client_of(own).get("/v1/materials?q=white").json()["materials"])
+    assert (line["verdict"], line["as_published"], line["conserves_energy"]) == ("passes", None, None)
 
 
 def test_a_verdict_of_another_revision_says_so(own: Path) -> None:

@@ -184,7 +184,8 @@ def test_an_albedo_that_is_not_finite_is_null_in_the_report(table: Table, value:
     found = audit(node(table, value))
     assert (found.of(Energy).table.verdict, found.of(Energy).table.max_albedo) == ("violates", None)
     angle = table.axes_deg["theta_i"][1]
-    assert found.of(Energy).table.reason == f"reflects no finite share of what arrives at {angle:g} degrees"
+    at = f"{angle:g} degrees" + ("" if table.wavelength_nm is None else f" and {table.wavelength_nm[0]:g} nm")
+    assert found.of(Energy).table.reason == f"reflects no finite share of what arrives at {at}"
     assert found.of(Energy).table.albedo[1] == [None] * (1 if table.wavelength_nm is None else 3)
     (entry,) = written([found])["materials"]
     assert entry["findings"]["energy"]["table"]["albedo"][1] == [None] * (1 if table.wavelength_nm is None else 3)

@@ -95,7 +95,7 @@ def test_the_published_magnesium_oxide_is_a_known_excess() -> None:
     found = audit(tabulated(presets()["magnesium-oxide-ceramic"], fine(1.0), np.array([500.0])))
     assert verdicts(found) == {"energy": "known published excess"}
     assert found.verdict == "known published excess"
-    assert " of what arrives at 83 degrees: He et al. 1991, section 3.2.3" in found.of(Energy).table.reason
+    assert " of what arrives at 83 degrees and 500 nm: He et al. 1991, section 3.2.3" in found.of(Energy).table.reason
     # ERRATA: 0.977 at 30 degrees, 1.016 at 60, 1.11 at 85, above 1 from about 54 on
     at = {
         theta: row[0]
@@ -153,8 +153,12 @@ def test_the_report_names_the_violations_and_nothing_else() -> None:
     named = {"good": good, "bad": bad, "excused": excused}
     audits = [audit(replace(table, name=name)) for name, table in named.items()]
     document = written(audits)
-    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 5, ["bad"])
+    assert (document["format"], document["version"], document["violations"]) == ("brdfdb-audit", 6, ["bad"])
     assert [entry["verdict"] for entry in document["materials"]] == ["passes", "violates", "known published excess"]
+    answers = [[entry[key]["text"] for key in ("as_published", "conserves_energy")] for entry in document["materials"]]
+    assert answers[0] == ["yes", "yes"]
+    assert answers[1][0].startswith("no: ")
+    assert answers[2] == ["yes", "no, as published: albedo 1.15 at 90°, 460 nm"]
     assert AuditReport.model_validate(document) == report(audits, **ABOUT)
 
 
@@ -163,7 +167,7 @@ def test_an_empty_report_is_a_report() -> None:
     empty: dict[str, list[Any]] = {"materials": [], "atlas": [], "gallery": [], "damaged": [], "violations": []}
     document = written([])
     assert [each["key"] for each in document.pop("explanations")] == list(FINDINGS)
-    assert document == {"format": "brdfdb-audit", "version": 5, **about, **empty}
+    assert document == {"format": "brdfdb-audit", "version": 6, **about, **empty}
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from brdfdb.audit.answers import as_published, conserves_energy
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import Finding, Verdict
 from brdfdb.audit.model_energy import EnergyVerdict, Furnace, ModelEnergy, UniformBound
@@ -123,7 +124,7 @@ def energy(verdict: EnergyVerdict, strength: float, spectral: bool) -> Energy:
 
 def overall(verdict: EnergyVerdict) -> Verdict:
     """The verdict on a material whose energy has one."""
-    return "passes" if verdict in ("conserves", "loses") else verdict  # type: ignore[return-value]
+    return "passes" if verdict in ("conserves", "loses", "gains") else verdict  # type: ignore[return-value]
 
 
 def table_error() -> TableError:
@@ -196,6 +197,8 @@ def material(
         model="he_torrance" if spectral else "ward",
         findings=findings,
         sentences=[sentence for each in findings.values() for sentence in each.sentences()],
+        as_published=as_published(findings),
+        conserves_energy=conserves_energy(findings),
         verdict=overall(verdict),
     )
 

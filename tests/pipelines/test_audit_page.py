@@ -141,6 +141,18 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
     assert "Validity: at the edge. Its paper states 2 limits: 1 inside, 1 at the edge." in words
 
 
+def test_the_two_questions_have_answers_on_every_material(document: Document, report: AuditReport) -> None:
+    words = re.sub(r"\s+", " ", document.words())
+    for question in audit_page.QUESTIONS:
+        assert words.count(question.capitalize()) == 1 + len(report.materials)  # in the words, and in each section
+    for text in (
+        "creates none, loses up to 0 %",
+        "no, as published: albedo 1.07 at 89°, 700 nm",
+        "no: albedo 1.55 at 89°",
+    ):
+        assert text in words
+
+
 def test_violations_come_first_then_known_excess_then_losses(html: str) -> None:
     rows = re.findall(r'<th scope="row"><a href="#([^"]+)">', html)
     assert rows == [audit_page.anchor(name) for name in (ODD, "gold", "oxide", "paint", "brass")]
@@ -183,7 +195,7 @@ def test_numbers_are_those_that_people_write(value: float | None, text: str) -> 
     assert number(value) == text
 
 
-@pytest.mark.parametrize(("of", "column"), [("model", 1), ("table", 2)])
+@pytest.mark.parametrize(("of", "column"), [("model", 2), ("table", 3)])
 def test_an_albedo_that_is_not_finite_sorts_after_all_others(of: str, column: int) -> None:
     good = material("good", "violates", 3.0)
     energy = good.of(Energy)

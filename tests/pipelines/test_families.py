@@ -147,8 +147,8 @@ def test_a_family_is_listed_shown_and_looked_up(copper: Path, capsys: Captured) 
     assert run(copper, "list") == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].strip() == f"4 materials in {copper}"
-    assert lines[6].strip() == "1 family"
-    assert lines[8].split()[:5] == ["rough-copper", "Rough", "copper", "he_torrance", "4"]
+    assert lines[7].strip() == "1 family"
+    assert lines[9].split()[:5] == ["rough-copper", "Rough", "copper", "he_torrance", "4"]
     family = brdfdb.open(copper).family("rough-copper")
     p99 = family.error.overall.p99
     assert run(copper, "show", "rough-copper") == 0

@@ -41,14 +41,23 @@ def run(*arguments: object) -> int:
 def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured) -> None:
     capsys.readouterr()
     assert run("list", "--store", planned) == 0
-    _, head, *lines = capsys.readouterr().out.splitlines()
-    assert "error (p99)" in head
+    _, head, *lines, explained = capsys.readouterr().out.splitlines()
+    assert explained.startswith("table error: the table against its formula; formula error: ")
+    columns = re.split(r"  +", head)
+    assert columns[3:8] == [
+        *("colours", "table error (p99)", "formula error (p99)", "what the paper says?", "model conserves energy?")
+    ]
     store = brdfdb.open(planned)
     assert len(lines) == 2
     for line in lines:
         error = store[line.split()[0]].error
         assert error is not None
         assert f" {terminal.error(error.overall.p99)}  " in line
+    # Ward's model is a fit itself, and He and Torrance's is the sum that others cut short
+    assert [re.split(r"  +", line)[3:8:2] for line in lines] == [
+        ["grey", "none known", "not audited"],
+        ["400-700 nm", "0, highest rung", "not audited"],
+    ]
 
 
 def test_a_table_of_another_program_is_shown_with_a_sentence_on_what_it_lacks(tmp_path: Path, capsys: Captured) -> None:

@@ -214,12 +214,21 @@ def test_blocks_and_frame_make_the_table_of_tabulate(tmp_path: Path, four_blocks
     assert stored == sum(len(data) for data in contents(store.path("white")).values())
     error = store["white"].attrs["error"]
     with store.dataset("white") as found:
-        expected = lambert(0.75).assign_attrs(request=REQUEST, request_sha256=digest(REQUEST), error=error)
+        measured = {key: store["white"].attrs[key] for key in ("error", "formula_error", "largest_albedo")}
+        expected = lambert(0.75).assign_attrs(request=REQUEST, request_sha256=digest(REQUEST), **measured)
         expected.attrs = plain_attributes(expected.attrs)
         xr.testing.assert_identical(found.load(), expected)
     layout = Layout.from_document(json.loads(four_blocks))
     assert error == measure(layout, lambda rows: lambert(0.75)["brdf"].values[rows]).model_dump(mode="json")
-    assert store.summary("white")["error_p99"] == error["overall"]["p99"]
+    summary = store.summary("white")
+    assert summary["error_p99"] == error["overall"]["p99"]
+    assert (summary["wavelength_range_nm"], summary["largest_albedo"]) == ([], measured["largest_albedo"])
+    assert measured["largest_albedo"]["albedo"] == 0.75  # of Lambert's law: rho
+    assert summary["formula_error"] == {
+        "against": "highest rung",
+        "rung": measured["formula_error"]["rung"],
+        "p99": 0.0,
+    }
     assert (revision, store["white"].revision, rho(tmp_path)) == ("r000001", "r000001", 0.75)
     assert staged(tmp_path) == []
 

@@ -13,10 +13,15 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
-/** A verdict: its words, and a colour that repeats them. */
-export function chip(verdict) {
-  return element("span", { className: `chip ${LEVELS[verdict] ?? "none"}` }, verdict ?? "not audited");
+/** A verdict: its words, or others for it, and a colour that repeats them. */
+export function chip(verdict, text = verdict) {
+  return element("span", { className: `chip ${LEVELS[verdict] ?? "none"}` }, text ?? "not audited");
 }
+
+/** The two questions of an audit, by the names of their answers. */
+export const QUESTIONS = {
+  as_published: "is it what the paper says?", conserves_energy: "does the published model conserve energy?",
+};
 
 /** Whether a verdict is a plain pass. */
 export const isGood = (verdict) => LEVELS[verdict] === "good";

@@ -1,6 +1,6 @@
 // What is known of a material, beside the picture: parameters, stated error, what the audit found, links.
 
-import { chip, element, isGood, percent, short } from "./dom.js";
+import { QUESTIONS, chip, element, isGood, percent, short } from "./dom.js";
 import { nearest } from "./series.js";
 
 const aside = document.getElementById("facts");
@@ -20,18 +20,37 @@ export function show(info) {
     element("h3", {}, "Parameters"),
     pairs(info.parameters.map((each) => [each.name, value(each), each.meaning,
       each.source === attributes.source ? "" : each.source, assumed(each, attributes)])),
-    element("h3", {}, "Error of the table"),
+    element("h3", {}, "Error of the table against its formula"),
     error ? pairs([
       ["99 of 100", `within ${percent(error.overall.p99)}`], ["median", percent(error.overall.median)],
-      ["largest", percent(error.overall.max)], ["at this θᵢ", element("span", { id: "band" })],
+      ["largest", percent(error.overall.max), error.worst?.why ?? ""], ["at this θᵢ", element("span", { id: "band" })],
     ]) : element("p", {}, "not measured"),
+    element("h3", {}, "Error of the formula against the highest rung"),
+    ...formula(info.formula_error),
     element("h3", {}, "Audit"),
+    pairs(above(info.largest_albedo)),
     ...(audit ? audited(audit) : [element("p", {}, "no audit of it is here; ", element("code", {}, "brdfdb audit"), " makes one")]),
     element("h3", {}, "As data"),
     element("p", { className: "links" }, ...links(info)),
     element("p", { className: "quiet" }, `${info.name}, revision ${info.revision}`),
   );
 }
+
+/** How far the formula is from the best that is known of its surface. */
+function formula(of) {
+  if (!of) return [element("p", {}, "not measured")];
+  if (of.against === "none known") return [element("p", {}, "none known: the formula is a fit, or no higher rung is known")];
+  if (of.against === "highest rung") return [element("p", {}, `0: it is the highest rung, ${of.rung}`)];
+  return [pairs([
+    ["99 of 100", `within ${percent(of.overall.p99)}`, `against ${of.rung}`],
+    ["largest", percent(of.overall.max), of.worst?.why ?? ""],
+  ])];
+}
+
+/** An albedo above 1, where the table has one. */
+const above = (largest) => (largest && (largest.albedo === null || largest.albedo > 1 + largest.tolerance) ? [[
+  "albedo", `${largest.albedo === null ? "not finite" : short(largest.albedo)} at ${largest.theta_i_deg}°` +
+    `${largest.wavelength_nm === null ? "" : `, ${largest.wavelength_nm} nm`}`]] : []);
 
 /** Why a value that no paper prints was chosen; tables built earlier have the names alone, and reasons in their note. */
 function assumed(parameter, attributes) {
@@ -59,7 +78,8 @@ function audited(audit) {
   const found = audit.sentences.filter(({ quote }) => !quote);
   return [
     pairs([
-      ["verdict", chip(audit.verdict)],
+      ...(audit.as_published && audit.conserves_energy ? Object.entries(QUESTIONS).map(([key, question]) =>
+        [question, chip(audit[key].word, audit[key].text)]) : [["verdict", chip(audit.verdict)]]),
       ...found.map(({ title, word, text }) => [title.toLowerCase(), chip(word), isGood(word) ? "" : text]),
     ]),
     ...(audit.current ? [] : [element("p", {}, `This is of revision ${audit.revision}, not of the current one.`)]),

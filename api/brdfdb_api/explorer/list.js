@@ -1,7 +1,7 @@
 // The list of materials: fetched page by page, searched, filtered, and walked with arrow keys.
 
 import { AGAIN_MS, json } from "./api.js";
-import { chip, element } from "./dom.js";
+import { QUESTIONS, chip, element, percent } from "./dom.js";
 
 const [search, model, paper, verdict, count, list] = ["search", "model", "paper", "verdict", "count", "list"].map((id) =>
   document.getElementById(id));
@@ -69,7 +69,7 @@ export function update(each) {
   if (!made) return;
   if (each.colour) made.querySelector(".swatch").style.background = each.colour;
   made.dataset.verdict = words(each);
-  made.querySelector(".chip").replaceWith(chip(words(each)));
+  made.querySelector(".answers").replaceWith(answers(each));
   offer(verdict, [[words(each), words(each)]]);
 }
 
@@ -88,11 +88,22 @@ const paperOf = (each) => each.source?.split(",")[0];
 const words = ({ damaged, verdict, audit }) =>
   damaged ? "damaged" : verdict ?? (audit?.current ? audit.verdict : "not audited");
 
+/** The answers of the audit to its two questions, or the verdict where it has none. */
+function answers(each) {
+  const from = each.audit?.current ? each.audit : each;
+  const chips = Object.entries(QUESTIONS).filter(([key]) => from[key]).map(([key, question]) =>
+    Object.assign(chip(from[key].word, `${SHORT[key]}: ${from[key].text}`), { title: `${question} ${from[key].reason}` }));
+  return element("span", { className: "answers" }, ...(chips.length && !each.damaged ? chips : [chip(words(each))]));
+}
+
+const SHORT = { as_published: "as published", conserves_energy: "energy" };
+
 function option(each) {
   const swatch = element("span", { className: "swatch" });
   swatch.style.background = each.colour ?? "";
-  const name = element("span", { className: "name" }, each.title || each.name);
-  const made = element("li", { id: `m-${each.name}`, title: each.damaged ?? each.source }, swatch, name, chip(words(each)));
+  const name = element("span", { className: "name" }, each.title || each.name, ...grey(each));
+  const made = element("li", { id: `m-${each.name}`, title: each.damaged ?? each.source }, swatch, name, answers(each),
+    element("span", { className: "quiet" }, errors(each)));
   made.setAttribute("role", "option");
   made.setAttribute("aria-selected", each.name === chosen);
   Object.assign(made.dataset, {
@@ -101,6 +112,18 @@ function option(each) {
   });
   return made;
 }
+
+/** The error of the table and that of its formula, in a line. */
+function errors({ damaged, error_p99: table, formula_error: formula }) {
+  if (damaged) return "";
+  const rung = !formula ? "not measured" : formula.against === "measured" ? percent(formula.p99)
+    : formula.against === "highest rung" ? "0, highest rung" : "none known";
+  return `error: table ${table === null || table === undefined ? "not measured" : percent(table)}, formula ${rung}`;
+}
+
+/** A word beside the name of a material whose colour is not known. */
+const grey = ({ spectrum }) => (spectrum && spectrum !== "spectral" ?
+  [" ", element("span", { className: "quiet" }, spectrum === "grey" ? "grey" : "one wavelength, shown grey")] : []);
 
 function offer(select, pairs) {
   const known = new Set([...select.options].map((each) => each.value));

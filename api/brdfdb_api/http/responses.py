@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from starlette.responses import Response
 
 from brdfdb.materials.spectrum import Spectrum
+from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -45,6 +46,24 @@ class Health(Alive):
     materials: int = Field(description="number of materials in the store")
 
 
+class Answer(BaseModel):
+    """The answer of an audit to one of its two questions."""
+
+    word: str = Field(description="verdict behind the answer")
+    text: str = Field(description="the answer in a few words")
+    reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
+
+
+class FormulaRung(BaseModel):
+    """Standing of the formula of a table among the forms of its surface."""
+
+    against: Literal["measured", "highest rung", "none known"] = Field(
+        description="measured: against a higher rung; highest rung: it is that rung; none known: it is a fit"
+    )
+    rung: str = Field(description="name of the highest rung; empty: none is known")
+    p99: float | None = Field(description="relative error that 99 of 100 values keep to; null: no rung is known")
+
+
 class Summary(BaseModel):
     """One line of the catalogue; of a damaged material only `name`, `damaged` and `href`."""
 
@@ -59,10 +78,29 @@ class Summary(BaseModel):
         default=None, description="first and last wavelength [nm]; null: grey"
     )
     error_p99: float | None = Field(
-        default=None, description="relative error that 99 of 100 values keep to; null: not measured"
+        default=None,
+        description="of the table against its formula: relative error that 99 of 100 values keep to; "
+        "null: not measured",
+    )
+    formula_error: FormulaRung | None = Field(
+        default=None, description="error of that formula against the highest rung of its surface; null: not measured"
+    )
+    largest_albedo: LargestAlbedo | None = Field(
+        default=None, description="of the table, specular part included; null: not measured"
+    )
+    spectrum: Literal["grey", "one wavelength", "spectral"] | None = Field(
+        default=None, description="grey: no colour is known, all wavelengths are alike; one wavelength: shown as grey"
     )
     verdict: str | None = Field(default=None, description="of the audit of this revision; null: it has none")
-    colour: str | None = Field(default=None, description="#rrggbb of its albedo under D65, at 45 degrees, to look at")
+    as_published: Answer | None = Field(
+        default=None, description="of that audit, about the table: is it what the paper says?"
+    )
+    conserves_energy: Answer | None = Field(
+        default=None, description="of that audit, about the model: does the published model conserve energy?"
+    )
+    colour: str | None = Field(
+        default=None, description="#rrggbb of its albedo under D65, at 45 degrees, to look at; see spectrum"
+    )
     revision: str = ""
     created: str | None = None
     bytes: int | None = None
@@ -100,14 +138,20 @@ class Material(BaseModel):
     parameters: list[ParameterDocument]
     anisotropic: bool
     wavelength_nm: list[float] | None = Field(description="wavelengths [nm]; null: grey")
+    spectrum: Literal["grey", "one wavelength", "spectral"] = Field(description="as in the catalogue")
     axes_deg: dict[str, list[float]] = Field(description="the grid of the table [degrees]")
     specular: bool = Field(description="whether there is a specular part: specular_reflectance is not 0 everywhere")
     error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
         description="the measured error of the table against its model, by bands of theta_i; null: not measured"
     )
+    formula_error: FormulaError | None = Field(
+        description="error of the model against the highest rung of its surface; null: not measured"
+    )
+    largest_albedo: LargestAlbedo | None = Field(description="of the table, specular part included; null: not measured")
     incomplete: str | None = Field(description="what the table does not state of itself; null: nothing")
     audit: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
-        description="verdict of the audit, its findings in sentences, and whether it is of this revision; null: none"
+        description="verdict of the audit, its answers to the two questions, its findings in sentences, and whether it "
+        "is of this revision; null: none"
     )
     colour: str | None
     attributes: Annotated[dict[str, Any], WithJsonSchema({"type": "object"})] = Field(

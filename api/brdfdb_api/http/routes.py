@@ -39,7 +39,7 @@ from brdfdb_api.http.responses import (
     plain,
     tag_of,
 )
-from brdfdb_api.serving.shelf import Shelf
+from brdfdb_api.serving.shelf import Shelf, answers_of, spectrum_of
 
 if TYPE_CHECKING:
     from brdfdb.tables.metadata import TableMetadata
@@ -181,9 +181,12 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "parameters": _parameters(metadata),
         "anisotropic": table.anisotropic,
         "wavelength_nm": table.wavelength_nm,
+        "spectrum": spectrum_of([] if table.wavelength_nm is None else table.wavelength_nm.tolist()),
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,
         "error": None if table.error is None else table.attrs["error"],
+        "formula_error": table.attrs.get("formula_error"),
+        "largest_albedo": table.attrs.get("largest_albedo"),
         "incomplete": metadata.gaps or None,
         "audit": None if verdict is None else _verdicts(verdict.finding, verdict.when, table.revision),
         "colour": shelf.swatch(table),
@@ -223,9 +226,10 @@ def _parameters(metadata: TableMetadata) -> list[dict[str, Any]]:
 
 
 def _verdicts(finding: dict[str, Any], when: str, revision: str) -> dict[str, Any]:
-    """Return the verdict of an audit, and its findings in sentences."""
+    """Return the verdict of an audit, its two answers, and its findings in sentences."""
     return {
         "verdict": finding["verdict"],
+        **answers_of(finding),
         "model": finding["model"],
         "sentences": finding["sentences"],
         "revision": finding["revision"],

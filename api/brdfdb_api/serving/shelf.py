@@ -6,7 +6,7 @@ import contextlib
 import os
 import queue
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -129,6 +129,7 @@ class Shelf:
         return {
             **known[1],
             "verdict": verdict.finding["verdict"] if verdict and verdict.current else None,
+            **answers_of(verdict.finding if verdict and verdict.current else {}),
             "colour": colour if cached == digest else None,
         }
 
@@ -225,12 +226,33 @@ def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> 
         "source": metadata.source or "",
         "anisotropic": metadata.anisotropic,
         "wavelength_range_nm": metadata.wavelength_range_nm or None,
+        "spectrum": spectrum_of(metadata.wavelength_range_nm),
         "incomplete": metadata.gaps or None,
         "error_p99": head.get("error_p99"),
+        "formula_error": None if metadata.formula_error is None else metadata.formula_error.in_lists(),
+        "largest_albedo": None if metadata.largest_albedo is None else metadata.largest_albedo.model_dump(mode="json"),
         "revision": group.name,
         "created": head.get("created"),
         "bytes": head.get("bytes"),
         "href": f"/v1/materials/{name}",
+    }
+
+
+def spectrum_of(range_nm: Sequence[float]) -> str:
+    """Return whether a table has colours: grey, one wavelength or spectral, by its first and last wavelength [nm]."""
+    if not range_nm:
+        return "grey"
+    return "one wavelength" if range_nm[0] == range_nm[-1] else "spectral"
+
+
+def answers_of(finding: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the answers of an audit to its two questions; None of one that the audit of an older program lacks."""
+    given = {key: finding.get(key) for key in ("as_published", "conserves_energy")}
+    return {
+        key: {"word": answer["word"], "text": answer["text"], "reason": answer["reason"]}
+        if isinstance(answer, Mapping) and all(isinstance(answer.get(x), str) for x in ("word", "text", "reason"))
+        else None
+        for key, answer in given.items()
     }
 
 

@@ -57,10 +57,12 @@ def _print_presets(library: str | None) -> None:
 
 
 def _print_materials(store: Store, root: Path) -> list[str]:
-    """Print a line for each material from its pointer alone; return a sentence for each damaged one."""
+    """Print a line for each material from its pointer and the last audit; return a sentence for each damaged one."""
+    from brdfdb.store.summary_words import COLUMNS, NOT_AUDITED, colours, energy, formula_error, last_audit
     from brdfdb_pipelines import terminal
 
     rows, damaged, incomplete = [], [], []
+    audits = last_audit(root)
     for name in store:
         try:
             head = store.summary(name)
@@ -70,15 +72,24 @@ def _print_materials(store: Store, root: Path) -> list[str]:
         except StoreError as error:
             damaged.append(str(error))
             continue
+        audited = audits.get((name, head["revision"]))
         rows.append(
-            (name, head["title"], head["model"] or "function", terminal.error(head.get("error_p99")), head["revision"])
+            (
+                *(name, head["title"], head["model"] or "function", colours(head)),
+                *(terminal.error(head.get("error_p99")), formula_error(head, terminal.error)),
+                *(NOT_AUDITED if audited is None else audited.as_published, energy(head, audited)),
+                head["revision"],
+            )
         )
+    errors = ("table error (p99)", "formula error (p99)")
     terminal.print_table(
         f"{counted(len(rows), 'material')} in {root}",
-        ("material", "title", "model", "error (p99)", "revision"),
+        ("material", "title", "model", "colours", *errors, *COLUMNS, "revision"),
         rows,
-        numbers=("error (p99)",),
+        numbers=errors,
     )
+    if rows:
+        print("table error: the table against its formula; formula error: the formula against the highest rung known")
     for sentence in incomplete:
         print(terminal.plain(sentence))
     return damaged

@@ -13,9 +13,12 @@ from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 if TYPE_CHECKING:
     from brdfdb.materials.provenance import Assumption
     from brdfdb.store.family import Family
+    from brdfdb.store.summary_words import Audited
+    from brdfdb.tables.first_numbers import FormulaError
     from brdfdb.tables.metadata import TableMetadata
-    from brdfdb.tables.stated_error import Error
+    from brdfdb.tables.stated_error import Error, Overall
     from brdfdb.tables.table import Table
+    from brdfdb.tables.worst_pair import WorstPair
 
 HELP = "Show parameters, sources, grid, albedo and files of a material, or a family."
 
@@ -31,16 +34,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print what the store, or a snapshot of it, knows of a material or a family."""
+    from brdfdb.store.summary_words import last_audit
+
     root: Path = options.store
     store = brdfdb.open(root, snapshot=options.snapshot)
     if options.name not in store and options.name in store.families():
         _print_family(store.family(options.name))
     else:
-        _print_material(store[options.name], store.path(options.name))
+        table = store[options.name]
+        audited = last_audit(root).get((table.name, table.revision))
+        _print_material(table, store.path(options.name), audited)
     return 0
 
 
-def _print_material(table: Table, path: Path) -> None:
+def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     from brdfdb_pipelines import terminal
 
     metadata = table.metadata
@@ -48,7 +55,9 @@ def _print_material(table: Table, path: Path) -> None:
     if metadata.gaps:
         print(terminal.plain(f"  incomplete  the table {metadata.gaps}"))
     _print_grid(table)
-    _print_error(table.error, "its source" if metadata.model is None else "the model")
+    _print_error(table.error, "its source" if metadata.model is None else "its formula")
+    _print_formula_error(metadata.formula_error)
+    _print_answers(audited)
     _print_albedo(table)
     print(f"  files       {path} (zarr v3, {terminal.size(_stored(path))})")
 
@@ -160,10 +169,8 @@ def _print_error(error: Error | None, truth: str) -> None:
         print("  error       not measured")
         return
     overall = error.overall
-    print(
-        f"  error       {terminal.error(overall.p99)} of f_r against {truth}, in 99 of 100 of {error.directions} "
-        f"directions (median {overall.median:.2g}, largest {overall.max:.2g}, of what is reflected {overall.l1:.2g})"
-    )
+    print(f"  error       {terminal.error(overall.p99)} of f_r against {truth}, {_spread(overall, error)}")
+    _print_worst(error.worst)
     edges = error.theta_i_deg
     rows = [("99 of 100", error.p99), ("reflected", error.l1)]
     if error.places is not None:
@@ -185,6 +192,45 @@ def _print_error(error: Error | None, truth: str) -> None:
         print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in rings))
 
 
+def _spread(overall: Overall, error: Error | FormulaError) -> str:
+    """Return what the percentile is of, and other statistics of the same errors."""
+    return (
+        f"in 99 of 100 of {error.directions} directions (median {overall.median:.2g}, largest {overall.max:.2g}, "
+        f"of what is reflected {overall.l1:.2g})"
+    )
+
+
+def _print_worst(worst: WorstPair | None) -> None:
+    """Print where the largest error was met, and why it is large there."""
+    if worst is None:
+        return
+    at = f"theta_i {worst.theta_i_deg:g}°, theta_r {worst.theta_r_deg:g}°, delta_phi {worst.delta_phi_deg:g}°"
+    at += "" if worst.wavelength_nm is None else f", {worst.wavelength_nm:g} nm"
+    print(f"    largest     at {at}: {worst.why}")
+
+
+def _print_formula_error(error: FormulaError | None) -> None:
+    """Print the error of the formula of a table against the highest rung of its surface."""
+    from brdfdb_pipelines import terminal
+
+    if error is None:
+        print("  formula     not measured; `brdfdb build` measures it")
+    elif error.against != "measured" or error.overall is None:
+        print(f"  formula     {error.in_words()}")
+    else:
+        print(f"  formula     {terminal.error(error.p99)} of f_r {error.in_words()}, {_spread(error.overall, error)}")
+        _print_worst(error.worst)
+
+
+def _print_answers(audited: Audited | None) -> None:
+    """Print the answers of the last audit of this revision to its two questions."""
+    from brdfdb.store.summary_words import NOT_AUDITED
+
+    both = (NOT_AUDITED, NOT_AUDITED) if audited is None else audited
+    print(f"  audit       is it what the paper says? {both[0]}")
+    print(f"              does the published model conserve energy? {both[1]}")
+
+
 def _print_albedo(table: Table) -> None:
     """Print the directional albedo [1] of the table at a few angles, at the first, middle and last wavelength."""
     import numpy as np
@@ -201,6 +247,13 @@ def _print_albedo(table: Table) -> None:
         + "".join(f"{f'{angle:g}°':>9}" for angle in ALBEDO_ANGLES_DEG)
         + "  (theta_i; with the specular part)"
     )
+    largest = table.metadata.largest_albedo
+    if largest is not None and largest.above_1:
+        where = "" if largest.wavelength_nm is None else f", {largest.wavelength_nm:g} nm"
+        value = "not finite" if largest.albedo is None else f"{largest.albedo:.3g}"
+        known = table.metadata.known_excess
+        cited = "" if known is None else f": {known.citation}"
+        print(f"    above 1     {value} at {largest.theta_i_deg:g}°{where}{cited}")
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)

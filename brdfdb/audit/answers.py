@@ -1,0 +1,96 @@
+"""The two questions of an audit: is a table what the paper says, and does the published model conserve energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pydantic import BaseModel, Field
+
+from brdfdb.audit.energy import Energy
+from brdfdb.audit.finding import STRICT, Finding, NotJudged, Word
+from brdfdb.audit.model_energy import LOSS_UP_TO_DEG, Furnace, ModelEnergy
+from brdfdb.audit.registry import FINDINGS
+from brdfdb.audit.table_error import TableError
+
+AS_PUBLISHED = "is it what the paper says?"
+CONSERVES_ENERGY = "does the published model conserve energy?"
+
+
+class Answer(BaseModel):
+    """The answer to one of the two questions, in a few words and in a sentence."""
+
+    model_config = STRICT
+
+    word: Word = Field(description="verdict behind the answer")
+    text: str = Field(description="the answer in a few words, for a column")
+    reason: str = Field(description="the answer in a sentence, with its angle and its wavelength")
+
+
+def as_published(findings: Mapping[str, Finding]) -> Answer:
+    """Return the answer to `AS_PUBLISHED`: every finding on the table, its excess over that of the model included."""
+    energy = findings[Energy.key]
+    failing = [
+        FINDINGS[key].title.lower() for key, finding in findings.items() if key != Energy.key and _violates(finding)
+    ]
+    if isinstance(energy, Energy) and _of_table_alone(energy):
+        failing.insert(0, "energy of the table")
+    if failing:
+        named = ", ".join(failing)
+        return Answer(word="violates", text=f"no: {named}", reason=f"the table differs from its source in: {named}")
+    if isinstance(findings[TableError.key], NotJudged):
+        return Answer(word="not judged", text="not judged", reason="the source of this table is not known")
+    reason = "the table keeps to the formulas of its source within the error that it states"
+    return Answer(word="passes", text="yes", reason=reason)
+
+
+def conserves_energy(findings: Mapping[str, Finding]) -> Answer:
+    """Return the answer to `CONSERVES_ENERGY`, which the table has no part in."""
+    energy = findings[Energy.key]
+    if not isinstance(energy, Energy) or energy.model is None:
+        return Answer(word="not judged", text="not judged", reason="the source of this table is not known")
+    model = energy.model
+    return Answer(word=model.verdict, text=_short(model), reason=model.reason)
+
+
+def _violates(finding: Finding) -> bool:
+    return finding.verdict == "violates"
+
+
+def _of_table_alone(energy: Energy) -> bool:
+    """Return True if a table reflects too much where its model does not, or more than its model."""
+    return energy.table.verdict == "violates" and (energy.model is None or energy.model.verdict != "violates")
+
+
+def _short(model: ModelEnergy) -> str:
+    """Return the verdict on a model in a few words: yes, no, or the light that it loses or creates if lossless."""
+    most = "not finite" if model.max_albedo is None else f"albedo {model.max_albedo:.3g}"
+    where = f"{most} at {model.max_at_theta_i_deg:.3g}°"
+    if model.max_at_wavelength_nm is not None:
+        where += f", {model.max_at_wavelength_nm:g} nm"
+    if model.verdict == "conserves":
+        return "yes" if model.furnace is not None else "yes, at these parameters"
+    if model.verdict == "loses":
+        return f"creates none, loses up to {_percent(_loss(model.furnace))}"
+    if model.verdict == "gains":
+        return f"creates none here, {_percent(_gain(model.furnace))} if lossless"
+    return {
+        "known published excess": f"no, as published: {where}",
+        "accepted excess": f"no, as accepted: {where}",
+        "violates": f"no: {where}",
+    }[model.verdict]
+
+
+def _loss(furnace: Furnace | None) -> float:
+    """Return the largest loss [1] of a lossless model up to the last angle that is judged."""
+    assert furnace is not None
+    judged = [row for at, row in zip(furnace.theta_i_deg, furnace.albedo, strict=True) if at <= LOSS_UP_TO_DEG]
+    return 1.0 - min(value for row in judged for value in row if value is not None)
+
+
+def _gain(furnace: Furnace | None) -> float:
+    """Return the largest excess [1] of a lossless model."""
+    return 0.0 if furnace is None or furnace.largest is None else furnace.largest - 1.0
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 0.995 else "100 %"

@@ -1,0 +1,72 @@
+"""A line of a list in words: colours, error of the formula, and the answers of the last audit to its two questions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+NOT_MEASURED = "not measured"
+NOT_AUDITED = "not audited"
+COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
+
+
+class Audited(NamedTuple):
+    """The answers of an audit in a few words: is it what the paper says, does the published model conserve energy."""
+
+    as_published: str
+    conserves_energy: str
+
+
+def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
+    """Return the answers of the last audit by material and revision; none where there is no readable report.
+
+    Audits of older programs have one verdict, which stands for the first answer.
+    """
+    try:
+        report = json.loads((root / "audit.json").read_bytes())
+        return {(str(one["material"]), str(one["revision"])): _answers(one) for one in report["materials"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+
+
+def _answers(one: Mapping[str, Any]) -> Audited:
+    if "as_published" not in one:
+        return Audited(str(one["verdict"]), "")
+    return Audited(str(one["as_published"]["text"]), str(one["conserves_energy"]["text"]))
+
+
+def colours(head: Mapping[str, Any]) -> str:
+    """Return the wavelengths of a table in words: grey, one wavelength, or a range; empty if its pointer is older."""
+    at = head.get("wavelength_range_nm")
+    if at is None:
+        return ""
+    if not at:
+        return "grey"
+    return f"{at[0]:g} nm" if at[0] == at[-1] else f"{at[0]:g}-{at[-1]:g} nm"
+
+
+def formula_error(head: Mapping[str, Any], percent: Callable[[float], str]) -> str:
+    """Return the error of a formula against the highest rung of its surface, in words."""
+    stated = head.get("formula_error")
+    if stated is None:
+        return NOT_MEASURED
+    if stated["against"] == "measured":
+        return percent(stated["p99"])
+    return "0, highest rung" if stated["against"] == "highest rung" else "none known"
+
+
+def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
+    """Return the answer of the audit on energy; without one, that it is missing and an albedo above 1."""
+    if audited is not None:
+        return audited.conserves_energy
+    largest = head.get("largest_albedo")
+    if largest is None:
+        return NOT_AUDITED
+    value = largest["albedo"]
+    if value is not None and value <= 1.0 + largest["tolerance"]:
+        return NOT_AUDITED
+    at = f"{largest['theta_i_deg']:g}°"
+    at += "" if largest["wavelength_nm"] is None else f", {largest['wavelength_nm']:g} nm"
+    return f"{NOT_AUDITED}: albedo {'not finite' if value is None else f'{value:.3g}'} at {at}"

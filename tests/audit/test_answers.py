@@ -1,0 +1,80 @@
+"""The two questions of an audit: the answers on a sound table, a spoilt one, and models that lose or create light."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from brdfdb.audit.answers import as_published, conserves_energy
+from brdfdb.audit.energy import Energy
+from brdfdb.audit.finding import LEVELS, NotJudged
+from brdfdb.audit.model_energy import ModelEnergy
+from brdfdb.audit.table_error import TableError
+from tests.pipelines.a_report import material
+
+
+def model_of(name: str, verdict: Any, **more: Any) -> ModelEnergy:
+    """The energy of a model with an albedo of 0.84 at 89 degrees, whose furnace is 0.8 to 1.2."""
+    model = material(name, verdict, **more).of(Energy).model
+    assert model is not None
+    return model
+
+
+@pytest.mark.parametrize(
+    ("verdict", "text", "level"),
+    [
+        ("conserves", "yes", "good"),
+        # The furnace of `a_report` is its albedo over its strength: 1 at the normal, 1 + (89/90)^3 / 5 at 89 degrees
+        ("loses", "creates none, loses up to 0 %", "calm"),
+        ("gains", "creates none here, 20 % if lossless", "note"),
+        ("known published excess", "no, as published: albedo 0.835 at 89°", "note"),
+        ("accepted excess", "no, as accepted: albedo 0.835 at 89°", "note"),
+        ("violates", "no: albedo 0.835 at 89°", "bad"),
+    ],
+)
+def test_each_verdict_on_a_model_is_an_answer_of_its_own(verdict: Any, text: str, level: str) -> None:
+    judged = material("paint", verdict)
+    answer = conserves_energy(judged.findings)
+    assert (answer.text, LEVELS[answer.word]) == (text, level)
+    assert answer.reason == judged.of(Energy).reason
+
+
+def test_the_answer_names_the_wavelength_of_a_spectral_model() -> None:
+    judged = material("oxide", "known published excess", 0.9, spectral=True)
+    assert conserves_energy(judged.findings).text == "no, as published: albedo 1.07 at 89°, 700 nm"
+
+
+def test_a_model_that_nothing_makes_lossless_answers_for_its_own_parameters() -> None:
+    judged = material("foam")
+    energy = judged.of(Energy)
+    assert energy.model is not None
+    bare = energy.model_copy(update={"model": energy.model.model_copy(update={"furnace": None})})
+    assert conserves_energy(judged.findings | {"energy": bare}).text == "yes, at these parameters"
+
+
+def test_a_published_excess_is_what_the_paper_says() -> None:
+    for verdict in ("known published excess", "accepted excess", "violates"):
+        assert as_published(material("oxide", verdict).findings).text == "yes"  # the table is as its model
+
+
+def test_a_table_that_exceeds_1_alone_is_not_what_the_paper_says() -> None:
+    judged = material("paint")
+    energy = judged.of(Energy)
+    coarse = energy.model_copy(update={"table": energy.table.model_copy(update={"verdict": "violates"})})
+    answer = as_published(judged.findings | {"energy": coarse})
+    assert (answer.word, answer.text) == ("violates", "no: energy of the table")
+    assert conserves_energy(judged.findings | {"energy": coarse}).text == "yes"  # of the model
+
+
+def test_every_finding_that_fails_is_named() -> None:
+    findings = material("paint").findings
+    bad = {key: findings[key].model_copy(update={"verdict": "violates"}) for key in ("values", "table_error")}
+    assert as_published(findings | bad).text == "no: values, table error"
+
+
+def test_without_a_source_neither_question_is_judged() -> None:
+    judged = material("paint")
+    alone = judged.of(Energy).model_copy(update={"model": None})
+    findings = judged.findings | {"energy": alone, TableError.key: NotJudged(reason="no source")}
+    assert as_published(findings).text == conserves_energy(findings).text == "not judged"

@@ -1,0 +1,77 @@
+"""A line of a list in words: of new pointers, of those of older programs, and of audits old and new."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from brdfdb.errors import StoreError
+from brdfdb.notebook import percent
+from brdfdb.store.manifest import SUMMARY_FIELDS, summary_fields
+from brdfdb.store.reader import Store
+from brdfdb.store.sealed_json import check_fields
+from brdfdb.store.summary_words import Audited, colours, energy, formula_error, last_audit
+
+ALBEDO = {"albedo": 1.37, "theta_i_deg": 80.0, "wavelength_nm": 550.0, "tolerance": 1e-3}
+
+
+@pytest.mark.parametrize(
+    ("at", "text"), [(None, ""), ([], "grey"), ([500.0, 500.0], "500 nm"), ([380.0, 780.0], "380-780 nm")]
+)
+def test_a_grey_material_says_so(at: Any, text: str) -> None:
+    assert colours({} if at is None else {"wavelength_range_nm": at}) == text
+
+
+@pytest.mark.parametrize(
+    ("stated", "text"),
+    [
+        (None, "not measured"),
+        ({"against": "measured", "rung": "facets", "p99": 0.119}, "12 %"),
+        ({"against": "highest rung", "rung": "the sum", "p99": 0.0}, "0, highest rung"),
+        ({"against": "none known", "rung": "", "p99": None}, "none known"),
+    ],
+)
+def test_the_formula_stands_apart_from_the_table(stated: Any, text: str) -> None:
+    assert formula_error({"error_p99": 0.0077, "formula_error": stated}, percent) == text
+    assert formula_error({"error_p99": 0.0077}, percent) == "not measured"
+
+
+def test_an_albedo_above_1_is_told_before_any_audit_and_by_the_audit_after_it() -> None:
+    head = {"largest_albedo": ALBEDO}
+    assert energy(head, None) == "not audited: albedo 1.37 at 80°, 550 nm"
+    answer = "no, as published: albedo 1.37 at 80°, 550 nm"
+    assert energy(head, Audited("yes", answer)) == answer
+    for quiet in ({}, {"largest_albedo": None}, {"largest_albedo": {**ALBEDO, "albedo": 1.0005}}):
+        assert energy(quiet, None) == "not audited"
+    assert energy({"largest_albedo": {**ALBEDO, "albedo": None, "wavelength_nm": None}}, None).endswith(
+        "albedo not finite at 80°"
+    )
+
+
+def test_the_audit_of_an_older_program_has_one_verdict(tmp_path: Path) -> None:
+    answers = {"as_published": {"text": "yes"}, "conserves_energy": {"text": "no: albedo 2"}}
+    found = [
+        {"material": "old", "revision": "r000001", "verdict": "passes"},
+        {"material": "new", "revision": "r000002", "verdict": "violates", **answers},
+    ]
+    (tmp_path / "audit.json").write_text(json.dumps({"materials": found}), encoding="utf-8")
+    assert last_audit(tmp_path) == {
+        ("old", "r000001"): Audited("passes", ""),
+        ("new", "r000002"): Audited("yes", "no: albedo 2"),
+    }
+    for broken in ("", "[]", '{"materials": [1]}', '{"materials": [{"as_published": 1}]}'):
+        (tmp_path / "audit.json").write_text(broken, encoding="utf-8")
+        assert last_audit(tmp_path) == {}
+
+
+def test_a_pointer_of_an_older_program_is_read_and_a_wrong_one_is_not(root: Path) -> None:
+    head = dict(Store(root).summary("white"))
+    assert (head["wavelength_range_nm"], head["formula_error"]) == ([], None)  # published without a measurement
+    older = {key: head[key] for key in SUMMARY_FIELDS}
+    check_fields(older, summary_fields(older), "white", "HEAD.json")
+    wrong = older | {"formula_error": 0.1}
+    with pytest.raises(StoreError, match=r"HEAD\.json has no valid 'formula_error'"):
+        check_fields(wrong, summary_fields(wrong), "white", "HEAD.json")
