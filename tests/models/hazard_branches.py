@@ -3,7 +3,7 @@
 import numpy as np
 
 from brdfdb.reference import he_torrance_1991, mp
-from tests.models.hazards import HALF_PI, PI, Directions
+from tests.models.hazard_directions import HALF_PI, PI, Directions
 
 
 def slope_of_small_z_0() -> float:

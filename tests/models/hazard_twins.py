@@ -10,16 +10,8 @@ from numpy.typing import NDArray
 from brdfdb import models
 from brdfdb.geometry import unit_vector
 from brdfdb.reference import mp
-from tests.models.hazards import (
-    BY_NAME,
-    COS_HORIZON,
-    HALF_PI,
-    MATRICES,
-    SUBJECTS,
-    Arguments,
-    Directions,
-    Subject,
-)
+from tests.models.hazard_directions import HALF_PI, Directions
+from tests.models.hazards import BY_NAME, COS_HORIZON, MATRICES, SUBJECTS, Arguments, Subject
 
 TINY = {np.float64: 1e-270, np.float32: 2.0**-126}  # smaller values carry too few digits, or none
 # exp(-tan^2(delta) / alpha^2), the pole at grazing, the kink at the angle of total reflection: of the rounding of the

@@ -12,6 +12,7 @@ from brdfdb import models
 from brdfdb.models import MODELS
 from brdfdb.models._diffraction_series import diffraction_series
 from brdfdb.reference import he_torrance_1991, mp
+from tests.models.hazard_directions import EXACT, NEAR, PI, SOME, Directions
 from tests.models.hazard_twins import (
     EPSILON,
     FORMS,
@@ -34,18 +35,13 @@ from tests.models.hazard_twins import (
 from tests.models.hazards import (
     AGREEMENT,
     BY_NAME,
-    EXACT,
     HE_TORRANCE_TABLE,
     INTEGRATED,
     INTEGRATED_FLOOR,
     JUMP,
     MATRICES,
-    NEAR,
-    PI,
-    SOME,
     SUBJECTS,
     Arguments,
-    Directions,
     Subject,
     table,
 )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brdfdb import models
 from brdfdb.reference import mp
 from tests.models.hazard_branches import BRANCHES
+from tests.models.hazard_directions import EXACT, HALF_PI, Directions
 from tests.models.hazard_twins import (
     EPSILON,
     FORMS,
@@ -28,18 +29,7 @@ from tests.models.hazard_twins import (
     roundings,
     scales,
 )
-from tests.models.hazards import (
-    BY_NAME,
-    EXACT,
-    HALF_PI,
-    JUMP,
-    MATRICES,
-    SUBJECTS,
-    Arguments,
-    Directions,
-    Subject,
-    table,
-)
+from tests.models.hazards import BY_NAME, JUMP, MATRICES, SUBJECTS, Arguments, Subject, table
 
 # float32 vectors have lengths of 1 to 6e-8 only, and lengths of neighbours differ
 CONTINUOUS = [
