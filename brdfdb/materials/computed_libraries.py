@@ -17,7 +17,6 @@ from brdfdb.errors import ParameterError
 from brdfdb.materials.material import Material
 from brdfdb.materials.provenance import Text, Words
 
-MODEL = "he_torrance"
 COMPUTED = "Computed, not measured"
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
@@ -105,6 +104,7 @@ class Substance(BaseModel):
 class _File(BaseModel):
     model_config = _STRICT
 
+    model: str
     libraries: dict[str, Library]
     kinds: dict[Kind, Traits]
     finishes: dict[str, Finish]
@@ -157,18 +157,17 @@ def _entries(file: _File, library: Library) -> list[Entry]:
         for name in traits.finishes:
             finish = file.finishes[name]
             parts = (slug, name, library.suffix) if library.suffix else (slug, name)
-            table = _table(library, traits, substance, finish)
+            table = {"model": file.model, **_table(library, traits, substance, finish)}
             made.append(Entry(Material.from_table("-".join(parts), table), substance, finish))
     return made
 
 
 def _table(library: Library, traits: Traits, substance: Substance, finish: Finish) -> dict[str, Any]:
-    """Return a material as a TOML table would have it."""
+    """Return a material as a TOML table would have it, without its model."""
     every, covered = (library.wavelengths_nm.within(*ends) for ends in ((0.0, float("inf")), substance.covers_nm))
     who = substance.citation.partition(":")[0].partition(",")[0]
     text = {
         "title": ", ".join([substance.title, finish.title, *filter(None, [library.suffix]), "computed"]),
-        "model": MODEL,
         "source": f"{COMPUTED}: the model of He et al. 1991 with n and k of {who} ({substance.refractive_index})",
         "note": " ".join(note.strip() for note in (substance.note, traits.note) if note),
         "refractive_index": substance.refractive_index,
