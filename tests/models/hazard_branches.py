@@ -70,6 +70,16 @@ BRANCHES = [
         (0, 2),
         "wavelength_nm=500 sigma_0_um=0.1 tau_um=1 n=0.5 k=0",
     ),
+    ("phase of 90", "ross_li", Directions(PI / 4, 0.0, PI / 4, PI), (0, 2, 3), "f_iso=0.3 f_vol=0.5 f_geo=0.01"),
+    (  # the shadow begins to leave the crown: sin(xi) is half the sum of the cosines
+        "overlap ends",
+        "ross_li",
+        Directions(2.0 * float(np.arctan(0.5)), 0.0, 0.0, 0.0),
+        (0, 2),
+        "f_iso=0.3 f_vol=0 f_geo=0.1",
+    ),
+    ("equal angles", "hapke", EQUAL, (0,), "w=0.5 b=0.2 c=0.6 b_0=1 h=0.1 theta_bar=0.3"),
+    ("azimuth 90", "hapke", ACROSS, (3,), "w=0.5 b=0.2 c=0.6 b_0=1 h=0.1 theta_bar=0.3"),
     (
         "small z_0",
         "he_torrance",

@@ -9,7 +9,7 @@ from brdfdb.models import MODELS, hapke
 # A basaltic soil of Pommerol et al. 2013, whose c is 0.273 in [-1, 1]
 SOIL = {"w": 0.526, "b": 0.187, "c": 1.273 / 2.0, "b_0": 1.0, "h": 0.083, "theta_bar": np.deg2rad(13.3)}
 # theta_r, delta_phi [degree] and the reflectance factor pi f_r for theta_i = 30 degrees that eradiate states in the
-# tests of its plugin `hapke`, in float32, after a program of Nguyen and Jacquemoud. It returns that factor
+# tests of its plugin `hapke`, in float32, after a program of Nguyen and Jacquemoud
 STATED = [(30.0, 0.0, 0.24746648), (80.0, 0.0, 0.19555340), (89.0, 180.0, 0.15426355)]
 FLOAT32 = 5e-7  # worst measured: 4.2e-7
 WHITE = {"w": 1.0, "b": 0.0, "c": 0.0}
