@@ -29,11 +29,19 @@ class SlopeDistribution:
         ``radius(u)`` gives the t [1] that a share u of half vectors exceeds, for random numbers u in (0, 1].
     density : callable
         ``density(t2)`` gives the probability density [1] of the square of t at t2 >= 0. Its integral over t2 is 1.
+    visible : callable or None
+        ``visible(u, angle, w)`` gives normals (..., 3), of any length, of the facets of a surface of width 1 that are
+        seen from the unit vectors w (..., 3), for random numbers u in [0, 1] and angles [rad]. Their density is that of
+        the facets times their projected area. None: such normals cannot be drawn.
+    area : callable or None
+        ``area(w_z)`` gives the projected area [1] of these facets, per area of the surface.
     """
 
     name: str
     radius: Callable[[Array], Array]
     density: Callable[[Array], Array]
+    visible: Callable[[Array, Array, Array], Array] | None = None
+    area: Callable[[Array], Array] | None = None
 
 
 def _gaussian_radius(u: Array) -> Array:
@@ -54,8 +62,21 @@ def _ggx_density(t2: Array) -> Array:
     return np.asarray((1.0 + t2) ** -2)
 
 
+def _ggx_visible(u: Array, angle: Array, w: Array) -> Array:
+    # Dupuy and Benyoub 2023: mirrors w in the facets of a sphere. All directions above -w_z are equally probable
+    w_z = w[..., 2]
+    z = (1.0 - u) * (1.0 + w_z) - w_z
+    sin = np.sqrt(np.clip(1.0 - z * z, 0.0, 1.0))
+    mirrored = np.stack(np.broadcast_arrays(sin * np.cos(angle), sin * np.sin(angle), z), axis=-1)
+    return np.asarray(mirrored + w)
+
+
+def _ggx_area(w_z: Array) -> Array:
+    return np.asarray(0.5 * (1.0 + w_z))
+
+
 GAUSSIAN = SlopeDistribution("Gaussian", _gaussian_radius, _gaussian_density)
-GGX = SlopeDistribution("GGX", _ggx_radius, _ggx_density)
+GGX = SlopeDistribution("GGX", _ggx_radius, _ggx_density, _ggx_visible, _ggx_area)
 
 
 class Lobe(NamedTuple):
@@ -71,12 +92,16 @@ class Lobe(NamedTuple):
         Widths of the slopes of half vectors along x and y.
     distribution : SlopeDistribution
         Slopes in these widths. A Gaussian has the density exp(-(s_x / alpha_x)^2 - (s_y / alpha_y)^2).
+    visible : bool
+        True if samplers draw the facets that the direction sees, in proportion to the area that it sees of each. False
+        if they draw all facets alike. Quadratures do not read it.
     """
 
     share: Array
     alpha_x: Array
     alpha_y: Array
     distribution: SlopeDistribution = GAUSSIAN
+    visible: bool = False
 
 
 def narrowest(lobe: Lobe | None) -> Lobe | None:

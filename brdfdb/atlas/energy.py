@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from brdfdb import fresnel
-from brdfdb.atlas import energy_ward
+from brdfdb.atlas import energy_microfacets, energy_ward
 from brdfdb.atlas._albedos import (
     EXACT,
     THETA,
@@ -328,6 +328,7 @@ def _closed_forms() -> Figure:
 FIGURES: dict[str, Callable[[], Figure]] = {
     "energy-oren-nayar": _oren_nayar,
     **energy_ward.FIGURES,
+    **energy_microfacets.FIGURES,
     "energy-he-torrance": _he_torrance,
     "energy-magnesium-oxide": _magnesium_oxide,
     "energy-minnaert": _minnaert,

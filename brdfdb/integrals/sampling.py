@@ -17,6 +17,7 @@ from brdfdb.parameters import Floats, ModelSpec
 Array = NDArray[np.float64]
 
 _TINY = 1e-300  # least u, so that its logarithm is finite
+_FLAT = 1e-70  # z of a half vector up to which the density counts as 0: z^4 is still a number
 DIFFUSE = Lobe(np.asarray(0.0), np.asarray(1.0), np.asarray(1.0))
 
 
@@ -60,7 +61,8 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
     Notes
     -----
     The `lobe` of the model gives the probability of a half vector from a Gaussian of slopes, in which the light is
-    mirrored. It follows Ward's eq. 7 with tan(delta) in (7a), which is printed without its arctan. Otherwise the
+    mirrored. It follows Ward's eq. 7 with tan(delta) in (7a), which is printed without its arctan. Half vectors of GGX
+    are normals of facets that the light sees (Heitz 2018), drawn as Dupuy and Benyoub 2023 do. Otherwise the
     direction has a density of cos theta_r / pi. u1 selects the component, then is rescaled to [0, 1] and reused.
     Directions of a lobe that fall below the horizon are kept with a weight of 0, because they are a part of the
     density. Ward's samples are not "uniformly weighted": the weights are those of `Sample`. The specular part of a
@@ -68,7 +70,7 @@ def sample(model: ModelSpec | str, u1: ArrayLike, u2: ArrayLike, wi: ArrayLike, 
 
     References
     ----------
-    ward1992
+    ward1992, heitz2018, dupuybenyoub2023
 
     Examples
     --------
@@ -157,7 +159,8 @@ def directions(lobe: Lobe, u1: Array, u2: Array, i: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):  # the component that is not taken may divide by zero
         stretched = np.where(in_lobe, u1 / lobe.share, (u1 - lobe.share) / (1.0 - lobe.share))
     angle = 2.0 * np.pi * u2
-    mirrored = mirrored_in_lobe(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
+    mirror = _mirrored_in_visible if lobe.visible else mirrored_in_lobe
+    mirrored = mirror(np.clip(stretched, _TINY, 1.0), angle, i, lobe)
     return np.where(in_lobe[..., np.newaxis], mirrored, _cosine_weighted(np.clip(stretched, 0.0, 1.0), angle))
 
 
@@ -166,8 +169,26 @@ def mirrored_in_lobe(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
     radius = lobe.distribution.radius(u1)
     s_x, s_y = radius * lobe.alpha_x * np.cos(angle), radius * lobe.alpha_y * np.sin(angle)
     s_x, s_y = np.broadcast_arrays(s_x, s_y)
-    h = np.stack([s_x, s_y, np.ones_like(s_x)], axis=-1)
-    h /= np.sqrt(np.sum(h * h, axis=-1, keepdims=True))
+    return _mirrored(np.stack([s_x, s_y, np.ones_like(s_x)], axis=-1), i)
+
+
+def _mirrored_in_visible(u1: Array, angle: Array, i: Array, lobe: Lobe) -> Array:
+    """Return the light (..., 3) mirrored in the facets that it sees."""
+    assert lobe.distribution.visible is not None
+    # The surface is stretched until its slopes have the width 1. The light is stretched the other way
+    x, y, z = np.broadcast_arrays(lobe.alpha_x * i[..., 0], lobe.alpha_y * i[..., 1], i[..., 2])
+    w = np.stack([x, y, z], axis=-1) / _stretched_length(i, lobe)[..., np.newaxis]
+    h_x, h_y, h_z = np.moveaxis(lobe.distribution.visible(u1, angle, w), -1, 0)
+    return _mirrored(np.stack([lobe.alpha_x * h_x, lobe.alpha_y * h_y, h_z], axis=-1), i)
+
+
+def _stretched_length(i: Array, lobe: Lobe) -> Array:
+    return np.asarray(np.sqrt((lobe.alpha_x * i[..., 0]) ** 2 + (lobe.alpha_y * i[..., 1]) ** 2 + i[..., 2] ** 2))
+
+
+def _mirrored(h: Array, i: Array) -> Array:
+    """Return the light mirrored in half vectors of any length."""
+    h = h / np.sqrt(np.maximum(np.sum(h * h, axis=-1, keepdims=True), _TINY))
     return np.asarray(2.0 * np.sum(h * i, axis=-1, keepdims=True) * h - i)
 
 
@@ -188,6 +209,18 @@ def mixture_density(lobe: Lobe, i: Array, r: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t2 = ((x / lobe.alpha_x) ** 2 + (y / lobe.alpha_y) ** 2) / (z * z)
         slopes = lobe.distribution.density(t2)
-        mirrored = slopes * length2 / (2.0 * np.pi * lobe.alpha_x * lobe.alpha_y * np.abs(z) ** 3)
+        if lobe.visible:
+            mirrored = _of_visible(slopes, length2, z, lobe, i)
+        else:
+            mirrored = slopes * length2 / (2.0 * np.pi * lobe.alpha_x * lobe.alpha_y * np.abs(z) ** 3)
     mirrored = np.where(np.abs(z) < 1e-100, 0.0, mirrored)  # no half vector is drawn at the horizon
     return np.asarray(lobe.share * mirrored + (1.0 - lobe.share) * cosine)
+
+
+def _of_visible(slopes: Floats, length2: Array, z: Array, lobe: Lobe, i: Array) -> Array:
+    """Return the density [1/sr] of directions mirrored in visible facets, D / (4 projected area)."""
+    assert lobe.distribution.area is not None
+    stretched = _stretched_length(i, lobe)
+    area = stretched * lobe.distribution.area(i[..., 2] / stretched)
+    density = slopes * length2**2 / (4.0 * np.pi * lobe.alpha_x * lobe.alpha_y * area * z**4)
+    return np.where(z > _FLAT, density, 0.0)  # facets with z < 0 face away

@@ -271,13 +271,26 @@ def by_vectors(form: Form, wi: ArrayLike, wr: ArrayLike, facets: Facets) -> Floa
 _SHARE = 0.9  # share of samples in the lobe: the rest bounds the weights at grazing
 
 
+def _most(distribution: SlopeDistribution, alpha_x: Floats, alpha_y: Floats) -> Floats:
+    """Return the share [1] of samples in a lobe that reflects all light.
+
+    Visible facets bound their own weights. Rough ones mirror light below the horizon: samples of the cosine, which are
+    never lost, then lower the variance.
+    """
+    if distribution.visible is None:
+        return np.full(np.broadcast_shapes(alpha_x.shape, alpha_y.shape), _SHARE)
+    return 1.0 / (1.0 + 0.25 * alpha_x * alpha_y)
+
+
 def lobe_of_metal(distribution: SlopeDistribution) -> Callable[..., Lobe]:
     """Return the `lobe` of a model without a uniform part, for one distribution of slopes."""
 
     def lobe(cos_i: Floats, *, alpha_x: ArrayLike, alpha_y: ArrayLike, n: ArrayLike, **_: ArrayLike) -> Lobe:
         """Return the lobe of the facets. Its widths are the alphas."""
-        share = np.full(np.broadcast_shapes(np.shape(cos_i), np.shape(n)), _SHARE)
-        return Lobe(share, np.asarray(alpha_x, np.float64), np.asarray(alpha_y, np.float64), distribution)
+        alpha_x, alpha_y = np.asarray(alpha_x, np.float64), np.asarray(alpha_y, np.float64)
+        most = _most(distribution, alpha_x, alpha_y)
+        share = np.broadcast_to(most, np.broadcast_shapes(np.shape(cos_i), np.shape(n), most.shape))
+        return Lobe(share, alpha_x, alpha_y, distribution, distribution.visible is not None)
 
     return lobe
 
@@ -288,10 +301,12 @@ def lobe_of_painted(distribution: SlopeDistribution) -> Callable[..., Lobe]:
     def lobe(cos_i: Floats, *, rho_d: ArrayLike, f_0: ArrayLike, alpha_x: ArrayLike, alpha_y: ArrayLike) -> Lobe:
         """Return the lobe of the facets. Its share follows from the reflectances, and its widths are the alphas."""
         f_0, rho_d = np.asarray(f_0, np.float64), np.asarray(rho_d, np.float64)
+        alpha_x, alpha_y = np.asarray(alpha_x, np.float64), np.asarray(alpha_y, np.float64)
         reflected = f_0 + (1.0 - f_0) * (1.0 - np.clip(cos_i, 0.0, 1.0)) ** 5
         total = reflected + rho_d
-        share = np.divide(_SHARE * reflected, total, where=total > 0.0, out=np.zeros(np.shape(total)))
-        return Lobe(share, np.asarray(alpha_x, np.float64), np.asarray(alpha_y, np.float64), distribution)
+        share = np.divide(reflected, total, where=total > 0.0, out=np.zeros(np.shape(total)))
+        share = share * _most(distribution, alpha_x, alpha_y)
+        return Lobe(share, alpha_x, alpha_y, distribution, distribution.visible is not None)
 
     return lobe
 

@@ -18,7 +18,6 @@ from brdfdb.models.turquin_2019 import ALPHA, ggx_scaled_vectors
 from brdfdb.parameters import Arguments, Floats, ModelForm, ModelSpec, bytes_of
 
 _GGX = (_microfacets.GGX, CORRELATED, SCHLICK)
-_SHARE = 0.9  # share of samples in the lobe of light that the facets reflect once, of that which they reflect
 
 
 def ggx_compensated(
@@ -108,7 +107,7 @@ def _lobe(cos_i: Floats, *, f_0: ArrayLike, alpha: ArrayLike) -> Lobe:
     lost = lost_share(cos, alpha)
     once = (f_0 + (1.0 - f_0) * (1.0 - cos) ** 5) * (1.0 - lost)
     total = once + _reflected_again(f_0, mean_lost_share(alpha), 2) * lost
-    return Lobe(_SHARE * once / total, alpha, alpha, GGX)
+    return Lobe(once / total, alpha, alpha, GGX, visible=True)
 
 
 def _lossless(_: Mapping[str, Any]) -> dict[str, float]:

@@ -64,8 +64,8 @@ def draw(
 
     theta_i is uniform in its band, phi_i in the circle. Over the hemisphere the solid angle is uniform; in the lobe the
     light is mirrored in half vectors that follow `Source.lobe`, of the wavelengths in turn, or a lobe twice as wide:
-    its own distribution hardly ever reaches the shoulder where the lobe ends. Viewers of a source without a lobe,
-    or of an unknown one, are all drawn over the hemisphere.
+    its own distribution hardly ever reaches the shoulder where the lobe ends. All facets count alike, seen or not.
+    Viewers of a source without a lobe, or of an unknown one, are all drawn over the hemisphere.
     """
     rng = np.random.default_rng(seed)
     band = np.repeat(np.arange(BANDS_DEG.size - 1), count)
@@ -78,7 +78,8 @@ def draw(
     if lobe is None:
         return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), np.zeros(band.size, dtype=bool))
     lobes = [
-        lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y) for width in WIDTHS
+        lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False)
+        for width in WIDTHS
     ]
     which = rng.random(band.size) * 2 * len(lobes)  # one half over the hemisphere, the other among the lobes
     wr = over

@@ -11,7 +11,7 @@ from _site.files import write_page
 from _site.markup import plain
 
 _BIBLIOGRAPHY = Path(__file__).parents[2] / "references.bib"
-_LETTERS = {r"{\"u}": "ü", r"{\c{c}}": "ç", "--": "–"}
+_LETTERS = {r"{\"u}": "ü", r"{\c{c}}": "ç", r"{\'a}": "á", r"{\'o}": "ó", r"\&": "&", "--": "–"}
 
 
 class Paper(NamedTuple):
@@ -26,6 +26,7 @@ PAPERS = {
     "ward1992": Paper("ward", "Ward 1992", "Measured, anisotropic surfaces"),
     "orennayar1994": Paper("oren-nayar", "Oren and Nayar 1994", "Rough diffuse surfaces"),
     "he1991": Paper("he-torrance", "He, Torrance, Sillion and Greenberg 1991", "Physical optics"),
+    "walter2007": Paper("microfacets", "Walter et al. 2007", "Microfacets, with later shadowing and energy"),
     "": Paper("others", "Other models", "Lambert, Minnaert, and surfaces seen from satellites"),
 }
 

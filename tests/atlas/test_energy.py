@@ -32,6 +32,12 @@ HOLDING = [
     ("energy-ward-normal", "the albedo of each form along the normal"),
     ("energy-ward-normal", '"The normalization factor, 1 / (4 pi alpha^2), is accurate'),
     ("energy-ward-samples", "the mean of the weights f_r cos(theta_r) / pdf"),
+    ("energy-microfacets", "for alpha of 1 both albedos have a closed form"),
+    ("energy-microfacets", "separable shadowing counts facets twice"),
+    ("energy-microfacets", "at grazing the light meets the highest facets only"),
+    ("energy-microfacets", "the compensated form reflects all of the light"),
+    ("energy-compensation", "light and viewer exchanged give the same f_r"),
+    ("energy-compensation", "light of the second lobe has met two facets"),
     ("energy-he-torrance", "n = 0.001 and k = 10000 stand for |F|^2 = 1"),
     ("energy-he-torrance", "where slopes are gentle all light near normal incidence"),
     ("energy-he-torrance", "towards grazing the albedo falls"),
@@ -144,6 +150,12 @@ def test_lobes_of_ward_agree_with_scipy(
 ) -> None:
     albedo = by_scipy(model, theta_i_deg, azimuths, rho_d=0.0, rho_s=1.0, alpha_x=alpha, alpha_y=alpha)
     assert curve_of("energy-ward", label, panel)[theta_i_deg] == pytest.approx(albedo, rel=SCIPY)
+
+
+@pytest.mark.parametrize(("label", "model"), [("correlated", "ggx"), ("separable", "ggx_separable")])
+def test_microfacets_agree_with_scipy(label: str, model: str) -> None:
+    albedo = by_scipy(model, 60.0, 512, alpha_x=0.3, alpha_y=0.3, n=1e-3, k=1e4)
+    assert curve_of("energy-microfacets", label)[60.0] == pytest.approx(albedo, rel=SCIPY)
 
 
 @pytest.mark.parametrize("theta_i_deg", [30.0, 85.5])

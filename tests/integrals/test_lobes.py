@@ -10,7 +10,7 @@ from scipy import stats
 from brdfdb.audit import sampling as audit_sampling
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.quadrature import directional_albedo
-from brdfdb.integrals.sampling import lobe_of, pdf, sample
+from brdfdb.integrals.sampling import directions, lobe_of, mixture_density, pdf, sample
 from brdfdb.lobes import GAUSSIAN, GGX, Lobe, SlopeDistribution
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
@@ -93,6 +93,30 @@ def test_the_mean_weight_is_the_albedo(distribution: SlopeDistribution, theta_de
     assert abs(weight.mean() - albedo) < STANDARD_ERRORS * weight.std() / np.sqrt(weight.size)
     # of its own facets every lobe direction weighs about as much; a Gaussian never draws the tail
     assert (weight.max() < 2.0) == (distribution is GGX)
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 60.0, 89.0])
+def test_weights_of_visible_facets_are_the_share_that_the_viewer_sees(theta_deg: float) -> None:
+    # Heitz 2018: F G_2 / G_1, here with F = 1 and separable shadowing, G_1 of the viewer
+    alpha, wi = 0.7, light(theta_deg)
+    lobe = Lobe(np.ones(()), np.asarray(alpha), np.asarray(alpha), GGX, visible=True)
+    u1, u2 = np.random.default_rng(8).random((2, 10_000))
+    wr = directions(lobe, u1, u2, wi)
+    wr = wr[wr[:, 2] > 0.0]
+    weight = microfacets(wi, wr, alpha=alpha) * wr[:, 2] / mixture_density(lobe, wi, wr)
+    tan2 = 1.0 / wr[:, 2] ** 2 - 1.0
+    np.testing.assert_allclose(weight, 2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * tan2)), rtol=1e-9)
+
+
+def test_visible_facets_of_an_anisotropic_surface_have_their_density() -> None:
+    alpha, wi = np.array([0.2, 0.8]), light(75.0)
+    lobe = Lobe(np.ones(()), np.asarray(alpha[0]), np.asarray(alpha[1]), GGX, visible=True)
+    u1, u2 = np.random.default_rng(9).random((2, 40_000))
+    wr = directions(lobe, u1, u2, wi)
+    assert audit_sampling._chance(wr, wi, lobe) > CHANCE
+    assert audit_sampling._chance(wr, wi, lobe._replace(visible=False)) < 1e-12
+    of_all = directions(lobe._replace(visible=False), u1, u2, wi)
+    assert np.mean(wr[:, 2] < 0.0) < 0.6 * np.mean(of_all[:, 2] < 0.0)
 
 
 @DISTRIBUTIONS
