@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import shlex
 import sys
 import time
@@ -47,6 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Build the recipe, show progress, and print what was built."""
+    # Read when numpy is imported, below. The workers fill the cores: threads of linear algebra beside them wait for one
+    # another, and take as much time again
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         _build(options)
     except KeyboardInterrupt:
