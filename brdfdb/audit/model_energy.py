@@ -12,9 +12,12 @@ from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of, pl
 from brdfdb.audit.finding import STRICT
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
+from brdfdb.integrals.quadrature import reflected_share
 from brdfdb.integrals.uniform_bound import largest_uniform_beside
+from brdfdb.lobes import narrowest
 from brdfdb.materials import Material, Source
 from brdfdb.materials.provenance import KnownExcess
+from brdfdb.materials.source import Lossless
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import source_albedo
 from brdfdb.tables.grids import Axis
@@ -125,8 +128,8 @@ def model_energy_of(
     quotes it, and it excuses nothing. With `accept_excess` an excess that is not known is accepted.
     """
     lights = _lights(source)
-    furnace = _furnace(source, wavelength_nm, lights)
-    lights, reflected = _refined(source, wavelength_nm, lights, _reflected(source, wavelength_nm, lights))
+    reflected, furnace = _with_furnace(source, wavelength_nm, lights)
+    lights, reflected = _refined(source, wavelength_nm, lights, reflected)
     theta, wavelength = _worst(reflected.largest)
     first = _first_above_1(source, wavelength_nm, lights, reflected)
     verdict, reason = _verdict(lights, wavelength_nm, reflected, furnace, known)
@@ -294,15 +297,53 @@ def _reflected(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> _
     return _Reflected(diffuse.max(axis=1) + specular, mean, specular, error)
 
 
-def _furnace(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> Furnace | None:
-    """Return the white furnace of a source, or None; at the first, the middle and the last wavelength."""
+def _with_furnace(source: Source, wavelength_nm: Axis | None, lights: _Lights) -> tuple[_Reflected, Furnace | None]:
+    """Return the albedos of a source and its white furnace, the latter at the first, middle and last wavelength."""
     lossless = source.lossless
     if lossless is None:
-        return None
+        return _reflected(source, wavelength_nm, lights), None
+    if isinstance(source, Material) and source.spec.slow and not (source.spectral or source.anisotropic):
+        reflected, white = _reflected_together(source, lossless, lights)
+        return reflected, _furnace(lossless, None, lights, white)
     wavelengths = wavelength_nm
     if wavelength_nm is not None:
         wavelengths = wavelength_nm[np.unique([0, wavelength_nm.size // 2, wavelength_nm.size - 1])]
-    reflected = _reflected(lossless.source, wavelengths, lights)
+    white = _reflected(lossless.source, wavelengths, lights)
+    return _reflected(source, wavelength_nm, lights), _furnace(lossless, wavelengths, lights, white)
+
+
+def _reflected_together(source: Material, lossless: Lossless, lights: _Lights) -> tuple[_Reflected, _Reflected]:
+    """Return the albedos of a slow grey material and of its lossless form, from one integral over its facets."""
+    given = source.arguments()
+    both = {
+        name: np.array([value, lossless.changes[name]]) for name, value in given.items() if name in lossless.changes
+    }
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        values = source.spec.vectors(wi, wr.reshape(-1, 1, 3), **{**given, **both})
+        return np.asarray(values).reshape(*wr.shape[:-1], 2)
+
+    albedos = [
+        reflected_share(
+            brdf,
+            float(theta),
+            0.0,
+            narrowest(source.lobe(np.asarray(np.cos(theta)), None)),
+            tolerance=TOLERANCE,
+            most_panels=MOST_PANELS,
+            width=2,
+            mirrored=True,
+        )
+        for theta in radians(lights.theta_i_deg)
+    ]
+    columns = np.array([albedo.albedo for albedo in albedos])
+    error = np.array([[float(albedo.error)] for albedo in albedos])
+    own, white = (_Reflected(columns[:, [k]], columns[:, [k]], np.zeros((columns.shape[0], 1)), error) for k in (0, 1))
+    return own, white
+
+
+def _furnace(lossless: Lossless, wavelengths: Axis | None, lights: _Lights, reflected: _Reflected) -> Furnace:
+    """Return the white furnace of a source from the albedos of its lossless form."""
     low, high = (
         np.unravel_index(extreme(reflected.largest), reflected.largest.shape) for extreme in (np.argmin, np.argmax)
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from brdfdb.materials import Source
+from brdfdb.materials import Material, Source
 from brdfdb.parameters import Floats
 from brdfdb.tables import error_measurement
 from brdfdb.tables.albedo import wavelengths_of
@@ -13,7 +13,7 @@ from brdfdb.tables.table import Table
 
 SEED = 1967  # differs from the seeds of build and planner, which the table was fitted to
 # Directions per band of theta_i, half of them in the lobe. Tables with more than `_FEW` wavelengths use fewer, because
-# their wavelengths vary alike
+# their wavelengths vary alike, and so do tables of slow models
 DIRECTIONS, _FEW, _FEWER_DIRECTIONS = 3000, 4, 1000
 
 
@@ -32,7 +32,8 @@ class Pairs(NamedTuple):
 
 def pairs_of(table: Table, source: Source | None) -> Pairs:
     """Return f_r [1/sr] of a table, and of its source if it is known, at all wavelengths of the table."""
-    count = DIRECTIONS if wavelengths_of(table) <= _FEW else _FEWER_DIRECTIONS
+    slow = isinstance(source, Material) and source.spec.slow
+    count = DIRECTIONS if wavelengths_of(table) <= _FEW and not slow else _FEWER_DIRECTIONS
     drawn = error_measurement.draw(table.source if source is None else source, table.wavelength_nm, count, SEED)
     shape = (len(drawn.wi), wavelengths_of(table))
     both = ((drawn.wi, drawn.wr), (drawn.wr, drawn.wi))

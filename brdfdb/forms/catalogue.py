@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.materials import Material, Source
+from brdfdb.materials import Material, Source, exact_material
 from brdfdb.parameters import Floats, FormKind, ModelForm, bytes_of
 from brdfdb.store.family import Family
 from brdfdb.tables import tabulation
@@ -114,7 +114,7 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         itself = Form(key, title, "exact", f"source {source.name}", source.brdf_at(at), 0)
         return [itself, *_tables(source, source, at, tolerances, "table")]
     listed = list(_of_model(source, at))
-    tabulated = _exact(source)
+    tabulated = exact_material(source)
     title = "table" if listed[0].python == f"models.{tabulated.model}" else "table of the fit"
     return [*listed, *_tables(source, tabulated, at, tolerances, title)]
 
@@ -156,23 +156,6 @@ def _single(form: Form) -> Form:
 
 
 # Tables
-
-
-def _exact(material: Material) -> Material:
-    """Return the material whose values charted tables hold, with the exact model if the registry has it.
-
-    Statements about parameters that the exact model lacks are left out.
-    """
-    exact = None if material.spec.exact_model is None else material.spec.exact_model(material.parameters)
-    if exact is None:
-        return material
-    model, parameters = exact
-    stated = {
-        "sources": {name: source for name, source in material.sources.items() if name in parameters},
-        "assumed": {name: assumption for name, assumption in material.assumed.items() if name in parameters},
-        "known_excess": None,  # the known excess belongs to the other model
-    }
-    return material.model_copy(update={"model": model, "parameters": parameters, **stated})
 
 
 def _tables(

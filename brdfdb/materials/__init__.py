@@ -6,6 +6,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from brdfdb.errors import BrdfdbError, sentence_of
+from brdfdb.materials.exact import exact_material
 from brdfdb.materials.function_source import FunctionRecord, FunctionSource
 from brdfdb.materials.material import Material
 from brdfdb.materials.preset_files import PAPERS, libraries, presets
@@ -18,6 +19,7 @@ __all__ = [
     "FunctionSource",
     "Material",
     "Source",
+    "exact_material",
     "libraries",
     "presets",
     "source_of",

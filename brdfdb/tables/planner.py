@@ -63,13 +63,22 @@ class _Task(NamedTuple):
     mixture: Mixture | None
 
 
+class _Final(NamedTuple):
+    """Directions at which finished tables are measured, and f_r there, at all wavelengths."""
+
+    drawn: error_measurement.Draw
+    truth: Floats
+
+
 def check_tolerance(tolerance: float) -> None:
     """Raise a ParameterError if no table is planned for a tolerance."""
     if not 1e-4 <= tolerance <= 0.5:
         raise ParameterError("tolerance", f"{tolerance:g} is outside [0.0001, 0.5]", tolerance, (1e-4, 0.5))
 
 
-def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout:
+def plan(
+    source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: float, *, alike: Source | None = None
+) -> Layout:
     """Return the layout of the smallest table that keeps to a tolerance.
 
     Parameters
@@ -82,6 +91,9 @@ def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: f
         The 99th percentile of the relative error of f_r against the source, at the worst wavelength, over the
         directions of `brdfdb.tables.error_measurement.draw`; in [1e-4, 0.5]. The l1 error keeps to it, too, and each
         band of theta_i to thirty times as much.
+    alike : Source, optional
+        A source that is about as smooth and faster to evaluate, such as a fit of an integral. Its axes are tried, and
+        the finished table is measured against `source`.
 
     Returns
     -------
@@ -102,15 +114,20 @@ def plan(source: Source, wavelength_nm: NDArray[np.float64] | None, tolerance: f
     """
     check_tolerance(tolerance)
     mixture = mixture_of(source, wavelength_nm)
-    task = _task(source, wavelength_nm, tolerance, mixture)
+    planned_on = source if alike is None else alike
+    task = _task(planned_on, wavelength_nm, tolerance, mixture)
     if not task.truth.any():
         return Layout(source, coarsest(source), wavelength_nm, reason="f_r is 0: all light is in the specular part")
     table_kinds = tried = list(_table_kinds(task))
+    final: _Final | None = None
     for stricter in _STRICTER:
         layout = _smallest(task._replace(tolerance=stricter * tolerance), tried)
         if layout is not None:
             tried = [kind for kind in table_kinds if _kind(kind[1]) == _kind(layout)]
-        finished = None if layout is None else _finished(layout, wavelength_nm, tolerance, mixture)
+        finished = None
+        if layout is not None:
+            final = final or _final(source, wavelength_nm)
+            finished = _finished(replace(layout, source=source), final, wavelength_nm, tolerance, mixture)
         if finished is not None:
             return replace(finished, reason=_reason(finished, tolerance, table_kinds))
     raise ParameterError(
@@ -310,12 +327,16 @@ def _refined(task: _Task, layout: Layout, needs: dict[str, Need], most: float) -
     return best
 
 
+def _final(source: Source, wavelength_nm: NDArray[np.float64] | None) -> _Final:
+    drawn = error_measurement.draw(source, wavelength_nm, _FINAL_DRAWS, _SEED + 1)
+    return _Final(drawn, error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr))
+
+
 def _finished(
-    layout: Layout, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
+    layout: Layout, final: _Final, wavelength_nm: NDArray[np.float64] | None, tolerance: float, mixture: Mixture | None
 ) -> Layout | None:
     """Return the layout at all wavelengths, with as few coefficients and bits as the error allows; None if none do."""
-    drawn = error_measurement.draw(layout.source, wavelength_nm, _FINAL_DRAWS, _SEED + 1)
-    truth = error_measurement.model_values(layout.source, wavelength_nm, drawn.wi, drawn.wr)
+    drawn, truth = final
     goal = _MARGIN * tolerance
     reason = f"the smallest of those tried that keep 99 of 100 values within {tolerance:g} of the model, relative"
     spectra = None if mixture is None else mixture.spectra

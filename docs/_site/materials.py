@@ -158,6 +158,16 @@ def _assumption(name: str, assumed: Assumption) -> str:
     return " ".join(lines) + "\n"
 
 
+def _formula(stored: Table) -> str:
+    """Return the error of the formula of a table against the highest rung of its surface."""
+    error = stored.metadata.formula_error
+    if error is None:
+        return "not measured"
+    if error.against != "measured":
+        return plain(error.in_words())
+    return f"**{terminal.error(error.p99)} of f_r** in 99 of 100 directions, {plain(error.in_words())}"
+
+
 def _table(stored: Table) -> str:
     """Return the axes of a table and its stated error."""
     rows = [
@@ -175,12 +185,16 @@ def _table(stored: Table) -> str:
     metadata = stored.metadata
     rows.append(("values", f"{stored.values.size}, with {metadata.bits} of 23 bits of the mantissa"))
     rows.append((r"f\_r", f"`{metadata.reconstruction}`"))
+    formula = f"{metadata.model_title}, {metadata.model_equation}"
+    rows.append(("formula", plain(formula)))
     error = stored.error
     assert error is not None
     overall = error.overall
     stated = f"{terminal.error(overall.p99)} of f_r in 99 of 100 of {error.directions} directions"
-    rows.append(("stated error", f"**{stated}** (median {overall.median:.2g}, largest {overall.max:.2g})"))
-    parts = [table(("axis or quantity", "stored"), rows)]
+    rows.append(("error of the table", f"**{stated}** (median {overall.median:.2g}, largest {overall.max:.2g})"))
+    largest = "" if error.worst is None else f" The largest: {plain(error.worst.why)}."
+    rows.append(("error of the formula", _formula(stored)))
+    parts = [table(("axis or quantity", "stored"), rows), f"{largest}\n"]
     bands = [f"{low:g} to {high:g}" for low, high in itertools.pairwise(error.theta_i_deg)]
     worst = [f"{max(row):.2g}" for row in error.p99]
     parts.append("Stated error by band of theta\\_i, in degrees, at the worst wavelength:\n")

@@ -26,7 +26,7 @@ from pydantic import (
 )
 
 from brdfdb.errors import MaterialError, ParameterError, sentence_of
-from brdfdb.materials import PAPERS, Material, presets, written_name
+from brdfdb.materials import PAPERS, Material, exact_material, presets, written_name
 from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
@@ -164,13 +164,17 @@ class Grids(BaseModel):
 
 @dataclass(frozen=True)
 class Job:
-    """One table to build: on a grid, or to a tolerance, of which one is None; `family` says what it is a member of."""
+    """One table to build: on a grid, or to a tolerance, of which one is None; `family` says what it is a member of.
+
+    `planned_on` has the formula that the model of `material` is the exact form of. It plans the axes faster.
+    """
 
     material: Material
     wavelength_nm: NDArray[np.float64] | None
     grid: Grid | None
     tolerance: float | None
     interpolation: str = "linear"
+    planned_on: Material | None = None
     family: Mapping[str, Any] | None = None
 
     def layout(self) -> Layout:
@@ -181,7 +185,7 @@ class Job:
             how = Interpolation(method, logarithm, offset)
             return Layout(self.material, self.grid, self.wavelength_nm, interpolation=how)
         assert self.tolerance is not None
-        return plan(self.material, self.wavelength_nm, self.tolerance)
+        return plan(self.material, self.wavelength_nm, self.tolerance, alike=self.planned_on)
 
     def check(self) -> None:
         """Raise the ParameterError that `layout` would raise for what does not suit the material."""
@@ -195,8 +199,10 @@ class Job:
     def request(self) -> dict[str, Any]:
         """Everything that decides the table, ready for JSON: the same request makes the same table."""
         member = {} if self.family is None else {"family": dict(self.family)}
+        alike = {} if self.planned_on is None else {"planned_on": self.planned_on.document()}
         return {
             **member,
+            **alike,
             "table_version": TABLE_VERSION,
             **self.material.document(),
             "wavelength_nm": None if self.wavelength_nm is None else self.wavelength_nm.tolist(),
@@ -227,6 +233,10 @@ class Recipe(BaseModel):
     interpolation: Literal["linear", "cubic", "log-linear", "log-cubic"] | None = Field(
         default=None, description="between the nodes of grids, of f_r or of its logarithm; by default linear"
     )
+    forms: Literal["exact", "paper"] = Field(
+        default="paper",
+        description="exact: tabulate the integral that a formula approximates, if there is one, except of families",
+    )
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
     sweep: dict[str, dict[str, Any]] = Field(
         default={}, description="families of materials: written like a material, with lists as values of parameters"
@@ -250,7 +260,8 @@ class Recipe(BaseModel):
         grids = {name: self._grid(grid, name) for name, grid in given.items()}
         wavelengths = self._wavelengths()
         jobs = []
-        for material, family in self._selected():
+        for named, family in self._selected():
+            material = exact_material(named) if self.forms == "exact" and family is None else named
             wavelength_nm = None
             if material.spectral:
                 stated = material.wavelengths_nm
@@ -261,7 +272,11 @@ class Recipe(BaseModel):
             kind = "anisotropic" if material.anisotropic else "spectral" if several else "isotropic"
             if self.grids is not None and kind not in grids:
                 raise RecipeError(f"grids.{kind}", f"is missing; {material.name} needs it")
-            job = Job(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear", family)
+            job = Job(
+                *(material, wavelength_nm, grids.get(kind), self.tolerance, self.interpolation or "linear"),
+                planned_on=None if material is named or self.tolerance is None else named,
+                family=family,
+            )
             try:
                 job.check()
             except ParameterError as error:

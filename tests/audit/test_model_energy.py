@@ -13,6 +13,7 @@ import scipy.optimize
 
 from brdfdb import fresnel
 from brdfdb.audit import energy as joined
+from brdfdb.audit import model_energy
 from brdfdb.audit.excess import published_excess
 from brdfdb.audit.model_energy import BOUND_TOLERANCE, TOLERANCE, EnergyVerdict, ModelEnergy, model_energy_of
 from brdfdb.audit.table_energy import TableEnergy
@@ -337,6 +338,17 @@ def test_bounds_of_many_surfaces_at_once_are_those_of_each() -> None:
     assert found is not None
     assert found.keeps
     np.testing.assert_allclose(np.array(found.largest, dtype=float), together, atol=BOUND_TOLERANCE)
+
+
+def test_a_slow_model_and_its_furnace_from_one_integral_have_the_same_albedos() -> None:
+    facets = material("oren_nayar_gaussian", {"rho": 0.7, "sigma_deg": 30})
+    lights = model_energy._Lights(np.array([0.0, 60.0]), np.zeros(2))
+    assert facets.lossless is not None
+    together = model_energy._reflected_together(facets, facets.lossless, lights)
+    for both, alone in zip(together, (facets, facets.lossless.source), strict=True):
+        expected = model_energy._reflected(alone, None, lights)
+        np.testing.assert_allclose(both.largest, expected.largest, atol=TOLERANCE)
+        np.testing.assert_allclose(both.mean, expected.mean, atol=TOLERANCE)
 
 
 # Model and table together

@@ -48,6 +48,39 @@ def test_every_preset_is_a_job_of_the_default_recipe() -> None:
             assert job.wavelength_nm.tolist() == wavelengths.tolist()
 
 
+def test_the_default_recipe_tabulates_facets_where_the_paper_prints_a_fit(tmp_path: Path) -> None:
+    named = {name for name, material in presets().items() if material.model == "oren_nayar"}
+    jobs = {job.material.name: job for job in load().jobs()}
+    assert {name for name, job in jobs.items() if job.planned_on is not None} == named
+    vase = jobs["clay-vase"]
+    assert vase.material.model == "oren_nayar_gaussian"
+    assert vase.planned_on == presets()["clay-vase"]
+    assert vase.request["planned_on"]["material"]["model"] == "oren_nayar"
+    assert {job.material.model for name, job in jobs.items() if name not in named} == {
+        *("ward", "lambert", "he_torrance", "oren_nayar_body_surface")
+    }
+    (fit,) = load(recipe_of(tmp_path, 'materials = ["clay-vase"]\ntolerance = 0.1\n')).jobs()
+    assert (fit.material, fit.planned_on) == (presets()["clay-vase"], None)
+    assert "planned_on" not in fit.request
+    with pytest.raises(RecipeError, match="forms: "):
+        load(recipe_of(tmp_path, 'materials = ["clay-vase"]\ntolerance = 0.1\nforms = "best"\n'))
+
+
+def test_members_of_a_family_keep_their_formula(tmp_path: Path) -> None:
+    sweep = """
+materials = ["rough"]
+tolerance = 0.1
+forms = "exact"
+[sweep.rough]
+title = "Rough"
+model = "oren_nayar"
+source = "a sweep"
+parameters = { rho = 0.5, sigma_deg = [10, 20] }
+"""
+    jobs = load(recipe_of(tmp_path, sweep)).jobs()
+    assert [(job.material.model, job.planned_on) for job in jobs] == [("oren_nayar", None)] * 2
+
+
 @pytest.mark.parametrize("grids", [True, False], ids=["both", "neither"])
 def test_a_recipe_names_either_a_tolerance_or_grids(tmp_path: Path, grids: bool) -> None:
     text = "tolerance = 0.01\n" + GOOD if grids else GOOD[: GOOD.index("[grids")]
