@@ -31,7 +31,7 @@ from brdfdb.errors import (
 )
 from brdfdb.parameters import Parameter
 from brdfdb.scenes.choice import InfeasibleError
-from brdfdb_pipelines.recipe_file import RecipeError
+from brdfdb_pipelines.recipe_grids import RecipeError
 from brdfdb_pipelines.scene_file import SceneError
 
 RECIPE_ERROR = RecipeError("grids.isotropic.theta_i_deg", "must start at 0")

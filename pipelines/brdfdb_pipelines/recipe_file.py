@@ -15,13 +15,9 @@ from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BaseModel,
-    ConfigDict,
-    Discriminator,
     FailFast,
     Field,
     PrivateAttr,
-    Tag,
-    TypeAdapter,
     ValidationError,
 )
 
@@ -33,133 +29,12 @@ from brdfdb.tables.grids import Axis, Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, plan
 from brdfdb_pipelines import preset_names, toml_file
+from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
 
-_STRICT = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
-_MOST_NODES = 100_000  # of an axis: far above any that is used, far below what fills the memory
 _MOST_VALUES = 1 << 36  # of a table: 275 GB
 _MOST_PATTERNS = 10_000  # each is compared with every name
 _MOST_MEMBERS = 100_000  # of all families of a recipe
 _MOST_SWEPT = 6  # parameters of a family: a lookup is made of two members for each, 64 in all
-
-
-class RecipeError(ParameterError):
-    """A recipe that cannot be built; `parameter` is its field, with the tables around it, and may be "".
-
-    Attributes
-    ----------
-    file : str
-        Path of the recipe; "" of a recipe that was not read from a file.
-    """
-
-    file = ""
-
-    def __str__(self) -> str:
-        return ": ".join(part for part in (self.file, self.parameter, self.sentence) if part)
-
-
-class Range(BaseModel):
-    """Equally spaced numbers from start to stop, both included."""
-
-    model_config = _STRICT
-
-    start: float
-    stop: float
-    step: float = Field(gt=0.0)
-
-    def nodes(self, name: str) -> Axis:
-        """Return the numbers; RecipeError if the step does not lead from start to stop."""
-        count = (self.stop - self.start) / self.step
-        if count >= _MOST_NODES:
-            raise RecipeError(name, f"steps of {self.step:g} make more than the {_MOST_NODES} nodes an axis may have")
-        if not count >= 0.0 or abs(count - round(count)) > 1e-6:
-            raise RecipeError(name, f"steps of {self.step:g} from {self.start:g} do not end at {self.stop:g}")
-        return np.linspace(self.start, self.stop, round(count) + 1)
-
-
-# FailFast: pydantic would keep two errors for each wrong number
-Nodes = Annotated[list[float | Range], FailFast(), Field(min_length=1, max_length=_MOST_NODES)]
-_VALUES: TypeAdapter[list[float | Range]] = TypeAdapter(Nodes, config=ConfigDict(strict=True, allow_inf_nan=False))
-
-
-def _nodes(name: str, parts: list[float | Range]) -> Axis:
-    """Return the numbers of a list with ranges; RecipeError if there are more than an axis may have."""
-    pieces, count = [], 0
-    for part in parts:
-        pieces.append(part.nodes(name) if isinstance(part, Range) else np.array([part]))
-        count += pieces[-1].size
-        if count > _MOST_NODES:
-            raise RecipeError(name, f"the list makes more than the {_MOST_NODES} nodes an axis may have")
-    return np.concatenate(pieces)
-
-
-class IsotropicGrid(BaseModel):
-    """Axes of a table of an isotropic material."""
-
-    model_config = _STRICT
-
-    theta_i_deg: Nodes
-    theta_r_deg: Nodes
-    delta_phi_deg: Nodes
-
-
-class AnisotropicGrid(BaseModel):
-    """Axes of a table of an anisotropic material."""
-
-    model_config = _STRICT
-
-    theta_i_deg: Nodes
-    phi_i_deg: Nodes
-    theta_r_deg: Nodes
-    phi_r_deg: Nodes
-
-
-class HalfDifferenceGrid(BaseModel):
-    """Axes of half and difference vectors, of a table of an isotropic material."""
-
-    model_config = _STRICT
-
-    theta_h_deg: Nodes
-    theta_d_deg: Nodes
-    phi_d_deg: Nodes
-
-
-class AnisotropicHalfDifferenceGrid(BaseModel):
-    """Axes of half and difference vectors, of a table of an anisotropic material."""
-
-    model_config = _STRICT
-
-    theta_h_deg: Nodes
-    phi_h_deg: Nodes
-    theta_d_deg: Nodes
-    phi_d_deg: Nodes
-
-
-def _meant(grid: Any) -> str:
-    """Return the kind of grid that a table of a recipe is meant to be."""
-    half = isinstance(grid, BaseModel | dict) and "theta_h_deg" in (grid if isinstance(grid, dict) else dict(grid))
-    return "half" if half else "plain"
-
-
-AnyIsotropicGrid = Annotated[
-    Annotated[IsotropicGrid, Tag("plain")] | Annotated[HalfDifferenceGrid, Tag("half")], Discriminator(_meant)
-]
-AnyAnisotropicGrid = Annotated[
-    Annotated[AnisotropicGrid, Tag("plain")] | Annotated[AnisotropicHalfDifferenceGrid, Tag("half")],
-    Discriminator(_meant),
-]
-
-
-class Grids(BaseModel):
-    """The grid for each kind of material, over light and viewer or over half and difference vectors.
-
-    A kind of which the recipe has no material may be left out.
-    """
-
-    model_config = _STRICT
-
-    isotropic: AnyIsotropicGrid | None = None
-    spectral: AnyIsotropicGrid | None = None
-    anisotropic: AnyAnisotropicGrid | None = None
 
 
 @dataclass(frozen=True)
@@ -216,7 +91,7 @@ class Job:
 class Recipe(BaseModel):
     """A recipe file. Angles are degrees, wavelengths nanometres."""
 
-    model_config = _STRICT
+    model_config = STRICT
 
     title: str = ""
     materials: Annotated[list[str], FailFast()] = Field(
@@ -289,14 +164,14 @@ class Recipe(BaseModel):
         if not self.wavelengths_nm:
             return None
         try:
-            return check_wavelengths(_nodes("wavelengths_nm", self.wavelengths_nm))
+            return check_wavelengths(nodes_of("wavelengths_nm", self.wavelengths_nm))
         except ParameterError as error:
             raise RecipeError(error.parameter, error.sentence) from None
 
     def _grid(self, grid: BaseModel, name: str) -> Grid:
         parts: dict[str, list[float | Range]] = dict(grid)
         try:
-            axes = {field.removesuffix("_deg"): _nodes(field, nodes) for field, nodes in parts.items()}
+            axes = {field.removesuffix("_deg"): nodes_of(field, nodes) for field, nodes in parts.items()}
         except RecipeError as error:
             raise RecipeError(f"grids.{name}.{error.parameter}", error.sentence) from None
         try:
@@ -377,11 +252,11 @@ def _swept(name: str, table: Mapping[str, Any]) -> dict[str, list[float]]:
     axes = {}
     for x in sorted(lists, key=lambda x: known.index(x) if x in known else len(known)):
         try:
-            parts = _VALUES.validate_python(lists[x])
+            parts = LIST.validate_python(lists[x])
         except ValidationError as error:
             field, message = _first(error)
             raise RecipeError(f"{where}.{x}{field and f'.{field}'}", message) from None
-        values = [float(f"{value:.12g}") for value in _nodes(f"{where}.{x}", parts)]  # 0.3, not 0.1 + 0.1 + 0.1
+        values = [float(f"{value:.12g}") for value in nodes_of(f"{where}.{x}", parts)]  # 0.3, not 0.1 + 0.1 + 0.1
         if len(values) < 2:
             raise RecipeError(f"{where}.{x}", "needs a list of at least two values")
         if not all(low < high for low, high in itertools.pairwise(values)):

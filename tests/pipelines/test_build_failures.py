@@ -23,7 +23,8 @@ from brdfdb.tables.layout import Layout
 from brdfdb_pipelines import cli
 from brdfdb_pipelines.build import build
 from brdfdb_pipelines.exit_codes import BUG
-from brdfdb_pipelines.recipe_file import Recipe, RecipeError, load
+from brdfdb_pipelines.recipe_file import Recipe, load
+from brdfdb_pipelines.recipe_grids import RecipeError
 from tests.pipelines.a_build import Captured, OneByOne, changed, failing, staged, states
 
 # What cannot be built

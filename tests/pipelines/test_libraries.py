@@ -11,7 +11,8 @@ import pytest
 import brdfdb
 from brdfdb.materials import PAPERS, libraries, presets
 from brdfdb_pipelines.preset_names import recipe_of
-from brdfdb_pipelines.recipe_file import RecipeError, load
+from brdfdb_pipelines.recipe_file import load
+from brdfdb_pipelines.recipe_grids import RecipeError
 from tests.pipelines.command import Captured, run
 
 # A few tables that build in seconds: a metal and a glass, at few wavelengths

@@ -14,7 +14,8 @@ from brdfdb.materials import Material, presets
 from brdfdb.tables.grids import HALF_DIFFERENCE_AXES
 from brdfdb.tables.layout import digest
 from brdfdb.tables.planner import PLAN_VERSION
-from brdfdb_pipelines.recipe_file import Range, RecipeError, load
+from brdfdb_pipelines.recipe_file import load
+from brdfdb_pipelines.recipe_grids import Range, RecipeError
 from tests.pipelines.recipes import DEFINED, GOOD, SWEPT, isotropic
 
 # What the fields do
