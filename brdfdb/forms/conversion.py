@@ -21,9 +21,9 @@ from brdfdb.forms.conversion_measurement import (
     worst_view,
 )
 from brdfdb.forms.conversion_nodes import COARSE, FINER, FITTED, WEIGHS, Nodes, Weigh, specular_of
-from brdfdb.forms.conversion_remarks import remarks
+from brdfdb.forms.conversion_remarks import is_lost, remarks, with_highlight
+from brdfdb.forms.conversion_search import REFUSED, Distance, Result, search
 from brdfdb.forms.conversion_search import STEPS as _SEARCH_STEPS
-from brdfdb.forms.conversion_search import Distance, Result, search
 from brdfdb.forms.conversion_target import Target
 from brdfdb.geometry import degrees
 from brdfdb.integrals.pairs import Counts, Symmetry
@@ -40,7 +40,7 @@ SEARCHED = 5  # wavelengths at most at which shared parameters are searched
 ASSUMED_NM = 550.0  # wavelength of the n and k that are searched for a grey source
 DIGITS = 6  # significant digits of the parameters; what is left is measured with these
 _ZERO = 1e-12  # parameters that are not larger are 0
-STEPS = _SEARCH_STEPS + 1  # calls of `tick` in a conversion
+STEPS = _SEARCH_STEPS  # calls of `tick` in a conversion
 
 
 def convert(
@@ -50,7 +50,7 @@ def convert(
     *,
     fixed: Mapping[str, float] | None = None,
     refractive_index: str | None = None,
-    weigh: Weigh = "light",
+    weigh: Weigh | None = None,
     tick: Callable[[], None] = lambda: None,
 ) -> Conversion:
     """Search the parameters of a model that come closest to a source, and measure the error that is left.
@@ -70,8 +70,8 @@ def convert(
         For a model with n and k, the entry ``shelf/book/page`` that has them, or "fit". By default it is the entry of
         the source. Without one, n and k are searched.
     weigh : {"light", "lightness"}
-        What the search makes least: l1, or the root mean square difference of cube roots of f_r, with the same cosines,
-        as the eye weighs light. The latter keeps a highlight that carries little of the light.
+        What the search makes least: l1; or the root mean square difference of cube roots of f_r, with the same cosines,
+        of lobes half to twice as wide. By default it is l1, unless that loses the highlight and cube roots keep it.
     tick : callable
         A function that is called `STEPS` times at most, to show progress.
 
@@ -83,8 +83,8 @@ def convert(
     Raises
     ------
     ParameterError
-        If the model is that of the source or unknown, if n and k would have to be searched at several wavelengths, if
-        a fixed parameter is unknown or out of range, or if the source reflects nothing.
+        If the model is that of the source or unknown, if n and k would be searched at several wavelengths, if a fixed
+        parameter is not allowed, or if the source reflects nothing.
 
     Notes
     -----
@@ -95,18 +95,15 @@ def convert(
     over all lights and viewers above the horizon: the light in the wrong place under light from everywhere, counted
     where it is missing and where it is too much. It is 0 for the same surface, and 2 for one that reflects as much to
     other places alone. Specular parts (Dirac deltas) count with their reflectance, abs(S_g - S_f). Of several
-    wavelengths it is the mean. The mean square would follow the largest values, next to grazing, and give up the
-    uniform part of brass; a specular part has none. l1 has a price, too: a highlight with a few hundredths of the light
-    may go, if the model cannot put it right. `Conversion.peak` shows that.
+    wavelengths it is the mean. The mean square would follow the largest values, next to grazing, and a specular part
+    has none. l1 has a price, too: a highlight with a few hundredths of the light may go.
 
     All numbers of the model are searched within their ranges, as in `brdfdb.forms.conversion_search`. A reflectance has
     a value at each wavelength; the others are shared, and searched at five wavelengths. Switches keep their defaults.
-    An isotropic source gives one alpha. n and k are searched as the reflectance at normal incidence, which the light
-    fixes well, and the place between the two n of k = 0, which matters little: `Conversion.as_good` shows that.
-
-    Integrals are sums at nodes that follow the lobe of the source (`brdfdb.integrals.pairs`). The stated l1 is measured
-    at five times as many nodes as the search has, or more. `Conversion.quadrature` is the difference of the two.
-    `brdfdb.roughness` has the conversions that are exact.
+    An isotropic source gives one alpha. n and k are searched as the reflectance at normal incidence and a place between
+    the two n of k = 0, which matters little: `Conversion.as_good` shows that. Integrals are sums at nodes that follow
+    the lobe of the source (`brdfdb.integrals.pairs`). The stated l1 is measured at more than five times as many nodes;
+    `Conversion.quadrature` is the difference. `brdfdb.roughness` has the conversions that are exact.
 
     References
     ----------
@@ -119,10 +116,13 @@ def convert(
     >>> round(brass.parameters["alpha_x"], 2), round(brass.l1, 2)
     (0.05, 0.14)
     """
-    request = _request(source, model, wavelength_nm, fixed or {}, refractive_index, weigh)
-    fit = _searched(request, tick)
-    tick()
-    return _measured(request, fit)
+    request = _request(source, model, wavelength_nm, fixed or {}, refractive_index, weigh or "light")
+    least = _measured(request, _searched(request, tick))
+    if weigh is not None or MODELS[model].lobe is None or not is_lost(source, least):
+        return least
+    request = request._replace(weigh="lightness")
+    other = _measured(request, _searched(request, tick))
+    return least if is_lost(source, other) else with_highlight(other, least)
 
 
 class Difference(NamedTuple):
@@ -258,11 +258,15 @@ def _searched(request: _Request, tick: Callable[[], None]) -> _Fit:
     some = None if request.before is None else request.before[columns]
     lobe = lobe_of(source, some)
     coarse, fitted = (_nodes(request, lobe, counts, some) for counts in (COARSE, request.counts))
-    result = search(target, coarse, fitted, columns, _alpha(lobe), tick)
+    result = search(target, coarse, fitted, columns, _alphas(lobe), tick)
+    if result.distance >= REFUSED:
+        raise ParameterError(
+            "fixed", f"the lobe of {target.spec.name} is then less than a quarter as wide as that of {source.name}"
+        )
     if target.count == columns.size and not target.colours:
         return _Fit(result, np.zeros((target.count, 0)), fitted)
     nodes = _nodes(request, lobe, request.counts, request.before)
-    every = Distance(target, nodes, np.arange(target.count, dtype=np.int64))
+    every = Distance(target, nodes, np.arange(target.count, dtype=np.int64), _alphas(lobe))
     ends = [every.of_column(result.numbers, column, column)[1] for column in range(target.count)]
     return _Fit(result, np.stack(ends), nodes)
 
@@ -281,10 +285,10 @@ def _nodes(
     return nodes
 
 
-def _alpha(lobe: Callable[[Array], Lobe | None]) -> float:
-    """Return the width [1] of a lobe at normal incidence, at the wavelength where it is narrowest; nan without one."""
+def _alphas(lobe: Callable[[Array], Lobe | None]) -> Array:
+    """Return the widths (2,) of a lobe at normal incidence, where a wavelength is narrowest; nan without one."""
     normal = lobe(np.asarray(1.0))
-    return np.nan if normal is None else float(np.sqrt(np.min(normal.alpha_x) * np.min(normal.alpha_y)))
+    return np.full(2, np.nan) if normal is None else np.array([np.min(normal.alpha_x), np.min(normal.alpha_y)])
 
 
 # What is left

@@ -73,20 +73,28 @@ class Nodes:
         self.specular = np.zeros((self.theta.size, columns)) if mirror is None else mirror(self.theta)
         self.total = self.weight @ self.truth + self.theta_weight @ self.specular
 
-        self.roots = np.cbrt(self.truth) if weigh == "lightness" else None
+        # A column at a time is compared: columns that are contiguous take half of the time
+        self.columns = list(np.ascontiguousarray(np.cbrt(self.truth.T) if weigh == "lightness" else self.truth.T))
+        self.size = [_sum(self.weight, column * column) for column in self.columns]
 
     def distance(self, column: int, values: Floats, specular: Floats | None) -> float:
         """Return the distance [1] of f_r (N,) and of a specular part (V,) from one column of the truth.
 
-        Of light it is l1, with specular parts. Of lightness it is the root mean square difference of cube roots,
-        relative to the root mean square of those of the truth, without specular parts.
+        Of light it is l1. Of lightness it is the root mean square difference of cube roots, relative to the root mean
+        square of those of the truth. Specular parts add the share of the light by which they differ.
         """
-        if self.roots is not None:
-            root = self.roots[:, column]
-            return float(np.sqrt(self.weight @ (np.cbrt(values) - root) ** 2 / (self.weight @ (root * root))))
         left = self.specular[:, column] if specular is None else np.abs(specular - self.specular[:, column])
-        wrong = self.weight @ np.abs(values - self.truth[:, column]) + self.theta_weight @ left
-        return float(wrong / self.total[column])
+        mirrored = _sum(self.theta_weight, left) / self.total[column]
+        if self.weigh == "lightness":
+            difference = np.cbrt(values) - self.columns[column]
+            return float(np.sqrt(_sum(self.weight, difference * difference) / self.size[column]) + mirrored)
+        difference = values - self.columns[column]
+        return float(_sum(self.weight, np.abs(difference, out=difference)) / self.total[column] + mirrored)
+
+
+def _sum(weight: Floats, values: Floats) -> float:
+    """Return a weighted sum. A BLAS would wait for its threads, and sum in an order of its own."""
+    return float(np.einsum("i,i->", weight, values))
 
 
 class Left:

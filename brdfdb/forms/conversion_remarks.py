@@ -12,6 +12,20 @@ _LOST = 0.5  # share of the peak below which a highlight is lost
 _UNSURE = 0.01  # error of l1, relative to l1, that is worth a sentence
 
 
+def is_lost(source: Source, conversion: Conversion) -> bool:
+    """Return True if a lobe of the source has less than half of its peak in the model."""
+    return source.has_lobe and conversion.peak.after < _LOST * conversion.peak.before
+
+
+def with_highlight(conversion: Conversion, least: Conversion) -> Conversion:
+    """Return a conversion that keeps the highlight, with a sentence on the one with the least l1, which loses it."""
+    sentence = (
+        f"Cube roots of f_r were compared, because the least l1, {percent(least.l1)}, is without the highlight: f_r in "
+        f"the mirror direction at {least.peak.theta_deg:g} degrees is {least.peak.after:.3g} /sr there."
+    )
+    return conversion.model_copy(update={"remarks": [sentence, *conversion.remarks]})
+
+
 def remarks(source: Source, conversion: Conversion) -> list[str]:
     """Return sentences on parts of the source that the model lacks, a lost highlight, and an inexact l1."""
     spec, made = MODELS[conversion.model], conversion.material
@@ -32,11 +46,11 @@ def remarks(source: Source, conversion: Conversion) -> list[str]:
             )
     if source.anisotropic and not made.anisotropic:
         sentences.append(f"{source.name} is anisotropic; {made.name} is not.")
-    peak = conversion.peak
-    if conversion.weigh == "light" and source.has_lobe and peak.after < _LOST * peak.before:
+    if is_lost(source, conversion):
+        peak = conversion.peak
         sentences.append(
             f"The highlight is lost: f_r in the mirror direction at {peak.theta_deg:g} degrees falls from "
-            f"{peak.before:.3g} to {peak.after:.3g} /sr. Weighing lightness instead of light keeps it."
+            f"{peak.before:.3g} to {peak.after:.3g} /sr. Fix reflectance and width to keep one."
         )
     if conversion.quadrature > _UNSURE * conversion.l1:
         sentences.append(f"l1 is known to within {percent(conversion.quadrature)} of the light.")

@@ -24,8 +24,11 @@ STEPS = 1 + 2 * BEGINNINGS  # calls of `tick` in a search, at most
 _COARSE, _FINE = 1e-4, 1e-7  # tolerances of simplexes at coarse and at all nodes
 _COLOURS = 1e-6  # tolerance of the simplexes of colours, below that of the shared parameters
 _PROMISING = 1.03  # times the least distance at coarse nodes: the nodes themselves change less
+REFUSED = 1e9  # distance of parameters that are not tried
 # Lobes narrower than this, relative to the lobe that nodes follow, are not tried: nodes would miss them
 _NARROWEST = 0.25
+# Widths of lobes, relative to that of the source, that are tried where lightness is weighed, to keep a highlight
+_SAME_HIGHLIGHT = 0.5, 2.0
 # Share by which the distance rises, at most four times less, from the middle of ranges to their ends. It decides where
 # nothing else does, as between surfaces of He and Torrance with the same slopes
 _LOOSE = 1e-3
@@ -59,24 +62,28 @@ class Distance:
     The colours of each column are searched inside, from where the last search ended.
     """
 
-    def __init__(self, target: Target, nodes: Nodes, columns: NDArray[np.int64], alpha: float = math.nan) -> None:
+    def __init__(self, target: Target, nodes: Nodes, columns: NDArray[np.int64], alphas: Array) -> None:
         self.target, self.nodes, self.columns = target, nodes, columns
-        self.narrowest = _NARROWEST * (WIDTHS[1] if math.isnan(alpha) else alpha)
+        free = not set(target.spec.lobe_axes or ()) & set(target.fixed)
+        low, high = _SAME_HIGHLIGHT if nodes.weigh == "lightness" and free else (_NARROWEST, np.inf)
+        self.narrowest = low * np.where(np.isnan(alphas), WIDTHS[1], alphas)
+        self.widest = high * np.where(np.isnan(alphas), np.inf, alphas)
         self.loose = np.array([variable.loose for variable in target.shape], dtype=bool)
         self.colours = np.full((columns.size, len(target.colours)), 0.5)
         self.record: list[tuple[float, dict[str, float]]] = []
 
     def __call__(self, shape: Array) -> float:
-        """Return the distance [1], with a trifle for loose variables; infinity where nodes do not resolve the lobe."""
+        """Return the distance [1], with a trifle for loose variables; `REFUSED` where nodes do not resolve the lobe."""
         numbers = self.target.numbers(shape)
-        if self.target.lobe_alpha(numbers) < self.narrowest:
-            return math.inf
+        widths = self.target.lobe_alphas(numbers)
+        if np.any((widths < self.narrowest) | (widths > self.widest)):
+            return REFUSED
         total = 0.0
         for row, column in enumerate(self.columns.tolist()):
             best, self.colours[row] = self.of_column(numbers, row, column)
             total += best
         mean = total / self.columns.size
-        mean = mean if math.isfinite(mean) else math.inf
+        mean = min(mean, REFUSED) if math.isfinite(mean) else REFUSED
         mean *= 1.0 + _LOOSE * float(np.mean((shape[self.loose] - 0.5) ** 2)) if self.loose.any() else 1.0
         self.record.append((mean, numbers))
         return mean
@@ -103,7 +110,7 @@ class Distance:
 
 
 def search(
-    target: Target, coarse: Nodes, fitted: Nodes, columns: NDArray[np.int64], alpha: float, tick: Callable[[], None]
+    target: Target, coarse: Nodes, fitted: Nodes, columns: NDArray[np.int64], alphas: Array, tick: Callable[[], None]
 ) -> Result:
     """Search the shared parameters.
 
@@ -115,8 +122,8 @@ def search(
         The truth at few nodes, for many sets of parameters, and at those of the last descents.
     columns : array of int
         Wavelengths of the target in the columns of both.
-    alpha : float [1]
-        Width of the lobe of the source; nan for a diffuse one.
+    alphas : array (2,) [1]
+        Widths of the lobe of the source along x and y; nan for a diffuse one.
     tick : callable
         A function that is called `STEPS` times.
 
@@ -127,17 +134,17 @@ def search(
 
     Notes
     -----
-    Points are spread evenly over the ranges of the parameters. Those whose lobe is most nearly as wide as that of the
-    source are tried at coarse nodes. Simplexes begin at the best three that are not near each other, and go downhill
-    at coarse nodes. Ends within 3 % of the best go on, twice, at all nodes: the second time with new edges, in case
-    that the first collapsed.
+    Points are spread evenly over the ranges of the parameters. The first of them, and those whose lobe is most nearly
+    as wide as that of the source, are tried at coarse nodes. Simplexes begin at the best three that are not near each
+    other, and go downhill at coarse nodes. Ends within 3 % of the best go on, twice, at all nodes: the second time with
+    new edges, in case that the first collapsed.
     """
-    distances = Distance(target, coarse, columns, alpha), Distance(target, fitted, columns, alpha)
+    distances = Distance(target, coarse, columns, alphas), Distance(target, fitted, columns, alphas)
     steps = np.array([variable.step for variable in target.shape])
     if not target.shape:
         distances[1](np.zeros(0))
         return _result(distances)
-    points = _beginnings(target, alpha)
+    points = _beginnings(target, alphas)
     values = np.array([distances[0](point) for point in points])
     tick()
     starts = []
@@ -155,19 +162,25 @@ def search(
 
 def _result(distances: tuple[Distance, Distance]) -> Result:
     record = distances[1].record
+    if not record:
+        return Result({}, REFUSED, {}, 0)
     best, numbers = min(record, key=lambda entry: entry[0])
     near = [entry[1] for entry in record if entry[0] <= _AS_GOOD * best]
     ranges = {name: (min(one[name] for one in near), max(one[name] for one in near)) for name in numbers}
     return Result(numbers, best, ranges, sum(len(distance.record) for distance in distances))
 
 
-def _beginnings(target: Target, alpha: float) -> Array:
-    """Return points of the unit cube to try: of those spread over it, the ones whose lobe is about as wide."""
+def _beginnings(target: Target, alphas: Array) -> Array:
+    """Return points of the unit cube to try, spread over it: half of them any, half those whose lobe is as wide."""
     points = spread(SPREAD, len(target.shape))
     tried = FEW_TRIED if target.spec.slow else TRIED
-    if target.spec.lobe is None or math.isnan(alpha):
+    if target.spec.lobe is None or np.isnan(alphas).any():
         return points[:tried]
     with np.errstate(all="ignore"):  # a lobe of extreme parameters may be no number
-        widths = np.array([target.lobe_alpha(target.numbers(point)) for point in points])
-        off = np.abs(np.log(widths / alpha))
-    return points[np.argsort(np.where(np.isfinite(off), off, np.inf), kind="stable")[:tried]]
+        widths = np.array([target.lobe_alphas(target.numbers(point)) for point in points])
+        off = np.abs(np.log(widths / alphas)).sum(axis=1)
+    nearest = np.argsort(np.where(np.isfinite(off), off, np.inf), kind="stable")
+    # A highlight may best be left out, by a lobe of another width
+    wide = np.flatnonzero(np.all(widths >= _NARROWEST * alphas, axis=1))
+    chosen = np.unique(np.concatenate([nearest[: tried // 2], wide[: tried // 2]]))
+    return np.asarray(points[chosen])

@@ -178,13 +178,13 @@ class Target:
 
         return summed
 
-    def lobe_alpha(self, numbers: Mapping[str, float]) -> float:
-        """Return the width [1] of the lobe at normal incidence, at the first wavelength; nan for a diffuse model."""
+    def lobe_alphas(self, numbers: Mapping[str, float]) -> Array:
+        """Return the widths (2,) of the lobe at normal incidence, at the first wavelength; nan for a diffuse model."""
         if self.spec.lobe is None:
-            return math.nan
+            return np.full(2, np.nan)
         colours = {variable.name: 0.5 for variable in self.colours}
         lobe = self.spec.lobe(np.asarray(1.0), **self.arguments(numbers, 0, colours))
-        return float(np.sqrt(np.min(lobe.alpha_x) * np.min(lobe.alpha_y)))
+        return np.array([np.min(lobe.alpha_x), np.min(lobe.alpha_y)])
 
 
 def _switches(spec: ModelSpec) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -122,9 +123,12 @@ def view_of(
     return View(theta, phi, float(weight), wr, wi.reshape(-1, 3), weights.reshape(-1))
 
 
+_rule = functools.cache(np.polynomial.legendre.leggauss)  # a millisecond each
+
+
 def _gauss(count: int, low: float, high: float) -> tuple[Array, Array]:
     """Return nodes and weights of Gauss's rule on an interval."""
-    x, weight = np.polynomial.legendre.leggauss(count)
+    x, weight = _rule(count)
     half = 0.5 * (high - low)
     return low + half * (x + 1.0), half * weight
 

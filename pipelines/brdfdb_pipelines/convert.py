@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -34,7 +34,7 @@ def run(
     wavelength_nm: Sequence[float] | None = None,
     fixed: Sequence[str] = (),
     refractive_index: str | None = None,
-    weigh: Weigh = "light",
+    weigh: Weigh | None = None,
     json: bool = False,
     picture: Path | None = None,
 ) -> Conversion:
@@ -75,14 +75,22 @@ def run(
     if wavelength_nm is not None:
         at = np.array(wavelength_nm, dtype=np.float64)
     values = _values(model, fixed)
-    began = time.monotonic()
     with terminal.progress(counted=False, transient=True) as bar:
         task = bar.add_task(f"{name} to {model}", total=STEPS, visible=False)
-
-        def tick() -> None:
-            bar.update(task, advance=1, visible=time.monotonic() - began > PATIENCE_S)
-
-        conversion = convert(source, model, at, fixed=values, refractive_index=refractive_index, weigh=weigh, tick=tick)
+        shown = threading.Timer(PATIENCE_S, lambda: bar.update(task, visible=True))
+        shown.start()
+        try:
+            conversion = convert(
+                source,
+                model,
+                at,
+                fixed=values,
+                refractive_index=refractive_index,
+                weigh=weigh,
+                tick=lambda: bar.advance(task),
+            )
+        finally:
+            shown.cancel()
     if picture is not None:
         from brdfdb_pipelines import conversion_picture
 

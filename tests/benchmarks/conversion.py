@@ -1,4 +1,4 @@
-"""Conversions between models: ``python tests/benchmarks/conversion.py``, two minutes.
+"""Conversions between models: ``python tests/benchmarks/conversion.py``, one minute.
 
 A surface of each of four models is converted to the others: the errors of the closest parameters, and those of the same
 width with the same reflectance, as programs copy them. Then brass as GGX against an exhaustive search, at other
@@ -35,7 +35,7 @@ COPPER = "main/Cu/Johnson"
 TAU_UM = 10.0  # long against the wavelength: the lobe of He and Torrance is that of the slopes
 BRASS = {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": 0.05, "alpha_y": 0.16}
 PAIRS, QUICK_PAIRS = 40_000, 2_000
-GRID, QUICK_GRID = (17, 17, 14, 4), (5, 5, 5, 3)  # alpha_x, alpha_y, reflectance at normal incidence, edge
+GRID, QUICK_GRID = (25, 25, 18, 4), (5, 5, 5, 3)  # alpha_x, alpha_y, reflectance at normal incidence, edge
 LEVELS = 4  # grids, each over a cell on either side of the best point of the last
 REQUIRED = 1.01
 MEASURED = (
@@ -129,7 +129,8 @@ def distance(pairs: tuple[Array, Array, Array, Array], point: Sequence[float]) -
 def left(pairs: tuple[Array, Array, Array, Array], surface: dict[str, Any]) -> float:
     """Return l1 of GGX."""
     wi, wr, weight, truth = pairs
-    return float(weight @ np.abs(models.ggx_vectors(wi, wr, **surface) - truth) / (weight @ truth))
+    wrong = np.einsum("i,i->", weight, np.abs(models.ggx_vectors(wi, wr, **surface) - truth))
+    return float(wrong / np.einsum("i,i->", weight, truth))  # a BLAS would wait for its threads
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -36,8 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--weigh",
         choices=("light", "lightness"),
-        default="light",
-        help="what is made least: l1, or a difference of cube roots, to keep faint highlights (default: %(default)s)",
+        help="what is made least: l1, or a difference of cube roots (default: light, unless it loses the highlight)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument(
