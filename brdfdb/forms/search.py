@@ -10,21 +10,16 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Function = Callable[[Array], float]
 
-_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
-MOST_VARIABLES = len(_PRIMES)
 _EXTENT = 100.0  # size of the last simplex, relative to the tolerance of its values
 _NEAR = 0.05  # distance, in the unit cube, below which two points are the same beginning
 
 
 def spread(count: int, variables: int) -> Array:
     """Return points (count, variables) spread evenly over the unit cube: Halton's sequence, the same at every call."""
-    points = np.zeros((count, variables))
-    for column, base in enumerate(_PRIMES[:variables]):
-        index, share = np.arange(1, count + 1), 1.0 / base
-        while index.any():
-            points[:, column] += share * (index % base)
-            index, share = index // base, share / base
-    return points
+    from scipy.stats.qmc import Halton
+
+    halton = Halton(variables, scramble=False).fast_forward(1)  # its first point is a corner of the cube
+    return np.asarray(halton.random(count))
 
 
 def best_apart(points: Array, values: Array, count: int) -> Array:
@@ -52,8 +47,8 @@ def downhill(
     size : array (variables,)
         Lengths of its edges.
     tolerance : float
-        The search stops when values at the corners differ by less than this, relative to the least, and the corners by
-        less than a hundred times as much. Corners on both sides of a minimum may have the same value.
+        The search stops when values at the corners differ by less than this, relative to the value at the beginning,
+        and the corners by less than a hundred times as much: corners on both sides of a minimum may share a value.
     most : int
         Number of evaluations at which the search stops.
 
@@ -71,42 +66,13 @@ def downhill(
     ----------
     neldermead1965
     """
-    dimensions = begin.size
-    corners = np.tile(begin, (dimensions + 1, 1))
-    for axis in range(dimensions):  # towards the side with more room
-        corners[axis + 1, axis] += size[axis] if begin[axis] <= 0.5 else -size[axis]
-    corners = np.clip(corners, 0.0, 1.0)
-    values = np.array([function(corner) for corner in corners])
-    done = values.size
-    while done < most:
-        order = np.argsort(values, kind="stable")
-        corners, values = corners[order], values[order]
-        extent = np.max(np.abs(corners[1:] - corners[0]))
-        if values[-1] - values[0] <= tolerance * abs(values[0]) and extent <= _EXTENT * tolerance:
-            break
-        centre = corners[:-1].mean(axis=0)
-        away = centre - corners[-1]
-        tried, value = _at(function, centre + away)
-        done += 1
-        if value < values[0]:
-            further, lower = _at(function, centre + 2.0 * away)
-            done += 1
-            corners[-1], values[-1] = (further, lower) if lower < value else (tried, value)
-        elif value < values[-2]:
-            corners[-1], values[-1] = tried, value
-        else:
-            nearer, lower = _at(function, centre + (0.5 if value < values[-1] else -0.5) * away)
-            done += 1
-            if lower < min(value, values[-1]):
-                corners[-1], values[-1] = nearer, lower
-            else:
-                corners[1:] = corners[0] + 0.5 * (corners[1:] - corners[0])
-                values[1:] = [function(corner) for corner in corners[1:]]
-                done += dimensions
-    best = int(np.argmin(values))
-    return corners[best], float(values[best])
+    from scipy.optimize import minimize
 
-
-def _at(function: Function, point: Array) -> tuple[Array, float]:
-    inside = np.clip(point, 0.0, 1.0)
-    return inside, function(inside)
+    towards = np.where(begin <= 0.5, size, -size)  # the side with more room
+    corners = np.clip(np.vstack([begin, begin + np.diag(towards)]), 0.0, 1.0)
+    limits = {"fatol": tolerance * abs(function(begin)), "xatol": _EXTENT * tolerance, "maxfev": most}
+    bounds = [(0.0, 1.0)] * begin.size
+    found = minimize(
+        function, begin, method="Nelder-Mead", bounds=bounds, options={"initial_simplex": corners, **limits}
+    )
+    return np.asarray(found.x), float(found.fun)
