@@ -10,11 +10,21 @@ import pytest
 from brdfdb_pipelines import recipe_file
 from tests.pipelines.command import Captured, run
 
-CLAY = ("convert", "clay-vase", "--to", "oren_nayar_fujii")
+
+@pytest.fixture(scope="module")
+def fit(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recipe with the fit of the paper: the facets of the default recipe take seconds to integrate."""
+    recipe = tmp_path_factory.mktemp("fit") / "fit.toml"
+    recipe.write_text('materials = ["clay-vase"]\nforms = "paper"\ntolerance = 0.05\n', encoding="utf-8")
+    return recipe
 
 
-def test_the_snippet_is_a_recipe_that_builds(tmp_path: Path, capsys: Captured) -> None:
-    assert run(*CLAY) == 0
+def clay(recipe: Path, model: str = "oren_nayar_fujii") -> tuple[str, ...]:
+    return "convert", "clay-vase", "--to", model, "--recipe", str(recipe)
+
+
+def test_the_snippet_is_a_recipe_that_builds(fit: Path, tmp_path: Path, capsys: Captured) -> None:
+    assert run(*clay(fit)) == 0
     printed = capsys.readouterr().out
     assert printed.startswith("clay-vase (oren_nayar) as oren_nayar_fujii\n  parameters\n    rho ")
     assert "  worst view  l1 " in printed
@@ -30,10 +40,10 @@ def test_the_snippet_is_a_recipe_that_builds(tmp_path: Path, capsys: Captured) -
     assert document["material"]["parameters"].keys() == {"rho"}
 
 
-def test_both_models_are_drawn(tmp_path: Path, capsys: Captured) -> None:
+def test_both_models_are_drawn(fit: Path, tmp_path: Path, capsys: Captured) -> None:
     first, again, bitmap = tmp_path / "new" / "clay.svg", tmp_path / "again.svg", tmp_path / "clay.png"
     for file in (first, again, bitmap):
-        assert run(*CLAY, "--picture", file) == 0
+        assert run(*clay(fit), "--picture", file) == 0
     text = first.read_text(encoding="utf-8")
     assert text == again.read_text(encoding="utf-8")
     assert text.startswith("<svg ")
@@ -42,12 +52,12 @@ def test_both_models_are_drawn(tmp_path: Path, capsys: Captured) -> None:
     assert bitmap.read_bytes().startswith(b"\x89PNG")
     capsys.readouterr()
     with pytest.raises(SystemExit):
-        run(*CLAY, "--picture", tmp_path / "clay.pdf")
+        run(*clay(fit), "--picture", tmp_path / "clay.pdf")
     assert "does not end in .svg or .png" in capsys.readouterr().err
 
 
-def test_a_fixed_angle_is_in_degrees(capsys: Captured) -> None:
-    assert run("convert", "clay-vase", "--to", "oren_nayar_qualitative", "--fix", "sigma_deg=20") == 0
+def test_a_fixed_angle_is_in_degrees(fit: Path, capsys: Captured) -> None:
+    assert run(*clay(fit, "oren_nayar_qualitative"), "--fix", "sigma_deg=20") == 0
     assert "sigma_deg       20          fixed" in capsys.readouterr().out
 
 
