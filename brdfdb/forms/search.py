@@ -13,6 +13,7 @@ Function = Callable[[Array], float]
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
 MOST_VARIABLES = len(_PRIMES)
 _EXTENT = 100.0  # size of the last simplex, relative to the tolerance of its values
+_NOTHING = 0.01  # value below which differences are relative to this one: there is hardly anything to gain
 _NEAR = 0.05  # distance, in the unit cube, below which two points are the same beginning
 
 
@@ -52,8 +53,9 @@ def downhill(
     size : array (variables,)
         Lengths of its edges.
     tolerance : float
-        The search stops when values at the corners differ by less than this, relative to the least, and the corners by
-        less than a hundred times as much. Corners on both sides of a minimum may have the same value.
+        The search stops when values at the corners differ by less than this, relative to the least or to a hundredth,
+        and the corners by less than a hundred times as much. Corners on both sides of a minimum may have the same
+        value.
     most : int
         Number of evaluations at which the search stops.
 
@@ -82,7 +84,7 @@ def downhill(
         order = np.argsort(values, kind="stable")
         corners, values = corners[order], values[order]
         extent = np.max(np.abs(corners[1:] - corners[0]))
-        if values[-1] - values[0] <= tolerance * abs(values[0]) and extent <= _EXTENT * tolerance:
+        if values[-1] - values[0] <= tolerance * max(abs(values[0]), _NOTHING) and extent <= _EXTENT * tolerance:
             break
         centre = corners[:-1].mean(axis=0)
         away = centre - corners[-1]
