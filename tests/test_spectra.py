@@ -27,6 +27,14 @@ def test_aluminum_agrees_with_another_compilation():
     assert k == pytest.approx(ALUMINUM_500_NM[1], rel=ALUMINUM_TOLERANCE[1])
 
 
+def test_an_entry_may_write_n_and_k_out():
+    n, k = refractive_index("constant/0.95/2.6", [400.0, 5000.0])
+    assert (n.tolist(), k.tolist()) == ([0.95, 0.95], [2.6, 2.6])
+    for wrong in ("constant/0/1", "constant/1/-1", "constant/1/x", "constant/1/nan"):
+        with pytest.raises(ValueError, match=f"'{wrong}' is not constant/N/K with a positive N and a K of 0 or more"):
+            refractive_index(wrong, 500.0)
+
+
 def test_sapphire_follows_its_dispersion_formula():
     # Sellmeier coefficients of the ordinary ray at 20 degrees C, Dodge 1986 (the reference of the entry), l in um
     wavelength_um = np.array([0.4, 0.55, 0.7])

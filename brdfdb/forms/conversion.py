@@ -112,9 +112,9 @@ def convert(
     Examples
     --------
     >>> from brdfdb.materials import presets
-    >>> brass = convert(presets()["rolled-brass"], "ward_duer")
-    >>> round(brass.parameters["alpha_x"], 2), round(brass.l1, 2)
-    (0.05, 0.14)
+    >>> clay = convert(presets()["clay-vase"], "oren_nayar_fujii")
+    >>> round(clay.parameters["rho"], 2), round(clay.l1, 3)
+    (0.63, 0.013)
     """
     request = _request(source, model, wavelength_nm, fixed or {}, refractive_index, weigh or "light")
     least = _measured(request, _searched(request, tick))

@@ -18,10 +18,11 @@ Array = NDArray[np.float64]
 
 SPREAD = 4096  # points of the unit cube, of which those with a lobe about as wide are tried
 TRIED = 160  # points that are tried at coarse nodes
-FEW_TRIED = 40  # of a model whose values are integrals
+FEW_TRIED = 40  # of a model whose values are integrals, or whose colours are searched for each
 BEGINNINGS = 3  # points from which simplexes go downhill
 STEPS = 1 + 2 * BEGINNINGS  # calls of `tick` in a search, at most
 _COARSE, _FINE = 1e-4, 1e-7  # tolerances of simplexes at coarse and at all nodes
+_FIRST_EDGE, _NEXT_EDGE = 0.1, 0.02  # of the simplexes of colours, which begin where the last ones ended
 _COLOURS = 1e-6  # tolerance of the simplexes of colours, below that of the shared parameters
 _PROMISING = 1.03  # times the least distance at coarse nodes: the nodes themselves change less
 REFUSED = 1e9  # distance of parameters that are not tried
@@ -70,6 +71,7 @@ class Distance:
         self.widest = high * np.where(np.isnan(alphas), np.inf, alphas)
         self.loose = np.array([variable.loose for variable in target.shape], dtype=bool)
         self.colours = np.full((columns.size, len(target.colours)), 0.5)
+        self.edge = _FIRST_EDGE
         self.record: list[tuple[float, dict[str, float]]] = []
 
     def __call__(self, shape: Array) -> float:
@@ -82,6 +84,7 @@ class Distance:
         for row, column in enumerate(self.columns.tolist()):
             best, self.colours[row] = self.of_column(numbers, row, column)
             total += best
+        self.edge = _NEXT_EDGE
         mean = total / self.columns.size
         mean = min(mean, REFUSED) if math.isfinite(mean) else REFUSED
         mean *= 1.0 + _LOOSE * float(np.mean((shape[self.loose] - 0.5) ** 2)) if self.loose.any() else 1.0
@@ -104,7 +107,7 @@ class Distance:
 
         if not target.colours:
             return left(np.zeros(0)), np.zeros(0)
-        size = np.full(len(target.colours), 0.1)
+        size = np.full(len(target.colours), self.edge)
         best, value = downhill(left, self.colours[row], size, tolerance=_COLOURS, most=60 * size.size)
         return value, best
 
@@ -173,7 +176,7 @@ def _result(distances: tuple[Distance, Distance]) -> Result:
 def _beginnings(target: Target, alphas: Array) -> Array:
     """Return points of the unit cube to try, spread over it: half of them any, half those whose lobe is as wide."""
     points = spread(SPREAD, len(target.shape))
-    tried = FEW_TRIED if target.spec.slow else TRIED
+    tried = FEW_TRIED if target.spec.slow or target.colours else TRIED
     if target.spec.lobe is None or np.isnan(alphas).any():
         return points[:tried]
     with np.errstate(all="ignore"):  # a lobe of extreme parameters may be no number

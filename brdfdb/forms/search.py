@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 Function = Callable[[Array], float]
 
 _EXTENT = 100.0  # size of the last simplex, relative to the tolerance of its values
+_NOTHING = 0.01  # value below which differences are relative to this one: there is hardly anything to gain
 _NEAR = 0.05  # distance, in the unit cube, below which two points are the same beginning
 
 
@@ -48,7 +49,8 @@ def downhill(
         Lengths of its edges.
     tolerance : float
         The search stops when values at the corners differ by less than this, relative to the value at the beginning,
-        and the corners by less than a hundred times as much: corners on both sides of a minimum may share a value.
+        or to a hundredth if that is more, and the corners by less than a hundred times as much: corners on both sides
+        of a minimum may share a value.
     most : int
         Number of evaluations at which the search stops.
 
@@ -70,7 +72,8 @@ def downhill(
 
     towards = np.where(begin <= 0.5, size, -size)  # the side with more room
     corners = np.clip(np.vstack([begin, begin + np.diag(towards)]), 0.0, 1.0)
-    limits = {"fatol": tolerance * abs(function(begin)), "xatol": _EXTENT * tolerance, "maxfev": most}
+    close = tolerance * max(abs(function(begin)), _NOTHING)
+    limits = {"fatol": close, "xatol": _EXTENT * tolerance, "maxfev": most}
     bounds = [(0.0, 1.0)] * begin.size
     found = minimize(
         function, begin, method="Nelder-Mead", bounds=bounds, options={"initial_simplex": corners, **limits}

@@ -1,5 +1,6 @@
 """Conversions against an exhaustive search, surfaces that both models have, and closed forms."""
 
+import doctest
 import functools
 import itertools
 import tomllib
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from brdfdb import models
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Panel
+from brdfdb.forms import conversion
 from brdfdb.forms.conversion import convert
 from brdfdb.forms.conversion_document import Conversion
 from brdfdb.forms.conversion_figure import figure_of
@@ -22,12 +24,14 @@ from brdfdb.geometry import unit_vector
 from brdfdb.integrals.sampling import directions, mixture_density
 from brdfdb.lobes import GGX, Lobe
 from brdfdb.materials import FunctionSource, Material, presets
+from brdfdb.materials.spectrum import Spectrum
 
 Floats = NDArray[np.float64]
 
 BRASS = {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": 0.05, "alpha_y": 0.16}
 PAIRS, MANY_PAIRS = 8_000, 400_000
 OPTIMUM = 1.01  # the promise: times the least distance of an exhaustive search
+NM = (450.0, 550.0, 650.0)
 STATED = 0.01  # relative; 400 000 pairs, measured: 0.002
 
 
@@ -154,6 +158,40 @@ def test_the_figure_has_both_models_at_their_peaks() -> None:
     assert curve.y[curve.x.index(45.0)] == pytest.approx(found.peak.after, rel=1e-4)
 
 
+# Colours
+
+
+def test_a_function_in_colour_gives_its_spectra() -> None:
+    f_0, rho_d = np.array([0.2, 0.5, 0.8]), np.array([0.5, 0.3, 0.1])
+
+    def colours(wi: Floats, wr: Floats, wavelength_nm: Floats) -> Floats:
+        pairs = zip(np.interp(wavelength_nm, NM, rho_d), np.interp(wavelength_nm, NM, f_0), strict=True)
+        width = {"alpha_x": 0.2, "alpha_y": 0.2}
+        values = [models.ggx_schlick_vectors(wi, wr, rho_d=low, f_0=high, **width) for low, high in pairs]
+        return np.stack(values, axis=-1)
+
+    record = {"name": "coloured", "title": "Coloured", "provenance": "ggx_schlick", "wavelengths_nm": NM, "alpha": 0.2}
+    found = convert(FunctionSource(brdf=colours, **record), "ggx_schlick")
+    assert found.parameters["alpha_x"] == pytest.approx(0.2, rel=1e-3)
+    for name, expected in (("f_0", f_0), ("rho_d", rho_d)):
+        spectrum = found.parameters[name]
+        assert isinstance(spectrum, Spectrum)
+        assert spectrum.wavelengths_nm == NM
+        assert spectrum.values == pytest.approx(expected, abs=1e-3)
+    assert max(found.l1_of) < 2e-3
+    table = tomllib.loads(found.recipe)["define"]["coloured-as-ggx-schlick"]
+    assert Material.from_table("coloured-as-ggx-schlick", table) == found.material
+
+
+def test_a_model_with_n_and_k_takes_those_of_the_source() -> None:
+    found = convert(presets()["scene-copper-sphere"], "ggx", NM)
+    assert found.refractive_index == found.material.refractive_index == "main/Cu/Johnson"
+    assert found.n is None
+    # alpha is 2 sigma_0 / tau = 0.217 where diffraction is left out; tails of GGX are longer
+    assert 0.16 < found.parameters["alpha_x"] < 0.217
+    assert len(found.l1_of) == 3
+
+
 # Recipes and requests
 
 
@@ -222,6 +260,15 @@ def test_a_highlight_is_kept_unless_light_alone_is_weighed() -> None:
 def test_what_cannot_be_converted_is_refused(name: str, model: str, options: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ParameterError, match=sentence):
         convert(presets()[name], model, **options)
+
+
+@pytest.mark.parametrize("function", [convert, conversion.compare], ids=lambda function: function.__name__)
+def test_examples_print_what_they_say(function: Any) -> None:
+    runner = doctest.DocTestRunner()
+    for example in doctest.DocTestFinder(recurse=False).find(function, globs=dict(vars(conversion))):
+        runner.run(example)
+    assert runner.summarize(verbose=False).failed == 0
+    assert runner.tries > 0
 
 
 def test_a_black_source_is_refused() -> None:
