@@ -139,8 +139,7 @@ def search(
     -----
     Points are spread evenly over the ranges of the parameters. The first of them, and those whose lobe is most nearly
     as wide as that of the source, are tried at coarse nodes. Simplexes begin at the best three that are not near each
-    other, and go downhill at coarse nodes. Ends within 3 % of the best go on, twice, at all nodes: the second time with
-    new edges, in case that the first collapsed.
+    other, and go downhill at coarse nodes. Ends within 3 % of the best go on at all nodes.
     """
     distances = Distance(target, coarse, columns, alphas), Distance(target, fitted, columns, alphas)
     steps = np.array([variable.step for variable in target.shape])
@@ -157,8 +156,7 @@ def search(
     ends, values = np.array([end for end, _ in starts]), np.array([value for _, value in starts])
     good = values <= _PROMISING * values.min()
     for point in best_apart(ends[good], values[good], BEGINNINGS):
-        end, _ = downhill(distances[1], point, 0.2 * steps, tolerance=_FINE, most=100 * steps.size)
-        downhill(distances[1], end, 0.05 * steps, tolerance=_FINE, most=100 * steps.size)
+        downhill(distances[1], point, 0.2 * steps, tolerance=_FINE, most=100 * steps.size)
         tick()
     return _result(distances)
 

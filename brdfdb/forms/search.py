@@ -70,12 +70,14 @@ def downhill(
     """
     from scipy.optimize import minimize
 
-    towards = np.where(begin <= 0.5, size, -size)  # the side with more room
-    corners = np.clip(np.vstack([begin, begin + np.diag(towards)]), 0.0, 1.0)
     close = tolerance * max(abs(function(begin)), _NOTHING)
     limits = {"fatol": close, "xatol": _EXTENT * tolerance, "maxfev": most}
-    bounds = [(0.0, 1.0)] * begin.size
-    found = minimize(
-        function, begin, method="Nelder-Mead", bounds=bounds, options={"initial_simplex": corners, **limits}
-    )
-    return np.asarray(found.x), float(found.fun)
+    best, value = begin, np.inf
+    for _ in range(2):  # again, because a simplex collapses on the surface of the cube
+        towards = np.where(best <= 0.5, size, -size)  # the side with more room
+        corners = np.clip(np.vstack([best, best + np.diag(towards)]), 0.0, 1.0)
+        options = {"initial_simplex": corners, **limits}
+        found = minimize(function, best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * begin.size, options=options)
+        if found.fun < value:
+            best, value = np.asarray(found.x), float(found.fun)
+    return best, value
