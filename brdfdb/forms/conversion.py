@@ -277,11 +277,15 @@ def _nodes(
     """Return the truth at nodes, of a source that reflects something at each wavelength."""
     f_r, mirror = request.source.brdf_at(wavelength_nm), specular_of(request.source, wavelength_nm)
     nodes = Nodes(lobe, counts, request.symmetry, f_r, mirror, request.weigh)
-    dark = ~(nodes.total > 0.0)
+    dark = ~(np.max(nodes.truth, axis=0) > 0.0)
     if np.any(dark):
         where = "" if wavelength_nm is None else f" at {wavelength_nm[dark][0]:g} nm"
         name = request.source.name
-        raise ParameterError("source", f"{name} reflects nothing{where}, so that no model is close to it", name)
+        raise ParameterError(
+            "source",
+            f"{name} reflects nothing{where} beside the mirror direction, so that no model is close to it",
+            name,
+        )
     return nodes
 
 

@@ -273,5 +273,7 @@ def test_examples_print_what_they_say(function: Any) -> None:
 
 def test_a_black_source_is_refused() -> None:
     black = presets()["rolled-brass"].model_copy(update={"parameters": {**BRASS, "rho_d": 0.0, "rho_s": 0.0}})
-    with pytest.raises(ParameterError, match="source: rolled-brass reflects nothing, so that no model is close to it"):
+    with pytest.raises(ParameterError, match="source: rolled-brass reflects nothing beside the mirror direction"):
         convert(black, "lambert")
+    with pytest.raises(ParameterError, match="13b reflects nothing at 550 nm beside the mirror direction, so that no"):
+        convert(presets()["aluminum-cylinder-13b"], "ggx", 550.0)
