@@ -82,7 +82,7 @@ def recipe(name: str) -> str:
     fields = tomllib.loads(default)
     wavelengths = re.findall(r"^wavelengths_nm = .*$", default, flags=re.MULTILINE)
     lines = [f'title = "{name}, as the default recipe builds it"', f'materials = ["{name}"]', *wavelengths]
-    return "\n".join([*lines, f"tolerance = {fields['tolerance']}", ""])
+    return "\n".join([*lines, f"tolerance = {fields['tolerance']}", f'forms = "{fields["forms"]}"', ""])
 
 
 @cache
