@@ -35,7 +35,7 @@ def test_facts_and_the_line_of_the_list_are_of_the_revision_of_the_picture(
     with serving(own) as address:
         chromium.open(f"{address}/#material=grey-felt&view={view}&compare={compare}")
         shown(chromium, "material=grey-felt")
-        assert chromium.until(f"document.querySelector('#m-grey-felt') && {LINE}") == "violates"
+        assert chromium.until(f"document.querySelector('#m-grey-felt') && {LINE}") == "as published: yes"
         assert "revision r000001" in chromium.evaluate("facts.innerText")
         publish(own, "grey-felt", "oren_nayar", rho=0.25, sigma_deg=40.0, error=True)
         move(chromium, "theta_i", 20)
