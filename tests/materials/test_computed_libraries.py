@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import brdfdb
+from brdfdb.audit.model_energy import model_energy_of
 from brdfdb.audit.validity import validity_of
 from brdfdb.errors import ParameterError
-from brdfdb.materials import PAPERS, libraries, presets
+from brdfdb.materials import PAPERS, Material, libraries, presets
 from brdfdb.materials.computed_libraries import COMPUTED, Entry, Substance, entries
 from brdfdb.spectra import _optical_constants, refractive_index
 
@@ -107,8 +108,8 @@ def test_finishes_lie_between_the_samples_of_the_paper(library: str) -> None:
         assert min(SIGMA_0_UM) <= entry.finish.sigma_0_um <= max(SIGMA_0_UM)
         assert min(TAU_UM) <= entry.finish.tau_um <= max(TAU_UM)
         assert "He et al. 1991" in entry.finish.source
-    sigmas = [entry.finish.sigma_0_um for entry in entries(library)[:4]]
-    assert sigmas == sorted(sigmas)
+    slopes = [entry.finish.sigma_0_um / entry.finish.tau_um for entry in entries(library)[:4]]
+    assert slopes == sorted(slopes)
 
 
 @pytest.mark.parametrize("library", COMPUTED_LIBRARIES)
@@ -132,6 +133,25 @@ def test_limits_hold_by_their_closed_form() -> None:
         sigma, tau = entry.finish.sigma_0_um, entry.finish.tau_um
         assert sigma / tau <= 0.1
         assert tau**2 / (math.sqrt(12.0) * sigma) >= 10.0 * 2.5
+
+
+def largest_albedo(material: Material, wavelength_nm: list[float]) -> float:
+    return model_energy_of(material, np.array(wavelength_nm), None).max_albedo or math.inf
+
+
+@pytest.mark.parametrize("finish", sorted(FINISHES))
+def test_no_finish_lets_silver_reflect_more_than_arrives(finish: str) -> None:
+    # Silver has the highest reflectance of the library, 0.997 at 2500 nm
+    wavelength_nm = [350.0, 780.0, 2500.0]
+    assert largest_albedo(presets("metals-infrared")[f"silver-{finish}-infrared"], wavelength_nm) < 1.0
+
+
+def test_between_polished_and_satin_the_model_creates_energy() -> None:
+    # The reason why metals have no finish there: silver, frosted as the dielectrics are
+    silver, frosted = presets("metals")["silver-satin"], presets("metals")["n-bk7-frosted"]
+    changed = silver.model_copy(update={"parameters": frosted.parameters})
+    assert largest_albedo(changed, [480.0, 780.0]) == pytest.approx(1.03, abs=0.005)
+    assert largest_albedo(frosted, [480.0, 780.0]) < 1.0
 
 
 def test_the_notes_on_doubtful_entries_are_true() -> None:

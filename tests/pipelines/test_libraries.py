@@ -73,7 +73,7 @@ def test_the_option_is_refused_where_it_means_nothing(
 def test_each_library_has_a_recipe_of_all_its_materials(library: str) -> None:
     jobs = load(library=library).jobs()
     assert [job.material.name for job in jobs] == list(presets(library))
-    assert {job.tolerance for job in jobs} == {0.01}
+    assert {job.tolerance for job in jobs} == {0.01 if library == PAPERS else 0.02}
     assert recipe_of(library).is_file()
     ends = {(job.wavelength_nm[0], job.wavelength_nm[-1]) for job in jobs if job.wavelength_nm is not None}
     if library != PAPERS:
@@ -131,7 +131,7 @@ def test_tables_say_that_they_are_computed(small: Path, capsys: Captured) -> Non
 
 def test_the_specular_part_of_a_mirror_is_that_of_eq_70(small: Path) -> None:
     # Fresnel at normal incidence, times exp(-g) with g = (4 pi sigma_0 / lambda)^2; nothing is hidden there
-    for name, sigma_0_nm in (("gold-mirror", 5.0), ("n-bk7-polished", 30.0)):
+    for name, sigma_0_nm in (("gold-mirror", 3.0), ("n-bk7-polished", 10.0)):
         table = brdfdb.open(small)[name]
         n, k = brdfdb.spectra.refractive_index(table.source.refractive_index, 550.0)
         fresnel = ((n - 1.0) ** 2 + k**2) / ((n + 1.0) ** 2 + k**2)
