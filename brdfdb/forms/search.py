@@ -77,7 +77,7 @@ def downhill(
         towards = np.where(best <= 0.5, size, -size)  # the side with more room
         corners = np.clip(np.vstack([best, best + np.diag(towards)]), 0.0, 1.0)
         options = {"initial_simplex": corners, **limits}
-        found = minimize(function, best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * begin.size, options=options)
-        if found.fun < value:
-            best, value = np.asarray(found.x), float(found.fun)
+        end = minimize(function, best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * begin.size, options=options)
+        if end.fun < value:
+            best, value = np.asarray(end.x), float(end.fun)
     return best, value

@@ -14,6 +14,37 @@ from brdfdb.parameters import Floats, ModelSpec, Parameter, white
 RHO = Parameter("rho", "c", "1", 0.0, 1.0, "albedo of a sphere, for one scattering", reflectance=True)
 
 
+Cubic = tuple[float, float, float, float]
+
+
+def _in_1_less(*s: float) -> Cubic:
+    """Return the coefficients in 1 - C of a polynomial whose coefficients in C are s: it keeps its digits at C = 1."""
+    s_0, s_1, s_2, s_3 = (*s, 0.0)[:4]
+    return (
+        math.fsum((s_0, s_1, s_2, s_3)),
+        -math.fsum((s_1, s_2, s_2, s_3, s_3, s_3)),
+        math.fsum((s_2, 3.0 * s_3)),
+        -s_3,
+    )
+
+
+# Numerators and denominators of the author's fits, in C = sqrt(1 - c)
+_B = _in_1_less(-0.08446297239646791, 0.5153566145541554, -0.77757371002123, 0.34668869623791543)
+_B_BELOW = _in_1_less(0.9648932738041012, -0.6655015709030936, 0.1826019462608555)
+_BOTH = _in_1_less(682.8479477533338, -2567.7368047535556, 7487.987105705168, -5602.448801045478)
+_BOTH_BELOW = _in_1_less(5850.602606063662, -4008.3309624647227, 1480.250743805733)
+_MIXED = _in_1_less(0.2855294320307508, 160.39651500649123, -327.42799697993706, 166.88327184107732)
+_MIXED_BELOW = _in_1_less(674.1908010450103, -412.9837444306491, 596.4232294419696)
+_F = _in_1_less(-1.9208967199948512, -242.16001167844007, -21.914139454773085, 266.06342182761813)
+_F_BELOW = _in_1_less(1499.904420175135, 457.4200839912641, 215.77342164754094)
+
+
+@kernel
+def _cubic(coefficients: Cubic, x: float) -> float:
+    """Return a polynomial of degree 3 [1]."""
+    return coefficients[0] + x * (coefficients[1] + x * (coefficients[2] + x * coefficients[3]))
+
+
 @kernel
 def _h0_less_1(u: float, c: float) -> float:
     """Return H - 1 [1] for the H function of the mean over azimuths, eq. (37)."""
@@ -26,8 +57,9 @@ def _h0_less_1(u: float, c: float) -> float:
     )
     # 1 - 2 (89 c / 288 + 59 c^2 / 288 - c^3 / 72), factored: 0 at c = 1, without a difference that cancels
     loss = math.sqrt((1.0 - c) * (288.0 + 110.0 * c - 8.0 * c * c) / 288.0)
+    gain = c * (178.0 + 118.0 * c - 8.0 * c * c) / (288.0 * (1.0 + loss))  # 1 - loss
     power = a * math.pow(u, d)
-    return power * (1.0 - loss) / (1.0 + loss * power)
+    return power * gain / (1.0 + loss * power)
 
 
 @kernel
@@ -44,25 +76,16 @@ def _mean(u_i: float, u_r: float, h_i: float, h_r: float, c: float) -> float:
     h is H - 1. The constants A of all scatterings and 207 c / 384 of the first are the same. They cancel, so that f_r
     keeps its digits where both directions graze.
     """
-    C = math.sqrt(1.0 - c)
-    C2, C3 = 1.0 - c, (1.0 - c) * C
+    D = c / (1.0 + math.sqrt(1.0 - c))  # 1 - C
     A = 69.0 * c / 128.0
-    B = (-0.08446297239646791 + 0.5153566145541554 * C - 0.77757371002123 * C2 + 0.34668869623791543 * C3) / (
-        0.9648932738041012 - 0.6655015709030936 * C + 0.1826019462608555 * C2
-    )
-    both = (682.8479477533338 - 2567.7368047535556 * C + 7487.987105705168 * C2 - 5602.448801045478 * C3) / (
-        5850.602606063662 - 4008.3309624647227 * C + 1480.250743805733 * C2
-    )
-    D = (0.2855294320307508 + 160.39651500649123 * C - 327.42799697993706 * C2 + 166.88327184107732 * C3) / (
-        674.1908010450103 - 412.9837444306491 * C + 596.4232294419696 * C2
-    )
-    E = 15.0 * C2 * c * (3.0 + 4.0 * c / 3.0) / 128.0
-    F = (-1.9208967199948512 - 242.16001167844007 * C - 21.914139454773085 * C2 + 266.06342182761813 * C3) / (
-        1499.904420175135 + 457.4200839912641 * C + 215.77342164754094 * C2
-    )
+    B = _cubic(_B, D) / _cubic(_B_BELOW, D)
+    both = _cubic(_BOTH, D) / _cubic(_BOTH_BELOW, D)
+    mixed = _cubic(_MIXED, D) / _cubic(_MIXED_BELOW, D)
+    E = 15.0 * (1.0 - c) * c * (3.0 + 4.0 * c / 3.0) / 128.0
+    F = _cubic(_F, D) / _cubic(_F_BELOW, D)
     product, total = u_i * u_r, u_i + u_r
     squares = u_i**2 + u_r**2
-    polynomial = both * product + E * product**2 + (B + D * product) * total + F * squares
+    polynomial = both * product + E * product**2 + (B + mixed * product) * total + F * squares
     h = h_i + h_r + h_i * h_r
     first = c * (256.0 * product - 45.0 * squares + 135.0 * product**2) / 384.0
     return 0.5 / np.pi * (polynomial + h * (A + polynomial) - first)

@@ -28,13 +28,15 @@ Rows = NDArray[np.float64]
 Three = tuple[float, float, float]
 
 _HALF_PI = 0.5 * np.pi
+_ONE = 700.0  # x from which on 1 - e**-x is 1
+_LEAST = 1e-150  # the same where the quotient is squared
 _TINY = 1e-300  # guard against 0 / 0 on a smooth surface and at the normal
 
 
 @kernel
 def _one_less_exp(x: float) -> float:
     """Return 1 - e**-x for x >= 0, with all its digits next to 0."""
-    u = exp(-x)
+    u = exp(-(_ONE if x > _ONE else x))
     # Kahan: the error of u in the numerator is that of its logarithm
     near = x if u == 1.0 else (1.0 - u) * x / -log(u)
     return 1.0 - u if x > 1.0 else near
@@ -43,7 +45,7 @@ def _one_less_exp(x: float) -> float:
 @kernel
 def _leaning(cos: float, sin: float, tan_slope: float) -> tuple[float, float]:
     """Return 1 - E_1 and 1 - E_2 [1] of a direction: what is missing from its share of slopes that lean away."""
-    q = cos / (sin * tan_slope + _TINY)
+    q = cos / (sin * tan_slope + _LEAST)
     return _one_less_exp(2.0 / np.pi * q), _one_less_exp(q * q / np.pi)
 
 

@@ -31,7 +31,7 @@ addEventListener("load", () => {
   const result = { width: innerWidth, content: document.documentElement.scrollWidth, first: names() };
   sort(0); result.named = names(); result.direction = sorted();
   sort(0); result.reversed = names(); result.turned = sorted();
-  sort(3); result.numbers = names();
+  sort(4); result.numbers = names();
   const filter = document.getElementById("filter");
   filter.value = "he_torrance"; filter.dispatchEvent(new Event("input")); result.filtered = names();
   filter.value = ""; filter.dispatchEvent(new Event("input"));

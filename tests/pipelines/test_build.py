@@ -62,8 +62,9 @@ def test_tables_are_those_of_tabulate_with_the_request_beside_them(recipe: Path,
         expected = tabulation.tabulate(job.layout())
         request = json.loads(json.dumps(job.request))
         with store.dataset(job.material.name) as found:
-            error = store[job.material.name].attrs["error"]
-            of_build = {"request": request, "request_sha256": digest(request), "error": error}
+            attrs = store[job.material.name].attrs
+            measured = {key: attrs[key] for key in ("error", "formula_error", "largest_albedo")}
+            of_build = {"request": request, "request_sha256": digest(request), **measured}
             expected.attrs = plain_attributes(expected.attrs | of_build)
             xr.testing.assert_identical(found.load(), expected)
         assert store.summary(job.material.name)["request_sha256"] == digest(request)

@@ -74,6 +74,9 @@ def test_a_fixed_angle_is_in_degrees(fit: Path, capsys: Captured) -> None:
         (("clay-vase", "--to", "lambert", "--fix", "rho=true"), "rho: True is not a number"),
     ],
 )
-def test_a_wrong_request_gets_a_sentence(arguments: tuple[str, ...], sentence: str, capsys: Captured) -> None:
+def test_a_wrong_request_gets_a_sentence(
+    arguments: tuple[str, ...], sentence: str, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("BRDFDB_STORE", raising=False)  # another test may have left one
     assert run("convert", *arguments) == 2
     assert capsys.readouterr().err.startswith(f"brdfdb: {sentence}")
