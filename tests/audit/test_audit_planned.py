@@ -20,12 +20,14 @@ from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import tabulate
 from tests.audit.a_table import ISOTROPIC, known, material, verdicts, written
-from tests.tables.test_albedo import KINDS, planned, table_of
+from tests.tables.test_albedo import KINDS, PLANNED, planned, table_of
 
 pytestmark = [
     pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation"),
     pytest.mark.usefixtures("few_samples"),
 ]
+# An audit of the anisotropic polar table takes ten seconds: its half and difference vectors stand for it
+FOUND_ANYWHERE = pytest.mark.parametrize("kind", [kind for kind in PLANNED if kind != "polar-anisotropic"])
 
 
 def scaled(table: Table, factor: float) -> Table:
@@ -64,7 +66,7 @@ def test_planned_tables_pass_and_their_reports_are_valid(kind: str) -> None:
     written([found])
 
 
-@KINDS
+@FOUND_ANYWHERE
 def test_half_as_much_light_again_violates(kind: str) -> None:
     table = table_of(kind)
     albedo = audited(kind).of(Energy).table.max_albedo
@@ -79,7 +81,7 @@ def test_half_as_much_light_again_violates(kind: str) -> None:
     )
 
 
-@KINDS
+@FOUND_ANYWHERE
 def test_one_node_of_nan_violates_and_the_report_is_json(kind: str) -> None:
     table = table_of(kind)
     values = table.values.copy()

@@ -101,6 +101,13 @@ def jumping(dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
+@pytest.mark.parametrize("name", ["scene-copper-sphere", "dark"])
+def test_a_sound_table_is_exit_code_0(name: str, sound: Path, tmp_path: Path) -> None:
+    root = tmp_path / "store"
+    publish_dataset(root, name, xr.open_zarr(brdfdb.open(sound).path(name)).load())
+    assert audited(root, name, tmp_path / "report.json") == 0
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -118,16 +125,13 @@ def test_a_planted_violation_is_named_and_is_exit_code_1(
 ) -> None:
     dataset = xr.open_zarr(brdfdb.open(sound).path(name)).load()
     report, root = tmp_path / "report.json", tmp_path / "store"
-    publish_dataset(root, name, dataset)
-    assert audited(root, name, report) == 0
-    capsys.readouterr()
     publish_dataset(root, name, change(dataset))
     assert cli.main(["verify", "--store", str(root)]) == 0  # the files are those of the manifest
     assert audited(root, name, report) == 1
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith(f"{name}: ") and said in line for line in lines)
     entry = entry_of(report)
-    assert (entry["material"], entry["revision"], entry["verdict"]) == (name, "r000002", "violates")
+    assert (entry["material"], entry["revision"], entry["verdict"]) == (name, "r000001", "violates")
 
 
 def test_a_dark_table_that_is_too_bright_is_caught_by_its_error_alone(sound: Path, tmp_path: Path) -> None:
