@@ -27,8 +27,7 @@ THETA_BAR = Parameter(
 Rows = NDArray[np.float64]
 Three = tuple[float, float, float]
 
-_HALF_PI = 0.5 * np.pi
-_ONE = 700.0  # x from which on 1 - e**-x is 1
+_FLAT = 700.0  # x from which on 1 - e**-x is 1 to the last bit
 _LEAST = 1e-150  # the same where the quotient is squared
 _TINY = 1e-300  # guard against 0 / 0 on a smooth surface and at the normal
 
@@ -36,7 +35,7 @@ _TINY = 1e-300  # guard against 0 / 0 on a smooth surface and at the normal
 @kernel
 def _one_less_exp(x: float) -> float:
     """Return 1 - e**-x for x >= 0, with all its digits next to 0."""
-    u = exp(-(_ONE if x > _ONE else x))
+    u = exp(-(_FLAT if x > _FLAT else x))
     # Kahan: the error of u in the numerator is that of its logarithm
     near = x if u == 1.0 else (1.0 - u) * x / -log(u)
     return 1.0 - u if x > 1.0 else near
