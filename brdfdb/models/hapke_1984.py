@@ -28,8 +28,8 @@ Rows = NDArray[np.float64]
 Three = tuple[float, float, float]
 
 _FLAT = 700.0  # x from which on 1 - e**-x is 1 to the last bit
-_LEAST = 1e-150  # the same where the quotient is squared
 _TINY = 1e-300  # guard against 0 / 0 on a smooth surface and at the normal
+_LEAST = 1e-150  # the same where the quotient is squared
 
 
 @kernel
