@@ -88,19 +88,19 @@ class _Band(NamedTuple):
 def contradictions(error: Error, wavelengths: int) -> list[str]:
     """Return a sentence on each contradiction in a stated error."""
     bands = BANDS_DEG.size - 1
-    shape = (bands, wavelengths)
+    columns = 1 if error.columns == 1 else wavelengths  # one: of the worst wavelength
     tables = {name: getattr(error, name) for name in NAMES}
     shapes = {name: {len(row) for row in rows} | {-len(rows)} for name, rows in tables.items()}
     if not np.array_equal(error.theta_i_deg, BANDS_DEG) or len(error.floor) != wavelengths:
         return [f"it is not about {bands} bands of theta_i and {wavelengths} wavelengths"]
-    if any(shape_of_rows != {wavelengths, -bands} for shape_of_rows in shapes.values()):
+    if any(shape_of_rows != {columns, -bands} for shape_of_rows in shapes.values()):
         return [f"it is not about {bands} bands of theta_i and {wavelengths} wavelengths"]
-    arrays = {name: np.array(rows, dtype=np.float64).reshape(shape) for name, rows in tables.items()}
+    arrays = {name: np.array(rows, dtype=np.float64).reshape(bands, columns) for name, rows in tables.items()}
     overall = {name: float(getattr(error.overall, name)) for name in Overall.model_fields}
     numbers = [*arrays.values(), np.array(error.floor), np.array([*overall.values()])]
     if not all(np.all(np.isfinite(array) & (array >= 0.0)) for array in numbers):
         return ["not all of its numbers are finite and at least 0"]
-    if not _whole(error, wavelengths):
+    if not _whole(error, columns, columns if columns == 1 else wavelengths - 1):
         return ["its limits in places and between wavelengths are not all finite and at least 0"]
     sentences = []
     ordered = [arrays[name] for name in QUANTILES]
@@ -117,13 +117,13 @@ def contradictions(error: Error, wavelengths: int) -> list[str]:
     return sentences
 
 
-def _whole(error: Error, wavelengths: int) -> bool:
-    """Return whether the limits in places and between wavelengths are complete, finite and at least 0."""
-    parts = [] if error.places is None else [(error.places, wavelengths)]
+def _whole(error: Error, at: int, between: int) -> bool:
+    """Return whether the limits in places, and between wavelengths, have so many columns, finite and at least 0."""
+    parts = [] if error.places is None else [(error.places, at)]
     tables: list[tuple[list[list[float]], int, int]] = []
     if error.between is not None:
-        tables.append((error.between.bands, BANDS, wavelengths - 1))
-        parts += [] if error.between.places is None else [(error.between.places, wavelengths - 1)]
+        tables.append((error.between.bands, BANDS, between))
+        parts += [] if error.between.places is None else [(error.between.places, between)]
     for places, columns in parts:
         tables += [
             (places.alongside, BANDS, columns),
@@ -151,30 +151,42 @@ def _disagreements(error: Error, pairs: Pairs, wavelength_nm: Axis | None) -> It
         relative = error_measurement.relative(pairs.table, pairs.model, floor)
     nm = [None] * floor.size if wavelength_nm is None else wavelength_nm.tolist()
     bands = list(_bands(error, drawn))
+    of_worst = error.columns < floor.size
     for number, band in enumerate(bands):
         whole = number == len(bands) - 1
         for name, quantile in QUANTILES.items():
-            stated = (
-                np.full(floor.size, error.overall.__dict__[name]) if whole else np.array(getattr(error, name)[number])
+            stated = np.broadcast_to(
+                getattr(error.overall, name) if whole else getattr(error, name)[number], floor.size
             )
             least, most = limits(band.stated, int(np.count_nonzero(band.chosen)), quantile)
             of_band = relative[band.chosen]
             above = _exceeding(of_band, np.maximum(stated, EXACT) * (1.0 + DIGITS))
             around = _exceeding(of_band, stated * (1.0 - DIGITS))
-            # Overall numbers are those of the worst wavelength. Other wavelengths may be better
-            too_good = np.zeros(floor.size, dtype=bool) if whole else (around <= least) & (stated > EXACT)
+            too_good = _judged(whole, of_worst, (around <= least) & (stated > EXACT))
             for w in np.flatnonzero((above >= most) | too_good):
                 fresh = _percentile(of_band[:, w], quantile)
                 yield _disagreement(name, band, nm[w], float(stated[w]), fresh)
-        stated = np.full(floor.size, error.overall.l1) if whole else np.array(error.l1[number])
+        stated = np.broadcast_to(error.overall.l1 if whole else error.l1[number], floor.size)
         ratio, off = _ratio(np.abs(pairs.table - pairs.model), pairs.model, drawn.weight, band)
         more = ratio - stated * (1.0 + DIGITS) > STANDARD_ERRORS * off + EXACT
         rare = np.zeros(floor.size) if whole else _rare(np.array(error.max[number]), pairs.model, drawn.weight, band)
-        less = (ratio + STANDARD_ERRORS * off + EXACT + rare < stated * (1.0 - DIGITS)) & (not whole)
+        low = ratio + STANDARD_ERRORS * off + EXACT + rare < stated * (1.0 - DIGITS)
+        less = _judged(whole, of_worst, low)
         more |= ~np.isfinite(ratio)
         for w in np.flatnonzero(more | less):
             yield _disagreement("l1", band, nm[w], float(stated[w]), float(ratio[w]))
     yield from _of_floor(floor, pairs, bands[-1], nm)
+
+
+def _judged(whole: bool, of_worst: bool, too_good: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return at which wavelengths a statement is judged to be too large.
+
+    Numbers of the worst wavelength are too large if they are so at each wavelength. Overall numbers are not judged: at
+    other wavelengths they may be smaller.
+    """
+    if whole:
+        return np.zeros_like(too_good)
+    return np.full_like(too_good, np.all(too_good)) if of_worst else too_good
 
 
 def _of_floor(stated: Floats, pairs: Pairs, band: _Band, nm: list[float | None]) -> Iterator[Disagreement]:

@@ -129,9 +129,13 @@ def _of_srgb(name: str, written: Any) -> Spectrum:
         colour.MSDS_CMFS[OBSERVER].copy().align(shape),
         colour.SDS_ILLUMINANTS[ILLUMINANT].copy().align(shape),
     )
+    # each second wavelength is enough: straight lines between them are fitted to the spectrum, which keeps the colour
+    nodes = made.wavelengths[::2]
+    lines = np.column_stack([np.interp(made.wavelengths, nodes, one) for one in np.eye(nodes.size)])
+    fitted = np.clip(np.linalg.lstsq(lines, made.values, rcond=None)[0], 0.0, 1.0)
     words = written if isinstance(written, str) else ", ".join(f"{value:g}" for value in code)
-    values = [float(f"{value:.6g}") for value in made.values]  # a colour has fewer digits
-    return _spectrum(name, made.wavelengths.tolist(), values, f"sRGB {words}, {UPSAMPLED}")
+    values = [float(f"{value:.6g}") for value in fitted.tolist()]  # a colour has fewer digits
+    return _spectrum(name, nodes.tolist(), values, f"sRGB {words}, {UPSAMPLED}")
 
 
 def _within(value: Any) -> bool:

@@ -60,7 +60,7 @@ def standing(root: Path, name: str, request: Mapping[str, Any]) -> Standing:
         if head["request_sha256"] == wanted:
             store.verify(name)
             return Standing("current", group.name)
-        why = difference(store.metadata(name).request or {}, request)
+        why = difference(store.metadata(name).whole_request, request)
     except UnknownMaterialError:
         why = "new"
     except StoreError as error:

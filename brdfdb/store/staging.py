@@ -177,8 +177,13 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
     with writing(store_of_staged(directory), table.source.name):
         write_file(directory / "table" / table.variable / METADATA, array_metadata(table), directory)
     read = _reader(table, directory / "table")
-    measured = {"request": request, "request_sha256": digest(request), "error": measure(table, read)}
-    metadata = tabulation.metadata_of(table).model_copy(update=measured | first_numbers(table, read))
+    known = tabulation.metadata_of(table)
+    measured = {
+        "request": known.without_source(request),
+        "request_sha256": digest(request),
+        "error": measure(table, read),
+    }
+    metadata = known.model_copy(update=measured | first_numbers(table, read))
     frame = tabulation.frame(table).assign_attrs(metadata.attributes())
     with writing(store_of_staged(directory), table.source.name):
         return {

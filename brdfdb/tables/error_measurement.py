@@ -149,7 +149,8 @@ def measure(
     Returns
     -------
     Error
-        For each band and wavelength, and overall, to three digits; and limits in places and between wavelengths.
+        For each band and wavelength, and overall, to three digits; and limits in places and between wavelengths. Of a
+        mixture, at its worst wavelength alone.
     """
     if count is None:
         several = layout.wavelength_nm is not None and layout.wavelength_nm.size > _FEW
@@ -173,13 +174,14 @@ def measure(
         layout.source,
         layout.wavelength_nm,
     )
-    return error.model_copy(
+    measured = error.model_copy(
         update={
             "worst": worst,
             "places": _in_places(relative(truth[own:], values[own:], floor), pairs),
             "between": None if floor.size < 2 else _between(layout, read, drawn, pairs, floor, count),
         }
     )
+    return measured if layout.part_nm is None else measured.of_worst_wavelength()
 
 
 def _between(

@@ -19,7 +19,7 @@ from brdfdb.materials import Material, Source, source_of
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import Grid, check_wavelengths
 
-TABLE_VERSION = 4  # of the variables, dimensions and attributes of a table
+TABLE_VERSION = 5  # of the variables, dimensions and attributes of a table
 
 _METHODS = ("linear", "cubic")
 

@@ -83,11 +83,16 @@ class TableMetadata(BaseModel):
     interpolation: Interpolation = Field(
         default=Interpolation(), description="the way from the numbers stored at nodes to f_r"
     )
+    part_wavelengths_nm: list[float] = Field(
+        default_factory=list, description="of a mixture, the wavelengths at which its parts are f_r; else empty"
+    )
     bits: int = Field(default=MANTISSA_BITS, ge=1, le=MANTISSA_BITS, description="bits of the mantissa that are kept")
     reconstruction: str | None = Field(default=None, description="the formula for f_r, in one line")
     reason: str = Field(default="", description="why the planner laid the table out so; empty for a grid of a recipe")
-    request: dict[str, Any] | None = Field(default=None, description="the request of the build that made the table")
-    request_sha256: str | None = Field(default=None, description="sha256 of the request")
+    request: dict[str, Any] | None = Field(
+        default=None, description="the request of the build that made the table, but for what source_record says"
+    )
+    request_sha256: str | None = Field(default=None, description="sha256 of the whole request")
     error: Error | None = Field(default=None, description="the stated error; null: not measured")
     formula_error: FormulaError | None = Field(
         default=None, description="error of the model against the highest rung of its surface; null: not measured"
@@ -129,6 +134,16 @@ class TableMetadata(BaseModel):
         """The required attributes that the table does not have."""
         needed = [key for key in REQUIRED if key not in _OF_MODELS] if self.of_function else REQUIRED
         return [key for key in needed if key not in self.model_fields_set and key not in self.strange]
+
+    def without_source(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a request but for what the source record says, as a table keeps it."""
+        record = self.source_record or {}
+        return {key: value for key, value in request.items() if key not in record or record[key] != value}
+
+    @property
+    def whole_request(self) -> dict[str, Any]:
+        """The request with what the source record says of it; empty if the table keeps none."""
+        return {} if self.request is None else {**(self.source_record or {}), **self.request}
 
     def known_interpolation(self) -> Interpolation:
         """Return the interpolation; ValueError if it is one that this program does not know."""

@@ -52,6 +52,10 @@ class Places(BaseModel):
         "three: any azimuth, exactly towards the light, and theta_r = theta_i"
     )
 
+    def of_worst_column(self) -> Places:
+        """Return the limits with one column, the largest of all."""
+        return Places(**{name: _worst(getattr(self, name)) for name in type(self).model_fields})
+
 
 class Between(BaseModel):
     """Limits of the error between neighbouring wavelengths, as those of `Places`, with the larger of two floors."""
@@ -67,7 +71,11 @@ class Between(BaseModel):
 
 
 class Error(BaseModel):
-    """The error of a table, abs(table - source) / max(source, floor), for each band of theta_i and each wavelength."""
+    """The error of a table, abs(table - source) / max(source, floor), for each band of theta_i and each wavelength.
+
+    The table of a mixture states one column, for the wavelength where it is largest: all of its wavelengths are made of
+    the same few parts. Only the floor is then for each wavelength.
+    """
 
     model_config = _STRICT
 
@@ -98,17 +106,41 @@ class Error(BaseModel):
         Rows are those of `places`. Columns are the wavelengths, and after them the intervals between them. In an
         interval no less is stated than at its two ends.
         """
-        at = _rows(self.p99, self.places)
+        wavelengths = len(self.floor)
+        at = _wide(_rows(self.p99, self.places), wavelengths)
         if self.between is None:
-            return np.concatenate([at, np.full((places.ROWS, at.shape[1] - 1), np.nan)], axis=1)
-        inside = _rows(self.between.bands, self.between.places)
+            return np.concatenate([at, np.full((places.ROWS, wavelengths - 1), np.nan)], axis=1)
+        inside = _wide(_rows(self.between.bands, self.between.places), wavelengths - 1)
         return np.concatenate([at, np.maximum(inside, np.maximum(at[:, 1:], at[:, :-1]))], axis=1)
+
+    @property
+    def columns(self) -> int:
+        """The number of columns of each statistic: one, or one for each wavelength."""
+        return len(self.p99[0]) if self.p99 else 0
+
+    def of_worst_wavelength(self) -> Error:
+        """Return the error with one column, the largest of all wavelengths, and of all intervals between them."""
+        update: dict[str, object] = {name: _worst(getattr(self, name)) for name in Overall.model_fields}
+        if self.places is not None:
+            update["places"] = self.places.of_worst_column()
+        if self.between is not None:
+            inside = None if self.between.places is None else self.between.places.of_worst_column()
+            update["between"] = self.between.model_copy(update={"bands": _worst(self.between.bands), "places": inside})
+        return self.model_copy(update=update)
 
     @functools.cached_property
     def floors(self) -> NDArray[np.float64]:
         """The floor [1/sr] of each column of `limits`."""
         floor = np.array(self.floor)
         return np.concatenate([floor, np.maximum(floor[1:], floor[:-1])])
+
+
+def _worst(rows: Numbers) -> Numbers:
+    return [[max(row)] for row in rows]
+
+
+def _wide(rows: NDArray[np.float64], columns: int) -> NDArray[np.float64]:
+    return np.broadcast_to(rows, (len(rows), columns)) if rows.shape[1] == 1 else rows
 
 
 def _rows(bands: Numbers, some: Places | None) -> NDArray[np.float64]:

@@ -263,13 +263,15 @@ def points(grid: Grid, wi: Floats, wr: Floats) -> NDArray[np.float64]:
 
 def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], attrs: Mapping[str, Any]) -> Table:
     """Return the table that the arrays and attributes of a stored group describe; ValueError if they do not fit."""
-    interpolation = TableMetadata.read(attrs).known_interpolation()
+    metadata = TableMetadata.read(attrs)
+    interpolation = metadata.known_interpolation()
     variable = "brdf" if "brdf" in arrays else "parts"
     if variable not in arrays:
         raise ParameterError("brdf", f"neither it nor parts is among the arrays {', '.join(arrays) or 'none'}")
     grid = Grid({axis: arrays[axis] for axis in axes_among(arrays)})
     specular, uniform = arrays.get("specular_reflectance"), arrays.get("uniform")
-    wavelength_nm, part_nm = arrays.get("wavelength"), arrays.get("part_wavelength")
+    wavelength_nm = arrays.get("wavelength")
+    part_nm = np.array(metadata.part_wavelengths_nm) if metadata.part_wavelengths_nm else None
     basis = "mixture" if "mixture" in arrays else "spectra"
     spectra = arrays.get(basis)
     spectrum = () if wavelength_nm is None else check_wavelengths(wavelength_nm).shape
@@ -279,7 +281,7 @@ def table_from(name: str, revision: str, arrays: Mapping[str, NDArray[Any]], att
     if spectra is not None and spectra.shape != (*channels, *spectrum):
         raise ParameterError(basis, f"shape {spectra.shape} is not {(*channels, *spectrum)}, of parts and wavelengths")
     if (part_nm is not None) != ("mixture" in arrays) or (part_nm is not None and part_nm.shape != channels):
-        raise ParameterError("part_wavelength", "it goes with mixture, one wavelength for each part")
+        raise ParameterError("part_wavelengths_nm", "it goes with mixture, one wavelength for each part")
     if uniform is not None and uniform.size not in (1, *spectrum):
         raise ParameterError("uniform", f"{uniform.size} values are neither one nor one for each wavelength")
     return Table(

@@ -186,12 +186,8 @@ def frame(layout: Layout) -> xr.Dataset:
         for name, meaning, values in zip("nk", ("refractive index", "extinction coefficient"), indices, strict=True):
             variables[name] = ("wavelength", values, {"units": "1", "long_name": meaning})
     if layout.spectra is not None:
-        parts = np.arange(float(len(layout.spectra)))
-        coordinates["part"] = ("part", parts, {"units": "1", "long_name": "number of a part"})
         name = "spectra" if layout.part_nm is None else "mixture"
         variables[name] = (("part", "wavelength"), layout.spectra, VARIABLES[name])
-    if layout.part_nm is not None:
-        variables["part_wavelength"] = ("part", layout.part_nm, VARIABLES["part_wavelength"])
     if layout.uniform is not None:
         of_each = layout.uniform.size > 1
         value = layout.uniform if of_each else layout.uniform[0]
@@ -250,6 +246,7 @@ def metadata_of(layout: Layout) -> TableMetadata:
         symmetries=layout.grid.symmetries,
         wavelength_range_nm=[] if wavelength_nm is None else [float(wavelength_nm[0]), float(wavelength_nm[-1])],
         interpolation=layout.interpolation,
+        part_wavelengths_nm=[] if layout.part_nm is None else layout.part_nm.tolist(),
         bits=layout.bits,
         reconstruction=_reconstruction(layout),
         reason=layout.reason,
@@ -274,6 +271,5 @@ VARIABLES = {
     "parts": {"units": "1", "long_name": "what f_r is rebuilt from, as the attribute reconstruction says"},
     "spectra": {"units": "1", "long_name": "how the parts make up each wavelength"},
     "mixture": {"units": "1", "long_name": "how f_r of the parts makes f_r at each wavelength"},
-    "part_wavelength": {"units": "nm", "long_name": "wavelength of a part"},
     "uniform": {"units": "sr-1", "long_name": "the part of f_r that is the same in all directions"},
 }

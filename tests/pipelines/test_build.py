@@ -60,14 +60,54 @@ def test_tables_are_those_of_tabulate_with_the_request_beside_them(recipe: Path,
     store = brdfdb.open(built)
     for job in load(recipe).jobs():
         expected = tabulation.tabulate(job.layout())
-        request = json.loads(json.dumps(job.request))
+        whole = json.loads(json.dumps(job.request))
+        request = {key: value for key, value in whole.items() if key not in ("material", "model_version")}
+        assert store.metadata(job.material.name).whole_request == whole
         with store.dataset(job.material.name) as found:
             attrs = store[job.material.name].attrs
             measured = {key: attrs[key] for key in ("error", "formula_error", "largest_albedo")}
-            of_build = {"request": request, "request_sha256": digest(request), **measured}
+            of_build = {"request": request, "request_sha256": digest(whole), **measured}
             expected.attrs = plain_attributes(expected.attrs | of_build)
             xr.testing.assert_identical(found.load(), expected)
-        assert store.summary(job.material.name)["request_sha256"] == digest(request)
+        assert store.summary(job.material.name)["request_sha256"] == digest(whole)
+
+
+WARD = """
+[define.{name}]
+title = "A test"
+model = "ward"
+source = "a test"
+[define.{name}.parameters]
+rho_d = {rho_d}
+rho_s = {rho_s}
+alpha_x = 0.1
+alpha_y = {alpha_y}
+"""
+
+
+@pytest.mark.parametrize("alpha_y", [0.1, 0.15])
+def test_a_colour_takes_less_than_twice_the_bytes_of_grey(tmp_path: Path, alpha_y: float) -> None:
+    path = tmp_path / "recipe.toml"
+    parameters = {
+        "grey": ("0.2", "0.05"),
+        "srgb": ('{ srgb = "#6b2424" }', '{ srgb = "#20201a" }'),
+        "patches": ('{ measured = "BabelColor Average/orange" }', '{ measured = "BabelColor Average/cyan" }'),
+    }
+    path.write_text(
+        f"materials = {list(parameters)}\ntolerance = 0.01\n"
+        "wavelengths_nm = [{ start = 380, stop = 730, step = 8.75 }]\n"
+        + "".join(
+            WARD.format(name=name, rho_d=rho_d, rho_s=rho_s, alpha_y=alpha_y)
+            for name, (rho_d, rho_s) in parameters.items()
+        )
+    )
+    with ThreadPoolExecutor(1) as executor:
+        built = build(load(path), tmp_path / "store", Workers(executor, lambda: 1), lambda _: None)
+    stored = {b.job.material.name: b.stored_bytes for b in built}
+    assert built[1].job.wavelength_nm is not None
+    assert built[1].job.wavelength_nm.size == 41
+    assert stored["srgb"] < 2 * stored["grey"]
+    assert stored["patches"] < 2 * stored["grey"]
 
 
 def test_the_largest_table_comes_first_and_the_number_of_workers_changes_nothing(

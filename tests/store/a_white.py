@@ -17,9 +17,10 @@ GRID = Grid({"theta_i": [0, 30, 60, 80], "theta_r": [0, 40, 80], "delta_phi": [0
 
 
 def lambert(rho: float) -> xr.Dataset:
-    """Return the table of an albedo, with a request as builds write it."""
+    """Return the table of an albedo, with a request of its albedo alone."""
     table = {"title": "White", "model": "lambert", "source": "no paper", "parameters": {"rho": rho}}
     dataset = tabulate(Layout(Material.from_table("white", table), GRID))
+    del dataset.attrs["source_record"]
     return dataset.assign_attrs(request={"rho": rho}, request_sha256=digest({"rho": rho}))
 
 

@@ -7,6 +7,9 @@ import pytest
 
 import brdfdb
 from brdfdb.audit.nodes import nodes_of
+from brdfdb.audit.pairs import pairs_of
+from brdfdb.audit.statement import NAMES as STATISTICS
+from brdfdb.audit.statement import contradictions, disagreements
 from brdfdb.materials import Material, presets
 from brdfdb.materials.spectrum import Spectrum
 from brdfdb.store.publication import publish
@@ -63,6 +66,21 @@ def test_lookups_of_a_coloured_table_keep_the_stated_error(tmp_path: object) -> 
     assert nodes_of(table, PAINTED).verdict == "passes"
     grey = plan(BRASS, None, 0.02)
     assert table.nbytes < 2 * 4 * grey.size  # the grey table holds float32 alone
+
+
+def test_the_one_column_that_a_mixture_states_is_judged_on_both_sides(tmp_path: object) -> None:
+    publish(f"{tmp_path}/store", PAINTED, wavelengths_nm=NM[::4], tolerance=0.05)
+    table = brdfdb.open(f"{tmp_path}/store")[PAINTED.name]
+    error = table.error
+    assert error is not None
+    assert (error.columns, len(error.floor), error.limits.shape[1]) == (1, 11, 21)
+    assert contradictions(error, 11) == []
+    pairs = pairs_of(table, PAINTED)
+    assert disagreements(error, pairs, table.wavelength_nm) == []
+    for factor, contradicted in ((0.25, {"l1", "p95", "p99", "max"}), (10.0, {"median", "p95"})):
+        wrong = {name: [[factor * row[0]] for row in getattr(error, name)] for name in STATISTICS}
+        said = {one.statistic for one in disagreements(error.model_copy(update=wrong), pairs, table.wavelength_nm)}
+        assert said >= contradicted
 
 
 def test_nodes_hold_the_f_r_of_lookups(tmp_path: object) -> None:

@@ -61,14 +61,14 @@ function assumed(parameter, attributes) {
 /** Know nothing. */
 export const forget = () => aside.replaceChildren();
 
-/** Say the error at the light that is looked at: between two wavelengths the larger of theirs. */
+/** Say the error at the light that is looked at: between two wavelengths the larger of theirs, of a mixture the one stated. */
 export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
   const into = document.getElementById("band");
   if (!into || !error) return;
   const at = Math.max(0, error.theta_i_deg.findLastIndex((edge) => edge <= theta_i));
   const row = error.p99[Math.min(at, error.p99.length - 1)];
   const wanted = wavelengths && nm !== null ? nearest({ wavelength_nm: wavelengths }, nm) : null;
-  const around = wanted === null ? row : row.slice(
+  const around = wanted === null || row.length === 1 ? row : row.slice(
     wavelengths.findLastIndex((each) => each <= wanted), wavelengths.findIndex((each) => each >= wanted) + 1);
   into.textContent = `within ${percent(Math.max(...around))}`;
 }
