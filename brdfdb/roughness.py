@@ -20,7 +20,7 @@ Disney, glTF
 
 The alpha of GGX is no width of a Gaussian. It is the t at which half of the slopes are steeper, and its slopes have no
 rms value. Ward's alpha put into GGX gives another surface: docs/explanation/microfacets.md measures the error.
-`brdfdb.forms.conversion.convert` searches the parameters of another model that come closest, where nothing is exact.
+`brdfdb.conversion.convert.convert` searches the parameters of another model that come closest, where nothing is exact.
 
 The roughness of a *diffuse* lobe is a different quantity, which is not squared and widens no lobe. The
 `oren_nayar_diffuse_bsdf` of OSL and MaterialX takes it as Oren and Nayar's sigma in radians (1 is 57 degrees) in the

@@ -1,1 +1,1 @@
-"""All forms of a material, with their errors and costs, and conversions to other models."""
+"""All forms of a material, with their errors and costs."""

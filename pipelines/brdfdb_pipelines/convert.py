@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import brdfdb
+from brdfdb.conversion.convert import STEPS, convert
+from brdfdb.conversion.document import Conversion, percent
+from brdfdb.conversion.figure import figure_of
+from brdfdb.conversion.nodes import Weigh
 from brdfdb.errors import ParameterError
-from brdfdb.forms.conversion import STEPS, convert
-from brdfdb.forms.conversion_document import Conversion, percent
-from brdfdb.forms.conversion_figure import figure_of
-from brdfdb.forms.conversion_nodes import Weigh
 from brdfdb.geometry import radians
 from brdfdb.materials import Source, written_name
 from brdfdb.models import MODELS
@@ -55,7 +55,7 @@ def run(
     fixed : sequence of str
         Parameters that are not searched, ``name=value`` as recipes write them.
     refractive_index, weigh
-        As of `brdfdb.forms.conversion.convert`.
+        As of `brdfdb.conversion.convert.convert`.
     json : bool
         Print the whole document as JSON.
     picture : Path, optional

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from brdfdb.audit import AuditReport
-from brdfdb.forms.conversion_document import Conversion
+from brdfdb.conversion.document import Conversion
 from brdfdb.forms.tradeoff_document import Charts
 from brdfdb.materials import Material
 from brdfdb.scenes.choice_document import Choice

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb import models, roughness
-from brdfdb.forms.conversion import compare, convert
-from brdfdb.forms.conversion_target import index_of
-from brdfdb.forms.search import spread
+from brdfdb.conversion.convert import compare, convert
+from brdfdb.conversion.minimisation import spread
+from brdfdb.conversion.target import index_of
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.sampling import directions, mixture_density
 from brdfdb.lobes import GGX, Lobe

@@ -11,14 +11,13 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb import models
+from brdfdb.conversion.convert import compare, convert
+from brdfdb.conversion.document import Conversion
+from brdfdb.conversion.figure import figure_of
+from brdfdb.conversion.minimisation import spread
+from brdfdb.conversion.target import index_of
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Panel
-from brdfdb.forms import conversion
-from brdfdb.forms.conversion import convert
-from brdfdb.forms.conversion_document import Conversion
-from brdfdb.forms.conversion_figure import figure_of
-from brdfdb.forms.conversion_target import index_of
-from brdfdb.forms.search import spread
 from brdfdb.fresnel import unpolarised
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.sampling import directions, mixture_density
@@ -262,10 +261,10 @@ def test_what_cannot_be_converted_is_refused(name: str, model: str, options: dic
         convert(presets()[name], model, **options)
 
 
-@pytest.mark.parametrize("function", [convert, conversion.compare], ids=lambda function: function.__name__)
+@pytest.mark.parametrize("function", [convert, compare], ids=lambda function: function.__name__)
 def test_examples_print_what_they_say(function: Any) -> None:
     runner = doctest.DocTestRunner()
-    for example in doctest.DocTestFinder(recurse=False).find(function, globs=dict(vars(conversion))):
+    for example in doctest.DocTestFinder(recurse=False).find(function, globs={"convert": convert, "compare": compare}):
         runner.run(example)
     assert runner.summarize(verbose=False).failed == 0
     assert runner.tries > 0

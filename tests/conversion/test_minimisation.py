@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb.forms.search import best_apart, downhill, spread
+from brdfdb.conversion.minimisation import best_apart, downhill, spread
 
 Floats = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from brdfdb.forms.conversion_document import Conversion, percent
+from brdfdb.conversion.document import Conversion, percent
 from brdfdb.materials import Material, Source
 from brdfdb.models import MODELS
 from brdfdb.parameters import closest

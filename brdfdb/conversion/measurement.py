@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.forms.conversion_document import Peak, WorstView
-from brdfdb.forms.conversion_nodes import Evaluate, Left, Nodes, Specular, ViewError, specular_of
+from brdfdb.conversion.document import Peak, WorstView
+from brdfdb.conversion.nodes import Evaluate, Left, Nodes, Specular, ViewError, specular_of
 from brdfdb.geometry import degrees, radians, unit_vector
 from brdfdb.integrals.pairs import Counts, Symmetry, view_of, views
 from brdfdb.lobes import Lobe

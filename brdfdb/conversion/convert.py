@@ -1,4 +1,4 @@
-"""Conversion from one model to another: the parameters that come closest, and the error that is left."""
+"""The parameters of another model that come closest to a source."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.errors import ParameterError
-from brdfdb.forms.conversion_document import Conversion, percent, toml_of
-from brdfdb.forms.conversion_measurement import (
+from brdfdb.conversion.document import Conversion, percent, toml_of
+from brdfdb.conversion.measurement import (
     VIEWS_DEG,
     l1_at,
     left_by,
@@ -20,11 +19,12 @@ from brdfdb.forms.conversion_measurement import (
     sides_of,
     worst_view,
 )
-from brdfdb.forms.conversion_nodes import COARSE, FINER, FITTED, WEIGHS, Nodes, Weigh, specular_of
-from brdfdb.forms.conversion_remarks import is_lost, remarks, with_highlight
-from brdfdb.forms.conversion_search import REFUSED, Distance, Result, search
-from brdfdb.forms.conversion_search import STEPS as _SEARCH_STEPS
-from brdfdb.forms.conversion_target import Target
+from brdfdb.conversion.nodes import COARSE, FINER, FITTED, WEIGHS, Nodes, Weigh, specular_of
+from brdfdb.conversion.remarks import is_lost, remarks, with_highlight
+from brdfdb.conversion.search import REFUSED, Distance, Result, search
+from brdfdb.conversion.search import STEPS as _SEARCH_STEPS
+from brdfdb.conversion.target import Target
+from brdfdb.errors import ParameterError
 from brdfdb.geometry import degrees
 from brdfdb.integrals.pairs import Counts, Symmetry
 from brdfdb.lobes import Lobe
@@ -98,7 +98,7 @@ def convert(
     wavelengths it is the mean. The mean square would follow the largest values, next to grazing, and a specular part
     has none. l1 has a price, too: a highlight with a few hundredths of the light may go.
 
-    All numbers of the model are searched within their ranges, as in `brdfdb.forms.conversion_search`. A reflectance has
+    All numbers of the model are searched within their ranges, as in `brdfdb.conversion.search`. A reflectance has
     a value at each wavelength; the others are shared, and searched at five wavelengths. Switches keep their defaults.
     An isotropic source gives one alpha. n and k are searched as the reflectance at normal incidence and a place between
     the two n of k = 0, which matters little: `Conversion.as_good` shows that. Integrals are sums at nodes that follow

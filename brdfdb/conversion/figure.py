@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.conversion.document import Conversion, percent
 from brdfdb.figure import Curve, Figure, Panel, curve_of
-from brdfdb.forms.conversion_document import Conversion, percent
 from brdfdb.geometry import degrees, radians, unit_vector
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.forms.conversion_nodes import Nodes
-from brdfdb.forms.conversion_target import Target
-from brdfdb.forms.search import best_apart, downhill, spread
+from brdfdb.conversion.minimisation import best_apart, downhill, spread
+from brdfdb.conversion.nodes import Nodes
+from brdfdb.conversion.target import Target
 from brdfdb.integrals.pairs import WIDTHS
 
 Array = NDArray[np.float64]
