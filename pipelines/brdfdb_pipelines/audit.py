@@ -196,10 +196,9 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     violating = len(audit_report.violations)
     partly = sum(bool(a.not_judged) for a in audits)
     not_whole = f"{partly} only in part, for lack of a source; " if partly else ""
-    allowed = f"{accepted} exceed 1 as --allow accepts, " if accepted else ""
+    allowed = f"accepted excess {accepted}, " if accepted else ""
     page_path = report_path.with_suffix(".html")
     print(
-        f"{len(audits)} audited: {not_whole}{len(audits) - known - accepted - violating} pass, {known} exceed 1 as "
-        f"their published parameters are known to, {allowed}{violating} violate; page {page_path}, "
-        f"data {report_path}"
+        f"{len(audits)} audited: {not_whole}passes {len(audits) - known - accepted - violating}, "
+        f"known published excess {known}, {allowed}violates {violating}; page {page_path}, data {report_path}"
     )

@@ -40,10 +40,7 @@ def test_audit_of_some_materials_reports_those(built: Path, tmp_path: Path, caps
         ["foam", "yes", "yes, at these parameters"],
     ]
     written = report.with_suffix(".html")
-    assert lines[-1] == (
-        "2 audited: 2 pass, 0 exceed 1 as their published parameters are known to, 0 violate; "
-        f"page {written}, data {report}"
-    )
+    assert lines[-1] == (f"2 audited: passes 2, known published excess 0, violates 0; page {written}, data {report}")
     assert written.read_text(encoding="utf-8").startswith("<!doctype html>")
     document = json.loads(report.read_bytes())
     jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
@@ -80,7 +77,7 @@ def test_a_violation_is_exit_code_1_and_stands_in_the_report(
     out, err = capsys.readouterr()
     assert f"bad: {said}\n" in out
     assert "good: " not in out
-    assert "2 audited: 1 pass, 0 exceed 1 as their published parameters are known to, 1 violate" in out
+    assert "2 audited: passes 1, known published excess 0, violates 1" in out
     assert "Traceback" not in err
     document = json.loads((tmp_path / "audit.json").read_text(encoding="utf-8"))
     jsonschema.validate(document, json.loads(SCHEMA.read_bytes()))
@@ -99,7 +96,7 @@ def test_audit_notices_a_file_that_was_exchanged_for_a_sound_one(tmp_path: Path,
     assert run("audit", "--no-figures", "--store", tmp_path) == 2
     out, err = capsys.readouterr()
     assert err.splitlines()[-1] == "brdfdb: grey r000001 is damaged: the content of brdf/c/0/0/0 changed"
-    assert "1 audited: 1 pass" in out  # the other one
+    assert "1 audited: passes 1" in out  # the other one
     document = json.loads((tmp_path / "audit.json").read_text(encoding="utf-8"))
     assert [entry["material"] for entry in document["materials"]] == ["white"]
 
@@ -136,7 +133,7 @@ def test_white_oren_nayar_violates_whatever_its_recipe_says_and_can_be_accepted(
     )
     assert run("audit", "mirror", "white", "--allow", "white", "--jobs", "1", "--store", store) == 0
     out, _ = capsys.readouterr()
-    assert "2 audited: 1 pass, 0 exceed 1 as their published parameters are known to, 1 exceed 1 as --allow" in out
+    assert "2 audited: passes 1, known published excess 0, accepted excess 1" in out
     document = json.loads((store / "audit-part.json").read_text(encoding="utf-8"))
     entry = next(entry for entry in document["materials"] if entry["material"] == "white")
     assert (entry["verdict"], entry["findings"]["energy"]["verdict"]) == ("accepted excess", "accepted excess")

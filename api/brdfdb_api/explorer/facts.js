@@ -55,7 +55,7 @@ const above = (largest) => (largest && (largest.albedo === null || largest.albed
 /** Why a value that no paper prints was chosen; tables built earlier have the names alone, and reasons in their note. */
 function assumed(parameter, attributes) {
   const why = attributes.assumed?.[parameter.name]?.why ?? "the paper does not print it";
-  return parameter.assumed ? `assumed: ${why}` : "";
+  return parameter.assumed && why !== parameter.source ? `assumed: ${why}` : ""; // a colour says so in its source
 }
 
 /** Know nothing. */
