@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import google_crc32c
 import numpy as np
-import xarray as xr
 import zarr
 from numcodecs import Blosc
 from numpy.typing import NDArray
@@ -19,7 +19,10 @@ from zarr.storage import MemoryStore
 from brdfdb.errors import StoreError
 from brdfdb.store.paths import METADATA
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.tabulation import VARIABLES
+from brdfdb.tables.tabulation import VARIABLES, Frame, Variable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CHUNK_VALUES = 1 << 20  # values of a chunk of a dataset that comes as a whole, 4 MB
 
@@ -105,9 +108,10 @@ def _array_files(
     return {name: content.to_bytes() for name, content in files.items()}
 
 
-def frame_files(layout: Layout, frame: xr.Dataset) -> dict[str, bytes]:
+def frame_files(layout: Layout, frame: Frame) -> dict[str, bytes]:
     """Return all files of a revision but the blocks: metadata, coordinates and small variables."""
-    return _group_files(frame, {f"{layout.variable}/{METADATA}": array_metadata(layout)})
+    others = {f"{layout.variable}/{METADATA}": array_metadata(layout)}
+    return _group_files({**frame.variables, **frame.coordinates}, frame.attrs, others)
 
 
 def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -120,24 +124,29 @@ def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 def dataset_files(dataset: xr.Dataset) -> dict[str, bytes]:
     """Return all files of a revision that holds a dataset."""
-    return _group_files(dataset, {})
+    variables = {
+        str(name): Variable(tuple(map(str, variable.dims)), np.asarray(variable.values), variable.attrs)
+        for name, variable in dataset.variables.items()
+    }
+    return _group_files(variables, dataset.attrs, {})
 
 
-def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, bytes]:
+def _group_files(
+    variables: Mapping[str, Variable], attrs: Mapping[str, Any], others: Mapping[str, bytes]
+) -> dict[str, bytes]:
     """Return the files of a group of plain arrays; the metadata of the group repeats those of the arrays.
 
     A plain `xarray.open_zarr` looks for them there first. `zarr.consolidate_metadata` warns while it does the same. A
     revision never changes: nothing goes stale.
     """
     files = dict(others)
-    for name, variable in dataset.variables.items():
-        values = np.asarray(variable.values)
+    for name, (dims, values, attributes) in variables.items():
         written = _array_files(
-            tuple(map(str, variable.dims)),
+            dims,
             values.shape,
             _chunks(values.shape),
             values.dtype.newbyteorder("<").str,
-            json.dumps(variable.attrs),
+            json.dumps(attributes),
             values.tobytes(),
         )
         files |= {f"{name}/{file}": data for file, data in written.items()}
@@ -147,7 +156,7 @@ def _group_files(dataset: xr.Dataset, others: Mapping[str, bytes]) -> dict[str, 
         if name.endswith(f"/{METADATA}")
     }
     metadata = {
-        "attributes": dataset.attrs,
+        "attributes": attrs,
         "zarr_format": 3,
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": arrays},
         "node_type": "group",

@@ -184,11 +184,12 @@ def write_frame(staging: str, layout: str) -> dict[str, Entry]:
         "error": measure(table, read),
     }
     metadata = known.model_copy(update=measured | first_numbers(table, read))
-    frame = tabulation.frame(table).assign_attrs(metadata.attributes())
+    frame = tabulation.frame(table)
+    attributes = {**frame.attrs, **metadata.attributes()}
     with writing(store_of_staged(directory), table.source.name):
         return {
             name: write_file(directory / "table" / name, data, directory)
-            for name, data in frame_files(table, frame).items()
+            for name, data in frame_files(table, frame._replace(attrs=attributes)).items()
         }
 
 

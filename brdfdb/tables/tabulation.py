@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
@@ -16,12 +15,34 @@ from brdfdb.tables.grids import Axis
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.metadata import TableMetadata
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 _SLOPE_STEP = np.deg2rad(2.0)  # from which the slope at the horizon is taken
 POLE_END_DEG = 89.9  # of light and viewer, where the pole of a model is tabulated as it is
 _CONTINUED = 7.5  # how many such steps numbers go on with it beyond the horizon
 # Where the specular part is tabulated, unless on an axis theta_i that somebody gave: a planner has no nodes for it
 SPECULAR_THETA_DEG = np.append(np.arange(0.0, 60.0, 0.5), np.arange(60.0, 90.01, 0.1).round(1))
 _SLAB = 1 << 17  # values evaluated at a time: fewer cost calls, more cost memory
+
+
+class Variable(NamedTuple):
+    """An array of a table: the names of its axes, its values, and its attributes such as units."""
+
+    dims: tuple[str, ...]
+    values: NDArray[Any]
+    attrs: Mapping[str, Any]
+
+
+class Frame(NamedTuple):
+    """A table without its values. Builds write it as it is: xarray takes longer to import than a small table to build.
+
+    Coordinates hold the axes, in degrees and nm. Variables hold the specular part, the basis and refractive indices.
+    """
+
+    variables: Mapping[str, Variable]
+    coordinates: Mapping[str, Variable]
+    attrs: Mapping[str, Any]
 
 
 def tabulate(layout: Layout) -> xr.Dataset:
@@ -36,8 +57,11 @@ def tabulate(layout: Layout) -> xr.Dataset:
         ``k`` as used.
         Coordinates in degrees and nm, with units. Attributes: title, model, parameters, sources and notes.
     """
+    import xarray as xr
+
     values = np.concatenate([block(layout, rows) for rows in layout.blocks])
-    return frame(layout).assign({layout.variable: (layout.dims, values, VARIABLES[layout.variable])})
+    dataset = xr.Dataset(*frame(layout))
+    return dataset.assign({layout.variable: (layout.dims, values, VARIABLES[layout.variable])})
 
 
 def block(layout: Layout, rows: slice) -> NDArray[np.float32]:
@@ -170,38 +194,39 @@ def _half_vectors(theta_h: Floats, phi_h: Floats, theta_d: Floats, phi_d: Floats
     return light, viewer
 
 
-def frame(layout: Layout) -> xr.Dataset:
+def frame(layout: Layout) -> Frame:
     """Return a table without its values: coordinates, specular part, basis, refractive indices and attributes."""
     source, grid, wavelength_nm = layout.source, layout.grid, layout.wavelength_nm
     spectral = () if wavelength_nm is None else ("wavelength",)
-    coordinates: dict[str, Any] = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
-    variables: dict[str, Any] = {}
+    coordinates = {name: _coordinate(name, nodes) for name, nodes in grid.axes.items()}
+    variables = {}
     if wavelength_nm is not None:
-        coordinates["wavelength"] = (
-            "wavelength",
+        coordinates["wavelength"] = Variable(
+            ("wavelength",),
             wavelength_nm,
             {"units": "nm", "long_name": "wavelength in vacuum", "standard_name": "radiation_wavelength"},
         )
     if (indices := source.refractive_indices(wavelength_nm)) is not None:
         for name, meaning, values in zip("nk", ("refractive index", "extinction coefficient"), indices, strict=True):
-            variables[name] = ("wavelength", values, {"units": "1", "long_name": meaning})
+            variables[name] = Variable(("wavelength",), np.asarray(values), {"units": "1", "long_name": meaning})
     if layout.spectra is not None:
         name = "spectra" if layout.part_nm is None else "mixture"
-        variables[name] = (("part", "wavelength"), layout.spectra, VARIABLES[name])
+        variables[name] = Variable(("part", "wavelength"), layout.spectra, VARIABLES[name])
     if layout.uniform is not None:
         of_each = layout.uniform.size > 1
         value = layout.uniform if of_each else layout.uniform[0]
-        variables["uniform"] = (("wavelength",) if of_each else (), value, VARIABLES["uniform"])
+        dims = ("wavelength",) if of_each else ()
+        variables["uniform"] = Variable(dims, np.asarray(value), VARIABLES["uniform"])
     if source.has_specular:
         theta_i_deg = specular_nodes(layout)
         name = "specular_theta_i" if theta_i_deg is SPECULAR_THETA_DEG else "theta_i"
         coordinates[name] = _coordinate(name, theta_i_deg)
-        variables["specular_reflectance"] = (
+        variables["specular_reflectance"] = Variable(
             (name, *spectral),
-            source.specular_reflectance(radians(theta_i_deg), wavelength_nm),
+            np.asarray(source.specular_reflectance(radians(theta_i_deg), wavelength_nm)),
             {"units": "1", "long_name": "reflectance of the specular part, in the exact mirror direction"},
         )
-    return xr.Dataset(variables, coordinates, metadata_of(layout).attributes())
+    return Frame(variables, coordinates, metadata_of(layout).attributes())
 
 
 def specular_nodes(layout: Layout) -> Axis:
@@ -210,8 +235,8 @@ def specular_nodes(layout: Layout) -> Axis:
     return layout.grid.axes["theta_i"] if given else SPECULAR_THETA_DEG
 
 
-def _coordinate(name: str, nodes: Axis) -> tuple[str, Axis, dict[str, str]]:
-    return name, nodes, {"units": "degree", "long_name": _LONG_NAMES[name]}
+def _coordinate(name: str, nodes: Axis) -> Variable:
+    return Variable((name,), nodes, {"units": "degree", "long_name": _LONG_NAMES[name]})
 
 
 def _reconstruction(layout: Layout) -> str:

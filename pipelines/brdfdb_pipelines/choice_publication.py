@@ -75,6 +75,7 @@ def _is_there(store: Store, name: str, layout: Layout) -> bool:
     if name not in store:
         return False
     wanted = frame(layout)
+    arrays = {**wanted.variables, **wanted.coordinates}
     try:
         store.verify(name)
         stored, metadata = store.dataset(name), store.metadata(name)
@@ -84,7 +85,7 @@ def _is_there(store: Store, name: str, layout: Layout) -> bool:
     return (
         metadata.error is not None
         and all(known.get(key) == value for key, value in wanted.attrs.items() if key != "reason")
-        and all(key in stored and np.array_equal(stored[key], value) for key, value in wanted.variables.items())
+        and all(key in stored and np.array_equal(stored[key], each.values) for key, each in arrays.items())
     )
 
 
