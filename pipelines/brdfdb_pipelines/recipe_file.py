@@ -118,6 +118,7 @@ class Recipe(BaseModel):
     )
 
     _folder: Path | None = PrivateAttr(default=None)  # that relative paths of CSV files begin at
+    _checked: list[Job] = PrivateAttr(default=[])  # jobs of this recipe, which does not change once it is read
 
     def jobs(self) -> list[Job]:
         """Return a job for each table that the recipe asks for.
@@ -127,6 +128,11 @@ class Recipe(BaseModel):
         RecipeError
             If a name matches nothing, or a material, grid or wavelength is not what it must be.
         """
+        if not self._checked:
+            self._checked = self._jobs()
+        return [*self._checked]
+
+    def _jobs(self) -> list[Job]:
         if (self.tolerance is None) == (self.grids is None):
             raise RecipeError("tolerance, grids", "give one of the two")
         if self.interpolation is not None and self.grids is None:
