@@ -25,6 +25,8 @@ _MACHINE = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO),
     *(errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE),
 }
+# Commands that evaluate no model, or one value: importing numba and loading compiled kernels takes longer
+_WITHOUT_KERNELS = {"gc", "history", "lookup", "rollback", "snapshot"}
 _MODELS = "files of models"  # begins the names under which parsers keep --models
 _EPILOG = f"""\
 exit codes:
@@ -84,8 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         arguments = sys.argv[1:]
         command = next((text for text in arguments if not text.startswith("-")), "")
-        if command == "lookup" and "BRDFDB_MODELS" not in os.environ:
-            os.environ.setdefault("NUMBA_DISABLE_JIT", "1")  # loading compiled kernels takes longer than one value
+        if command in _WITHOUT_KERNELS and "BRDFDB_MODELS" not in os.environ:
+            os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
     options = _parser().parse_args(arguments, argparse.Namespace(arguments=arguments))
     try:
         _add_models(options)
