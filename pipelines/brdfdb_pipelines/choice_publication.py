@@ -85,7 +85,7 @@ def _is_there(store: Store, name: str, layout: Layout) -> bool:
     return (
         metadata.error is not None
         and all(known.get(key) == value for key, value in wanted.attrs.items() if key != "reason")
-        and all(key in stored and np.array_equal(stored[key], each.values) for key, each in arrays.items())
+        and all(key in stored and np.array_equal(stored[key], array.values) for key, array in arrays.items())
     )
 
 
