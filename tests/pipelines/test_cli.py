@@ -90,6 +90,16 @@ def test_the_parser_loads_nothing_heavy() -> None:
     assert done.stdout == "set()\n"
 
 
+def test_a_build_writes_tables_without_xarray_and_history_reads_without_numba(built: Path) -> None:
+    arguments = ["history", "foam", "--store", str(built)]
+    history = f"from brdfdb_pipelines import cli; sys.argv[1:] = {arguments}; cli.main()"
+    staging = "from brdfdb.store import codec, publication, staging"
+    for code, heavy in ((staging, {"xarray"}), (history, {"numba", "xarray"})):
+        script = f"import sys; {code}; print(set(sys.modules) & {heavy})"
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == "set()"
+
+
 # Build, list, show
 
 
