@@ -53,7 +53,8 @@ class Conversion(_Record):
     wavelengths_nm: list[float] | None = Field(description="wavelengths of the comparison; null: grey")
     l1: float = Field(
         description="integral of abs(after - before) cos theta_i cos theta_r over all pairs of directions, over that "
-        "of before; the mean of all wavelengths. It is the share of the light in the wrong place, twice over"
+        "of before; the mean of all wavelengths. It is the share of the light in the wrong place, twice over; black "
+        "has 1, and a model that reflects more than the source can have any"
     )
     l1_of: list[float] = Field(description="l1 at each wavelength")
     quadrature: float = Field(description="change of l1 with a coarser rule, an estimate of its error")

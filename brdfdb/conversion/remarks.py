@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from brdfdb.conversion.document import Conversion, percent
-from brdfdb.materials import Material, Source
+from brdfdb.materials import Material, Source, written_name
 from brdfdb.models import MODELS
 from brdfdb.parameters import closest
 
+_NOT_NEAR = 0.9  # l1 from which on the model is hardly nearer than black, whose l1 is 1
+_END = 1e-3  # distance from the end of a range, as a share of it, that is the end
 _SEEN = 0.01  # share of the light from which on a part is worth a sentence
 _LOST = 0.5  # share of the peak below which a highlight is lost
 _UNSURE = 0.01  # error of l1, relative to l1, that is worth a sentence
@@ -26,10 +28,30 @@ def with_highlight(conversion: Conversion, least: Conversion) -> Conversion:
     return conversion.model_copy(update={"remarks": [sentence, *conversion.remarks]})
 
 
+def _at_an_end(conversion: Conversion) -> list[str]:
+    """Return the numbers that the search left at an end of their range, with the values, as recipes write them."""
+    in_file, ends = conversion.material.file_parameters(), []
+    for parameter in MODELS[conversion.model].parameters:
+        value = conversion.parameters[parameter.name]
+        if parameter.name in conversion.fixed or parameter.reflectance or not isinstance(value, float):
+            continue
+        near = _END * (parameter.high - parameter.low)
+        if parameter.high - value <= near or (parameter.low != 0.0 and value - parameter.low <= near):
+            name = written_name(parameter)
+            ends.append(f"{name} = {in_file[name]:g}")
+    return ends
+
+
 def remarks(source: Source, conversion: Conversion) -> list[str]:
-    """Return sentences on parts of the source that the model lacks, a lost highlight, and an inexact l1."""
+    """Return sentences on how far the model is, what it lacks of the source, a lost highlight, and an inexact l1."""
     spec, made = MODELS[conversion.model], conversion.material
     sentences = []
+    if conversion.l1 >= _NOT_NEAR:
+        sentences.append(
+            f"{spec.name} cannot carry {source.name}: black, which reflects nothing, has an l1 of 100 %, too."
+        )
+    if ends := _at_an_end(conversion):
+        sentences.append(f"At the end of their range: {', '.join(ends)}. A closer fit lies beyond.")
     if conversion.specular_share > _SEEN:
         share = f"{percent(conversion.specular_share)} of the light of {source.name} is its specular part"
         lacks = "has one, too" if spec.specular else "has none: that light counts as error"

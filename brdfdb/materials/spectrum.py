@@ -13,6 +13,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.materials.provenance import Text
 
 MOST_VALUES = 10_000  # of a spectrum
+_LEAST_NM = 20.0  # below it, the wavelengths of a spectrum are likely to be micrometres
 UPSAMPLED = "assumed: the smooth spectrum of Jakob and Hanika 2019 with this colour under D65"
 
 Values = Annotated[tuple[float, ...], Field(min_length=2, max_length=MOST_VALUES, fail_fast=True)]
@@ -46,7 +47,7 @@ class Spectrum(BaseModel):
     def _check_lengths(self) -> Spectrum:
         wavelengths = np.array(self.wavelengths_nm)
         if wavelengths[0] <= 0.0 or np.any(np.diff(wavelengths) <= 0.0):
-            raise ParameterError("wavelengths_nm", "of a spectrum must be positive and increase strictly")
+            raise ParameterError("wavelengths_nm", "those of a spectrum must be positive and increase strictly")
         if len(self.values) != len(self.wavelengths_nm):
             raise ParameterError(
                 "values", f"{len(self.values)} are given for {len(self.wavelengths_nm)} wavelengths of a spectrum"
@@ -67,7 +68,7 @@ class Spectrum(BaseModel):
             wrong = float(np.atleast_1d(wavelength_nm)[np.atleast_1d(outside)][0])
             raise ParameterError(
                 "wavelength_nm",
-                f"{wrong:g} has no {name}, whose spectrum covers [{low:g}, {high:g}] nm",
+                f"{wrong:g} has no {name}, whose spectrum covers [{low:g}, {high:g}] nm{_hint(high)}",
                 wrong,
                 (low, high),
             )
@@ -79,6 +80,10 @@ class Spectrum(BaseModel):
 
     def __format__(self, _: str) -> str:
         return str(self)
+
+
+def _hint(high: float) -> str:
+    return "; are they micrometres? A spectrum is in nm" if high < _LEAST_NM else ""
 
 
 def made_lossless(

@@ -56,7 +56,9 @@ def spectrum_of(name: str, written: Any, wavelengths_nm: Any = None, folder: Pat
             )
         return _spectrum(name, wavelengths_nm, written, "listed with the material")
     if not isinstance(written, Mapping):
-        raise ParameterError(name, f"{written!r} is neither a number nor a spectrum; a spectrum has {WAYS}", written)
+        raise ParameterError(
+            name, f"{written!r} is neither a number nor a spectrum; a spectrum is one of: {WAYS}", written
+        )
     fields = set(written)
     if fields == {"csv"}:
         return _of_csv(name, written["csv"], folder)
@@ -68,7 +70,7 @@ def spectrum_of(name: str, written: Any, wavelengths_nm: Any = None, folder: Pat
         origin = written.get("origin", "listed with the material")
         return _spectrum(name, written["wavelengths_nm"], written["values"], origin)
     raise ParameterError(
-        name, f"a spectrum with {', '.join(sorted(map(str, fields))) or 'nothing'}; it has {WAYS}", dict(written)
+        name, f"a spectrum with {', '.join(sorted(map(str, fields))) or 'nothing'}; give one of: {WAYS}", dict(written)
     )
 
 

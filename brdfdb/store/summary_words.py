@@ -61,12 +61,18 @@ def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
     """Return the answer of the audit on energy; without one, that it is missing and an albedo above 1."""
     if audited is not None:
         return audited.conserves_energy
+    above = excess(head)
+    return f"{NOT_AUDITED}: {above}" if above else NOT_AUDITED
+
+
+def excess(head: Mapping[str, Any]) -> str:
+    """Return an albedo above 1 and its place in words; empty without one."""
     largest = head.get("largest_albedo")
     if largest is None:
-        return NOT_AUDITED
+        return ""
     value = largest["albedo"]
     if value is not None and value <= 1.0 + largest["tolerance"]:
-        return NOT_AUDITED
+        return ""
     at = f"{largest['theta_i_deg']:g}°"
     at += "" if largest["wavelength_nm"] is None else f", {largest['wavelength_nm']:g} nm"
-    return f"{NOT_AUDITED}: albedo {'not finite' if value is None else f'{value:.3g}'} at {at}"
+    return f"albedo {'not finite' if value is None else f'{value:.3g}'} at {at}"

@@ -124,7 +124,7 @@ def _write(stem: Path, document: Charts, drawn: Chart | FamilyChart) -> None:
 
 
 def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None) -> list[_Subject | _Family]:
-    recipe = recipe_file.load(recipe_path)
+    recipe = recipe_file.load(recipe_path, to_build=False)
     listed = recipe.jobs()
     jobs, sweeps = {job.material.name: job for job in listed}, {sweep.name: sweep for sweep in recipe.sweeps(listed)}
     store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None

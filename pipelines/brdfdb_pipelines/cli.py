@@ -15,7 +15,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
-from brdfdb.errors import BrdfdbError, missing_extra
+from brdfdb.errors import BrdfdbError, UnknownMaterialError, missing_extra
 from brdfdb_pipelines.commands import commands
 from brdfdb_pipelines.exit_codes import BUG, INTERRUPTED, REFUSED, VIOLATED
 
@@ -141,6 +141,8 @@ def _add_models(options: argparse.Namespace) -> None:
 def _refusal(error: Exception) -> str | None:
     """Return the sentence of an error that the user can act on; None for a bug of this program."""
     match error:
+        case UnknownMaterialError(kind="material"):
+            return f"{error}{_of_library(error.name)}"
         case BrdfdbError():
             return str(error)
         case OSError(filename=str() | bytes() | os.PathLike() as file):
@@ -154,6 +156,14 @@ def _refusal(error: Exception) -> str | None:
             return None if missing is None else str(missing)
         case _:
             return None
+
+
+def _of_library(name: str) -> str:
+    """Return a phrase on the library of presets that a name is in; empty if there is none."""
+    from brdfdb_pipelines.preset_names import library_of
+
+    library = library_of(name)
+    return "" if library is None else f"; it is a preset of the library {library}, and not built in this store"
 
 
 def _bug(error: Exception, arguments: Sequence[str]) -> str:

@@ -49,7 +49,7 @@ def run(
     store : Path, optional
         Store whose materials are known as well; it need not exist.
     recipe_path : Path, optional
-        A recipe that defines materials, and the wavelengths of spectral ones.
+        A recipe that defines materials, and the wavelengths of spectral ones. It needs nothing else.
     wavelength_nm : sequence of float [nm], optional
         Wavelengths in place of those of the recipe.
     fixed : sequence of str
@@ -104,7 +104,7 @@ def run(
 
 def _source(name: str, root: Path | None, recipe_path: Path | None) -> tuple[Source, NDArray[np.float64] | None]:
     """Return a material of the recipe or the store, with its wavelengths."""
-    jobs = {job.material.name: job for job in recipe_file.load(recipe_path).jobs()}
+    jobs = {job.material.name: job for job in recipe_file.load(recipe_path, to_build=False).jobs()}
     if name in jobs:
         return jobs[name].material, jobs[name].wavelength_nm
     store = brdfdb.open(root) if root is not None and root.exists() else None
@@ -160,7 +160,8 @@ def lines(conversion: Conversion) -> list[str]:
     if conversion.n is None and conversion.refractive_index:
         text.append(f"    {'n, k':<16}{conversion.refractive_index}")
     view = conversion.worst_view
-    text.append(f"  left        l1 {percent(conversion.l1)}, p99 {percent(conversion.p99)}")
+    text.append(f"  l1          {percent(conversion.l1)} of the light of {conversion.source} is missing or too much")
+    text.append(f"  p99         {percent(conversion.p99)}: 99 of 100 values of f_r differ by less")
     text.append(f"  reflected   {100.0 * conversion.reflected:.3g} % of the light of {conversion.source}")
     peak = conversion.peak
     at_peak = f"in the mirror direction of {peak.theta_deg:g}°"

@@ -28,6 +28,11 @@ def checked(library: str) -> str:
         raise ValueError(error.sentence) from None
 
 
+def library_of(name: str) -> str | None:
+    """Return the library that has a preset of this name, or None."""
+    return next((library for library in libraries() if name in presets(library)), None)
+
+
 def recipe_of(library: str) -> Traversable:
     """Return the recipe file that comes with the program for a library; ParameterError if there is no such library."""
     name = "default" if known(library) == PAPERS else library

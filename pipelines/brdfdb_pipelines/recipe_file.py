@@ -293,8 +293,17 @@ def _members(name: str, table: Mapping[str, Any], folder: Path | None) -> list[t
     return members
 
 
-def load(path: Path | None = None, library: str = PAPERS) -> Recipe:
+def _completed(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a recipe that only defines materials, with a list of them and a tolerance, which nothing will use."""
+    own = [name for kind in ("define", "sweep") if isinstance(content.get(kind), dict) for name in content[kind]]
+    tolerance = {} if "grids" in content else {"tolerance": 0.1}
+    return {"materials": own or ["*"], **tolerance, **content}
+
+
+def load(path: Path | None = None, library: str = PAPERS, *, to_build: bool = True) -> Recipe:
     """Read a recipe file, by default that of a library of presets, and see that it can be built.
+
+    If it is not `to_build`, it may leave out `materials`, which are those that it defines, and `tolerance` or `grids`.
 
     Raises
     ------
@@ -306,7 +315,7 @@ def load(path: Path | None = None, library: str = PAPERS) -> Recipe:
     source = preset_names.recipe_of(library) if path is None else path
     try:
         content = toml_file.read(source)
-        recipe = Recipe.model_validate(content)
+        recipe = Recipe.model_validate(content if to_build else _completed(content))
         if path is not None:
             recipe._folder = path.parent
         recipe.jobs()

@@ -228,6 +228,16 @@ def test_a_highlight_is_kept_unless_light_alone_is_weighed() -> None:
     assert convert(tile, "lambert").weigh == "light"
 
 
+def test_a_model_that_is_hardly_nearer_than_black_says_so_and_an_end_of_a_range_too() -> None:
+    rough = convert(presets()["scene-copper-sphere"], "oren_nayar", [550.0])
+    assert rough.l1 > 0.9
+    assert rough.remarks[0].startswith("oren_nayar cannot carry scene-copper-sphere: black")
+    brass = convert(presets()["rolled-brass"], "abg")
+    assert brass.l1 < 0.9
+    assert brass.remarks[0] == "At the end of their range: b = 10, g = 0.5. A closer fit lies beyond."
+    assert not any("end of their range" in said for said in convert(presets()["clay-vase"], "lambert").remarks)
+
+
 @pytest.mark.parametrize(
     ("name", "model", "options", "sentence"),
     [

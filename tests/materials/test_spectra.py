@@ -75,7 +75,10 @@ def test_a_file_and_a_list_hold_the_same_values(tmp_path: Path) -> None:
         ({"rho_d": {"srgb": [0.1, 2.0, 0.0]}}, "is not three numbers in [0, 1]"),
         ({"rho_d": {"srgb": "red"}}, "srgb: 'red' is not three numbers in [0, 1] or \"#rrggbb\""),
         ({"rho_d": {"measured": "PMC/Porc"}}, "closest: PMC/Pork"),
-        ({"rho_d": {"colour": 1}}, "it has wavelengths_nm and values, csv, srgb, or measured"),
+        (
+            {"rho_d": {"colour": 1}},
+            "a spectrum with colour; give one of: wavelengths_nm and values, csv, srgb, or measured",
+        ),
         ({"rho_d": {"wavelengths_nm": [400, 700], "values": [0.1, 1.2]}}, "rho_d: 1.2 is outside [0, 1]"),
         ({"rho_d": {"wavelengths_nm": [700, 400], "values": [0.1, 0.2]}}, "must be positive and increase strictly"),
         ({"rho_d": {"wavelengths_nm": [400, 500, 600], "values": [0.1, 0.2]}}, "2 are given for 3 wavelengths"),

@@ -85,6 +85,16 @@ alpha_y = {alpha_y}
 """
 
 
+def test_a_build_names_a_material_that_reflects_more_than_it_receives(tmp_path: Path, capsys: Captured) -> None:
+    path = tmp_path / "recipe.toml"
+    define = [WARD.format(name=name, rho_d=0.6, rho_s=rho_s, alpha_y=0.1) for name, rho_s in (("a", 0.2), ("b", 0.6))]
+    path.write_text('materials = ["a", "b", "blue-plastic"]\ntolerance = 0.1\n' + "".join(define))
+    assert cli.main(["build", str(path), "--store", str(tmp_path / "store"), "--jobs", "1"]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if "reflects more" in line]
+    assert len(said) == 1
+    assert said[0].startswith("b reflects more than it receives: albedo 1.")
+
+
 @pytest.mark.parametrize("alpha_y", [0.1, 0.15])
 def test_a_colour_takes_less_than_twice_the_bytes_of_grey(tmp_path: Path, alpha_y: float) -> None:
     path = tmp_path / "recipe.toml"

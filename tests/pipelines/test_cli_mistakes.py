@@ -71,6 +71,11 @@ def test_an_unknown_material_is_one_sentence_with_the_closest_names(
         assert sentence.endswith("; closest: foam")
 
 
+def test_a_preset_that_was_not_built_is_named_as_one(built: Path, capsys: Captured) -> None:
+    sentence = fails(capsys, "show", "gold-satin", "--store", built)
+    assert sentence.endswith("; it is a preset of the library metals, and not built in this store")
+
+
 def test_a_damaged_store_is_one_sentence(built: Path, tmp_path: Path, capsys: Captured) -> None:
     root = tmp_path / "store"
     shutil.copytree(built, root)

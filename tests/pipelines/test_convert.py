@@ -34,6 +34,7 @@ def test_the_snippet_is_a_recipe_that_builds(fit: Path, tmp_path: Path, capsys: 
     )
     (job,) = recipe_file.load(recipe).jobs()
     assert job.material.model == "oren_nayar_fujii"
+    recipe.write_text(printed[printed.index("[define") :], encoding="utf-8")  # by itself it is no recipe to build
     assert run("convert", "clay-vase-as-oren-nayar-fujii", "--recipe", recipe, "--to", "lambert", "--json") == 0
     document = json.loads(capsys.readouterr().out)
     assert document["source_model"] == "oren_nayar_fujii"

@@ -93,8 +93,11 @@ def _build(options: argparse.Namespace) -> None:
 def _print(built: list[Built], root: Path, seconds: float) -> None:
     """Print a line for each table that is not as it was before."""
     from brdfdb.errors import counted
+    from brdfdb.store import summary_words
+    from brdfdb.store.reader import Store
     from brdfdb_pipelines import terminal
 
+    store = Store(root)
     changed = [one for one in built if one.state != "unchanged"]
     if changed:
         values = sum(math.prod(one.shape) for one in changed if one.shape)
@@ -118,3 +121,7 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
     if len(changed) < len(built):
         print(f"{counted(len(built) - len(changed), 'table')} unchanged")
     print(f"{terminal.size(sum(one.stored_bytes for one in built))} in {root}")
+    for material in (one.job.material for one in changed):
+        excess = summary_words.excess(store.summary(material.name))
+        if excess and material.known_excess is None:
+            print(f"{material.name} reflects more than it receives: {excess}")
