@@ -297,6 +297,6 @@ def test_a_range_of_more_nodes_than_any_memory_holds_is_refused() -> None:
 
 def test_the_request_in_a_table_is_that_of_the_recipe(recipe: Path, built: Path) -> None:
     for job in load(recipe).jobs():
-        written = brdfdb.open(built).metadata(job.material.name).request
+        written = brdfdb.open(built).metadata(job.material.name).whole_request
         assert written == json.loads(json.dumps(job.request))
         assert Material.model_validate(written["material"]) == job.material
