@@ -119,7 +119,7 @@ def test_the_record_says_what_the_family_is(copper: Path) -> None:
 def test_a_family_of_he_torrance_is_as_far_off_as_it_states(copper: Path) -> None:
     # sigma_0 from 0.1 to 0.12 um, tau from 1 to 1.2 um, at 450, 550 and 650 nm, tables to 20 %
     family = brdfdb.open(copper).family("rough-copper")
-    base = Material.model_validate(Store(copper)["rough-copper-001"].attrs["request"]["material"])
+    base = Material.model_validate(Store(copper)["rough-copper-001"].metadata.whole_request["material"])
     rng = np.random.default_rng(7)
     draws, found, truth = [], [], []
     for number in range(60):
