@@ -15,6 +15,7 @@ import brdfdb
 from brdfdb.audit import sampling
 from brdfdb.store.publication import publish_dataset
 from brdfdb_pipelines import cli
+from tests.audit.model_energies import each_model_once
 from tests.pipelines.recipes import anisotropic, isotropic, material
 
 DEFINED = """\
@@ -25,6 +26,9 @@ wavelengths_nm = [{ start = 400, stop = 700, step = 25 }]
 THETA, DELTA_PHI = "[{ start = 0, stop = 85, step = 5 }, 87.5, 89.5]", "[{ start = 0, stop = 180, step = 10 }]"
 GRIDS = isotropic(THETA, DELTA_PHI) + isotropic(THETA, DELTA_PHI, kind="spectral") + anisotropic()
 RECIPES = {"planned": DEFINED.replace("[define.dark]", "tolerance = 0.02\n[define.dark]"), "plain": DEFINED + GRIDS}
+
+__all__ = ["each_model_once"]
+pytestmark = pytest.mark.usefixtures("each_model_once")  # what is planted is in the tables
 
 Change = Callable[[xr.Dataset], xr.Dataset]
 
