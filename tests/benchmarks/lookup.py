@@ -125,8 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         *(Column(name=name, unit="1e6/s") for name in ("float64", "float32", "scipy")),
         Column(name="float64 / scipy", digits=2),
     )
-    for name, made, given, cubic_or_linear in cases(angles, single, vectors):
-        method = "linear" if options.quick else cubic_or_linear  # scipy prepares a cubic for seconds
+    for name, made, given, method in cases(angles, single, vectors):
         look = made.lookup if len(given[0]) == 4 else made.lookup_vectors
         double, float32 = (rate(lambda look=look, d=d: look(*d), count) for d in given)
         few = tuple(each[: count if method == "linear" else count // 20] for each in given[0])  # its cubic is slow

@@ -56,6 +56,7 @@ def spoil(dataset: xr.Dataset, index: tuple[int, ...], value: float) -> xr.Datas
     return dataset
 
 
+@pytest.mark.usefixtures("no_plots")
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -114,6 +115,7 @@ citation = "Erratum of eqs 27 and 28: Größe"
 GRID = "[{ start = 0, stop = 88, step = 2 }, 89, 89.5]"
 
 
+@pytest.mark.usefixtures("no_plots")
 @pytest.mark.parametrize("claim", ["", KNOWN], ids=["nothing", "an excuse"])
 def test_white_oren_nayar_violates_whatever_its_recipe_says_and_can_be_accepted(
     claim: str, recipe_text: str, tmp_path: Path, capsys: Captured
