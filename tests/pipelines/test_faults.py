@@ -49,9 +49,10 @@ from pathlib import Path
 import numpy, numba, xarray, zarr, zarr.codecs
 from brdfdb.store import codec, staging
 from brdfdb.tables import layout, tabulation
-from brdfdb_pipelines import build, cli, recipe_file
+from brdfdb_pipelines import build, build_survey, cli, recipe_file
 layout._BLOCK_VALUES //= 4
 jobs = recipe_file.load(Path(sys.argv[1])).jobs()
+build_survey.check_values(jobs[0])  # the first call loads a kernel, which takes longer than the rest of a build
 tabulation.block(jobs[0].layout(), slice(0, 1))
 tabulation.frame(jobs[0].layout())
 print("warm", flush=True)
