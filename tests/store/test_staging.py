@@ -149,11 +149,11 @@ def test_every_directory_of_a_revision_is_synced_before_the_pointer_is_swapped(
 # Imports once, then forks a writer for each line: a fork is safe while there is one thread
 KILLED = """
 import os, signal, sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from brdfdb.store import pointer, publication, sealed_json
+import zarr, zarr.codecs
+from brdfdb.store import codec, pointer, publication, sealed_json
 
 def die(*_):
     os.kill(os.getpid(), signal.SIGKILL)
@@ -161,11 +161,12 @@ def die(*_):
 places = {"pointer": pointer, "publication": publication, "sealed_json": sealed_json, "Path": Path}
 axes = {"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0]}
 values = np.full((2, 2, 2), 9.0, dtype=np.float32)
+dataset = xr.Dataset({"brdf": (tuple(axes), values)}, coords=axes)  # the first one imports dask
 for line in sys.stdin:
     root, place, step = line.rsplit(maxsplit=2)
     if (child := os.fork()) == 0:
         setattr(places[place], step, die)
-        publication.publish_dataset(root, "white", xr.Dataset({"brdf": (tuple(axes), values)}, coords=axes))
+        publication.publish_dataset(root, "white", dataset)
         os._exit(0)
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
