@@ -12,7 +12,7 @@ from brdfdb.audit.model_energy import ModelEnergy, model_energy_of
 from brdfdb.materials import Material
 from brdfdb.models import MODELS
 
-COARSE = 1e-3  # absolute tolerance of each albedo [1]: a tenth of the evaluations that 1e-6 takes
+COARSE = 1e-3  # absolute tolerance of each albedo [1]; audits take 1e-6
 
 _JUDGED: dict[Any, tuple[object, ModelEnergy]] = {}
 
