@@ -179,7 +179,7 @@ def test_killed_at_fifty_random_moments_nothing_is_lost_and_every_read_is_whole(
                 last = kills == KILLS
                 out.write_bytes(b"")
                 started = time.perf_counter()
-                code = nursery.build(recipe, root, out, None if last else draw.uniform(0.0, 1.5 * whole_s))
+                code = nursery.build(recipe, root, out, None if last else draw.uniform(0.0, 1.2 * whole_s))
                 assert code in (0, -signal.SIGKILL), out.read_text()
                 lines = out.read_text().splitlines(keepends=True)
                 events = [json.loads(line) for line in lines if line.endswith("\n")]
