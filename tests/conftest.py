@@ -14,6 +14,9 @@ from tests.api.chromium import Chromium
 settings.register_profile("brdfdb", derandomize=True, deadline=None, database=None)  # no clock: a first call compiles
 settings.load_profile("brdfdb")
 
+# Read by the workers of the tests and by the programs that they start: threads of linear algebra beside them wait for
+# one another, and take time of the processor while they wait
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _LONG = {"site", "test_house.py"}  # the site and the static checks take minutes in one piece
 

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from tests.audit.model_energies import coarse_model_energy, each_model_once
+
+__all__ = ["coarse_model_energy", "each_model_once", "few_samples"]
+
 
 @pytest.fixture
 def few_samples(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,7 +37,7 @@ from tests.audit.a_table import (
 
 pytestmark = [
     pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation"),
-    pytest.mark.usefixtures("few_samples"),
+    pytest.mark.usefixtures("few_samples", "each_model_once"),
 ]
 
 # rho / pi rounded to float32, summed in float64; half an ulp is 6e-8
@@ -119,6 +119,7 @@ def kinds_of_grids(number: int, model: str) -> list[str]:
     return [("isotropic", "unequal")[number % 2], *(["anisotropic"] if turned else [])]
 
 
+@pytest.mark.usefixtures("coarse_model_energy")
 @pytest.mark.parametrize(
     ("model", "grid"),
     [

@@ -36,7 +36,7 @@ from tests.audit.a_table import (
 
 pytestmark = [
     pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation"),
-    pytest.mark.usefixtures("few_samples"),
+    pytest.mark.usefixtures("few_samples", "each_model_once"),
 ]
 
 

@@ -24,9 +24,9 @@ from tests.tables.test_albedo import KINDS, PLANNED, planned, table_of
 
 pytestmark = [
     pytest.mark.skipif(numba.config.DISABLE_JIT, reason="minutes without compilation"),
-    pytest.mark.usefixtures("few_samples"),
+    pytest.mark.usefixtures("few_samples", "each_model_once", "coarse_model_energy"),
 ]
-# An audit of the anisotropic polar table takes ten seconds: its half and difference vectors stand for it
+# An audit of the anisotropic polar table takes seconds: its half and difference vectors stand for it
 FOUND_ANYWHERE = pytest.mark.parametrize("kind", [kind for kind in PLANNED if kind != "polar-anisotropic"])
 
 

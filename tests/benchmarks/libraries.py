@@ -34,6 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = run.parser(__doc__)
     parser.add_argument("--jobs", type=int, default=CORES)
     options = run.parse(parser, arguments)
+    options.jobs = 1 if options.quick else options.jobs  # each job of an audit is a process that has to start
     names = [name for name in libraries() if name != PAPERS]
     table = run.table(
         f"Build and audit with {options.jobs} jobs",

@@ -32,7 +32,7 @@ from tests.benchmarks.recording import Column, Run
 FRESH, AGREEMENT, TIMES_SMALLER = 20261121, 0.2, 20.0
 NARROW = 0.1
 DRAWS = 400  # directions of a band, for uniform grids: 8 or 16 evaluations of the model each
-QUICK = ("rolled-brass", "clay-vase")
+QUICK = ("lightly-brushed-aluminum", "scene-plastic-cube")  # a narrow lobe, and none; each is planned in half a second
 MEASURED = (
     "The tables that the planner makes of the presets for a tolerance: their size, the 99th percentile of the error "
     "that they state, the same at other directions, and the size of a uniform grid that is as good."

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from brdfdb_pipelines import cli
+from brdfdb_pipelines import audit_page, cli
 from tests.pipelines.recipes import anisotropic, isotropic, material
 
 # Grey isotropic, anisotropic, spectral, one wavelength, nothing but a Dirac part
@@ -56,3 +56,9 @@ def built(tmp_path_factory: pytest.TempPathFactory, recipe: Path) -> Path:
     root = tmp_path_factory.mktemp("built") / "store"
     assert cli.main(["build", str(recipe), "--store", str(root), "--jobs", "2"]) == 0
     return root
+
+
+@pytest.fixture
+def no_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw no plots on the page of an audit in this process: they take most of its time."""
+    monkeypatch.setattr(audit_page, "plots_of", lambda _: [])

@@ -100,6 +100,21 @@ POINTS = (
 )
 
 
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few directions, and one round of timing."""
+    monkeypatch.setattr(charting, "DIRECTIONS", 100)
+    monkeypatch.setattr(charting, "SINGLES", 1)
+    monkeypatch.setattr(timing, "ROUNDS", 1)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw nothing: pictures take more time than the charts of which the test reads the data."""
+    monkeypatch.setattr(tradeoff_plot, "svg", lambda _: "")
+    monkeypatch.setattr(tradeoff_plot, "png", lambda _: b"")
+
+
 def test_the_command_writes_the_data_and_a_picture_of_each(tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "charts" / "here"
     names = ["rolled-brass", "scene-plastic-cube"]
@@ -121,10 +136,8 @@ def test_the_command_writes_the_data_and_a_picture_of_each(tmp_path: Path, capsy
         ElementTree.fromstring((out / f"{name}.svg").read_text(encoding="utf-8"))
 
 
-def test_a_table_of_the_store_is_charted_beside_the_planned_ones(
-    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(timing, "ROUNDS", 1)
+@pytest.mark.usefixtures("quick", "no_pictures")
+def test_a_table_of_the_store_is_charted_beside_the_planned_ones(built: Path, tmp_path: Path) -> None:
     assert run("rolled-brass", "mirror", "--store", built, "--tolerance", 0.2, "--out", tmp_path) == 0
     brass, mirror = charted(tmp_path, "rolled-brass"), charted(tmp_path, "mirror")
     stored = {each.key: each for each in brass.points}["table-stored"]
@@ -134,8 +147,8 @@ def test_a_table_of_the_store_is_charted_beside_the_planned_ones(
     assert mirror.points[-1].key == "table-stored"
 
 
-def test_materials_of_a_recipe_can_be_charted(recipe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(timing, "ROUNDS", 1)
+@pytest.mark.usefixtures("quick", "no_pictures")
+def test_materials_of_a_recipe_can_be_charted(recipe: Path, tmp_path: Path) -> None:
     none = tmp_path / "none"
     assert run("mirror", "--recipe", recipe, "--tolerance", 0.2, "--out", tmp_path, "--store", none) == 0
     mirror = charted(tmp_path, "mirror")
@@ -161,11 +174,8 @@ def test_a_mistake_is_one_sentence_and_writes_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_another_run_leaves_the_charts_of_others_as_they_were(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
-) -> None:
-    monkeypatch.setattr(charting, "SINGLES", 1)
-    monkeypatch.setattr(timing, "ROUNDS", 1)
+@pytest.mark.usefixtures("quick")
+def test_another_run_leaves_the_charts_of_others_as_they_were(tmp_path: Path, capsys: Captured) -> None:
     given = ("--store", tmp_path / "none", "--out", tmp_path, "--tolerance", 0.2)
     assert run("rolled-brass", *given) == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -270,14 +280,6 @@ BRUSHED = 'materials = ["brushed"]\nwavelengths_nm = [550]\ntolerance = 0.2\n' +
 )
 
 
-@pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few directions, and one round of timing."""
-    monkeypatch.setattr(charting, "DIRECTIONS", 100)
-    monkeypatch.setattr(charting, "SINGLES", 1)
-    monkeypatch.setattr(timing, "ROUNDS", 1)
-
-
 @pytest.fixture(scope="module")
 def brushed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the recipe of a family, and the store that was built of it; tests must not change it."""
@@ -311,7 +313,7 @@ def test_a_family_of_a_recipe_is_charted_as_a_whole(brushed: Path, tmp_path: Pat
     ElementTree.fromstring((tmp_path / "brushed.svg").read_text(encoding="utf-8"))
 
 
-@pytest.mark.usefixtures("quick")
+@pytest.mark.usefixtures("quick", "no_pictures")
 @pytest.mark.parametrize("named", ["by its recipe", "by the store"])
 def test_a_family_of_the_store_is_charted_with_its_lookups_between_members(
     brushed: Path, tmp_path: Path, named: str, capsys: Captured

@@ -13,6 +13,7 @@ import pytest
 from matplotlib.image import imread
 
 import brdfdb
+from brdfdb.forms import timing
 from brdfdb.models import oren_nayar_gaussian_vectors
 from brdfdb.scenes.choice_document import Choice, Price
 from brdfdb.scenes.offered_forms import OfferedForm
@@ -65,6 +66,12 @@ def _few_places() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(choose, "EDGES", choose.EDGES // 5)
         yield
+
+
+@pytest.fixture
+def _made_up_prices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time nothing: the test says nothing of times, and a pass of the truth is long."""
+    monkeypatch.setattr(choose, "_prices", made_up_prices)
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +151,10 @@ def test_the_comparison_is_a_picture_of_truth_choice_next_cheaper_and_their_diff
     assert [bool(np.any((panel[..., 0] > 0.8) & (panel[..., 2] < 0.3))) for panel in panels[4:]] == [False, True]
 
 
-def test_without_a_chosen_table_there_is_nothing_to_build(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_chosen_table_there_is_nothing_to_build(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(timing, "ROUNDS", 1)
     choice = choose.run(written(tmp_path), tmp_path / "out", width=16, store=tmp_path / "store", tolerances=[])
     assert [one.revision for one in choice.materials] == [None]
     assert "nothing to build: no table was chosen" in capsys.readouterr().out.splitlines()
@@ -160,6 +170,7 @@ def test_a_file_is_no_store_and_is_said_so_before_the_work(
     assert capsys.readouterr().err == f"brdfdb: cannot write a store at {tmp_path / 'store'}: File exists\n"
 
 
+@pytest.mark.usefixtures("_made_up_prices")
 def test_a_recorded_scene_is_compared_and_checked_at_the_size_of_its_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -174,6 +185,7 @@ def test_a_recorded_scene_is_compared_and_checked_at_the_size_of_its_file(
     assert choice.statement in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("_made_up_prices")
 def test_bytes_can_be_weighed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     choice = choose.run(written(tmp_path), tmp_path / "out", width=16, weigh="bytes", tolerances=[])
     (one,) = choice.materials
@@ -183,6 +195,7 @@ def test_bytes_can_be_weighed(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert f"rendered-sphere-40deg: facets integrated, eqs 8-20 and 47 {said}" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("_made_up_prices")
 @pytest.mark.parametrize(("percentile", "where"), [("", "each of the 16"), (", percentile = 90", "90 % of each")])
 def test_what_is_printed_says_how_many_pixels_keep_to_the_tolerance(
     percentile: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

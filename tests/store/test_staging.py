@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -145,22 +146,45 @@ def test_every_directory_of_a_revision_is_synced_before_the_pointer_is_swapped(
     assert [path for path in directories if path.stat().st_ino not in known] == []
 
 
+# Imports once, then forks a writer for each line: a fork is safe while there is one thread
 KILLED = """
 import os, signal, sys
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from brdfdb.store import pointer, publication, sealed_json
+import zarr, zarr.codecs
+from brdfdb.store import codec, pointer, publication, sealed_json
 
 def die(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 
-root, place, step = sys.argv[1:]
-setattr({"pointer": pointer, "publication": publication, "sealed_json": sealed_json, "Path": Path}[place], step, die)
+places = {"pointer": pointer, "publication": publication, "sealed_json": sealed_json, "Path": Path}
 axes = {"theta_i": [0.0, 90.0], "theta_r": [0.0, 90.0], "delta_phi": [0.0, 180.0]}
 values = np.full((2, 2, 2), 9.0, dtype=np.float32)
-publication.publish_dataset(root, "white", xr.Dataset({"brdf": (tuple(axes), values)}, coords=axes))
+dataset = xr.Dataset({"brdf": (tuple(axes), values)}, coords=axes)  # the first one imports dask
+for line in sys.stdin:
+    root, place, step = line.rsplit(maxsplit=2)
+    if (child := os.fork()) == 0:
+        setattr(places[place], step, die)
+        publication.publish_dataset(root, "white", dataset)
+        os._exit(0)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
+
+
+@pytest.fixture(scope="module")
+def killed() -> Iterator[Callable[[Path, str], int]]:
+    """A function that writes a revision in a process that dies at a step, and returns its exit code."""
+    command = [sys.executable, "-c", KILLED]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+
+        def killed_at(root: Path, step: str) -> int:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            print(root, step, file=process.stdin, flush=True)
+            return int(process.stdout.readline())
+
+        yield killed_at
 
 
 @pytest.mark.parametrize(
@@ -168,10 +192,10 @@ publication.publish_dataset(root, "white", xr.Dataset({"brdf": (tuple(axes), val
              "publication write_sealed", "Path rename", "publication point_to", "pointer swap_sealed",
              "sealed_json sync_directory"],
 )  # fmt: skip
-def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(root: Path, step: str) -> None:
-    command = [sys.executable, "-c", KILLED, root, *step.split()]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == -signal.SIGKILL, done.stderr
+def test_a_killed_write_changes_nothing_for_readers_and_takes_no_number_twice(
+    root: Path, step: str, killed: Callable[[Path, str], int]
+) -> None:
+    assert killed(root, step) == -signal.SIGKILL
     store = brdfdb.open(root)
     if step == "sealed_json sync_directory":  # the pointer is swapped; only that it outlasts a power cut is not certain
         assert store.head("white") == "r000002"
