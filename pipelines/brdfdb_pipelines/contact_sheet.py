@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Literal
@@ -18,6 +18,7 @@ import brdfdb
 from brdfdb.errors import counted
 from brdfdb.materials import presets
 from brdfdb.scenes.lit_sphere import WHITE, lit_sphere
+from brdfdb.spectra import VISIBLE_FROM_NM, VISIBLE_TO_NM, picture_wavelengths
 from brdfdb.store.files import write_file
 from brdfdb.tables.table_base import BaseTable
 from brdfdb_pipelines import terminal
@@ -38,7 +39,8 @@ Align = Literal["left", "center", "right"]
 CAPTION = (
     "Spheres with the values of the tables, all under the same light and at the same exposure: a white Lambertian "
     f"sphere has {100.0 * WHITE:g} % of the screen's white where it is\nbrightest. Brighter light is clipped. A "
-    "material whose source states no colour, or a single wavelength, is grey, and says so."
+    f"material whose source states no colour, or whose wavelengths do not reach from {VISIBLE_FROM_NM:g} to "
+    f"{VISIBLE_TO_NM:g} nm, is grey, and says so."
 )
 
 
@@ -60,6 +62,8 @@ def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
     imsave(encoded, image, format="png", pil_kwargs={"optimize": True})
     write_file(out, encoded.getvalue(), out.parent)
     print(f"{out}: {counted(len(tables), 'material')}, {image.shape[1]} x {image.shape[0]} pixels")
+    for line in remarks(tables.values()):
+        print(line)
 
 
 def sections(tables: Mapping[str, BaseTable]) -> dict[str, list[BaseTable]]:
@@ -105,10 +109,27 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
 
 
 def colour_known(table: BaseTable) -> str:
-    """Return a word for a table whose colour is not known: grey, or its one wavelength; empty for a spectrum."""
-    if table.wavelength_nm is None:
+    """Return words for a table whose colour is not known: grey, with its wavelengths; empty for a colour."""
+    stored = table.wavelength_nm
+    if stored is None:
         return "grey"
-    return f"{table.wavelength_nm[0]:g} nm, grey" if table.wavelength_nm.size == 1 else ""
+    if picture_wavelengths(stored) is not None:
+        return ""
+    return f"{stored[0]:g} nm, grey" if stored.size == 1 else f"{stored[0]:g}-{stored[-1]:g} nm, grey"
+
+
+def remarks(tables: Iterable[BaseTable]) -> list[str]:
+    """Return a sentence for each table with several wavelengths that make no colour."""
+    lines = []
+    for table in tables:
+        stored = table.wavelength_nm
+        if stored is None or stored.size == 1 or picture_wavelengths(stored) is not None:
+            continue
+        lines.append(
+            f"{table.name}: grey, at {stored[0]:g} nm: a colour needs wavelengths from {VISIBLE_FROM_NM:g} to "
+            f"{VISIBLE_TO_NM:g} nm, and the table has {stored[0]:g} to {stored[-1]:g} nm"
+        )
+    return lines
 
 
 def wrapped(name: str) -> str:
