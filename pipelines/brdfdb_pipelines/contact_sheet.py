@@ -33,6 +33,7 @@ _DPI = 100
 _PLATE, _INK, _MUTED, _LINE = "#14171c", "#eef1f4", "#9aa4b0", "#2b3139"
 _SPACING = 1.3  # between lines of text, in its size
 _LETTERS = 17  # of a line of a name
+_DARK = 0.01  # largest albedo [1] of a sphere that looks black
 
 
 Align = Literal["left", "center", "right"]
@@ -109,13 +110,18 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
 
 
 def colour_known(table: BaseTable) -> str:
-    """Return words for a table whose colour is not known: grey, with its wavelengths; empty for a colour."""
-    stored = table.wavelength_nm
-    if stored is None:
-        return "grey"
-    if picture_wavelengths(stored) is not None:
+    """Return words for a table whose colour is not known: grey, with its wavelengths; empty for a colour.
+
+    A table so dark that its sphere is black has the bound of its albedo in place of "grey".
+    """
+    stored, largest = table.wavelength_nm, table.metadata.largest_albedo
+    if stored is not None and picture_wavelengths(stored) is not None:
         return ""
-    return f"{stored[0]:g} nm, grey" if stored.size == 1 else f"{stored[0]:g}-{stored[-1]:g} nm, grey"
+    dark = largest is not None and largest.albedo is not None and largest.albedo < _DARK
+    word = f"albedo < {_DARK:g}" if dark else "grey"
+    if stored is None:
+        return word
+    return f"{stored[0]:g} nm, {word}" if stored.size == 1 else f"{stored[0]:g}-{stored[-1]:g} nm, {word}"
 
 
 def remarks(tables: Iterable[BaseTable]) -> list[str]:

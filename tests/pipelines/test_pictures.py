@@ -86,6 +86,16 @@ def test_gallery_shows_a_colour_or_says_why_not(own: Path, tmp_path: Path, capsy
     assert np.ptp(grey) < 1e-6
 
 
+@pytest.mark.parametrize(("rho", "words"), [(0.005, "albedo < 0.01"), (0.5, "grey")])
+def test_a_black_sphere_names_its_albedo(tmp_path: Path, rho: float, words: str) -> None:
+    about = {"title": "Felt", "model": "lambert", "source": "a test", "parameters": {"rho": rho}}
+    grid = Grid({"theta_i": [0, 45, 90], "theta_r": [0, 45, 90], "delta_phi": [0, 180]})
+    largest = {"albedo": rho, "theta_i_deg": 0.0, "wavelength_nm": None, "tolerance": 0.001}
+    dataset = tabulate(Layout(Material.from_table("felt", about), grid)).assign_attrs(largest_albedo=largest)
+    publish_dataset(tmp_path, "felt", dataset)
+    assert contact_sheet.colour_known(brdfdb.open(tmp_path)["felt"]) == words
+
+
 def test_names_are_broken_after_hyphens() -> None:
     assert contact_sheet.wrapped("latex-semi-gloss-sprayed-sheetrock") == "latex-semi-gloss-\nsprayed-sheetrock"
     assert contact_sheet.wrapped("foam") == "foam"
