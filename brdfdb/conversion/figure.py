@@ -39,13 +39,15 @@ def figure_of(source: Source, conversion: Conversion) -> Figure:
     at = conversion.wavelengths_nm
     middle = None if at is None else np.array(at[len(at) // 2 :][:1])
     panels = [_of_light(source, conversion, theta_deg, middle) for theta_deg in LIGHTS_DEG]
-    views = curve_of("worst view at this angle", conversion.views_deg, conversion.l1_of_views, "ours")
-    mean = curve_of("over all pairs", [0.0, conversion.views_deg[-1]], [conversion.l1] * 2, "truth")
+    views = curve_of(
+        "worst view at this angle", conversion.views_deg, 100.0 * np.asarray(conversion.l1_of_views), "ours"
+    )
+    mean = curve_of("over all pairs", [0.0, conversion.views_deg[-1]], [100.0 * conversion.l1] * 2, "truth")
     panels.append(
         Panel(
             title="light in the wrong place",
             x_label="theta_r [degree]",
-            y_label="l1 [1]",
+            y_label="l1 [%]",
             curves=[views, mean],
         )
     )
