@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -33,6 +34,8 @@ _DPI = 100
 _PLATE, _INK, _MUTED, _LINE = "#14171c", "#eef1f4", "#9aa4b0", "#2b3139"
 _SPACING = 1.3  # between lines of text, in its size
 _LETTERS = 17  # of a line of a name
+_SOURCE, _SOURCE_LETTERS = 32, 18  # height of the lines with a source, in pixels, and letters of a line
+OTHERS = "Other sources"
 _DARK = 0.01  # largest albedo [1] of a sphere that looks black
 
 
@@ -68,38 +71,52 @@ def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
 
 
 def sections(tables: Mapping[str, BaseTable]) -> dict[str, list[BaseTable]]:
-    """Return tables by their paper, which is the text of their source before the first comma, in the paper's order."""
+    """Return tables by their paper, which is the text of their source before the first comma, in the paper's order.
+
+    Sources of one table each stand together under `OTHERS`, if there are several and they are not papers of presets.
+    """
     order = {name: number for number, name in enumerate(presets())}
     papers: dict[str, list[BaseTable]] = {}
     for name in sorted(tables, key=lambda name: (order.get(name, len(order)), name)):
-        source = tables[name].metadata.source or "Other materials"
-        papers.setdefault(source.partition(",")[0], []).append(tables[name])
+        papers.setdefault(_paper(tables[name].metadata.source), []).append(tables[name])
+    known = {_paper(preset.source) for preset in presets().values()}
+    single = [paper for paper, members in papers.items() if len(members) == 1 and paper not in known]
+    if len(single) > 1:
+        papers[OTHERS] = [table for paper in single for table in papers.pop(paper)]
     return papers
+
+
+def _paper(source: str | None) -> str:
+    return (source or "Other materials").partition(",")[0]
 
 
 def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array]) -> NDArray[np.uint8]:
     """Return the contact sheet as sRGB bytes (height, width, 3)."""
     columns = (WIDTH - 2 * _MARGIN) // _CELL
     rows = [-(-len(tables) // columns) for tables in papers.values()]
-    height = _HEADER + _CAPTION + sum(_SECTION + count * (SPHERE + _LABEL) + _BETWEEN for count in rows)
+    cells = [SPHERE + _LABEL + (_SOURCE if paper == OTHERS else 0) for paper in papers]
+    heights = [count * cell for count, cell in zip(rows, cells, strict=True)]
+    height = _HEADER + _CAPTION + sum(_SECTION + tall + _BETWEEN for tall in heights)
     page = _Page(height)
     count = sum(map(len, papers.values()))
     page.write(_MARGIN, 36, f"{count} materials" if count > 1 else "1 material", 30, _INK)
     page.write(WIDTH - _MARGIN, 50, "brdfdb", 20, _MUTED, align="right")
     top, corners = _HEADER, {}
-    for (paper, tables), lines in zip(papers.items(), rows, strict=True):
+    for (paper, tables), cell, tall in zip(papers.items(), cells, heights, strict=True):
         page.write(_MARGIN, top, paper, 16, _MUTED)
         page.rule(top + 26)
         top += _SECTION
         for number, table in enumerate(tables):
             row, column = divmod(number, columns)
-            left, upper = _MARGIN + column * _CELL, top + row * (SPHERE + _LABEL)
+            left, upper = _MARGIN + column * _CELL, top + row * cell
             corners[table.name] = (upper, left + (_CELL - SPHERE) // 2)
             name = wrapped(table.name)
             page.write(left + _CELL / 2, upper + SPHERE + 7, name, _SIZE, _INK, align="center")
             below = upper + SPHERE + 7 + _SIZE * _SPACING * len(name.splitlines())
-            page.write(left + _CELL / 2, below, colour_known(table), _SIZE - 1.0, _MUTED, align="center")
-        top += lines * (SPHERE + _LABEL) + _BETWEEN
+            source = [shortened(_paper(table.metadata.source))] if paper == OTHERS else []
+            words = "\n".join(filter(None, [colour_known(table), *source]))
+            page.write(left + _CELL / 2, below, words, _SIZE - 1.0, _MUTED, align="center")
+        top += tall + _BETWEEN
     page.write(_MARGIN, top + 16, CAPTION, 13.5, _MUTED)
     image = page.drawn()
     for name, (upper, left) in corners.items():
@@ -136,6 +153,11 @@ def remarks(tables: Iterable[BaseTable]) -> list[str]:
             f"{VISIBLE_TO_NM:g} nm, and the table has {stored[0]:g} to {stored[-1]:g} nm"
         )
     return lines
+
+
+def shortened(source: str) -> str:
+    """Return a source in two lines at most, which fit under a sphere."""
+    return textwrap.fill(source, _SOURCE_LETTERS, max_lines=2, placeholder="…")
 
 
 def wrapped(name: str) -> str:

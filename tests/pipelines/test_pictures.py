@@ -96,6 +96,25 @@ def test_a_black_sphere_names_its_albedo(tmp_path: Path, rho: float, words: str)
     assert contact_sheet.colour_known(brdfdb.open(tmp_path)["felt"]) == words
 
 
+def test_sources_of_one_material_share_a_row(tmp_path: Path, capsys: Captured) -> None:
+    grid = Grid({"theta_i": [0, 45, 90], "theta_r": [0, 45, 90], "delta_phi": [0, 180]})
+    sources = {name: f"a very long run {name} of a gonio" for name in "abcd"} | {"e": "twice", "f": "twice, again"}
+    for name, source in sources.items():
+        about = {"title": name, "model": "lambert", "source": source, "parameters": {"rho": 0.5}}
+        publish_dataset(tmp_path / "own", name, tabulate(Layout(Material.from_table(name, about), grid)))
+    store = brdfdb.open(tmp_path / "own")
+    groups = contact_sheet.sections({name: store[name] for name in store})
+    assert {paper: [table.name for table in tables] for paper, tables in groups.items()} == {
+        "twice": ["e", "f"],
+        contact_sheet.OTHERS: ["a", "b", "c", "d"],
+    }
+    assert contact_sheet.shortened(sources["a"]) == "a very long run a\nof a gonio"
+    assert contact_sheet.shortened("one two three four five six seven eight") == "one two three four\nfive six seven…"
+    assert run("gallery", "--store", tmp_path / "own", "--out", tmp_path / "sheet.png") == 0
+    assert "6 materials, 1400 x" in capsys.readouterr().out
+    assert len(imread(tmp_path / "sheet.png")) < 800
+
+
 def test_names_are_broken_after_hyphens() -> None:
     assert contact_sheet.wrapped("latex-semi-gloss-sprayed-sheetrock") == "latex-semi-gloss-\nsprayed-sheetrock"
     assert contact_sheet.wrapped("foam") == "foam"
