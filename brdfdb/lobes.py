@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 _EXPONENT = 700.0  # largest t^2; beyond, the Gaussian counts as 0 and no half vector is drawn
+# Plots of a lobe: largest slope in its widths, directions on either side of the mirror direction, last angle [degree]
+_OCTAVES, _ACROSS, _LAST_DEG = 20.0, 40, 89.0
 
 
 @dataclass(frozen=True)
@@ -110,3 +112,15 @@ def narrowest(lobe: Lobe | None) -> Lobe | None:
         return None
     share, alpha_x, alpha_y = np.max(lobe.share), np.min(lobe.alpha_x), np.min(lobe.alpha_y)
     return lobe._replace(share=np.asarray(share), alpha_x=np.asarray(alpha_x), alpha_y=np.asarray(alpha_y))
+
+
+def around_mirror(theta_deg: float, lobe: Lobe) -> NDArray[np.float64]:
+    """Return angles of viewers [degree] up to 89, which crowd around the mirror direction in proportion to a lobe.
+
+    Light is at `theta_deg`. Angles are positive on the mirror side of the plane of incidence, negative beyond the
+    normal. Half vectors have slopes up to 20 widths of the narrower axis of the lobe.
+    """
+    alpha = float(min(np.min(lobe.alpha_x), np.min(lobe.alpha_y)))
+    slopes = alpha * np.sinh(np.linspace(-1.0, 1.0, 2 * _ACROSS + 1) * np.arcsinh(_OCTAVES))
+    near = theta_deg + 2.0 * np.degrees(np.arctan(slopes))
+    return np.asarray(near[np.abs(near) <= _LAST_DEG])

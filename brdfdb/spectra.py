@@ -19,6 +19,7 @@ from brdfdb.parameters import closest
 
 ILLUMINANT, OBSERVER = "D65", "CIE 1931 2 Degree Standard Observer"
 VISIBLE_FROM_NM, VISIBLE_TO_NM, VISIBLE_STEP_NM = 420.0, 680.0, 20.0
+PICTURE_NM = np.arange(VISIBLE_FROM_NM, VISIBLE_TO_NM + 1.0, VISIBLE_STEP_NM)  # wavelengths of a picture
 
 # Unit conversion moves the end of a tabulated range by a few ulp; the package forgives the same amount.
 _RANGE_TOLERANCE = 1e-9
@@ -123,6 +124,18 @@ def covers_visible(wavelength_nm: ArrayLike) -> bool:
         and wavelength[-1] >= VISIBLE_TO_NM
         and np.all((step > 0.0) & (step <= VISIBLE_STEP_NM))
     )
+
+
+def picture_wavelengths(stored_nm: ArrayLike) -> NDArray[np.float64] | None:
+    """Return the wavelengths [nm] at which a picture looks up a table: 420 to 680 in steps of 20, or None.
+
+    None stands for a table whose wavelengths `stored_nm`, in increasing order, do not reach from 420 to 680 nm. A
+    picture of it is grey. Steps of a table may be wider than 20 nm: its lookups interpolate between its wavelengths.
+    """
+    stored = np.asarray(stored_nm, dtype=np.float64).reshape(-1)
+    if stored.size < 2 or stored[0] > VISIBLE_FROM_NM or stored[-1] < VISIBLE_TO_NM:
+        return None
+    return PICTURE_NM
 
 
 @cache

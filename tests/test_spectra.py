@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from brdfdb.spectra import covers_visible, linear_srgb, refractive_index, srgb_weights, xyz_weights
+from brdfdb.spectra import covers_visible, linear_srgb, picture_wavelengths, refractive_index, srgb_weights, xyz_weights
 
 EVERY_10_NM = np.arange(380.0, 781.0, 10.0)
 
@@ -135,6 +135,23 @@ def test_a_nan_in_a_spectrum_is_a_nan_in_its_colour_only():
 )
 def test_covers_visible(wavelength_nm, covered):
     assert covers_visible(wavelength_nm) is covered
+
+
+@pytest.mark.parametrize(
+    ("stored_nm", "coloured"),
+    [
+        (EVERY_10_NM, True),
+        (np.arange(400.0, 701.0, 25.0), True),
+        ([420.0, 680.0], True),
+        ([421.0, 700.0], False),
+        ([400.0, 679.0], False),
+        ([550.0], False),
+    ],
+)
+def test_pictures_look_up_at_wavelengths_that_make_a_colour(stored_nm, coloured):
+    at = picture_wavelengths(stored_nm)
+    assert (at is not None) is coloured
+    assert at is None or covers_visible(at)
 
 
 def test_a_colour_needs_the_whole_visible():

@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from brdfdb.conversion.document import Conversion, percent
 from brdfdb.figure import Curve, Figure, Panel, curve_of
-from brdfdb.geometry import degrees, radians, unit_vector
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.lobes import around_mirror
 from brdfdb.materials import Source
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
 
 LIGHTS_DEG = (15.0, 45.0, 75.0)  # theta_i of the panels
-_EVERY_DEG, _ACROSS = 1.0, 40  # step of theta_r, and angles on either side of the mirror direction
-_OCTAVES = 20.0  # widths of the lobe up to which angles crowd around the mirror direction
+_EVERY_DEG = 1.0  # step of theta_r
 _LEAST = 1e-5  # share of the largest value below which a curve has a gap
 
 
@@ -39,13 +39,15 @@ def figure_of(source: Source, conversion: Conversion) -> Figure:
     at = conversion.wavelengths_nm
     middle = None if at is None else np.array(at[len(at) // 2 :][:1])
     panels = [_of_light(source, conversion, theta_deg, middle) for theta_deg in LIGHTS_DEG]
-    views = curve_of("worst view at this angle", conversion.views_deg, conversion.l1_of_views, "ours")
-    mean = curve_of("over all pairs", [0.0, conversion.views_deg[-1]], [conversion.l1] * 2, "truth")
+    views = curve_of(
+        "worst view at this angle", conversion.views_deg, 100.0 * np.asarray(conversion.l1_of_views), "ours"
+    )
+    mean = curve_of("over all pairs", [0.0, conversion.views_deg[-1]], [100.0 * conversion.l1] * 2, "truth")
     panels.append(
         Panel(
             title="light in the wrong place",
             x_label="theta_r [degree]",
-            y_label="l1 [1]",
+            y_label="l1 [%]",
             curves=[views, mean],
         )
     )
@@ -96,7 +98,6 @@ def _angles(source: Source, theta_deg: float, middle: Array | None) -> Floats:
     if not source.has_lobe:
         return plain
     lobe = source.lobe(np.cos(radians(theta_deg)), middle if source.spectral else None)
-    alpha = 0.1 if lobe is None else float(min(np.min(lobe.alpha_x), np.min(lobe.alpha_y)))
-    slopes = alpha * np.sinh(np.linspace(-1.0, 1.0, 2 * _ACROSS + 1) * np.arcsinh(_OCTAVES))
-    near = theta_deg + 2.0 * degrees(np.arctan(slopes))
-    return np.unique(np.concatenate([plain, near[np.abs(near) <= 89.0]]))
+    if lobe is None:
+        return plain
+    return np.union1d(plain, around_mirror(theta_deg, lobe))

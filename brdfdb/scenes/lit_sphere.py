@@ -16,7 +16,7 @@ from brdfdb.materials import FunctionRecord, Source
 from brdfdb.parameters import Floats
 from brdfdb.scenes.environment import widest_lobe
 from brdfdb.scenes.studio import studio
-from brdfdb.spectra import colour_science, covers_visible, srgb_weights
+from brdfdb.spectra import PICTURE_NM, colour_science, picture_wavelengths, srgb_weights
 from brdfdb.tables.table_base import BaseTable
 
 Array = NDArray[np.float64]
@@ -26,7 +26,6 @@ Light = Callable[[Array], Array]
 
 SIZE, MOST_SIZE = 160, 2048  # pixels across a picture
 WHITE = 0.8  # linear value of a white Lambertian sphere where it is brightest
-_VISIBLE_NM = np.arange(420.0, 681.0, 20.0)
 # Normals at which reflected light is computed: angles to the viewer up to the last, and azimuths, a multiple of 4
 _THETAS, _LAST_DEG, _PHIS = 72, 89.0, 96
 # Directions of light for each normal. Anisotropic surfaces have many more normals
@@ -72,8 +71,9 @@ def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = stu
     light in the mirror direction of each point, exactly. There is one reflection and no shadow. The grain of
     an anisotropic material (its x axis) runs around the vertical axis of the sphere, as in scenes.
 
-    A spectrum is summed from 420 to 680 nm under D65. A material that is known for too few wavelengths for a colour is
-    grey, at the first of them.
+    A spectrum is summed from 420 to 680 nm under D65, in steps of 20 nm. A table with wider steps is interpolated
+    between its wavelengths, as by any lookup. A table whose wavelengths do not reach from 420 to 680 nm is grey, at the
+    first of them.
     """
     if not 1 <= size <= MOST_SIZE:
         raise ParameterError("size", f"{size} is not a number of pixels from 1 to {MOST_SIZE}", size, (1, MOST_SIZE))
@@ -147,11 +147,12 @@ class _Shown(NamedTuple):
 def _shown(surface: Source | BaseTable) -> _Shown:
     """Return a surface with the wavelengths of its picture: the visible, or the first one that it is known for."""
     if not isinstance(surface, BaseTable):
-        return _at(surface, surface, surface.evaluated_at(_VISIBLE_NM))
-    stored = surface.wavelength_nm
-    if stored is not None:
-        stored = _VISIBLE_NM if covers_visible(stored) else stored[:1]
-    return _at(surface, surface.source, stored)
+        return _at(surface, surface, surface.evaluated_at(PICTURE_NM))
+    at = surface.wavelength_nm
+    if at is not None:
+        visible = picture_wavelengths(at)
+        at = at[:1] if visible is None else visible
+    return _at(surface, surface.source, at)
 
 
 def _at(surface: Source | BaseTable, source: Source | FunctionRecord | None, at: Array | None) -> _Shown:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from brdfdb.errors import ParameterError, import_extra
 from brdfdb.geometry import radians
 from brdfdb.integrals.quadrature import reflected_share
-from brdfdb.lobes import narrowest
+from brdfdb.lobes import around_mirror, narrowest
 from brdfdb.materials import FunctionRecord, Material
 from brdfdb.parameters import Floats
 from brdfdb.tables.slices import Slice, Sliced, half_difference_slice, in_plane_slice
@@ -297,8 +297,7 @@ class Plot:
         for (number, theta), (row, phi), wavelength in itertools.product(
             enumerate(lights), enumerate(azimuths), wavelengths
         ):
-            around = _AROUND_DEG + theta
-            signed = np.union1d(_EVEN_DEG, around[np.abs(around) <= 89.0])
+            signed = self._views(theta, wavelength)
             phi_r = phi + np.where(signed > 0.0, 180.0, 0.0)
             light = radians(theta), radians(phi)
             brdf = np.asarray(
@@ -314,6 +313,14 @@ class Plot:
                 colour, dashes = _spectral_colour(wavelength), _DASHES[number % len(_DASHES)]
             curves.append(_Curve(", ".join(parts), signed, brdf, colour, dashes, wavelength))
         return curves
+
+    def _views(self, theta: float, wavelength: float | None) -> Array:
+        """Return angles of viewers [degree] of a cut, with more around the mirror direction, most in a narrow lobe."""
+        around = _AROUND_DEG + theta
+        views = np.union1d(_EVEN_DEG, around[np.abs(around) <= 89.0])
+        at = None if wavelength is None else np.array([wavelength])
+        lobe = None if self.table.source is None else self.table.source.lobe(np.cos(radians(theta)), at)
+        return views if lobe is None else np.union1d(views, around_mirror(theta, lobe))
 
     def _wavelengths(self, wavelength_nm: float | Sequence[float] | None) -> list[float | None]:
         stored = self.table.wavelength_nm

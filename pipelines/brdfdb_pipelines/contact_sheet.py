@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Literal
@@ -18,6 +19,7 @@ import brdfdb
 from brdfdb.errors import counted
 from brdfdb.materials import presets
 from brdfdb.scenes.lit_sphere import WHITE, lit_sphere
+from brdfdb.spectra import VISIBLE_FROM_NM, VISIBLE_TO_NM, picture_wavelengths
 from brdfdb.store.files import write_file
 from brdfdb.tables.table_base import BaseTable
 from brdfdb_pipelines import terminal
@@ -32,13 +34,17 @@ _DPI = 100
 _PLATE, _INK, _MUTED, _LINE = "#14171c", "#eef1f4", "#9aa4b0", "#2b3139"
 _SPACING = 1.3  # between lines of text, in its size
 _LETTERS = 17  # of a line of a name
+_SOURCE, _SOURCE_LETTERS = 32, 18  # height of the lines with a source, in pixels, and letters of a line
+OTHERS = "Other sources"
+_DARK = 0.01  # largest albedo [1] of a sphere that looks black
 
 
 Align = Literal["left", "center", "right"]
 CAPTION = (
     "Spheres with the values of the tables, all under the same light and at the same exposure: a white Lambertian "
     f"sphere has {100.0 * WHITE:g} % of the screen's white where it is\nbrightest. Brighter light is clipped. A "
-    "material whose source states no colour, or a single wavelength, is grey, and says so."
+    f"material whose source states no colour, or whose wavelengths do not reach from {VISIBLE_FROM_NM:g} to "
+    f"{VISIBLE_TO_NM:g} nm, is grey, and says so."
 )
 
 
@@ -60,41 +66,57 @@ def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
     imsave(encoded, image, format="png", pil_kwargs={"optimize": True})
     write_file(out, encoded.getvalue(), out.parent)
     print(f"{out}: {counted(len(tables), 'material')}, {image.shape[1]} x {image.shape[0]} pixels")
+    for line in remarks(tables.values()):
+        print(line)
 
 
 def sections(tables: Mapping[str, BaseTable]) -> dict[str, list[BaseTable]]:
-    """Return tables by their paper, which is the text of their source before the first comma, in the paper's order."""
+    """Return tables by their paper, which is the text of their source before the first comma, in the paper's order.
+
+    Sources of one table each stand together under `OTHERS`, if there are several and they are not papers of presets.
+    """
     order = {name: number for number, name in enumerate(presets())}
     papers: dict[str, list[BaseTable]] = {}
     for name in sorted(tables, key=lambda name: (order.get(name, len(order)), name)):
-        source = tables[name].metadata.source or "Other materials"
-        papers.setdefault(source.partition(",")[0], []).append(tables[name])
+        papers.setdefault(_paper(tables[name].metadata.source), []).append(tables[name])
+    known = {_paper(preset.source) for preset in presets().values()}
+    single = [paper for paper, members in papers.items() if len(members) == 1 and paper not in known]
+    if len(single) > 1:
+        papers[OTHERS] = [table for paper in single for table in papers.pop(paper)]
     return papers
+
+
+def _paper(source: str | None) -> str:
+    return (source or "Other materials").partition(",")[0]
 
 
 def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array]) -> NDArray[np.uint8]:
     """Return the contact sheet as sRGB bytes (height, width, 3)."""
     columns = (WIDTH - 2 * _MARGIN) // _CELL
     rows = [-(-len(tables) // columns) for tables in papers.values()]
-    height = _HEADER + _CAPTION + sum(_SECTION + count * (SPHERE + _LABEL) + _BETWEEN for count in rows)
+    cells = [SPHERE + _LABEL + (_SOURCE if paper == OTHERS else 0) for paper in papers]
+    heights = [count * cell for count, cell in zip(rows, cells, strict=True)]
+    height = _HEADER + _CAPTION + sum(_SECTION + tall + _BETWEEN for tall in heights)
     page = _Page(height)
     count = sum(map(len, papers.values()))
     page.write(_MARGIN, 36, f"{count} materials" if count > 1 else "1 material", 30, _INK)
     page.write(WIDTH - _MARGIN, 50, "brdfdb", 20, _MUTED, align="right")
     top, corners = _HEADER, {}
-    for (paper, tables), lines in zip(papers.items(), rows, strict=True):
+    for (paper, tables), cell, tall in zip(papers.items(), cells, heights, strict=True):
         page.write(_MARGIN, top, paper, 16, _MUTED)
         page.rule(top + 26)
         top += _SECTION
         for number, table in enumerate(tables):
             row, column = divmod(number, columns)
-            left, upper = _MARGIN + column * _CELL, top + row * (SPHERE + _LABEL)
+            left, upper = _MARGIN + column * _CELL, top + row * cell
             corners[table.name] = (upper, left + (_CELL - SPHERE) // 2)
             name = wrapped(table.name)
             page.write(left + _CELL / 2, upper + SPHERE + 7, name, _SIZE, _INK, align="center")
             below = upper + SPHERE + 7 + _SIZE * _SPACING * len(name.splitlines())
-            page.write(left + _CELL / 2, below, colour_known(table), _SIZE - 1.0, _MUTED, align="center")
-        top += lines * (SPHERE + _LABEL) + _BETWEEN
+            source = [shortened(_paper(table.metadata.source))] if paper == OTHERS else []
+            words = "\n".join(filter(None, [colour_known(table), *source]))
+            page.write(left + _CELL / 2, below, words, _SIZE - 1.0, _MUTED, align="center")
+        top += tall + _BETWEEN
     page.write(_MARGIN, top + 16, CAPTION, 13.5, _MUTED)
     image = page.drawn()
     for name, (upper, left) in corners.items():
@@ -105,10 +127,37 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
 
 
 def colour_known(table: BaseTable) -> str:
-    """Return a word for a table whose colour is not known: grey, or its one wavelength; empty for a spectrum."""
-    if table.wavelength_nm is None:
-        return "grey"
-    return f"{table.wavelength_nm[0]:g} nm, grey" if table.wavelength_nm.size == 1 else ""
+    """Return words for a table whose colour is not known: grey, with its wavelengths; empty for a colour.
+
+    A table so dark that its sphere is black has the bound of its albedo in place of "grey".
+    """
+    stored, largest = table.wavelength_nm, table.metadata.largest_albedo
+    if stored is not None and picture_wavelengths(stored) is not None:
+        return ""
+    dark = largest is not None and largest.albedo is not None and largest.albedo < _DARK
+    word = f"albedo < {_DARK:g}" if dark else "grey"
+    if stored is None:
+        return word
+    return f"{stored[0]:g} nm, {word}" if stored.size == 1 else f"{stored[0]:g}-{stored[-1]:g} nm, {word}"
+
+
+def remarks(tables: Iterable[BaseTable]) -> list[str]:
+    """Return a sentence for each table with several wavelengths that make no colour."""
+    lines = []
+    for table in tables:
+        stored = table.wavelength_nm
+        if stored is None or stored.size == 1 or picture_wavelengths(stored) is not None:
+            continue
+        lines.append(
+            f"{table.name}: grey, at {stored[0]:g} nm: a colour needs wavelengths from {VISIBLE_FROM_NM:g} to "
+            f"{VISIBLE_TO_NM:g} nm, and the table has {stored[0]:g} to {stored[-1]:g} nm"
+        )
+    return lines
+
+
+def shortened(source: str) -> str:
+    """Return a source in two lines at most, which fit under a sphere."""
+    return textwrap.fill(source, _SOURCE_LETTERS, max_lines=2, placeholder="…")
 
 
 def wrapped(name: str) -> str:

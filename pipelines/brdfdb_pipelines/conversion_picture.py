@@ -63,7 +63,7 @@ def _drawn(figure: Figure) -> Canvas:
         axes.tick_params(length=0)
         canvas.text((left + 8.0) / width, 1.0 - (top + 6.0) / height, panel.title, va="top", fontweight="bold")
         canvas.legend(
-            handles=figure_svg.curves_on(axes, panel),
+            handles=figure_svg.curves_on(axes, panel, powers=True),
             loc="upper left",
             bbox_to_anchor=((left + 4.0) / width, 1.0 - (top + 14.0) / height),
             ncols=2,

@@ -120,15 +120,18 @@ def _curves(panel: Panel) -> Canvas:
     return canvas
 
 
-def curves_on(axes: Axes, panel: Panel) -> list[Line2D]:
-    """Draw the curves of a panel, its axes and their labels; return the lines, for a legend."""
+def curves_on(axes: Axes, panel: Panel, *, powers: bool = False) -> list[Line2D]:
+    """Draw the curves of a panel, its axes and their labels; return the lines, for a legend.
+
+    With `powers`, logarithmic axes have powers of ten as labels whatever their range, for panels side by side.
+    """
     lines = _lines(panel.curves)
     for index, (curve, line) in enumerate(zip(panel.curves, lines, strict=True)):
         line.set_data(curve.x, _array(curve.y).tolist())
         line.set_gid(f"curve-{index}")
         axes.add_line(line)
-    _scale(axes, "x", [x for curve in panel.curves for x in curve.x], log=panel.log_x)
-    _scale(axes, "y", [y for curve in panel.curves for y in curve.y], log=panel.log_y)
+    _scale(axes, "x", [x for curve in panel.curves for x in curve.x], log=panel.log_x, powers=powers)
+    _scale(axes, "y", [y for curve in panel.curves for y in curve.y], log=panel.log_y, powers=powers)
     axes.grid(color=GRID, linewidth=0.6, clip_on=False)
     axes.set_xlabel(panel.x_label)
     axes.set_ylabel(panel.y_label)
@@ -328,7 +331,9 @@ def _lines(curves: list[Curve]) -> list[Line2D]:
     return lines
 
 
-def _scale(axes: Axes, which: Literal["x", "y"], values: Iterable[float | None], *, log: bool) -> None:
+def _scale(
+    axes: Axes, which: Literal["x", "y"], values: Iterable[float | None], *, log: bool, powers: bool = False
+) -> None:
     """Set limits and ticks; limits start at 0 where that costs less than half of the height."""
     finite = [v for v in values if v is not None and math.isfinite(v) and (v > 0.0 or not log)]
     low, high = (min(finite), max(finite)) if finite else (0.1, 1.0)
@@ -346,16 +351,16 @@ def _scale(axes: Axes, which: Literal["x", "y"], values: Iterable[float | None],
             low, high = (low if low == 0.0 else low - pad), high + pad
     (axes.set_xscale if which == "x" else axes.set_yscale)("log" if log else "linear")
     (axes.set_xlim if which == "x" else axes.set_ylim)(low, high)
-    _ticks(axes, which, low, high, log=log)
+    _ticks(axes, which, low, high, log=log, powers=powers)
 
 
-def _ticks(axes: Axes, which: Literal["x", "y"], low: float, high: float, *, log: bool) -> None:
+def _ticks(axes: Axes, which: Literal["x", "y"], low: float, high: float, *, log: bool, powers: bool = False) -> None:
     axis = axes.xaxis if which == "x" else axes.yaxis
     span = high - low
     if log and high / low > 20.0:
         axis.set_major_locator(LogLocator(numticks=6))
-        powers = high / low > 1e5  # all or none
-        axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if powers else _plain(value)))
+        as_power = powers or high / low > 1e5  # all labels of an axis or none
+        axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if as_power else _plain(value)))
     else:
         degrees = any(abs(span - turn) < 0.1 * turn for turn in (90.0, 180.0, 360.0))
         locator = MultipleLocator(15.0 * round(span / 90.0)) if degrees else MaxNLocator(6, steps=[1, 2, 2.5, 5, 10])

@@ -42,7 +42,7 @@ from brdfdb_pipelines.plot_panels import (
 _SHARES = (0.38, 0.15, 0.15, 0.15, 0.17)  # widths of the panels as shares of the whole
 _DPI = 110
 # Left end of titles and right ends of columns, of the table of forms and of that of samplers
-_COLUMNS = (18.0, 230.0, 280.0, 385.0, 435.0, 485.0, 540.0, 630.0, 680.0, 735.0, 800.0, 935.0, 988.0)
+COLUMNS = (18.0, 230.0, 278.0, 412.0, 462.0, 512.0, 566.0, 656.0, 704.0, 756.0, 818.0, 940.0, 988.0)
 _SAMPLER_COLUMNS = (18.0, 300.0, 390.0, 480.0, 620.0, 710.0, 800.0, 940.0)
 _BARS = 76.0  # height of the panels of samplers
 _STYLE: dict[Any, Any] = figure_svg.STYLE | {"svg.hashsalt": "brdfdb", "font.family": "sans-serif"}
@@ -117,7 +117,7 @@ def _drawn(chart: Chart) -> Canvas:
         rows.append((point, (*cells, terminal.size(point.bytes)), point.key in fronts))
     heads = ("mean error", "p99 (95 % interval)", "forward", "back", "grazing", "ns, many (quartiles)")
     table_of(
-        canvas, _COLUMNS, (*heads, "256", "one", "in turn", "times as fast as its rung", "bytes"), rows, table, height
+        canvas, COLUMNS, (*heads, "256", "one", "in turn", "times as fast as its rung", "bytes"), rows, table, height
     )
     _samplers(canvas, chart, samplers, height)
     return canvas

@@ -316,6 +316,39 @@ def test_what_was_away_is_shown_when_it_is_back(chromium: Chromium, address: str
     assert len(curve(chromium, "first")) > 100
 
 
+# gives every material an albedo above 1
+BRIGHT = """\
+const ask = fetch, largest_albedo = { albedo: 1.05, tolerance: 0.01, theta_i_deg: 0, wavelength_nm: 700 };
+globalThis.fetch = async (...all) => {
+  const answer = await ask(...all);
+  return /^v1.materials.[a-z-]+$/.test(all[0]) ? Response.json({ ...(await answer.json()), largest_albedo }) : answer;
+};
+"""
+# widths in em of texts beside the picture that take more than one line
+BROKEN_LINES = """\
+[...facts.querySelectorAll('dt, dd, p, .chip, .quiet')].flatMap(part => [...part.childNodes].flatMap(node => {
+  const text = document.createRange();
+  text.selectNodeContents(node);
+  const broken = node.nodeType === Node.TEXT_NODE && text.getClientRects().length > 1;
+  return broken ? [part.getBoundingClientRect().width / parseFloat(getComputedStyle(part).fontSize)] : [];
+}))
+"""
+
+
+@pytest.mark.parametrize("width", [1600, 1280, 420])
+def test_texts_beside_the_picture_are_wide_enough_to_read(chromium: Chromium, address: str, width: int) -> None:
+    script = chromium.send("Page.addScriptToEvaluateOnNewDocument", source=BRIGHT)
+    chromium.open(f"{address}#material=rolled-brass", width)
+    shown(chromium, "material=rolled-brass")
+    words = chromium.evaluate("facts.innerText")
+    assert "does the published model conserve energy?" in words
+    assert re.search(r"albedo above 1\s+1\.05 at 0°, 700 nm", words)
+    assert min(chromium.evaluate(BROKEN_LINES)) >= 8.0
+    assert chromium.evaluate("facts.scrollWidth <= facts.clientWidth")
+    assert chromium.evaluate("document.documentElement.scrollWidth") <= width
+    chromium.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+
+
 @pytest.mark.parametrize("width", [1280, 390])
 def test_the_explorer_is_ink_on_paper_and_dark_where_that_is_asked_for(
     chromium: Chromium, address: str, width: int

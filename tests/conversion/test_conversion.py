@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from brdfdb import models
 from brdfdb.conversion.convert import compare, convert
-from brdfdb.conversion.document import Conversion
+from brdfdb.conversion.document import Conversion, percent
 from brdfdb.conversion.figure import figure_of
 from brdfdb.conversion.minimisation import spread
 from brdfdb.conversion.target import index_of
@@ -155,6 +155,11 @@ def test_the_figure_has_both_models_at_their_peaks() -> None:
         assert peak == pytest.approx(0.33 * np.sqrt(2.0) / (4.0 * np.pi * 0.05 * 0.16) + 0.1 / np.pi, rel=1e-4)
     curve = curves["ggx along x"]
     assert curve.y[curve.x.index(45.0)] == pytest.approx(found.peak.after, rel=1e-4)
+    views = figure.panels[-1]
+    assert isinstance(views, Panel)
+    assert views.y_label == "l1 [%]"
+    assert f"l1 {percent(found.l1)}" in figure.caption
+    np.testing.assert_allclose(np.array(views.curves[1].y, dtype=float), 100.0 * found.l1, rtol=1e-4)
 
 
 # Colours

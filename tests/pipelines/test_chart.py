@@ -395,3 +395,14 @@ def test_the_recipe_of_copper_goes_from_smooth_to_rough() -> None:
     g = [(4.0 * math.pi * value / 0.55) ** 2 for value in sweep.axes["sigma_0_um"]]  # eq. 79 along the normal
     assert g[0] < 0.1 < 100.0 < g[-1]
     assert not {*sweep.members, sweep.name} & {*presets()}
+
+
+def test_cells_of_the_table_of_forms_stand_apart() -> None:
+    canvas = plot_panels.titled(200.0, "", "")
+    errors = ["≤ 0.0001 %", "0.0002 % (0.00019-0.00022)", "≤ 0.0001 %", "≤ 0.0001 %", "≤ 0.0001 %"]
+    cells = ["10", "a title", *errors, "16.29 (15.91-16.81)", "46.2k", "9.87k", "314k", "0.53 (he_torrance)", "717 kB"]
+    before = len(canvas.texts)
+    plot_panels.row_of(canvas, tradeoff_plot.COLUMNS, 1, cells, 50.0, 200.0, fontweight="bold")
+    boxes = [text.get_window_extent() for text in canvas.texts[before:]]
+    assert len(boxes) == len(cells)
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))

@@ -6,8 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
+from brdfdb.figure import Panel, curve_of
 from brdfdb_pipelines import recipe_file
+from brdfdb_pipelines.figure_svg import curves_on
 from tests.pipelines.command import Captured, run
 
 
@@ -50,11 +53,24 @@ def test_both_models_are_drawn(fit: Path, tmp_path: Path, capsys: Captured) -> N
     assert text.startswith("<svg ")
     for words in ("clay-vase as oren_nayar_fujii", "theta_i = 75 degrees", "light in the wrong place", "f_r [1/sr]"):
         assert words in text
+    assert "l1 [%]" in text
     assert bitmap.read_bytes().startswith(b"\x89PNG")
     capsys.readouterr()
     with pytest.raises(SystemExit):
         run(*clay(fit), "--picture", tmp_path / "clay.pdf")
     assert "does not end in .svg or .png" in capsys.readouterr().err
+
+
+def test_logarithmic_panels_side_by_side_have_the_same_kind_of_labels() -> None:
+    labels = []
+    for low in (2e-3, 2e-6):
+        curve = curve_of("a lobe", [0.0, 1.0], [low, 1.0])
+        panel = Panel(x_label="x", y_label="y", curves=[curve], log_y=True)
+        axes = Figure().add_subplot()
+        curves_on(axes, panel, powers=True)
+        labels.append([label.get_text() for label in axes.get_yticklabels()])
+    assert "10⁻²" in labels[0]
+    assert "10⁻⁴" in labels[1]
 
 
 def test_a_fixed_angle_is_in_degrees(fit: Path, capsys: Captured) -> None:

@@ -10,7 +10,12 @@ import pytest
 from matplotlib.image import imread
 
 import brdfdb
+from brdfdb.materials import Material
 from brdfdb.scenes.lit_sphere import lit_sphere
+from brdfdb.store.publication import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
 from brdfdb_pipelines import contact_sheet
 from tests.pipelines.command import Captured, run
 
@@ -53,6 +58,61 @@ def test_gallery_has_a_sphere_of_each_material(built: Path, tmp_path: Path, caps
     middle = sphere[contact_sheet.SPHERE // 2, contact_sheet.SPHERE // 2, :3]
     differences = np.abs(image - middle).max(axis=-1)
     assert differences[:400, :200].min() < 2.0 / 255.0
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """Directory of a store with gold in steps of 25 nm, and gold that is known from 400 to 600 nm."""
+    about = {"title": "Gold", "model": "he_torrance", "source": "a test", "refractive_index": "main/Au/Johnson"}
+    parameters = {"sigma_0_um": 0.1, "tau_um": 2.0}
+    theta = [0, 30, 60, 85]
+    grid = Grid({"theta_i": theta, "theta_r": theta, "delta_phi": [0, 90, 180]})
+    for name, last_nm in (("gold", 700.0), ("narrow", 600.0)):
+        material = Material.from_table(name, about | {"parameters": parameters})
+        publish_dataset(tmp_path / "own", name, tabulate(Layout(material, grid, np.arange(400.0, last_nm + 1.0, 25.0))))
+    return tmp_path / "own"
+
+
+def test_gallery_shows_a_colour_or_says_why_not(own: Path, tmp_path: Path, capsys: Captured) -> None:
+    assert run("gallery", "--store", own, "--out", tmp_path / "sheet.png") == 0
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "narrow: grey, at 400 nm: a colour needs wavelengths from 420 to 680 nm, and the table has 400 to 600 nm"
+    ]
+    gold, narrow = (brdfdb.open(own)[name] for name in ("gold", "narrow"))
+    assert [contact_sheet.colour_known(table) for table in (gold, narrow)] == ["", "400-600 nm, grey"]
+    red, _, blue, _ = lit_sphere(gold, 16)[8, 8]
+    assert red > 1.2 * blue
+    grey = lit_sphere(narrow, 16)[8, 8, :3]
+    assert np.ptp(grey) < 1e-6
+
+
+@pytest.mark.parametrize(("rho", "words"), [(0.005, "albedo < 0.01"), (0.5, "grey")])
+def test_a_black_sphere_names_its_albedo(tmp_path: Path, rho: float, words: str) -> None:
+    about = {"title": "Felt", "model": "lambert", "source": "a test", "parameters": {"rho": rho}}
+    grid = Grid({"theta_i": [0, 45, 90], "theta_r": [0, 45, 90], "delta_phi": [0, 180]})
+    largest = {"albedo": rho, "theta_i_deg": 0.0, "wavelength_nm": None, "tolerance": 0.001}
+    dataset = tabulate(Layout(Material.from_table("felt", about), grid)).assign_attrs(largest_albedo=largest)
+    publish_dataset(tmp_path, "felt", dataset)
+    assert contact_sheet.colour_known(brdfdb.open(tmp_path)["felt"]) == words
+
+
+def test_sources_of_one_material_share_a_row(tmp_path: Path, capsys: Captured) -> None:
+    grid = Grid({"theta_i": [0, 45, 90], "theta_r": [0, 45, 90], "delta_phi": [0, 180]})
+    sources = {name: f"a very long run {name} of a gonio" for name in "abcd"} | {"e": "twice", "f": "twice, again"}
+    for name, source in sources.items():
+        about = {"title": name, "model": "lambert", "source": source, "parameters": {"rho": 0.5}}
+        publish_dataset(tmp_path / "own", name, tabulate(Layout(Material.from_table(name, about), grid)))
+    store = brdfdb.open(tmp_path / "own")
+    groups = contact_sheet.sections({name: store[name] for name in store})
+    assert {paper: [table.name for table in tables] for paper, tables in groups.items()} == {
+        "twice": ["e", "f"],
+        contact_sheet.OTHERS: ["a", "b", "c", "d"],
+    }
+    assert contact_sheet.shortened(sources["a"]) == "a very long run a\nof a gonio"
+    assert contact_sheet.shortened("one two three four five six seven eight") == "one two three four\nfive six seven…"
+    assert run("gallery", "--store", tmp_path / "own", "--out", tmp_path / "sheet.png") == 0
+    assert "6 materials, 1400 x" in capsys.readouterr().out
+    assert len(imread(tmp_path / "sheet.png")) < 800
 
 
 def test_names_are_broken_after_hyphens() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -13,9 +14,14 @@ from matplotlib.figure import Figure
 from brdfdb.errors import MissingExtraError, ParameterError
 from brdfdb.geometry import radians
 from brdfdb.materials import Material
+from brdfdb.store.publication import publish_dataset
+from brdfdb.store.reader import Store
 from brdfdb.tables.albedo import directional_albedo
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
 from brdfdb.tables.plot import ALBEDO_DEG, albedo_shares
 from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import tabulate
 from tests.tables.made_up import WAVELENGTHS, made_up
 
 mpl.use("Agg")
@@ -45,6 +51,21 @@ def test_lobe_has_the_mirror_direction_on_the_right(grey: Table) -> None:
     radius, angle = np.hypot(x, y), np.arctan2(x, y)
     expected = grey.lookup(radians(30.0), 0.0, np.abs(angle), np.where(angle > 0.0, np.pi, 0.0))
     np.testing.assert_allclose(radius / radius.max(), expected / expected.max(), rtol=1e-6)
+
+
+def test_cuts_resolve_a_lobe_narrower_than_their_even_steps(tmp_path: Path) -> None:
+    narrow = {"rho_d": 0.1, "rho_s": 0.3, "alpha_x": 2e-3, "alpha_y": 2e-3}
+    about = {"title": "Polished", "model": "ward", "source": "a test", "parameters": narrow}
+    theta = np.array([0.0, 30.0, 60.0, 85.0])
+    grid = Grid({"theta_i": theta, "theta_r": theta, "delta_phi": np.array([0.0, 90.0, 180.0])})
+    publish_dataset(tmp_path, "polished", tabulate(Layout(Material.from_table("polished", about), grid)))
+    table = Store(tmp_path)["polished"]
+    for theta_i in (0.0, 30.0, 60.0):
+        theta_r = np.asarray(table.plot.cuts(theta_i, ax=Figure().add_subplot()).lines[0].get_xdata())
+        slopes = np.tan(radians(theta_r - theta_i) / 2.0) / narrow["alpha_x"]
+        inside = slopes[np.abs(slopes) < 2.0]
+        assert np.diff(inside).max() < 0.25
+        assert theta_r.size < 700
 
 
 def test_lobe_of_an_anisotropic_table_has_two_azimuths() -> None:

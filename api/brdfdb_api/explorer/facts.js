@@ -49,7 +49,7 @@ function formula(of) {
 
 /** An albedo above 1, where the table has one. */
 const above = (largest) => (largest && (largest.albedo === null || largest.albedo > 1 + largest.tolerance) ? [[
-  "albedo", `${largest.albedo === null ? "not finite" : short(largest.albedo)} at ${largest.theta_i_deg}°` +
+  largest.albedo === null ? "albedo" : "albedo above 1", `${largest.albedo === null ? "not finite" : short(largest.albedo)} at ${largest.theta_i_deg}°` +
     `${largest.wavelength_nm === null ? "" : `, ${largest.wavelength_nm} nm`}`]] : []);
 
 /** Why a value that no paper prints was chosen; tables built earlier have the names alone, and reasons in their note. */
@@ -75,12 +75,12 @@ export function band({ error, wavelength_nm: wavelengths }, { theta_i, nm }) {
 
 /** Every finding of the audit, in words where it is no plain pass; the report has the words of the papers. */
 function audited(audit) {
-  const found = audit.sentences.filter(({ quote }) => !quote);
+  const findings = audit.sentences.filter(({ quote }) => !quote);
   return [
-    pairs([
+    answers([
       ...(audit.as_published && audit.conserves_energy ? Object.entries(QUESTIONS).map(([key, question]) =>
         [question, chip(audit[key].word, audit[key].text)]) : [["verdict", chip(audit.verdict)]]),
-      ...found.map(({ title, word, text }) => [title.toLowerCase(), chip(word), isGood(word) ? "" : text]),
+      ...findings.map(({ title, word, text }) => [title.toLowerCase(), chip(word), isGood(word) ? "" : text]),
     ]),
     ...(audit.current ? [] : [element("p", {}, `This is of revision ${audit.revision}, not of the current one.`)]),
   ];
@@ -101,6 +101,13 @@ function pairs(rows) {
     element("dt", {}, term),
     element("dd", {}, first, ...small.filter(Boolean).map((text) => element("span", { className: "quiet" }, text))),
   ]));
+}
+
+/** A list of questions: each with its verdict beside it or below, and a reason over the whole width. */
+function answers(rows) {
+  return element("dl", { className: "answered" }, ...rows.map(([question, verdict, reason]) => element("div", {},
+    element("dt", {}, question), element("dd", {}, verdict),
+    ...(reason ? [element("dd", { className: "quiet" }, reason)] : []))));
 }
 
 const shown = (of) => (typeof of === "number" ? short(of)

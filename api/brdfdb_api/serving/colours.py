@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.parameters import Floats
-from brdfdb.spectra import check_illuminant, colour_science, covers_visible, srgb_weights, xyz_weights
+from brdfdb.spectra import (
+    check_illuminant,
+    colour_science,
+    covers_visible,
+    picture_wavelengths,
+    srgb_weights,
+    xyz_weights,
+)
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -60,7 +67,8 @@ def coloured(values: Floats, of: NDArray[np.float64], *, grey: bool) -> Floats:
 def swatch(table: Table) -> str:
     """Return the colour of a table under D65 as ``#rrggbb``: albedo for light at 45 degrees, specular part included.
 
-    Grey where its wavelengths make no colour. For display only: the albedo is a mean over few directions.
+    Grey where its wavelengths do not reach from 420 to 680 nm. For display only: the albedo is a mean over few
+    directions.
     """
     from brdfdb.integrals.sampling import DIFFUSE, directions, mixture_density
 
@@ -72,11 +80,9 @@ def swatch(table: Table) -> str:
     density = mixture_density(lobe or DIFFUSE, wi, wr)
     cosine = np.maximum(wr[:, 2], 0.0)
     weight = np.divide(cosine, density, out=np.zeros(_SAMPLES), where=density > 0.0) / _SAMPLES
-    f_r = np.asarray(table.lookup_vectors(wi, wr)).reshape(_SAMPLES, -1)
-    reflected = weight @ f_r + np.ravel(table.specular_reflectance(radians(_LIGHT_DEG)))
-    if table.wavelength_nm is not None and covers_visible(table.wavelength_nm):
-        rgb = reflected @ srgb_weights(tuple(table.wavelength_nm.tolist()))
-    else:
-        rgb = np.full(3, reflected.mean())
+    visible = None if table.wavelength_nm is None else picture_wavelengths(table.wavelength_nm)
+    f_r = np.asarray(table.lookup_vectors(wi, wr, visible)).reshape(_SAMPLES, -1)
+    reflected = weight @ f_r + np.ravel(table.specular_reflectance(radians(_LIGHT_DEG), visible))
+    rgb = np.full(3, reflected.mean()) if visible is None else reflected @ srgb_weights(tuple(visible.tolist()))
     encoded = colour_science().cctf_encoding(np.clip(rgb, 0.0, 1.0), function="sRGB")
     return "#" + "".join(f"{round(255.0 * value):02x}" for value in encoded.tolist())
