@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field
 
 from brdfdb.audit.finding import RANKS, STRICT, Cell, Finding, Sentence, Subject
 from brdfdb.materials import Material
-from brdfdb.parameters import Standing
+from brdfdb.parameters import Standing, StatedLimit
 from brdfdb.tables.grids import Axis
 
 _ORDER: tuple[Standing, ...] = ("inside", "at the edge", "outside")
@@ -75,6 +75,11 @@ class Validity(Finding):
 def validity_of(material: Material, wavelength_nm: Axis | None) -> Validity:
     """Return the limits of the model, judged at the wavelengths [nm] of the table."""
     stated = material.spec.limits
-    limits = [] if stated is None else [Limit(**limit._asdict()) for limit in stated(material.arguments(wavelength_nm))]
+    limits = [] if stated is None else [_limit(limit) for limit in stated(material.arguments(wavelength_nm))]
     known = [limit.standing for limit in limits if limit.standing != "unknown"]
     return Validity(limits=limits, verdict=max(known, key=_ORDER.index, default="inside"))
+
+
+def _limit(stated: StatedLimit) -> Limit:
+    """Return a stated limit as the report has it."""
+    return Limit(**{name: getattr(stated, name) for name in Limit.model_fields})
