@@ -103,12 +103,10 @@ def size(count: float) -> str:
 
 
 def error(p99: float | None) -> str:
-    """Return a stated relative error as text in percent."""
-    if p99 is None:
-        return "not measured"
-    if p99 < 1e-5:
-        return "< 0.001 %"
-    return f"{100.0 * p99:.0f} %" if p99 >= 0.995 else f"{100.0 * p99:#.2g}".rstrip(".") + " %"
+    """Return a relative error [1] as text in percent, or as a factor."""
+    from brdfdb.figure import error_in_words
+
+    return error_in_words(p99)
 
 
 def count(value: float) -> str:
