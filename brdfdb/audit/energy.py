@@ -151,7 +151,7 @@ def furnace_cell(furnace: Furnace | None) -> Cell:
     """Return the albedo [1] of the lossless surface in uniform light, at the worst wavelength."""
     values = [] if furnace is None else [value for value in furnace.hemispherical if value is not None]
     if not values:
-        return Cell("unknown", "–", LAST)
+        return Cell("unknown", "no lossless form", LAST)
     worst = max(values, key=lambda value: abs(value - 1.0))
     word: Word = "loses" if worst < LOSSLESS else "gains" if worst > 2.0 - LOSSLESS else "conserves"
     return Cell(word, f"{worst:.3f}", worst)

@@ -56,7 +56,7 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
     # Ward's model is a fit itself, and He and Torrance's is the sum that others cut short
     assert [re.split(r"  +", line)[3:8:2] for line in lines] == [
         ["grey", "none known", "not audited"],
-        ["400-700 nm", "0, highest rung", "not audited"],
+        ["400-700 nm", "0, exact form", "not audited"],
     ]
 
 

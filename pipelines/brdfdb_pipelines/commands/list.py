@@ -58,7 +58,15 @@ def _print_presets(library: str | None) -> None:
 
 def _print_materials(store: Store, root: Path) -> list[str]:
     """Print a line for each material from its pointer and the last audit; return a sentence for each damaged one."""
-    from brdfdb.store.summary_words import COLUMNS, NOT_AUDITED, colours, energy, formula_error, last_audit
+    from brdfdb.store.summary_words import (
+        COLUMNS,
+        ERRORS_EXPLAINED,
+        NOT_AUDITED,
+        colours,
+        energy,
+        formula_error,
+        last_audit,
+    )
     from brdfdb_pipelines import terminal
 
     rows, damaged, incomplete = [], [], []
@@ -89,7 +97,7 @@ def _print_materials(store: Store, root: Path) -> list[str]:
         numbers=errors,
     )
     if rows:
-        print("table error: the table against its formula; formula error: the formula against the highest rung known")
+        print(ERRORS_EXPLAINED)
     for sentence in incomplete:
         print(terminal.plain(sentence))
     return damaged
