@@ -50,6 +50,7 @@ class Energy(Finding):
         "Directional albedo is the share of the light from one direction that leaves the surface in any direction, "
         "specular part included: the integral of f_r cos theta_r over the hemisphere. An albedo above 1 creates "
         "energy. Lights up to 90° are examined, or up to 89.9° for models that grow without bound at the horizon. The "
+        "largest albedo of a model is searched between these lights, that of a table is the largest at fixed ones. The "
         "white furnace is the surface in uniform light, with its parameters set so that nothing is absorbed. An ideal "
         "model then shows 1 at every angle. Less than 1 is light that single scattering loses, more than 1 is energy "
         "that the model creates. The table of all materials shows the mean over angles, which counts as a loss or a "

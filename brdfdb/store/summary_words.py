@@ -74,4 +74,4 @@ def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
         return NOT_AUDITED
     at = f"{largest['theta_i_deg']:g}°"
     at += "" if largest["wavelength_nm"] is None else f", {largest['wavelength_nm']:g} nm"
-    return f"{NOT_AUDITED}: albedo {'not finite' if value is None else f'{value:.3g}'} at {at}"
+    return f"{NOT_AUDITED}: albedo of the table {'not finite' if value is None else f'{value:.3g}'} at {at}"

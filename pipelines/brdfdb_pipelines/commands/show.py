@@ -283,7 +283,7 @@ def _print_albedo(table: Table) -> None:
         value = "not finite" if largest.albedo is None else f"{largest.albedo:.3g}"
         known = table.metadata.known_excess
         cited = "" if known is None else f": {known.citation}"
-        print(f"    above 1     {value} at {largest.theta_i_deg:g}°{where}{cited}")
+        print(f"    above 1     the table {value} at {largest.theta_i_deg:g}°{where}{cited}")
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
