@@ -106,7 +106,7 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
                 (
                     one.job.material.name,
                     one.job.material.model,
-                    " x ".join(map(str, one.shape)),
+                    shape_in_words(one.shape, one.wavelengths),
                     one.revision,
                     terminal.size(one.stored_bytes),
                     f"{one.why}; {one.revision} is current again" if one.state == "adopted" else one.why,
@@ -118,3 +118,10 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
     if len(changed) < len(built):
         print(f"{counted(len(built) - len(changed), 'table')} unchanged")
     print(f"{terminal.size(sum(one.stored_bytes for one in built))} in {root}")
+
+
+def shape_in_words(shape: tuple[int, ...], wavelengths: int) -> str:
+    """Return the numbers of nodes of a table, and how many values serve all its wavelengths, if they are fewer."""
+    if not wavelengths or shape[-1] == wavelengths:
+        return " x ".join(map(str, shape))
+    return f"{' x '.join(map(str, shape[:-1]))}, {shape[-1]} for {wavelengths} wavelengths"

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 HELP = "Show parameters, sources, grid, albedo and files of a material, or a family."
 
+_VALUE_WIDTH = 9  # of the numbers of parameters; longer values are spectra in words
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
 
@@ -98,7 +99,9 @@ def _origin(metadata: TableMetadata) -> list[str]:
         note = metadata.parameter_sources.get(parameter, "")
         if parameter in metadata.assumed:
             note = f"assumed, see {'the note' if metadata.assumed[parameter] is None else 'below'}"
-        lines.append(f"    {parameter:<16}{value!s:<8} {note}".rstrip())
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        note = f"; {note}" if note and len(text) > _VALUE_WIDTH else note
+        lines.append(f"    {parameter:<16}{text:<{_VALUE_WIDTH}}{note}".rstrip())
     if metadata.source is not None:
         lines.append(f"  source      {metadata.source}")
     if metadata.refractive_index:
