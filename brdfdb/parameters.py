@@ -111,7 +111,7 @@ class StatedLimit(NamedTuple):
 
     `quantity` is the limited quantity, `value` its value and `valid` its range, in words. `words` is the quotation,
     `where` its paper and section. If a paper says "much less" without a number, values up to a tenth are inside, and
-    values between a tenth and 1 at the edge.
+    values between a tenth and 1 at the edge. `of_energy` marks a limit beyond which the model creates energy.
     """
 
     quantity: str
@@ -120,6 +120,7 @@ class StatedLimit(NamedTuple):
     standing: Standing
     words: str
     where: str
+    of_energy: bool = False
 
 
 class Diagnostic(NamedTuple):

@@ -14,6 +14,7 @@ from brdfdb.audit.table_error import TableError
 
 AS_PUBLISHED = "is it what the paper says?"
 CONSERVES_ENERGY = "does the published model conserve energy?"
+NO_PAPER = "a material of your own has no paper: its model, or its function, takes the place of the paper"
 
 
 class Answer(BaseModel):
@@ -68,11 +69,11 @@ def _short(model: ModelEnergy) -> str:
     if model.max_at_wavelength_nm is not None:
         where += f", {model.max_at_wavelength_nm:g} nm"
     if model.verdict == "conserves":
-        return "yes" if model.furnace is not None else "yes, at these parameters"
+        return "yes" if model.furnace is not None else "yes, no lossless form to judge"
     if model.verdict == "loses":
         return f"creates none, loses up to {_percent(_loss(model.furnace))}"
     if model.verdict == "gains":
-        return f"creates none here, {_percent(_gain(model.furnace))} if lossless"
+        return f"creates none; would create {_percent(_gain(model.furnace))} if nothing were absorbed"
     return {
         "known published excess": f"no, as published: {where}",
         "accepted excess": f"no, as accepted: {where}",

@@ -37,6 +37,7 @@ _SEVERITY: tuple[EnergyVerdict, ...] = (
 # Verdicts on models that reflect at most what arrives with the parameters of the material
 WITHIN_1: tuple[EnergyVerdict, ...] = ("conserves", "loses", "gains")
 _ACCEPTED = "accepted, not published"
+_OF_MODEL = "the model itself reflects more than arrives, and the table follows it"
 
 
 class Energy(Finding):
@@ -49,6 +50,7 @@ class Energy(Finding):
         "Directional albedo is the share of the light from one direction that leaves the surface in any direction, "
         "specular part included: the integral of f_r cos theta_r over the hemisphere. An albedo above 1 creates "
         "energy. Lights up to 90° are examined, or up to 89.9° for models that grow without bound at the horizon. The "
+        "largest albedo of a model is searched between these lights, that of a table is the largest at fixed ones. The "
         "white furnace is the surface in uniform light, with its parameters set so that nothing is absorbed. An ideal "
         "model then shows 1 at every angle. Less than 1 is light that single scattering loses, more than 1 is energy "
         "that the model creates. The table of all materials shows the mean over angles, which counts as a loss or a "
@@ -150,7 +152,7 @@ def furnace_cell(furnace: Furnace | None) -> Cell:
     """Return the albedo [1] of the lossless surface in uniform light, at the worst wavelength."""
     values = [] if furnace is None else [value for value in furnace.hemispherical if value is not None]
     if not values:
-        return Cell("unknown", "–", LAST)
+        return Cell("unknown", "no lossless form", LAST)
     worst = max(values, key=lambda value: abs(value - 1.0))
     word: Word = "loses" if worst < LOSSLESS else "gains" if worst > 2.0 - LOSSLESS else "conserves"
     return Cell(word, f"{worst:.3f}", worst)
@@ -183,9 +185,9 @@ def energy_of(table: Table, source: Source | None, *, accept_excess: bool = Fals
     claim = str(table.attrs.get("known_excess", {}).get("citation", ""))
     model = model_energy_of(source, table.wavelength_nm, known, claim, accept_excess=accept_excess)
     # The excess that is published or accepted is that of the model. An excess of the table alone is excused by neither
-    excess = {"known published excess": known, "accepted excess": _of_model(model)}.get(model.verdict)
-    accepted = model.verdict == "accepted excess"
-    stored = table_energy_of(table, excess, "accepted excess" if accepted else "known published excess")
+    excess = known if model.verdict == "known published excess" else _of_model(model)
+    excused = model.verdict if model.verdict in ("accepted excess", "violates") else "known published excess"
+    stored = table_energy_of(table, excess, excused)
     of_table: EnergyVerdict = "conserves" if stored.verdict == "passes" else stored.verdict
     if _SEVERITY.index(of_table) > _SEVERITY.index(model.verdict):
         reason = stored.reason if of_table.startswith("known") else f"the table {stored.reason}"
@@ -194,11 +196,16 @@ def energy_of(table: Table, source: Source | None, *, accept_excess: bool = Fals
 
 
 def _of_model(model: ModelEnergy) -> KnownExcess | None:
-    """Return the excess of a model: its largest albedo [1], and the angle [degree] above which it exceeds 1."""
-    if model.exceeds_1_from_theta_i_deg is None or model.max_albedo is None or not np.isfinite(model.max_albedo):
+    """Return the excess of a model, accepted or not: its largest albedo [1], and the angle [degree] where it begins."""
+    if (
+        model.verdict in WITHIN_1
+        or model.exceeds_1_from_theta_i_deg is None
+        or model.max_albedo is None
+        or not np.isfinite(model.max_albedo)
+    ):
         return None
     return KnownExcess(
         max_albedo=model.max_albedo + TOLERANCE,
         from_theta_i_deg=max(model.exceeds_1_from_theta_i_deg - 2.0 * ANGLE_TOLERANCE_DEG, 0.0),
-        citation=_ACCEPTED,
+        citation=_ACCEPTED if model.verdict == "accepted excess" else _OF_MODEL,
     )

@@ -37,6 +37,25 @@ def published_excess(material: Material, wavelength_nm: Axis | None) -> KnownExc
     return None
 
 
+def cause_of(material: Material, wavelength_nm: Axis | None) -> str:
+    """Return why the model of a material can reflect more than arrives, in words; empty if its paper does not say.
+
+    A limit of energy that the parameters do not keep comes first. The general reason of the model follows only if they
+    leave another limit, too, or keep all of them.
+    """
+    spec = material.spec
+    stated = [] if spec.limits is None else list(spec.limits(material.arguments(wavelength_nm)))
+    outside = [limit for limit in stated if limit.standing == "outside" and limit.of_energy]
+    causes = [
+        f"a limit is not kept: {limit.quantity} is {limit.value}, valid {limit.valid}; {limit.where}"
+        for limit in outside
+    ]
+    others = any(limit.standing in ("at the edge", "outside") for limit in stated if not limit.of_energy)
+    if spec.excess and (others or not outside):
+        causes.append(spec.excess)
+    return "; ".join(causes)
+
+
 def limit_of(known: KnownExcess | None, theta_i_deg: Axis) -> Axis:
     """Return the largest allowed albedo [1] at each angle [degree]: 1, or the known excess above its angle."""
     one = np.full(theta_i_deg.size, 1.0 + ENERGY_TOLERANCE)

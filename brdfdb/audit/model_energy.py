@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, Field
 
-from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, crossing, limit_of, place
+from brdfdb.audit.excess import DIGITS, ENERGY_TOLERANCE, cause_of, crossing, limit_of, place
 from brdfdb.audit.finding import STRICT
 from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
@@ -134,7 +134,7 @@ def model_energy_of(
     first = _first_above_1(source, wavelength_nm, lights, reflected)
     verdict, reason = _verdict(lights, wavelength_nm, reflected, furnace, known)
     if verdict == "violates" and first is not None:
-        reason += _explained(source, reflected, first, known, claim)
+        reason += _explained(source, wavelength_nm, reflected, first, known, claim)
         verdict = "accepted excess" if accept_excess and np.isfinite(reflected.largest).all() else verdict
     return ModelEnergy(
         theta_i_deg=lights.theta_i_deg.tolist(),
@@ -192,12 +192,19 @@ def _first_above_1(source: Source, wavelength_nm: Axis | None, lights: _Lights, 
     return crossing(between, *lights.theta_i_deg[first - 1 : first + 1].tolist())
 
 
-def _explained(source: Source, reflected: _Reflected, first: float, known: KnownExcess | None, claim: str) -> str:
+def _explained(
+    source: Source,
+    wavelength_nm: Axis | None,
+    reflected: _Reflected,
+    first: float,
+    known: KnownExcess | None,
+    claim: str,
+) -> str:
     """Return a clause on an excess that is not known as published: its origin, and the claim on it."""
     most = float(np.max(np.where(np.isfinite(reflected.largest), reflected.largest, -np.inf)))
     clause = f"; this model does so by itself for such parameters: up to {most:.4g}, from {first:.4g} degrees"
-    if isinstance(source, Material) and source.spec.excess:
-        clause += f" ({source.spec.excess})"
+    if isinstance(source, Material) and (cause := cause_of(source, wavelength_nm)):
+        clause += f" ({cause})"
     if known is not None:
         return f"{clause}; the paper has up to {known.max_albedo:.4g}, from {known.from_theta_i_deg:.4g} degrees"
     return f"{clause}; its recipe excuses it, which is not accepted: {claim}" if claim else clause

@@ -109,7 +109,7 @@ class _Judge(NamedTuple):
 def table_energy_of(
     table: Table,
     known: KnownExcess | None,
-    excused: Literal["known published excess", "accepted excess"] = "known published excess",
+    excused: Literal["known published excess", "accepted excess", "violates"] = "known published excess",
 ) -> TableEnergy:
     """Return the energy of a table; `excused` is the verdict on an excess that is not above the known one."""
     integrated = directional_albedo(table)

@@ -165,6 +165,7 @@ def limits(arguments: Arguments) -> list[StatedLimit]:
             words="As long as the total reflectance, ρ_d + ρ_s, is less than 1 and the two α's are not too large, "
             "Equation 5 will yield a physically valid reflectance function.",
             where="Ward 1992, section 4.2",
+            of_energy=True,
         ),
     ]
 

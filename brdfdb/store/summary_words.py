@@ -9,6 +9,11 @@ from typing import Any, NamedTuple
 
 NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
+# What the two errors of a list are, for the line below it
+ERRORS_EXPLAINED = (
+    "table error: the table against its formula; formula error: the formula against the highest rung, which is the "
+    "form of the same model without an approximation; 0, exact form: the formula is that form"
+)
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
 
@@ -54,7 +59,7 @@ def formula_error(head: Mapping[str, Any], percent: Callable[[float], str]) -> s
         return NOT_MEASURED
     if stated["against"] == "measured":
         return percent(stated["p99"])
-    return "0, highest rung" if stated["against"] == "highest rung" else "none known"
+    return "0, exact form" if stated["against"] == "highest rung" else "none known"
 
 
 def energy(head: Mapping[str, Any], audited: Audited | None) -> str:
@@ -75,4 +80,4 @@ def excess(head: Mapping[str, Any]) -> str:
         return ""
     at = f"{largest['theta_i_deg']:g}°"
     at += "" if largest["wavelength_nm"] is None else f", {largest['wavelength_nm']:g} nm"
-    return f"albedo {'not finite' if value is None else f'{value:.3g}'} at {at}"
+    return f"albedo of the table {'not finite' if value is None else f'{value:.3g}'} at {at}"

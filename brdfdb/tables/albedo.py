@@ -68,8 +68,8 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
     -------
     TableAlbedo
         By default at the nodes of theta_i and phi_i where the integral is exact, else at `THETA_I_DEG` and every 30
-        degrees of phi_i; at nodes and `THETA_I_DEG`, but not 90 degrees, if a planner chose the nodes: the attribute
-        ``reason`` says so.
+        degrees of phi_i; at nodes and `THETA_I_DEG` if a planner chose the nodes: the attribute ``reason`` says so.
+        Such nodes are at 90 degrees only if f_r has no pole there.
 
     Notes
     -----
@@ -94,8 +94,8 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
         brdf = table.brdf.reshape(*table.brdf.shape[:3], -1)
         albedo = np.einsum("ijkw,j,k->iw", brdf, theta_weights, phi_weights, optimize=True)[:, np.newaxis]
     lights = theta_i_deg
-    if lights is None and table.metadata.reason:  # a planner's nodes are few, and reach 90 degrees
-        lights = np.union1d(THETA_I_DEG, nodes[nodes < 90.0])
+    if lights is None and table.metadata.reason:  # a planner's nodes are few
+        lights = np.union1d(THETA_I_DEG, nodes)
     if lights is not None:
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
         nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)

@@ -41,7 +41,7 @@ class FormulaError(BaseModel):
         """Return the standing of the formula in a few words, without its error."""
         return {
             "measured": f"against {self.rung}",
-            "highest rung": f"is the highest rung: {self.rung}",
+            "highest rung": f"exact form of its model: {self.rung}",
             "none known": "no higher rung is known",
         }[self.against]
 

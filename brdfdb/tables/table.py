@@ -87,7 +87,7 @@ class Table(BaseTable):
         return cls(
             name=layout.source.name,
             revision="",
-            attrs={},
+            attrs={"reason": layout.reason} if layout.reason else {},
             grid=layout.grid if grid is None else grid,
             wavelength_nm=layout.wavelength_nm,
             values=values,

@@ -15,8 +15,10 @@ from typing import Any, NamedTuple
 import brdfdb
 from brdfdb.atlas import ATLAS
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
+from brdfdb.audit.answers import NO_PAPER
 from brdfdb.errors import BrdfdbError, ParameterError, StoreError
 from brdfdb.gallery import GALLERY
+from brdfdb.materials import presets
 from brdfdb.models import MODELS
 from brdfdb.store.reader import Store
 from brdfdb_pipelines import audit_page, terminal, workers
@@ -197,8 +199,12 @@ def _print(root: Path, audit_report: AuditReport, report_path: Path) -> None:
     partly = sum(bool(a.not_judged) for a in audits)
     not_whole = f"{partly} only in part, for lack of a source; " if partly else ""
     allowed = f"accepted excess {accepted}, " if accepted else ""
+    remarks = audit_page.remarked(audit_report)
+    remarked = f", {remarks} of them with a remark on the model" if remarks else ""
+    if any(a.material not in presets() for a in audits):
+        print(NO_PAPER)
     page_path = report_path.with_suffix(".html")
     print(
-        f"{len(audits)} audited: {not_whole}passes {len(audits) - known - accepted - violating}, "
+        f"{len(audits)} audited: {not_whole}passes {len(audits) - known - accepted - violating}{remarked}, "
         f"known published excess {known}, {allowed}violates {violating}; page {page_path}, data {report_path}"
     )

@@ -10,9 +10,10 @@ from typing import NamedTuple
 import jinja2
 
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
-from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, Answer
+from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, Finding, NotJudged, NumberTable, Word
+from brdfdb.audit.validity import Validity
 from brdfdb.figure import Figure
 from brdfdb_pipelines import figure_svg
 
@@ -110,11 +111,19 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
         plots=plots,
         rows=rows,
         questions=QUESTIONS,
+        no_paper=NO_PAPER,
+        remarked=remarked(report),
         columns=columns(),
         counts=[(word, sum(verdict == word for verdict in energy.values())) for word in _COUNTED],
         gallery=_by_paper(report.gallery),
         colours=figure_svg.VARIABLES,
     )
+
+
+def remarked(report: AuditReport) -> int:
+    """Return the number of materials that pass although their model gains light or they leave its limits."""
+    passing = [a for a in report.materials if a.verdict == "passes"]
+    return sum(a.conserves_energy.word == "gains" or a.findings[Validity.key].verdict == "outside" for a in passing)
 
 
 def anchor(name: str) -> str:

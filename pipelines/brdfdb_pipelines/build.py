@@ -49,6 +49,8 @@ class Built:
         Phrase on why the table was not left unchanged; empty for "unchanged".
     shape : tuple of int
         Shape of the table; empty unless it was computed.
+    wavelengths : int
+        Number of wavelengths for which it holds; 0 if it is grey.
     """
 
     job: Job
@@ -57,6 +59,7 @@ class Built:
     stored_bytes: int
     why: str = ""
     shape: tuple[int, ...] = ()
+    wavelengths: int = 0
 
 
 @dataclass(eq=False)
@@ -350,7 +353,8 @@ class _Builder:
         if files is not None:
             revision, stored = publish_staged(self.root, table.name, table.staging, {**table.files, **files})
             why = table.survey.standing.why
-            self.built[table.name] = Built(table.job, "published", revision, stored, why, table.survey.shape)
+            about = (table.survey.shape, table.survey.wavelengths)
+            self.built[table.name] = Built(table.job, "published", revision, stored, why, *about)
             self.report(
                 {"event": "published", "material": table.name, "revision": revision, "bytes": stored, "why": why}
             )

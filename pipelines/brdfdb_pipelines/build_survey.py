@@ -30,6 +30,7 @@ class Survey:
     head: str
     layout: str = ""
     shape: tuple[int, ...] = ()
+    wavelengths: int = 0  # 0: the table is grey
     block_values: tuple[int, ...] = ()
     task_bytes: int = 0  # memory of one task
     disk_bytes: int = 0  # disk space still to be written, at most
@@ -61,7 +62,8 @@ def survey(root: str, job: Job) -> Survey:
     values = tuple((rows.stop - rows.start) * rest for rows in layout.blocks)
     staged = build_resources.stored_bytes([request_path(store, name, digest(request)) / "table"])
     disk = max(0, build_resources.table_bytes(layout) - staged)
-    return Survey(status, head, text, tuple(layout.shape), values, build_resources.task_bytes(layout), disk)
+    shape, wavelengths = tuple(layout.shape), 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
+    return Survey(status, head, text, shape, wavelengths, values, build_resources.task_bytes(layout), disk)
 
 
 def check_values(job: Job) -> None:

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 _FOLDED = 8  # width of a column of text below which a table is wider than the terminal instead
+_NARROW = 16  # width of a column of text below which a less important column is left out, if there is one
 _MANY = 200  # rows that rich lays out in a tenth of a second; longer tables are printed plainly
 
 
@@ -47,13 +48,25 @@ def progress(counted: bool = True, text: str = "", transient: bool = False) -> P
 
 
 def print_table(
-    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: Sequence[str] = ()
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    numbers: Sequence[str] = (),
+    less: Sequence[str] = (),
 ) -> None:
     """Print rows under column headings; the columns in `numbers` are set right.
 
-    When the output is not a terminal, lines are as long as needed, so that programs read everything.
+    When the output is not a terminal, lines are as long as needed, so that programs read everything. On a narrow
+    terminal the columns in `less` are left out, the first of them first, and a line names them.
     """
     title, rows = plain(title), [[plain(cell) for cell in row] for row in rows]
+    console = Console(markup=False, emoji=False, highlight=False)  # a name may hold [brackets] and :colons:
+    dropped = _too_many(columns, rows, numbers, less, console.width) if console.is_terminal else []
+    if dropped:
+        kept = [column not in dropped for column in columns]
+        rows = [[cell for cell, keep in zip(row, kept, strict=True) if keep] for row in rows]
+        columns = [column for column in columns if column not in dropped]
     if len(rows) > _MANY:
         _print_plainly(title, columns, rows, numbers)
         return
@@ -64,7 +77,6 @@ def print_table(
         table.add_column(column, justify="right" if number else "left", overflow="fold", no_wrap=whole)
     for row in rows:
         table.add_row(*row)
-    console = Console(markup=False, emoji=False, highlight=False)  # a name may hold [brackets] and :colons:
     if not console.is_terminal:
         console.width = 10_000
         console.width = console.measure(table).maximum
@@ -73,14 +85,31 @@ def print_table(
         return
     console.print(title, style="bold", soft_wrap=True)
     console.print(table)
+    if dropped:
+        print(f"left out, for a wider terminal: {', '.join(dropped)}")
 
 
-def _least_width(columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[str]) -> int:
+def _too_many(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[str], less: Sequence[str], width: int
+) -> list[str]:
+    """Return the columns of `less` that a table of a width [1] has no room for."""
+    left, dropped = dict(zip(columns, zip(*rows, strict=True), strict=True)) if rows else {}, []
+    for column in less:
+        if not left or _least_width([*left], [*zip(*left.values(), strict=True)], numbers, _NARROW) <= width:
+            break
+        del left[column]
+        dropped.append(column)
+    return dropped
+
+
+def _least_width(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[str], folded: int = _FOLDED
+) -> int:
     """Return the width [1] of a table whose names and numbers are whole, and whose other columns are folded."""
     widths = [max(map(cell_len, cells)) for cells in zip(columns, *rows, strict=True)]
     whole = [column in (columns[0], *numbers) for column in columns]
-    return sum(width if keep else min(width, _FOLDED) for width, keep in zip(widths, whole, strict=True)) + 2 * len(
-        columns
+    return sum(width if keep else min(width, folded) for width, keep in zip(widths, whole, strict=True)) + 2 * (
+        len(columns) - 1
     )
 
 
@@ -103,12 +132,10 @@ def size(count: float) -> str:
 
 
 def error(p99: float | None) -> str:
-    """Return a stated relative error as text in percent."""
-    if p99 is None:
-        return "not measured"
-    if p99 < 1e-5:
-        return "< 0.001 %"
-    return f"{100.0 * p99:.0f} %" if p99 >= 0.995 else f"{100.0 * p99:#.2g}".rstrip(".") + " %"
+    """Return a relative error [1] as text in percent, or as a factor."""
+    from brdfdb.figure import error_in_words
+
+    return error_in_words(p99)
 
 
 def count(value: float) -> str:

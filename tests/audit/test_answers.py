@@ -11,6 +11,7 @@ from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LEVELS, NotJudged
 from brdfdb.audit.model_energy import ModelEnergy
 from brdfdb.audit.table_error import TableError
+from brdfdb.audit.validity import Validity
 from tests.pipelines.a_report import material
 
 
@@ -27,7 +28,7 @@ def model_of(name: str, verdict: Any, **more: Any) -> ModelEnergy:
         ("conserves", "yes", "good"),
         # The furnace of `a_report` is its albedo over its strength: 1 at the normal, 1 + (89/90)^3 / 5 at 89 degrees
         ("loses", "creates none, loses up to 0 %", "calm"),
-        ("gains", "creates none here, 20 % if lossless", "note"),
+        ("gains", "creates none; would create 20 % if nothing were absorbed", "note"),
         ("known published excess", "no, as published: albedo 0.835 at 89°", "note"),
         ("accepted excess", "no, as accepted: albedo 0.835 at 89°", "note"),
         ("violates", "no: albedo 0.835 at 89°", "bad"),
@@ -50,7 +51,7 @@ def test_a_model_that_nothing_makes_lossless_answers_for_its_own_parameters() ->
     energy = judged.of(Energy)
     assert energy.model is not None
     bare = energy.model_copy(update={"model": energy.model.model_copy(update={"furnace": None})})
-    assert conserves_energy(judged.findings | {"energy": bare}).text == "yes, at these parameters"
+    assert conserves_energy(judged.findings | {"energy": bare}).text == "yes, no lossless form to judge"
 
 
 def test_a_published_excess_is_what_the_paper_says() -> None:
@@ -78,3 +79,36 @@ def test_without_a_source_neither_question_is_judged() -> None:
     alone = judged.of(Energy).model_copy(update={"model": None})
     findings = judged.findings | {"energy": alone, TableError.key: NotJudged(reason="no source")}
     assert as_published(findings).text == conserves_energy(findings).text == "not judged"
+
+
+@pytest.mark.parametrize(
+    ("fresh", "stated", "verdict", "text"),
+    [
+        (0.016, 0.015, "passes", "1.6 % measured, 1.5 % stated, within chance"),
+        (0.015, 0.016, "passes", "1.5 % measured, 1.6 % stated"),
+        (0.01504, 0.015, "passes", "1.5 % measured, 1.5 % stated"),
+        (0.5, 0.015, "violates", "50 % measured, 1.5 % stated"),
+        (0.015, None, "passes", "1.5 % measured"),
+        (None, 0.015, "violates", "not finite, 1.5 % stated"),
+    ],
+)
+def test_a_measured_error_stands_beside_the_stated_one(fresh: Any, stated: Any, verdict: Any, text: str) -> None:
+    changes = {"fresh_p99": fresh, "stated_p99": stated, "verdict": verdict}
+    (cell,) = material("paint").of(TableError).model_copy(update=changes).cells()
+    assert cell.text == text
+
+
+@pytest.mark.parametrize(
+    ("standings", "cell", "words"),
+    [
+        (("outside", "outside"), "2 of 2 limits not kept", "its paper states 2 limits: 2 not kept"),
+        (("at the edge", "inside"), "1 of 2 limits at the edge", "its paper states 2 limits: 1 at the edge, 1 kept"),
+        (("unknown",), "", "its paper states 1 limit: 1 not known"),
+        ((), "", "its paper states no limits"),
+    ],
+)
+def test_limits_that_are_not_kept_are_counted_as_such(standings: tuple[Any, ...], cell: str, words: str) -> None:
+    validity = material("paint").of(Validity)
+    limits = [validity.limits[0].model_copy(update={"standing": standing}) for standing in standings]
+    changed = validity.model_copy(update={"limits": limits})
+    assert (changed.cells()[0].text, changed.in_words()) == (cell, words)

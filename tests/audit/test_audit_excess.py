@@ -14,6 +14,7 @@ import pytest
 
 from brdfdb.audit import FINDINGS, AuditReport, audit, report
 from brdfdb.audit.energy import Energy
+from brdfdb.audit.excess import cause_of
 from brdfdb.audit.table_energy import table_energy_of
 from brdfdb.audit.values import Values
 from brdfdb.materials import presets
@@ -119,6 +120,17 @@ def test_oren_nayar_with_rho_1_violates_unless_it_is_accepted(sigma_deg: float, 
     assert (accepted.verdict, accepted.of(Energy).verdict) == ("accepted excess", "accepted excess")
     assert "this model does so by itself" in accepted.of(Energy).reason
     assert found.of(Energy).table.albedo[-2] == [pytest.approx(albedo, abs=0.002)]
+
+
+@pytest.mark.parametrize(
+    ("rho_d", "alpha", "limit", "general"), [(0.0, 1.0, False, True), (0.1, 1.0, True, True), (0.1, 0.1, True, False)]
+)
+def test_a_model_gives_its_general_reason_unless_only_a_limit_of_energy_is_left(
+    rho_d: float, alpha: float, limit: bool, general: bool
+) -> None:
+    ward = {"rho_d": rho_d, "rho_s": 1.0, "alpha_x": alpha, "alpha_y": alpha}
+    cause = cause_of(material("ward", ward), None)
+    assert ("rho_d + rho_s is 1.1" in cause, "rougher lobes" in cause) == (limit, general)
 
 
 def test_what_a_recipe_says_of_an_excess_is_repeated_and_excuses_nothing() -> None:

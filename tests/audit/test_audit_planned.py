@@ -201,3 +201,16 @@ def test_means_over_bands_are_those_of_what_is_linear_between_lights() -> None:
     np.testing.assert_allclose(means.sum(axis=1), 1.0, rtol=1e-12)
     np.testing.assert_allclose(means @ lights, [5.0, 15.0], rtol=1e-12)
     np.testing.assert_allclose(_band_means(lights[:3], edges) @ lights[:3], [5.0, 10.0], rtol=1e-12)
+
+
+def test_a_limit_that_is_not_kept_is_the_reason_of_an_excess_and_the_table_follows_its_model() -> None:
+    found = audit(planned("ward", {"rho_d": 0.6, "rho_s": 0.45, "alpha_x": 0.1, "alpha_y": 0.1}))
+    energy = found.of(Energy)
+    assert energy.model is not None
+    assert found.verdict == energy.model.verdict == energy.table.verdict == "violates"
+    limit = "(a limit is not kept: rho_d + rho_s is 1.05, valid below 1, at the edge 1; Ward 1992, section 4.2)"
+    assert energy.model.reason.endswith(limit)
+    assert energy.table.reason.endswith(
+        "at 0 degrees: the model itself reflects more than arrives, and the table follows it"
+    )
+    assert (found.as_published.text, found.conserves_energy.word) == ("yes", "violates")

@@ -136,9 +136,9 @@ def test_reasons_are_sentences_and_said_once(document: Document) -> None:
     assert "Nodes: passes. All 360 stored values that were compared, of the 720 in the table, are the model's." in words
     assert "Smoothness: passes. The table jumps by 0.0001 of f_r across delta_phi = 180°, of 0.01 allowed." in words
     assert "Sampling: passes. The smallest p of 3 lights is below 0.001." in words
-    assert "Table error: passes. 99 of 100 fresh values are within 0.0091, on average off by −0.002 of the" in words
+    assert "Table error: passes. 99 of 100 fresh values are within 0.91 %, on average off by −0.2 % of the" in words
     assert "Alpha: at the edge. 0.2 (at most 0.2). up to about 0.2 section 4" in words
-    assert "Validity: at the edge. Its paper states 2 limits: 1 inside, 1 at the edge." in words
+    assert "Validity: at the edge. Its paper states 2 limits: 1 at the edge, 1 kept." in words
 
 
 def test_the_two_questions_have_answers_on_every_material(document: Document, report: AuditReport) -> None:
@@ -151,6 +151,15 @@ def test_the_two_questions_have_answers_on_every_material(document: Document, re
         "no: albedo 1.55 at 89°",
     ):
         assert text in words
+
+
+def test_one_material_violates_and_a_remark_on_a_model_that_passes_is_said() -> None:
+    good, bad = material("good", "gains"), material("bad", "violates")
+    words = re.sub(r"\s+", " ", Document(audit_page.render(report_of([good, bad], ["bad"]))).words())
+    assert "1 of 2 violates something that is neither" in words
+    assert "1 passes with a remark on the model: it would create light" in words
+    assert audit_page.remarked(report_of([good, bad], ["bad"])) == 1
+    assert audit_page.remarked(report_of([bad], ["bad"])) == 0
 
 
 def test_violations_come_first_then_known_excess_then_losses(html: str) -> None:

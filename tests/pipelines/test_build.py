@@ -92,7 +92,7 @@ def test_a_build_names_a_material_that_reflects_more_than_it_receives(tmp_path: 
     assert cli.main(["build", str(path), "--store", str(tmp_path / "store"), "--jobs", "1"]) == 0
     said = [line for line in capsys.readouterr().out.splitlines() if "reflects more" in line]
     assert len(said) == 1
-    assert said[0].startswith("b reflects more than it receives: albedo 1.")
+    assert said[0].startswith("b reflects more than it receives: albedo of the table 1.")
 
 
 @pytest.mark.parametrize("alpha_y", [0.1, 0.15])

@@ -13,6 +13,7 @@ import pytest
 import brdfdb
 from brdfdb.materials import presets
 from brdfdb_pipelines import terminal
+from brdfdb_pipelines.commands.build import shape_in_words
 from brdfdb_pipelines.exit_codes import INTERRUPTED
 from tests.pipelines.command import Captured, run
 from tests.pipelines.failing import fails
@@ -120,6 +121,18 @@ def test_build_shows_progress_on_stderr_and_a_table_on_stdout(
     assert lines[7].endswith(f" in {tmp_path / 'store'}")
 
 
+@pytest.mark.parametrize(
+    ("shape", "wavelengths", "text"),
+    [
+        ((12, 2, 2, 1), 41, "12 x 2 x 2, 1 for 41 wavelengths"),
+        ((12, 2, 2, 41), 41, "12 x 2 x 2 x 41"),
+        ((12, 2, 2), 0, "12 x 2 x 2"),
+    ],
+)
+def test_the_shape_says_that_values_serve_many_wavelengths(shape: tuple[int, ...], wavelengths: int, text: str) -> None:
+    assert shape_in_words(shape, wavelengths) == text
+
+
 def test_list_names_what_is_in_the_store(built: Path, names: list[str], capsys: Captured) -> None:
     assert run("list", "--store", built) == 0
     out, err = capsys.readouterr()
@@ -156,7 +169,8 @@ def test_show_tells_parameters_source_grid_albedo_and_files(name: str, built: Pa
     table = brdfdb.open(built)[name]
     assert out.startswith(f"{name}: {table.attrs['title']}\n")
     for parameter, value in table.attrs["parameters"].items():
-        assert f"    {parameter:<16}{value!s:<8} " in out
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        assert f"    {parameter:<16}{text:<9}" in out
     assert table.attrs["source"] in out
     assert table.attrs["note"] in out
     for axis, nodes in table.axes_deg.items():
@@ -173,7 +187,7 @@ def test_show_tells_parameters_source_grid_albedo_and_files(name: str, built: Pa
 def test_show_says_what_was_assumed(built: Path, capsys: Captured) -> None:
     assert run("show", "blue-plastic", "--store", built) == 0
     out, _ = capsys.readouterr()
-    assert "    tau_um          1.0      assumed, see below\n" in out
+    assert "    tau_um          1        assumed, see below\n" in out
     assert "  assumed     tau_um: the autocorrelation length plays no role at sigma_0_um = 0.\n" in out
     assert (
         "    largest albedo  1.150 as tabulated\n                    1.150 with tau_um = 10.0, more than arrives\n"

@@ -37,7 +37,7 @@ def test_audit_of_some_materials_reports_those(built: Path, tmp_path: Path, caps
     assert [re.split(r"  +", line)[:3] for line in lines[1:4]] == [
         ["material", "is it what the paper says?", "does the published model conserve energy?"],
         ["mirror", "yes", "yes"],
-        ["foam", "yes", "yes, at these parameters"],
+        ["foam", "yes", "yes, no lossless form to judge"],
     ]
     written = report.with_suffix(".html")
     assert lines[-1] == (f"2 audited: passes 2, known published excess 0, violates 0; page {written}, data {report}")

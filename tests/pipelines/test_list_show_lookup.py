@@ -56,7 +56,7 @@ def test_list_has_a_column_with_the_stated_error(planned: Path, capsys: Captured
     # Ward's model is a fit itself, and He and Torrance's is the sum that others cut short
     assert [re.split(r"  +", line)[3:8:2] for line in lines] == [
         ["grey", "none known", "not audited"],
-        ["400-700 nm", "0, highest rung", "not audited"],
+        ["400-700 nm", "0, exact form", "not audited"],
     ]
 
 
@@ -99,6 +99,7 @@ def test_list_goes_on_past_what_is_damaged_and_fails(planned: Path, tmp_path: Pa
         (0.00946, "0.95 %"),
         (0.2, "20 %"),
         (1.5, "150 %"),
+        (34.0, "a factor of 35"),
         (0.998, "100 %"),
         (4e-8, "< 0.001 %"),
     ],
@@ -107,8 +108,15 @@ def test_errors_in_percent(p99: float | None, text: str) -> None:
     assert terminal.error(p99) == text
 
 
-@pytest.mark.parametrize("name", ["rolled-brass", "scene-copper-sphere"])
-def test_show_tells_grid_numbers_and_error_of_a_planned_table(name: str, planned: Path, capsys: Captured) -> None:
+def in_percent(bands: list[list[float]]) -> list[str]:
+    """The worst of each band, as a row of `show` has it, without blanks."""
+    return [re.sub(r"a factor of ", "x", terminal.error(max(row))).replace(" ", "") for row in bands]
+
+
+@pytest.mark.parametrize(("name", "edges"), [("rolled-brass", (False, False)), ("scene-copper-sphere", (False, True))])
+def test_show_tells_grid_numbers_and_error_of_a_planned_table(
+    name: str, edges: tuple[bool, bool], planned: Path, capsys: Captured
+) -> None:
     assert run("show", name, "--store", planned) == 0
     out = capsys.readouterr().out
     table = brdfdb.open(planned)[name]
@@ -122,7 +130,7 @@ def test_show_tells_grid_numbers_and_error_of_a_planned_table(name: str, planned
     assert table.error is not None
     assert f"  error       {terminal.error(table.error.overall.p99)} of f_r" in out
     (reflected,) = re.findall(r"^    reflected +(.*)$", out, flags=re.MULTILINE)
-    assert [float(text) for text in reflected.split()] == [float(f"{max(row):.2g}") for row in table.error.l1]
+    assert re.sub("([<x]) ", r"\1", reflected).split() == in_percent(table.error.l1)
     places = table.error.places
     assert places is not None
     limits = {"alongside": places.alongside, "one there": places.one_grazing, "both beyond": places.both_grazing}
@@ -131,7 +139,10 @@ def test_show_tells_grid_numbers_and_error_of_a_planned_table(name: str, planned
     assert ("between" in limits) == (table.wavelength_nm is not None)
     for label, rows in limits.items():
         (printed,) = re.findall(rf"^    {label}  +(.*)$", out, flags=re.MULTILINE)
-        assert [float(text) for text in printed.split()] == [float(f"{max(row):.2g}") for row in rows]
+        assert re.sub("([<x]) ", r"\1", printed).split() == in_percent(rows)
+    assert f"; {terminal.error(table.error.overall.l1)} of the reflected light (l1))" in out
+    assert "  validity    its paper states " in out
+    assert ("    not kept    " in out, "    at the edge " in out) == edges
 
 
 def test_lookup_prints_the_stated_error_between_wavelengths(planned: Path, capsys: Captured) -> None:

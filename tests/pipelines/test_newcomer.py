@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -41,6 +42,20 @@ def test_a_table_never_cuts_a_name_or_a_number(
     assert "latex-semi-gloss-brushed-sheetrock" in out
     assert "< 0.001 %" in out
     assert "error (p99)" in out
+
+
+@pytest.mark.parametrize(("width", "left_out"), [(200, []), (85, ["revision"]), (62, ["revision", "title"])])
+def test_a_narrow_terminal_leaves_columns_out_and_names_them(
+    width: int, left_out: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(terminal, "Console", partial(Console, force_terminal=True, width=width, no_color=True))
+    columns, rows = (*COLUMNS, "revision"), [(*ROWS[0], "r000001-and-so-on")]
+    terminal.print_table("1 material", columns, rows, numbers=("error (p99)",), less=("revision", "title"))
+    lines = re.sub(r"\x1b\[[0-9]*m", "", capsys.readouterr().out).splitlines()
+    assert max(map(len, lines)) <= width
+    assert lines[-1].startswith("left out, for a wider terminal: ") == bool(left_out)
+    assert [column for column in ("revision", "title") if column not in lines[1]] == left_out
+    assert lines[-1].endswith(", ".join(left_out))
 
 
 def test_a_lookup_of_one_value_does_not_load_numba(built: Path) -> None:

@@ -30,7 +30,7 @@ def test_a_grey_material_says_so(at: Any, text: str) -> None:
     [
         (None, "not measured"),
         ({"against": "measured", "rung": "facets", "p99": 0.119}, "12 %"),
-        ({"against": "highest rung", "rung": "the sum", "p99": 0.0}, "0, highest rung"),
+        ({"against": "highest rung", "rung": "the sum", "p99": 0.0}, "0, exact form"),
         ({"against": "none known", "rung": "", "p99": None}, "none known"),
     ],
 )
@@ -41,13 +41,13 @@ def test_the_formula_stands_apart_from_the_table(stated: Any, text: str) -> None
 
 def test_an_albedo_above_1_is_told_before_any_audit_and_by_the_audit_after_it() -> None:
     head = {"largest_albedo": ALBEDO}
-    assert energy(head, None) == "not audited: albedo 1.37 at 80°, 550 nm"
+    assert energy(head, None) == "not audited: albedo of the table 1.37 at 80°, 550 nm"
     answer = "no, as published: albedo 1.37 at 80°, 550 nm"
     assert energy(head, Audited("yes", answer)) == answer
     for quiet in ({}, {"largest_albedo": None}, {"largest_albedo": {**ALBEDO, "albedo": 1.0005}}):
         assert energy(quiet, None) == "not audited"
     assert energy({"largest_albedo": {**ALBEDO, "albedo": None, "wavelength_nm": None}}, None).endswith(
-        "albedo not finite at 80°"
+        "albedo of the table not finite at 80°"
     )
 
 

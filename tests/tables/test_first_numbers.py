@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from brdfdb import models
+from brdfdb.audit.table_energy import table_energy_of
 from brdfdb.forms import catalogue
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import FunctionSource, Material, presets
@@ -15,7 +16,8 @@ from brdfdb.tables import error_measurement
 from brdfdb.tables.first_numbers import LargestAlbedo
 from brdfdb.tables.formula_measurement import DIRECTIONS, SEED, first_numbers, formula_error_of, highest_rung
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.planner import coarsest
+from brdfdb.tables.planner import coarsest, plan
+from brdfdb.tables.table import table_from
 from brdfdb.tables.tabulation import tabulate
 from brdfdb.tables.worst_pair import worst_pair
 
@@ -70,6 +72,20 @@ def test_half_vectors_of_ward_are_measured_against_his_ellipse() -> None:
         "x", {"title": "X", "model": "ward_half_vector", "source": "x", "parameters": parameters}
     )
     assert formula_error_of(made, None).rung == "elliptical Gaussian, eq. 5a"
+
+
+@pytest.mark.parametrize(("name", "largest"), [("blue-plastic", 1.15), ("aluminum-cylinder-13b", 1.0)])
+def test_the_largest_albedo_of_a_build_is_that_of_the_audit_of_the_table_and_of_its_model(
+    name: str, largest: float
+) -> None:
+    layout = plan(presets()[name], AT, 0.01)
+    dataset = tabulate(layout)
+    stated = first_numbers(layout, lambda rows: dataset["brdf"].values[rows])["largest_albedo"]
+    arrays = {str(key): np.asarray(variable.values) for key, variable in dataset.variables.items()}
+    stored = table_from(name, "r000001", arrays, dataset.attrs)
+    audited = table_energy_of(stored, None)
+    assert (audited.max_albedo, audited.max_at_theta_i_deg) == (pytest.approx(largest, abs=1e-6), 90.0)
+    assert (stated.albedo, stated.theta_i_deg) == (pytest.approx(largest, abs=1e-4), 90.0)
 
 
 def test_the_largest_albedo_has_the_specular_part() -> None:

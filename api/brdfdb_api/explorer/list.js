@@ -117,7 +117,7 @@ function option(each) {
 function errors({ damaged, error_p99: table, formula_error: formula }) {
   if (damaged) return "";
   const rung = !formula ? "not measured" : formula.against === "measured" ? percent(formula.p99)
-    : formula.against === "highest rung" ? "0, highest rung" : "none known";
+    : formula.against === "highest rung" ? "0, exact form" : "none known";
   return `error: table ${table === null || table === undefined ? "not measured" : percent(table)}, formula ${rung}`;
 }
 

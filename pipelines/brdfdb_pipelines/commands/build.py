@@ -109,7 +109,7 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
                 (
                     one.job.material.name,
                     one.job.material.model,
-                    " x ".join(map(str, one.shape)),
+                    shape_in_words(one.shape, one.wavelengths),
                     one.revision,
                     terminal.size(one.stored_bytes),
                     f"{one.why}; {one.revision} is current again" if one.state == "adopted" else one.why,
@@ -125,3 +125,10 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
         excess = summary_words.excess(store.summary(material.name))
         if excess and material.known_excess is None:
             print(f"{material.name} reflects more than it receives: {excess}")
+
+
+def shape_in_words(shape: tuple[int, ...], wavelengths: int) -> str:
+    """Return the numbers of nodes of a table, and how many values serve all its wavelengths, if they are fewer."""
+    if not wavelengths or shape[-1] == wavelengths:
+        return " x ".join(map(str, shape))
+    return f"{' x '.join(map(str, shape[:-1]))}, {shape[-1]} for {wavelengths} wavelengths"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,9 +12,14 @@ from brdfdb.errors import ParameterError, StoreError, counted
 from brdfdb_pipelines.commands._arguments import add_snapshot, add_store
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from brdfdb.materials import Material
     from brdfdb.store.reader import Store
 
 HELP = "List the materials and families of the store, or the presets."
+
+_WORDS = 5  # number of words that all sources must share before they are printed once
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,18 +53,47 @@ def _print_presets(library: str | None) -> None:
     from brdfdb_pipelines import terminal
 
     name = PAPERS if library is None else library
-    rows = [(m.name, m.title, m.model, m.source) for m in presets(name).values()]
+    materials = list(presets(name).values())
+    shared = _shared([material.source for material in materials])
+    rows = [(m.name, m.title, m.model, _colours(m), m.source.removeprefix(shared)) for m in materials]
     title = f"{len(rows)} presets" if name == PAPERS else f"{len(rows)} presets of the library {name}"
-    terminal.print_table(title, ("material", "title", "model", "source"), rows)
+    terminal.print_table(
+        title, ("material", "title", "model", "colours", "source"), rows, less=("title", "model", "source")
+    )
+    if shared:
+        print(f"source: {shared}...")
     if library is not None:
         print(f"{name}: {libraries()[name]}")
     others = [other for other in libraries() if other != name]
     print(f"other libraries: {', '.join(others)}; `brdfdb list --presets --library NAME`")
 
 
+def _shared(sources: Sequence[str]) -> str:
+    """Return the words with which all sources begin; empty if they are few."""
+    columns = zip(*(source.split() for source in sources), strict=False)  # sources differ in length
+    start = [words[0] for words in itertools.takewhile(lambda words: len(set(words)) == 1, columns)]
+    return f"{' '.join(start)} " if len(sources) > 1 and len(start) >= _WORDS else ""
+
+
+def _colours(material: Material) -> str:
+    """Return whether a material is grey, is stated at one wavelength, or is spectral."""
+    if not material.spectral:
+        return "grey"
+    at = material.wavelengths_nm
+    return f"{at[0]:g} nm" if at is not None and len(at) == 1 else "spectral"
+
+
 def _print_materials(store: Store, root: Path) -> list[str]:
     """Print a line for each material from its pointer and the last audit; return a sentence for each damaged one."""
-    from brdfdb.store.summary_words import COLUMNS, NOT_AUDITED, colours, energy, formula_error, last_audit
+    from brdfdb.store.summary_words import (
+        COLUMNS,
+        ERRORS_EXPLAINED,
+        NOT_AUDITED,
+        colours,
+        energy,
+        formula_error,
+        last_audit,
+    )
     from brdfdb_pipelines import terminal
 
     rows, damaged, incomplete = [], [], []
@@ -87,9 +122,10 @@ def _print_materials(store: Store, root: Path) -> list[str]:
         ("material", "title", "model", "colours", *errors, *COLUMNS, "revision"),
         rows,
         numbers=errors,
+        less=("revision", "title", "model", errors[1], "colours", errors[0]),
     )
     if rows:
-        print("table error: the table against its formula; formula error: the formula against the highest rung known")
+        print(ERRORS_EXPLAINED)
     for sentence in incomplete:
         print(terminal.plain(sentence))
     return damaged
@@ -117,5 +153,6 @@ def _print_families(store: Store) -> list[str]:
             columns,
             rows,
             numbers=("tables", "error (p99)"),
+            less=("title", "tables"),
         )
     return damaged

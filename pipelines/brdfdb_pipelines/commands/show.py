@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 HELP = "Show parameters, sources, grid, albedo and files of a material, or a family."
 
+_VALUE_WIDTH = 9  # of the numbers of parameters; longer values are spectra in words
 ALBEDO_ANGLES_DEG = (0.0, 30.0, 60.0, 80.0)
 
 
@@ -57,7 +58,8 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     _print_grid(table)
     _print_error(table.error, "its source" if metadata.model is None else "its formula")
     _print_formula_error(metadata.formula_error)
-    _print_answers(audited)
+    _print_answers(audited, table.name)
+    _print_validity(table)
     _print_albedo(table)
     print(f"  files       {path} (zarr v3, {terminal.size(_stored(path))})")
 
@@ -97,7 +99,9 @@ def _origin(metadata: TableMetadata) -> list[str]:
         note = metadata.parameter_sources.get(parameter, "")
         if parameter in metadata.assumed:
             note = f"assumed, see {'the note' if metadata.assumed[parameter] is None else 'below'}"
-        lines.append(f"    {parameter:<16}{value!s:<8} {note}".rstrip())
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        note = f"; {note}" if note and len(text) > _VALUE_WIDTH else note
+        lines.append(f"    {parameter:<16}{text:<{_VALUE_WIDTH}}{note}".rstrip())
     if metadata.source is not None:
         lines.append(f"  source      {metadata.source}")
     if metadata.refractive_index:
@@ -179,24 +183,35 @@ def _print_error(error: Error | None, truth: str) -> None:
         rows.append(("between", error.between.bands))
     print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
     for label, bands in rows:
-        print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in bands))
+        print(_errors(label, bands))
     notes = [] if error.places is None else ["alongside: theta_r within 10° of theta_i, delta_phi within 90°"]
     notes += [] if error.between is None else ["between: any wavelength between those of the table"]
     if notes:
+        print("    99 of 100: of f_r; reflected: of the reflected light (l1); x 35: a factor of 35")
         print(f"    {'; '.join(notes)}")
         print("    98 of 100 values are within these limits, and within those next to the horizon, if given")
     if error.places is None:
         return
     print("    horizon     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(RINGS_DEG)))
     for label, rings in (("one there", error.places.one_grazing), ("both beyond", error.places.both_grazing)):
-        print(f"    {label:<12}" + "".join(f"{max(row):9.2g}" for row in rings))
+        print(_errors(label, rings))
+
+
+def _errors(label: str, bands: list[list[float]]) -> str:
+    """Return a row of errors at their worst wavelengths, in percent or as factors."""
+    from brdfdb_pipelines import terminal
+
+    cells = [terminal.error(max(row)).replace("a factor of ", "x ").replace(" %", "%") for row in bands]
+    return f"    {label:<12}" + "".join(f"{cell:>9}" for cell in cells)
 
 
 def _spread(overall: Overall, error: Error | FormulaError) -> str:
     """Return what the percentile is of, and other statistics of the same errors."""
+    from brdfdb_pipelines import terminal
+
     return (
-        f"in 99 of 100 of {error.directions} directions (median {overall.median:.2g}, largest {overall.max:.2g}, "
-        f"of what is reflected {overall.l1:.2g})"
+        f"in 99 of 100 of {error.directions} directions (median {terminal.error(overall.median)}, largest "
+        f"{terminal.error(overall.max)}; {terminal.error(overall.l1)} of the reflected light (l1))"
     )
 
 
@@ -222,13 +237,31 @@ def _print_formula_error(error: FormulaError | None) -> None:
         _print_worst(error.worst)
 
 
-def _print_answers(audited: Audited | None) -> None:
+def _print_answers(audited: Audited | None, name: str) -> None:
     """Print the answers of the last audit of this revision to its two questions."""
+    from brdfdb.materials import presets
     from brdfdb.store.summary_words import NOT_AUDITED
 
     both = (NOT_AUDITED, NOT_AUDITED) if audited is None else audited
-    print(f"  audit       is it what the paper says? {both[0]}")
+    says = "the paper" if name in presets() else "its model"
+    print(f"  audit       is it what {says} says? {both[0]}")
     print(f"              does the published model conserve energy? {both[1]}")
+
+
+def _print_validity(table: Table) -> None:
+    """Print how many limits of its paper a material keeps, and each limit that it does not keep."""
+    from brdfdb.audit.validity import validity_of
+    from brdfdb.materials import Material
+    from brdfdb_pipelines import terminal
+
+    if not isinstance(table.source, Material):
+        return
+    validity = validity_of(table.source, table.wavelength_nm)
+    print(f"  validity    {validity.in_words()}")
+    for limit in validity.limits:
+        if limit.standing in ("at the edge", "outside"):
+            kept = "at the edge" if limit.standing == "at the edge" else "not kept"
+            print(terminal.plain(f"    {kept:<16}{limit.quantity}: {limit.value} ({limit.valid}); {limit.where}"))
 
 
 def _print_albedo(table: Table) -> None:
@@ -253,7 +286,7 @@ def _print_albedo(table: Table) -> None:
         value = "not finite" if largest.albedo is None else f"{largest.albedo:.3g}"
         known = table.metadata.known_excess
         cited = "" if known is None else f": {known.citation}"
-        print(f"    above 1     {value} at {largest.theta_i_deg:g}°{where}{cited}")
+        print(f"    above 1     the table {value} at {largest.theta_i_deg:g}°{where}{cited}")
     for w in columns:
         at = None if wavelength is None else float(wavelength[w])
         specular = table.specular_reflectance(radians(ALBEDO_ANGLES_DEG), at)
