@@ -96,8 +96,7 @@ def convert(
     where it is missing and where it is too much. It is 0 for the same surface, 1 for black, 2 for one that reflects as
     much to other places alone, and more for one that reflects more. Specular parts (Dirac deltas) count with their
     reflectance, abs(S_g - S_f). Of several wavelengths it is the mean. The mean square would follow the largest values,
-    next to grazing, and a specular part has none. l1 has a price, too: a highlight with a few hundredths of the light
-    may go.
+    next to grazing, and a specular part has none. l1 has a price: a highlight with few hundredths of the light may go.
 
     All numbers of the model are searched within their ranges, as in `brdfdb.conversion.search`. A reflectance has
     a value at each wavelength; the others are shared, and searched at five wavelengths. Switches keep their defaults.
