@@ -100,7 +100,7 @@ def contradictions(error: Error, wavelengths: int) -> list[str]:
     numbers = [*arrays.values(), np.array(error.floor), np.array([*overall.values()])]
     if not all(np.all(np.isfinite(array) & (array >= 0.0)) for array in numbers):
         return ["not all of its numbers are finite and at least 0"]
-    if not _whole(error, columns, columns if columns == 1 else wavelengths - 1):
+    if not _whole(error, columns, wavelengths - 1, mixed=columns < wavelengths):
         return ["its limits in places and between wavelengths are not all finite and at least 0"]
     sentences = []
     ordered = [arrays[name] for name in QUANTILES]
@@ -117,18 +117,22 @@ def contradictions(error: Error, wavelengths: int) -> list[str]:
     return sentences
 
 
-def _whole(error: Error, at: int, between: int) -> bool:
-    """Return whether the limits in places, and between wavelengths, have so many columns, finite and at least 0."""
-    parts = [] if error.places is None else [(error.places, at)]
+def _whole(error: Error, at: int, between: int, *, mixed: bool) -> bool:
+    """Return whether the limits in places, and between wavelengths, have so many columns, finite and at least 0.
+
+    A mixture has one row of each kind between wavelengths.
+    """
+    bands, rings = (1, 1) if mixed else (BANDS, RINGS)
+    parts = [] if error.places is None else [(error.places, at, BANDS, RINGS)]
     tables: list[tuple[list[list[float]], int, int]] = []
     if error.between is not None:
-        tables.append((error.between.bands, BANDS, between))
-        parts += [] if error.between.places is None else [(error.between.places, between)]
-    for places, columns in parts:
+        tables.append((error.between.bands, bands, between))
+        parts += [] if error.between.places is None else [(error.between.places, between, bands, rings)]
+    for places, columns, of_bands, of_rings in parts:
         tables += [
-            (places.alongside, BANDS, columns),
-            (places.one_grazing, RINGS, columns),
-            (places.both_grazing, RINGS, columns),
+            (places.alongside, of_bands, columns),
+            (places.one_grazing, of_rings, columns),
+            (places.both_grazing, of_rings, columns),
         ]
     return all(
         len(rows) == count

@@ -264,10 +264,13 @@ def finished(
             numbers[j] = 0.0 if rule.overshoots and value < 0.0 else value  # nan stays nan
     total, column = np.empty(BLOCK), np.empty(channels)
     for m in range(wavelengths):
-        apart, overshoots = 0.0, True
+        apart, lowest, overshoots = 0.0, 0.0, True
         for side in range(4):
-            apart += weight[m, side] * uniform[nodes[m, side]]
+            stored = uniform[nodes[m, side]]
+            apart += weight[m, side] * stored
+            lowest = stored if stored < lowest else lowest
             overshoots = overshoots and weight[m, side] != 1.0  # on a node nothing is interpolated
+        apart = lowest if overshoots and apart < lowest else apart
         overshoots = overshoots or rule.overshoots or rule.mixed
         for j in range(count):
             total[j] = 0.0

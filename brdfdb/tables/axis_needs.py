@@ -90,6 +90,12 @@ def _points(name: str, end: float, s: Floats) -> Axis:
     return np.asarray(end * (s**power if power > 0.0 else 1.0 - (1.0 - s) ** -power), dtype=np.float64)
 
 
+def _quotient(above: Floats, below: Floats) -> Floats:
+    """Return a quotient, and 0 where a surface that is black at a wavelength makes it one by 0."""
+    shape = np.broadcast_shapes(np.shape(above), below.shape)
+    return np.divide(above, below, out=np.zeros(shape), where=np.broadcast_to(below > 0.0, shape))
+
+
 def lines(layout: Layout, axis: int, drawn: error_measurement.Draw, floor: Floats) -> tuple[Floats, Floats]:
     """Return numbers along lines of one axis through directions of a draw, and what an error in them makes of f_r.
 
@@ -124,10 +130,10 @@ def lines(layout: Layout, axis: int, drawn: error_measurement.Draw, floor: Float
     else:
         f_r, slope = numbers * factor, factor
     if layout.part_nm is None or layout.spectra is None:
-        share = slope / np.maximum(f_r + uniform, floor)
+        share = _quotient(slope, np.maximum(f_r + uniform, floor))
     else:  # of a part at the wavelength where its error counts most
         mixed = np.maximum(f_r @ layout.spectra + uniform, floor)
-        counts = [np.max(np.abs(row) / mixed, axis=-1) for row in layout.spectra]
+        counts = [np.max(_quotient(np.abs(row), mixed), axis=-1) for row in layout.spectra]
         share = slope * np.stack(counts, axis=-1)
     weight = np.where((lowest > 1e-3)[..., np.newaxis], share, 0.0)
     return numbers, weight

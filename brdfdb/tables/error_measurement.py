@@ -162,7 +162,7 @@ def measure(
     values = _looked_up(layout, read, wi, wr, layout.wavelength_nm)
     own = len(drawn.wi)
     error = compare(values[:own], truth[:own], drawn, seed)
-    floor = floor_of(truth[:own], drawn)
+    floor = np.array(error.floor)  # as it is stated, to three digits
     above = drawn.above
     worst = worst_pair(
         relative(values[:own], truth[:own], floor)[above],
@@ -225,9 +225,9 @@ def worst_wavelengths(
     mu = np.maximum(wi[:, 2], COS_HORIZON) * np.maximum(wr[:, 2], COS_HORIZON)
     numbers = how.numbers(model_values(source, stored, wi, wr), mu)
     nodes, weight = weights_of_nodes(stored, at)
-    error = relative(
-        np.maximum(how.f_r(np.sum(numbers[:, nodes] * weight, axis=-1), mu), 0.0),
+    error = relative(  # to what a lookup knows
         model_values(source, at, wi, wr),
+        np.maximum(how.f_r(np.sum(numbers[:, nodes] * weight, axis=-1), mu), 0.0),
         np.repeat(np.maximum(floor[1:], floor[:-1]), within),
     )
     worst = np.percentile(error, 95.0, axis=0).reshape(intervals, within).argmax(axis=1)
@@ -236,7 +236,7 @@ def worst_wavelengths(
 
 def limits_of_bands(error: Floats, band: NDArray[np.int64]) -> list[list[float]]:
     """Return the limit of errors (N, columns) in each band of theta_i."""
-    return [_short(_limit(error[band == row])) for row in range(places.BANDS)]
+    return [_not_less(_limit(error[band == row])) for row in range(places.BANDS)]
 
 
 def _first(sample: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
@@ -252,7 +252,7 @@ def _in_places(error: Floats, pairs: places.Pairs) -> Places:
         row = int(pairs.row[members][0])
         rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[members]))
 
-    limits = {row: _short(limit) for row, limit in rows.items()}
+    limits = {row: _not_less(limit) for row, limit in rows.items()}
     return Places(
         alongside=[limits[row] for row in range(places.ALONGSIDE, places.ONE_GRAZING)],
         one_grazing=[limits[row] for row in range(places.ONE_GRAZING, places.BOTH_GRAZING)],
@@ -333,6 +333,11 @@ def _looked_up(
         table = Table.of(layout, read(window), Grid.part(grid, window))
         values[inside] = table.lookup_vectors(wi[inside], wr[inside], wavelength_nm).reshape(-1, values.shape[1])
     return values
+
+
+def _not_less(values: Floats) -> list[float]:
+    """Return numbers to three digits, rounded up: errors that are all alike would exceed a smaller limit."""
+    return [float(f"{1.00501 * value:.3g}") for value in values.tolist()]
 
 
 def _short(values: Floats) -> list[float]:

@@ -52,6 +52,10 @@ class Places(BaseModel):
         "three: any azimuth, exactly towards the light, and theta_r = theta_i"
     )
 
+    def of_worst_row(self) -> Places:
+        """Return the limits with one row of each kind, the largest in each column."""
+        return Places(**{name: _worst_row(getattr(self, name)) for name in type(self).model_fields})
+
     def of_worst_column(self) -> Places:
         """Return the limits with one column, the largest of all."""
         return Places(**{name: _worst(getattr(self, name)) for name in type(self).model_fields})
@@ -66,15 +70,34 @@ class Between(BaseModel):
         description="where each interval was measured: where interpolation of the model itself is worst, of nine or "
         "more places in it"
     )
-    bands: Numbers = Field(description="[band][interval]")
-    places: Places | None = Field(default=None, description="[band or ring][interval]; none of a family")
+    bands: Numbers = Field(description="[band][interval]; one row, of the worst band, of a mixture")
+    places: Places | None = Field(
+        default=None, description="[band or ring][interval]; none of a family; one row of each kind of a mixture"
+    )
+
+    def of_worst_row(self) -> Between:
+        """Return the limits with one row of each kind, the largest in each interval."""
+        some = None if self.places is None else self.places.of_worst_row()
+        return self.model_copy(update={"bands": _worst_row(self.bands), "places": some})
+
+    def limits(self, intervals: int) -> NDArray[np.float64]:
+        """Return the limits by row of `places`, shape (rows, intervals)."""
+        if self.places is None:
+            return _rows(_wide(np.array(self.bands), places.BANDS, intervals), None)
+        kinds = (
+            (self.bands, places.BANDS),
+            (self.places.alongside, places.BANDS),
+            (self.places.one_grazing, places.RINGS),
+            (self.places.both_grazing, places.RINGS),
+        )
+        return np.concatenate([_wide(np.array(limits), rows, intervals) for limits, rows in kinds])
 
 
 class Error(BaseModel):
     """The error of a table, abs(table - source) / max(source, floor), for each band of theta_i and each wavelength.
 
     The table of a mixture states one column, for the wavelength where it is largest: all of its wavelengths are made of
-    the same few parts. Only the floor is then for each wavelength.
+    the same few parts. Only the floor is then for each wavelength. In the intervals between, it states one row.
     """
 
     model_config = _STRICT
@@ -101,16 +124,20 @@ class Error(BaseModel):
 
     @functools.cached_property
     def limits(self) -> NDArray[np.float64]:
-        """The relative error that is stated, nan where there is none: shape (rows, L + intervals).
+        """The error that is stated, relative to a value of the table, nan where there is none: (rows, L + intervals).
+
+        p99 of a band is relative to the source. Where the table is low by it, the value of the source is that of the
+        table over 1 - p99; no more than twice the value is assumed.
 
         Rows are those of `places`. Columns are the wavelengths, and after them the intervals between them. In an
         interval no less is stated than at its two ends.
         """
         wavelengths = len(self.floor)
-        at = _wide(_rows(self.p99, self.places), wavelengths)
+        p99 = np.array(self.p99)
+        at = _wide(_rows(p99 / (1.0 - np.minimum(p99, 0.5)), self.places), places.ROWS, wavelengths)
         if self.between is None:
             return np.concatenate([at, np.full((places.ROWS, wavelengths - 1), np.nan)], axis=1)
-        inside = _wide(_rows(self.between.bands, self.between.places), wavelengths - 1)
+        inside = self.between.limits(wavelengths - 1)
         return np.concatenate([at, np.maximum(inside, np.maximum(at[:, 1:], at[:, :-1]))], axis=1)
 
     @property
@@ -119,13 +146,12 @@ class Error(BaseModel):
         return len(self.p99[0]) if self.p99 else 0
 
     def of_worst_wavelength(self) -> Error:
-        """Return the error with one column, the largest of all wavelengths, and of all intervals between them."""
+        """Return the error with one column, the largest of all wavelengths, and one row in the intervals between."""
         update: dict[str, object] = {name: _worst(getattr(self, name)) for name in Overall.model_fields}
         if self.places is not None:
             update["places"] = self.places.of_worst_column()
         if self.between is not None:
-            inside = None if self.between.places is None else self.between.places.of_worst_column()
-            update["between"] = self.between.model_copy(update={"bands": _worst(self.between.bands), "places": inside})
+            update["between"] = self.between.of_worst_row()
         return self.model_copy(update=update)
 
     @functools.cached_property
@@ -139,11 +165,16 @@ def _worst(rows: Numbers) -> Numbers:
     return [[max(row)] for row in rows]
 
 
-def _wide(rows: NDArray[np.float64], columns: int) -> NDArray[np.float64]:
-    return np.broadcast_to(rows, (len(rows), columns)) if rows.shape[1] == 1 else rows
+def _worst_row(rows: Numbers) -> Numbers:
+    return [[max(column) for column in zip(*rows, strict=True)]]
 
 
-def _rows(bands: Numbers, some: Places | None) -> NDArray[np.float64]:
+def _wide(limits: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
+    """Return limits in full, where one stands for all rows or columns."""
+    return np.broadcast_to(limits, (rows, columns))
+
+
+def _rows(bands: Numbers | NDArray[np.float64], some: Places | None) -> NDArray[np.float64]:
     """Return limits by row; of places that were not measured, 0: the band counts there."""
     if some is None:
         some = Places(

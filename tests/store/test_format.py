@@ -190,7 +190,9 @@ class Reader:
         value = value[:, 0] if mixture is None else np.maximum(value @ (mixture @ spectrum), 0.0)
         mu = np.maximum(wi[:, 2], C) * np.maximum(wr[:, 2], C)
         uniform = np.ravel(self.arrays.get("uniform", 0.0))
-        f_r = value / mu**self.power + (uniform[0] if uniform.size == 1 else uniform @ spectrum)
+        apart = uniform[0] if uniform.size == 1 else uniform @ spectrum
+        apart = apart if on_node else max(apart, min(0.0, uniform.min()))
+        f_r = value / mu**self.power + apart
         return np.where((wi[:, 2] < 0.0) | (wr[:, 2] < 0.0), 0.0, f_r)
 
     def specular(self, theta_i_deg: float, wavelength: float) -> float:

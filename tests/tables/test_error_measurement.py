@@ -130,10 +130,11 @@ def test_a_value_is_given_the_error_of_its_band_and_wavelength() -> None:
     error = compare(truth * (1.0 + 0.01 * (drawn.band[:, np.newaxis] + [0, 10, 20])), truth, drawn)
     pairs = checked_angles(radians([5.0, 45.0, 90.0]), 0.0, 0.5, 3.0)
     found = stated(error, pairs, np.full((3, 2), 2.0), np.array([0, 2]))
-    np.testing.assert_allclose(found, 2.0 * np.array([[0.0, 0.2], [0.04, 0.24], [0.08, 0.28]]), atol=1e-3)
+    p99 = np.array([[0.0, 0.2], [0.04, 0.24], [0.08, 0.28]])  # of the model, which the table may be low by
+    np.testing.assert_allclose(found, 2.0 * p99 / (1.0 - p99), atol=1e-3)
     floor = np.array(error.floor)[0]
     one = checked_angles(radians([45.0]), 0.0, 0.5, 3.0)
-    assert stated(error, one, np.zeros((1, 1)), np.array([0]))[0, 0] == pytest.approx(0.04 * floor, rel=1e-2)
+    assert stated(error, one, np.zeros((1, 1)), np.array([0]))[0, 0] == pytest.approx(0.04 / 0.96 * floor, rel=1e-2)
     unknown = checked_angles(np.array([np.nan]), 0.0, 0.5, 3.0)
     assert np.isnan(stated(error, unknown, np.full((1, 1), np.nan), np.array([0])))
 

@@ -1,6 +1,7 @@
 """Mixtures: tables of coloured materials that hold a few wavelengths and make the others of them."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,6 +82,43 @@ def test_the_one_column_that_a_mixture_states_is_judged_on_both_sides(tmp_path: 
         wrong = {name: [[factor * row[0]] for row in getattr(error, name)] for name in STATISTICS}
         said = {one.statistic for one in disagreements(error.model_copy(update=wrong), pairs, table.wavelength_nm)}
         assert said >= contradicted
+
+
+EDGE = Spectrum(wavelengths_nm=(380.0, 560.0, 580.0, 780.0), values=(0.02, 0.02, 0.8, 0.8), origin="a test")
+COARSE = np.linspace(400.0, 700.0, 16)
+
+
+def test_beside_a_steep_edge_nothing_is_negative_and_other_intervals_are_not_charged(tmp_path: object) -> None:
+    steep = changed(BRASS, rho_d=EDGE, rho_s=0.05)
+    publish(f"{tmp_path}/store", steep, wavelengths_nm=COARSE, tolerance=0.03)
+    table = brdfdb.open(f"{tmp_path}/store")[steep.name]
+    nm = np.linspace(400.0, 700.0, 301)
+    drawn = error_measurement.draw(steep, COARSE, 30, 7)
+    wi, wr = drawn.wi[drawn.above], drawn.wr[drawn.above]
+    values, error = table.lookup_vectors_with_error(wi, wr, nm)
+    assert np.all(values >= 0.0)
+    truth = steep.lookup_vectors(wi, wr, nm)
+    assert np.all(np.mean(np.abs(values - truth) <= error, axis=0) > 0.96)
+    # far from the edge the spectrum is a straight line, and the error is that of the wavelengths beside
+    far = np.searchsorted(nm, [450.0, 650.0])
+    near = np.searchsorted(nm, [440.0, 640.0])
+    assert np.median(error[:, far] / error[:, near]) < 4.0
+
+
+@pytest.mark.parametrize("values", [(0.0, 0.5, 0.5), (0.5, 0.5, 0.0)])
+@pytest.mark.parametrize("model", [{"model": "lambert"}, {"model": "oren_nayar", "sigma": 0.5}], ids=str)
+def test_a_surface_that_is_black_at_a_wavelength_has_a_table(
+    model: dict[str, Any], values: tuple[float, ...], tmp_path: object
+) -> None:
+    black = Spectrum(wavelengths_nm=(400.0, 500.0, 700.0), values=values, origin="a test")
+    parameters = {"rho": black} | {name: value for name, value in model.items() if name != "model"}
+    material = Material(name="black", title="Black", model=model["model"], parameters=parameters, source="a test")
+    publish(f"{tmp_path}/store", material, wavelengths_nm=[400.0, 500.0, 600.0, 700.0], tolerance=0.05)
+    table = brdfdb.open(f"{tmp_path}/store")["black"]
+    dark = 400.0 if values[0] == 0.0 else 700.0
+    assert table.lookup(0.3, 0.0, 0.5, 1.0, wavelength_nm=dark) == 0.0
+    expected = material.lookup(0.3, 0.0, 0.5, 1.0, wavelength_nm=500.0)
+    np.testing.assert_allclose(table.lookup(0.3, 0.0, 0.5, 1.0, wavelength_nm=500.0), expected, rtol=0.1)
 
 
 def test_nodes_hold_the_f_r_of_lookups(tmp_path: object) -> None:

@@ -180,7 +180,8 @@ def _print_error(error: Error | None, truth: str) -> None:
     if error.places is not None:
         rows.append(("alongside", error.places.alongside))
     if error.between is not None:
-        rows.append(("between", error.between.bands))
+        between = error.between.bands  # of a mixture, one row for all bands
+        rows.append(("between", between if len(between) > 1 else between * (len(edges) - 1)))
     print("    theta_i     " + "".join(f"{f'{a:g}-{b:g}°':>9}" for a, b in itertools.pairwise(edges)))
     for label, bands in rows:
         print(_errors(label, bands))
