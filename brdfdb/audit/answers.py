@@ -14,7 +14,7 @@ from brdfdb.audit.table_error import TableError
 
 AS_PUBLISHED = "is it what the paper says?"
 CONSERVES_ENERGY = "does the published model conserve energy?"
-NO_PAPER = "a material of your own has no paper: its model, or its function, takes the place of the paper"
+NO_PAPER = "where no paper states a material, its model, or its function, takes the place of the paper"
 
 
 class Answer(BaseModel):

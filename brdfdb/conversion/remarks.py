@@ -8,7 +8,7 @@ from brdfdb.models import MODELS
 from brdfdb.parameters import closest
 
 _NOT_NEAR = 0.9  # l1 from which on the model is hardly nearer than black, whose l1 is 1
-_END = 1e-3  # distance from the end of a range, as a share of it, that is the end
+_END = 1e-3  # distance from the end of a range, relative to that end, that is the end; 0 is none
 _SEEN = 0.01  # share of the light from which on a part is worth a sentence
 _LOST = 0.5  # share of the peak below which a highlight is lost
 _UNSURE = 0.01  # error of l1, relative to l1, that is worth a sentence
@@ -35,8 +35,7 @@ def _at_an_end(conversion: Conversion) -> list[str]:
         value = conversion.parameters[parameter.name]
         if parameter.name in conversion.fixed or parameter.reflectance or not isinstance(value, float):
             continue
-        near = _END * (parameter.high - parameter.low)
-        if parameter.high - value <= near or (parameter.low != 0.0 and value - parameter.low <= near):
+        if any(end != 0.0 and abs(value - end) <= _END * abs(end) for end in (parameter.low, parameter.high)):
             name = written_name(parameter)
             ends.append(f"{name} = {in_file[name]:g}")
     return ends

@@ -233,6 +233,9 @@ def test_a_highlight_is_kept_unless_light_alone_is_weighed() -> None:
     assert convert(tile, "lambert").weigh == "light"
 
 
+NARROW = {"rho_d": 0.1, "f_0": 0.5, "alpha_x": 1e-3, "alpha_y": 1e-3}
+
+
 def test_a_model_that_is_hardly_nearer_than_black_says_so_and_an_end_of_a_range_too() -> None:
     rough = convert(presets()["scene-copper-sphere"], "oren_nayar", [550.0])
     assert rough.l1 > 0.9
@@ -241,6 +244,11 @@ def test_a_model_that_is_hardly_nearer_than_black_says_so_and_an_end_of_a_range_
     assert brass.l1 < 0.9
     assert brass.remarks[0] == "At the end of their range: b = 10, g = 0.5. A closer fit lies beyond."
     assert not any("end of their range" in said for said in convert(presets()["clay-vase"], "lambert").remarks)
+    # an alpha of 1e-3 is near to the least one, 1e-6, as a share of the range alone
+    narrow = brass.material.model_copy(update={"model": "ggx_schlick", "parameters": {**NARROW}})
+    likeness = convert(narrow, "beckmann_schlick")
+    assert likeness.parameters["alpha_x"] == pytest.approx(1e-3, rel=0.5)
+    assert not any("end of their range: alpha" in said for said in likeness.remarks)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ export function show(info) {
       ["99 of 100", `within ${percent(error.overall.p99)}`], ["median", percent(error.overall.median)],
       ["largest", percent(error.overall.max), error.worst?.why ?? ""], ["at this θᵢ", element("span", { id: "band" })],
     ]) : element("p", {}, "not measured"),
-    element("h3", {}, "Error of the formula against the best that is known"),
+    element("h3", {}, "Error of the formula against the highest rung"),
     ...formula(info.formula_error),
     element("h3", {}, "Audit"),
     pairs(above(info.largest_albedo)),
@@ -39,7 +39,7 @@ export function show(info) {
 /** How far the formula is from the best that is known of its surface. */
 function formula(of) {
   if (!of) return [element("p", {}, "not measured")];
-  if (of.against === "none known") return [element("p", {}, "none known: the formula is a fit, or nothing better is known")];
+  if (of.against === "none known") return [element("p", {}, "none known: the formula is a fit, or no higher rung is known")];
   if (of.against === "highest rung") return [element("p", {}, `0: it is the exact form, ${of.rung}`)];
   return [pairs([
     ["99 of 100", `within ${percent(of.overall.p99)}`, `against ${of.rung}`],
