@@ -64,6 +64,14 @@ class WriteError(BrdfdbError, OSError):
     """A file that cannot be written, where the library that writes it does not say which error it met."""
 
 
+class CannotHoldError(BrdfdbError):
+    """A table that a file format has no place for; the sentence says why."""
+
+
+class FileFormatError(BrdfdbError, ValueError):
+    """A file that is not of the format that it is read as, or is damaged; the sentence names the file."""
+
+
 class StoreError(BrdfdbError):
     """A store that is missing, damaged, of another version, or cannot be written."""
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
+import json
 import os
-import uuid
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,8 @@ from numpy.typing import NDArray
 
 from brdfdb import spectra
 from brdfdb.errors import ParameterError, WriteError
+from brdfdb.formats._record import record
+from brdfdb.formats._written import Written, whole
 from brdfdb.tables.slices import Slice
 from brdfdb.tables.table import Table
 
@@ -31,7 +32,9 @@ def _dirac(specular: NDArray[np.float32]) -> str:
     return f"not in this image: up to {specular.max():.4g} of the light leaves in the exact mirror direction"
 
 
-def write_slice(path: str | os.PathLike[str], image: Slice, table: Table, half: bool = False) -> None:
+def write_slice(
+    path: str | os.PathLike[str], image: Slice, table: Table, half: bool = False, verdict: str | None = None
+) -> Written:
     """Write a slice as an OpenEXR file, ZIP compressed: whole, or not at all.
 
     Parameters
@@ -45,6 +48,8 @@ def write_slice(path: str | os.PathLike[str], image: Slice, table: Table, half: 
     half : bool
         Write 16-bit floats, for viewing, instead of 32-bit floats, for computing. Values above 65504, the largest
         16-bit float, are written as 65504, and the attribute ``brdf:half`` counts them.
+    verdict : str, optional
+        Verdict of the audit of this revision.
 
     Raises
     ------
@@ -69,6 +74,7 @@ def write_slice(path: str | os.PathLike[str], image: Slice, table: Table, half: 
     pixels = {name: rgb[..., index] for index, name in enumerate("RGB")}
     header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     header |= _attributes(image, table)
+    header["brdf:record"] = json.dumps(record(table, None, verdict))
     header["brdf:rgb"] = rgb_meaning
     if image.wavelength_nm is not None:
         names = _spectral_channels(image.wavelength_nm)
@@ -82,15 +88,12 @@ def write_slice(path: str | os.PathLike[str], image: Slice, table: Table, half: 
 
     # OpenEXR reads a strided array as if it were contiguous: wrong pixels and no error.
     channels = {name: np.ascontiguousarray(array) for name, array in pixels.items()}
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-    try:
-        OpenEXR.File(header, channels).write(str(temporary))
-        os.replace(temporary, path)
-    except RuntimeError as error:  # what OpenEXR raises for a missing directory and for a full disk alike
-        raise WriteError(f"cannot write {path}: {error}") from error
-    finally:
-        with contextlib.suppress(OSError):  # there only after a failure
-            temporary.unlink()
+    with whole(path) as (temporary,):
+        try:
+            OpenEXR.File(header, channels).write(str(temporary))
+        except RuntimeError as error:  # what OpenEXR raises for a missing directory and for a full disk alike
+            raise WriteError(f"cannot write {path}: {error}") from error
+    return Written((path,))
 
 
 def _rgb(image: Slice) -> tuple[NDArray[np.float32], str]:

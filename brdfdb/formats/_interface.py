@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from brdfdb.errors import ParameterError
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._written import Written
 
 
 @dataclass(frozen=True)
@@ -61,10 +66,19 @@ class Option:
         return value
 
 
+TOLERANCE = Option(
+    "tolerance",
+    0.02,
+    "largest error against the table that 99 of 100 values may have: the smallest file within it is written",
+    low=1e-4,
+    high=1.0,
+)
+
+
 class Exporter(Protocol):
     """A format that tables are written to: a module of `brdfdb.formats`, or another object with these names.
 
-    It is imported whenever the program starts, and imports large packages only when it writes.
+    It imports packages other than NumPy, and the tables, only when it writes.
 
     Attributes
     ----------
@@ -80,7 +94,9 @@ class Exporter(Protocol):
     options : tuple of Option
         All other keyword arguments.
     write : callable
-        ``write(table, path, **options)`` writes one file, whole or not at all.
+        ``write(table, path, verdict=None, **options)`` writes the file, and those that stand beside it: whole, or not
+        at all. `verdict` is that of the audit of this revision. It raises CannotHoldError for a table that the format
+        has no place for.
     """
 
     suffix: str
@@ -88,7 +104,25 @@ class Exporter(Protocol):
     summary: str
     kinds: tuple[str, ...]
     options: tuple[Option, ...]
-    write: Callable[..., None]
+    write: Callable[..., Written]
+
+
+class Importer(Protocol):
+    """A format that is read: a module of `brdfdb.formats`, or another object with these names.
+
+    Attributes
+    ----------
+    suffix : str
+        End of the names of its files, with the dot.
+    recognises : callable
+        ``recognises(head)`` is true if the first bytes of a file, 4096 of them or all, are those of this format.
+    read : callable
+        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists.
+    """
+
+    suffix: str
+    recognises: Callable[[bytes], bool]
+    read: Callable[[str | os.PathLike[str]], FileTable | Samples]
 
 
 def options_of(exporter: Exporter) -> dict[str, Option]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from brdfdb.formats._interface import Option
 
 if TYPE_CHECKING:
+    from brdfdb.formats._written import Written
     from brdfdb.tables.table import Table
 
 suffix = ".exr"
@@ -29,7 +30,8 @@ def write(
     theta_i: float = 45.0,
     phi_i: float = 0.0,
     half: bool = False,
-) -> None:
+    verdict: str | None = None,
+) -> Written:
     """Write one slice of a table as an OpenEXR file: whole, or not at all.
 
     Parameters
@@ -45,6 +47,8 @@ def write(
         the half vector in a half/difference slice.
     half : bool
         Write 16-bit floats, for viewing, instead of 32-bit floats, for computing.
+    verdict : str, optional
+        Verdict of the audit of this revision.
 
     Raises
     ------
@@ -62,4 +66,4 @@ def write(
         image = slices.in_plane_slice(table, phi_i_deg=phi_i)
     else:
         image = slices.half_difference_slice(table, phi_h_deg=phi_i)
-    write_slice(path, image, table, half)
+    return write_slice(path, image, table, half, verdict)

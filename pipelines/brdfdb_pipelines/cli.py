@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command = next((text for text in arguments if not text.startswith("-")), "")
         if command in _WITHOUT_KERNELS and "BRDFDB_MODELS" not in os.environ:
             os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
-    options = _parser().parse_args(arguments, argparse.Namespace(arguments=arguments))
+    options = _parser(arguments).parse_args(arguments, argparse.Namespace(arguments=arguments))
     try:
         _add_models(options)
         code: int = options.run(options)
@@ -111,7 +111,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return REFUSED
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentParser:
+    """Return the parser of the commands that the arguments name, with the names of all others; None: of all."""
     parser = _Parser(
         prog="brdfdb",
         description="Spectral BRDF tables from published surface parameters: build, audit, chart, export, look up, "
@@ -124,7 +125,8 @@ def _parser() -> argparse.ArgumentParser:
     for name, command in commands().items():
         first_sentence = command.HELP.partition(". ")[0].rstrip(".")
         subparser = subparsers.add_parser(name, help=f"{first_sentence}.", description=command.HELP)
-        command.add_arguments(subparser)
+        if arguments is None or name in arguments:  # some import a room of the library
+            command.add_arguments(subparser)
         subparser.set_defaults(run=command.run)
     return parser
 

@@ -2,46 +2,128 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import brdfdb
-from brdfdb.errors import counted
+from brdfdb.errors import CannotHoldError, WriteError, counted
 from brdfdb.formats import EXPORTERS
+from brdfdb.formats._written import Written
 from brdfdb.store.reader import Store
 from brdfdb_pipelines import terminal
 
 
-def run(root: Path, names: list[str], directory: Path, file_format: str, options: Mapping[str, Any]) -> None:
-    """Write the named materials of a store, or all of them, in a format of `EXPORTERS`, and print the number of files.
+class _Export(NamedTuple):
+    """Result of the export of one material: its files, or the reason why the format cannot hold it."""
 
-    A format with several kinds of files writes one of each, NAME_KIND.SUFFIX, unless the options choose a kind.
+    name: str
+    files: list[Written]
+    refusal: CannotHoldError | None = None
+
+
+def run(
+    root: Path, names: list[str], directory: Path, file_format: str, options: Mapping[str, Any], audit: Path
+) -> bool:
+    """Write the named materials of a store, or all of them, in a format of `EXPORTERS`, and print what was written.
+
+    A format with several kinds of files writes one of each, NAME_KIND.SUFFIX, unless the options choose a kind. Of all
+    materials, those that the format cannot hold are left out and named. `audit` is the report whose verdicts are
+    written.
+
+    Returns
+    -------
+    bool
+        True if each file is as near to its table as was asked for.
+
+    Raises
+    ------
+    CannotHoldError
+        If the format cannot hold a material that is named, or any of all.
+    WriteError
+        If a file cannot be written.
     """
     store = brdfdb.open(root)
     revisions = {name: store.head(name) for name in names or store}
-    directory.mkdir(parents=True, exist_ok=True)
-    write = partial(_write, store, directory=directory, file_format=file_format, options=options)
-    written: list[Path] = []
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise WriteError(f"cannot write to {directory}: it is a file, not a directory") from None
+    verdicts = _verdicts(audit, revisions)
+    write = partial(_write, store, directory=directory, file_format=file_format, options=options, verdicts=verdicts)
+    exports: list[_Export] = []
     with terminal.progress() as bar, ThreadPoolExecutor(os.cpu_count()) as threads:
-        for paths in bar.track(threads.map(write, revisions), total=len(revisions), description="exporting tables"):
-            written += paths
-    total = sum(path.stat().st_size for path in written)
-    print(f"{counted(len(written), f'{file_format.upper()} file')}, {terminal.size(total)}, in {directory}")
+        try:
+            results = threads.map(write, revisions)
+            exports += bar.track(results, total=len(revisions), description="exporting tables")
+        except BaseException:
+            threads.shutdown(cancel_futures=True)
+            raise
+    refused = [export for export in exports if export.refusal is not None]
+    if refused and (names or len(refused) == len(exports)):
+        assert refused[0].refusal is not None
+        raise refused[0].refusal
+    return _report(exports, directory, file_format)
 
 
-def _write(store: Store, name: str, *, directory: Path, file_format: str, options: Mapping[str, Any]) -> list[Path]:
-    """Write the files of one material, and return their paths."""
-    exporter, table = EXPORTERS[file_format], store[name]
+def _write(
+    store: Store,
+    name: str,
+    *,
+    directory: Path,
+    file_format: str,
+    options: Mapping[str, Any],
+    verdicts: Mapping[str, str],
+) -> _Export:
+    """Write the files of one material."""
+    exporter, table, verdict = EXPORTERS[file_format], store[name], verdicts.get(name)
     kinds = (options["kind"],) if "kind" in options else exporter.kinds
-    if not kinds:
-        path = directory / f"{name}{exporter.suffix}"
-        exporter.write(table, path, **options)
-        return [path]
-    paths = [directory / f"{name}_{kind}{exporter.suffix}" for kind in kinds]
-    for kind, path in zip(kinds, paths, strict=True):
-        exporter.write(table, path, **{**options, "kind": kind})
-    return paths
+    paths = [(directory / f"{name}_{kind}{exporter.suffix}", {"kind": kind}) for kind in kinds]
+    try:
+        return _Export(
+            name,
+            [
+                exporter.write(table, path, verdict=verdict, **{**options, **kind})
+                for path, kind in paths or [(directory / f"{name}{exporter.suffix}", {})]
+            ],
+        )
+    except CannotHoldError as error:
+        return _Export(name, [], error)
+
+
+def _verdicts(audit: Path, revisions: Mapping[str, str]) -> dict[str, str]:
+    """Return the verdicts of an audit report on these revisions by name; none if there is no report."""
+    try:
+        materials = json.loads(audit.read_bytes())["materials"]
+        given = {entry["material"]: (entry["revision"], entry["verdict"]) for entry in materials}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    return {
+        name: given[name][1] for name, revision in revisions.items() if name in given and given[name][0] == revision
+    }
+
+
+def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
+    """Print what was written, what is beyond its tolerance and what was left out; return True if nothing is beyond."""
+    written = [(export.name, files) for export in exports for files in export.files]
+    count, total = sum(len(files.paths) for _, files in written), sum(files.nbytes for _, files in written)
+    print(f"{counted(count, f'{file_format.upper()} file')}, {terminal.size(total)}, in {directory}")
+    stated = [(files.error.p99, name) for name, files in written if files.error is not None]
+    if stated:
+        worst, name = max(stated)
+        print(f"error against the table: 99 of 100 values within {worst:.2%} ({name}), each file states its own")
+    beyond = [(name, files) for name, files in written if not files.within]
+    for name, files in beyond:
+        assert files.error is not None
+        print(f"{name}: {files.error.p99:.2%}, beyond the tolerance of {files.tolerance:.2%}")
+    for remark in sorted({remark for _, files in written for remark in files.remarks}):
+        names = [name for name, files in written if remark in files.remarks]
+        print(f"{', '.join(names) if len(names) < 4 else counted(len(names), 'material')}: {remark}")
+    for export in exports:
+        if export.refusal is not None:
+            print(f"{export.refusal}; left out")
+    return not beyond

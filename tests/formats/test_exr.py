@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb import spectra
+from brdfdb.errors import WriteError
 from brdfdb.formats import _exr_file, exr
 from brdfdb.geometry import unit_vector
 from brdfdb.tables import slices
@@ -45,6 +47,7 @@ class FakeTable:
 
     name = "fake-brass"
     revision = "r000003"
+    digest = "0" * 64
     anisotropic = False
     specular: Floats | None = None
 
@@ -254,6 +257,7 @@ def test_export_writes_three_files_with_their_attributes(tmp_path: Path) -> None
             assert own.pop(f"{letter}_unit") == "degree"
             assert own.pop(f"{letter}_direction") == direction
         assert len(own.pop("description")) > 20
+        assert json.loads(own.pop("record"))["audit"] == "not audited"
         assert own == {
             "material": "fake-brass",
             "revision": "r000003",
@@ -339,6 +343,6 @@ def test_unwritable_places_are_an_os_error(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"cannot write .*nowhere.*slice\.exr: .*No such file"):
         _exr_file.write_slice(tmp_path / "nowhere" / "slice.exr", image, source)
     (tmp_path / "folder").mkdir()
-    with pytest.raises(IsADirectoryError):
+    with pytest.raises(WriteError, match="it is a directory"):
         _exr_file.write_slice(tmp_path / "folder", image, source)
     assert list(tmp_path.iterdir()) == [tmp_path / "folder"]

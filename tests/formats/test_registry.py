@@ -11,6 +11,7 @@ import pytest
 
 from brdfdb.errors import ParameterError
 from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options
+from brdfdb.formats._written import Written
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
@@ -20,16 +21,17 @@ from tests.api.a_store import client_of
 from tests.pipelines.command import Captured, run
 
 
-def write(table: Any, path: Path, *, digits: float = 4.0) -> None:
+def write(table: Any, path: Path, *, digits: float = 4.0, verdict: str | None = None) -> Written:
     lines = ["theta_i,theta_r,delta_phi,brdf"]
     for index in np.ndindex(*table.grid.shape):
         at = [nodes[i] for nodes, i in zip(table.axes_deg.values(), index, strict=True)]
         lines.append(",".join(f"{value:.{digits:.0f}g}" for value in (*at, table.brdf[index])))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text("\n".join([*lines, verdict or ""]) + "\n", encoding="utf-8")
+    return Written((path,))
 
 
-CSV = SimpleNamespace(
-    suffix=".csv",
+LIST = SimpleNamespace(
+    suffix=".list",
     media_type="text/csv",
     summary="f_r at the nodes of a table as text",
     kinds=(),
@@ -42,7 +44,7 @@ FIRST = "theta_i,theta_r,delta_phi,brdf\n0,0,0,0.159\n"
 @pytest.fixture
 def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A store with one grey table, and the format in the registry."""
-    monkeypatch.setitem(EXPORTERS, "csv", CSV)
+    monkeypatch.setitem(EXPORTERS, "list", LIST)
     table = {"title": "Grey", "model": "lambert", "source": "no paper", "parameters": {"rho": 0.5}}
     grid = Grid({"theta_i": [0, 80], "theta_r": [0, 80], "delta_phi": [0, 90, 180]})
     publish_dataset(tmp_path / "store", "grey", tabulate(Layout(Material.from_table("grey", table), grid)))
@@ -51,29 +53,29 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_format_of_fifteen_lines_is_a_command(store: Path, tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "out"
-    assert run("export", "csv", "grey", "--digits", "3", "--store", store, "--out", out) == 0
-    assert capsys.readouterr().out.startswith("1 CSV file, ")
-    assert (out / "grey.csv").read_text(encoding="utf-8").startswith(FIRST)
-    assert run("export", "csv", "grey", "--digits", "12", "--store", store, "--out", out) == 2
+    assert run("export", "list", "grey", "--digits", "3", "--store", store, "--out", out) == 0
+    assert capsys.readouterr().out.startswith("1 LIST file, ")
+    assert (out / "grey.list").read_text(encoding="utf-8").startswith(FIRST)
+    assert run("export", "list", "grey", "--digits", "12", "--store", store, "--out", out) == 2
     assert capsys.readouterr().err == "brdfdb: digits: '12' is not a number in [1, 9]\n"
     assert run("export", "exr", "--all", "--store", store, "--out", out, "--kind", "in_plane", "--half") == 0
-    assert sorted(path.name for path in out.iterdir()) == ["grey.csv", "grey_in_plane.exr"]
+    assert sorted(path.name for path in out.iterdir()) == ["grey.list", "grey_in_plane.exr"]
 
 
 def test_a_format_of_fifteen_lines_is_an_address(store: Path) -> None:
     client = client_of(store)
-    answer = client.get("/v1/materials/grey/export/csv?digits=3")
+    answer = client.get("/v1/materials/grey/export/list?digits=3")
     assert answer.text.startswith(FIRST)
     assert answer.headers["content-type"].startswith("text/csv")
-    assert answer.headers["content-disposition"] == 'attachment; filename="grey.csv"'
-    assert client.get("/v1/materials/grey").json()["links"]["export/csv"] == "/v1/materials/grey/export/csv"
-    assert client.problem("GET", "/v1/materials/grey/export/csv?digits=x", 422)["parameter"] == "digits"
-    assert client.problem("GET", "/v1/materials/grey/export/csv?kind=lobe", 422)["parameter"] == "kind"
-    assert "there are exr, csv" in client.problem("GET", "/v1/materials/grey/export/merl", 404)["detail"]
+    assert answer.headers["content-disposition"] == 'attachment; filename="grey.list"'
+    assert client.get("/v1/materials/grey").json()["links"]["export/list"] == "/v1/materials/grey/export/list"
+    assert client.problem("GET", "/v1/materials/grey/export/list?digits=x", 422)["parameter"] == "digits"
+    assert client.problem("GET", "/v1/materials/grey/export/list?kind=lobe", 422)["parameter"] == "kind"
+    assert "there are exr" in client.problem("GET", "/v1/materials/grey/export/merl", 404)["detail"]
 
 
 def test_modules_of_the_room_are_found() -> None:
-    assert list(EXPORTERS) == ["exr"]
+    assert "exr" in EXPORTERS
     for exporter in EXPORTERS.values():
         assert exporter.suffix.startswith(".")
         assert "/" in exporter.media_type

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
+import zipfile
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 from weakref import WeakKeyDictionary
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from starlette.requests import Request
 from starlette.responses import Response
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS, options_of, parsed_options
 from brdfdb.geometry import radians
 from brdfdb_api.http.errors import RequestError
@@ -200,15 +202,33 @@ def export(
     except ParameterError as error:
         raise RequestError(422, str(error), error.parameter) from None
     table = shelf_of(request).table(name, revision)
-    headers = cache_headers(tag_of(table), file_format, immutable=revision is not None)
+    known = shelf_of(request).verdict(name)
+    verdict = known.finding["verdict"] if known and known.finding["revision"] == table.revision else None
+    # the file states the verdict, which a later audit may change
+    headers = cache_headers(f"{tag_of(table)}-{verdict}", file_format)
     kind = f"_{options.get('kind', exporter.kinds[0])}" if exporter.kinds else ""
     headers["Content-Disposition"] = f'attachment; filename="{name}{kind}{exporter.suffix}"'
     if held := not_modified(request.headers.get("if-none-match"), headers):
         return held
     with tempfile.TemporaryDirectory() as folder:  # formats write files
-        path = FilePath(folder) / f"export{exporter.suffix}"
-        exporter.write(table, path, **options)
-        return Response(path.read_bytes(), media_type=exporter.media_type, headers=headers)
+        path = FilePath(folder) / f"{name}{kind}{exporter.suffix}"
+        try:
+            written = exporter.write(table, path, verdict=verdict, **options)
+        except CannotHoldError as error:
+            raise RequestError(422, str(error)) from None
+        if len(written.paths) == 1 and path.is_file():
+            return Response(path.read_bytes(), media_type=exporter.media_type, headers=headers)
+        headers["Content-Disposition"] = f'attachment; filename="{name}{kind}{exporter.suffix}.zip"'
+        return Response(_zipped(FilePath(folder)), media_type="application/zip", headers=headers)
+
+
+def _zipped(folder: FilePath) -> bytes:
+    """Return all files of a folder as a zip archive."""
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            archive.write(path, path.relative_to(folder))
+    return data.getvalue()
 
 
 @both(

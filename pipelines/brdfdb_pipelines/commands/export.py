@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from brdfdb.errors import ParameterError
-from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options
 from brdfdb_pipelines.commands._arguments import add_out, add_store
+from brdfdb_pipelines.exit_codes import VIOLATED
+
+if TYPE_CHECKING:
+    from brdfdb.formats import Option
 
 HELP = "Write tables as files of other formats."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the format and its arguments."""
+    from brdfdb.formats import EXPORTERS, options_of
+
     # a command a format: argparse takes no NAME after an option that follows another positional argument
     formats = parser.add_subparsers(required=True, metavar="FORMAT", dest="file_format")
     formats.hint = (  # type: ignore[attr-defined]  # read by the parser
@@ -25,6 +32,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add_store(command)
         command.add_argument("--all", action="store_true", help="every material of the store")
         add_out(command, f"brdf-{name}")
+        command.add_argument(
+            "--audit",
+            type=Path,
+            metavar="FILE",
+            help="report of `brdfdb audit` whose verdicts go into the files (default: DIR/audit.json of the store)",
+        )
+        command.add_argument(
+            "--strict", action="store_true", help="exit with 1 if a file is not within the tolerance that was asked for"
+        )
         for option in options_of(exporter).values():
             _add(command, option)
 
@@ -34,7 +50,8 @@ def _add(command: argparse.ArgumentParser, option: Option) -> None:
     if option.default is False:
         command.add_argument(flag, dest=target, action="store_const", const="true", help=option.help)
     elif option.choices:
-        text = f"{option.help}: {', '.join(option.choices)} (default: all of them)"
+        default = option.default if option.name != "kind" else "all of them"
+        text = f"{option.help}: {', '.join(option.choices)} (default: {default})"
         command.add_argument(flag, dest=target, metavar=option.name.upper(), help=text)
     else:
         text = f"{option.help} (default: {option.default:g})"
@@ -43,6 +60,7 @@ def _add(command: argparse.ArgumentParser, option: Option) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the files."""
+    from brdfdb.formats import EXPORTERS, options_of, parsed_options
     from brdfdb_pipelines import export
 
     if bool(options.names) == options.all:
@@ -50,5 +68,6 @@ def run(options: argparse.Namespace) -> int:
     exporter = EXPORTERS[options.file_format]
     texts = {name: getattr(options, f"option_{name}") for name in options_of(exporter)}
     given = parsed_options(exporter, {name: text for name, text in texts.items() if text is not None})
-    export.run(options.store, options.names, options.out, options.file_format, given)
-    return 0
+    audit = options.audit or options.store / "audit.json"
+    within = export.run(options.store, options.names, options.out, options.file_format, given, audit)
+    return VIOLATED if options.strict and not within else 0

@@ -1,0 +1,105 @@
+"""What readers of files give: f_r as the tools of a format see it, or the samples that the file lists."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import checked_angles, checked_vectors, unit_vector
+from brdfdb.materials.source import FourAngles, Lookups
+from brdfdb.parameters import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FileTable(Lookups):
+    """f_r of a file, evaluated as the tool that reads the format evaluates it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the material, or of the file.
+    channels : tuple of str
+        As of `Channels`: ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths.
+    wavelength_nm : array (L,) [nm] or None
+        Wavelengths of the channels; None of colours and of grey files.
+    evaluate : callable
+        Gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer above the horizon.
+    record : mapping
+        The record in the file or beside it; empty of files of other programs.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    wavelength_nm: NDArray[np.float64] | None
+    evaluate: Callable[[Floats, Floats], Floats] = field(repr=False)
+    record: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
+        """Return f_r [1/sr] for unit vectors: a last axis for the channels, or for the wavelengths that are given."""
+        vectors = checked_vectors(wi, wr)
+        shape = np.broadcast_shapes(vectors.w_i.shape, vectors.w_r.shape)
+        flat = [np.broadcast_to(w, shape).reshape(-1, 3).astype(np.float64) for w in (vectors.w_i, vectors.w_r)]
+        above = (flat[0][:, 2] > 0.0) & (flat[1][:, 2] > 0.0)
+        values = np.zeros((len(above), len(self.channels)))
+        values[above] = self.evaluate(flat[0][above], flat[1][above])
+        values = values.reshape(*shape[:-1], len(self.channels))
+        if self.wavelength_nm is None:
+            return np.asarray(values[..., 0] if len(self.channels) == 1 else values)[()]
+        return values if wavelength_nm is None else self._between(values, wavelength_nm)
+
+    def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
+        directions = checked_angles(*angles)
+        shape = np.broadcast_shapes(*(np.shape(angle) for angle in angles))
+        theta_i, phi_i, theta_r, phi_r = (np.broadcast_to(np.asarray(angle, np.float64), shape) for angle in angles)
+        del directions
+        return self.lookup_vectors(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), wavelength_nm)
+
+    def _between(self, values: Floats, wavelength_nm: ArrayLike) -> Floats:
+        """Return values at wavelengths [nm] by straight lines between those of the file."""
+        stored, wanted = self.wavelength_nm, np.asarray(wavelength_nm, dtype=np.float64)
+        assert stored is not None
+        if not np.all((wanted >= stored[0]) & (wanted <= stored[-1])):
+            raise ParameterError(
+                "wavelength_nm", f"{wanted.tolist()} is outside [{stored[0]:g}, {stored[-1]:g}] nm", wavelength_nm
+            )
+        below = np.clip(np.searchsorted(stored, wanted, side="right") - 1, 0, max(stored.size - 2, 0))
+        above = np.minimum(below + 1, stored.size - 1)
+        width = np.where(above > below, stored[above] - stored[below], 1.0)
+        share = (wanted - stored[below]) / width
+        return np.asarray(values[..., below] * (1.0 - share) + values[..., above] * share)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Values that a file lists at directions, without a rule for what lies between.
+
+    Attributes
+    ----------
+    name : str
+        Name of the material, or of the file.
+    theta_i, phi_i, theta_r, phi_r : array (N,) [rad]
+        Directions of light and viewer.
+    channels : tuple of str
+        As of `FileTable`.
+    wavelength_nm : array (L,) [nm] or None
+        Wavelengths of the channels; None of colours and of grey files.
+    values : array (N, C) [1/sr]
+        f_r.
+    record : mapping
+        The record in the file or beside it; empty of files of other programs.
+    """
+
+    name: str
+    theta_i: Floats = field(repr=False)
+    phi_i: Floats = field(repr=False)
+    theta_r: Floats = field(repr=False)
+    phi_r: Floats = field(repr=False)
+    channels: tuple[str, ...]
+    wavelength_nm: NDArray[np.float64] | None
+    values: Floats = field(repr=False)
+    record: Mapping[str, Any] = field(default_factory=dict, repr=False)

@@ -1,0 +1,84 @@
+"""The record that goes with an exported table: what it is, where it comes from, and how far it can be trusted."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from brdfdb.formats._stated_error import FileError
+    from brdfdb.tables.table import Table
+
+NOT_AUDITED = "not audited"
+CONVENTION = "f_r [1/sr], the BRDF without the cosine; unit vectors of light and viewer point away from the surface"
+_MEASURED = "refractive index and extinction: refractiveindex.info, CC0 1.0"
+
+
+def record(
+    table: Table,
+    error: FileError | None,
+    verdict: str | None,
+    *,
+    holds: str = CONVENTION,
+    remarks: tuple[str, ...] = (),
+    tolerance: float | None = None,
+) -> dict[str, Any]:
+    """Return the record of an exported table as JSON: the same keys in every format.
+
+    Parameters
+    ----------
+    table : Table
+        Table that is exported.
+    error : FileError or None
+        Error of the file against the table.
+    verdict : str or None
+        Verdict of the audit of this revision; None: it was not audited.
+    holds : str
+        Quantity, unit and cosine convention of the numbers in the file.
+    remarks : tuple of str
+        Sentences on what the format cannot hold of this table.
+    tolerance : float or None [1]
+        Largest p99 that was asked for.
+    """
+    known = table.metadata
+    document = known.model_dump(mode="json", include={"model", "model_version", "parameters", "refractive_index"})
+    licence = f"computed from parameters published in {known.source or 'a source that is not stated'}"
+    return {
+        "name": table.name,
+        "title": known.title or "",
+        **document,
+        "source": known.source or "",
+        "note": known.note,
+        "revision": table.revision,
+        "digest": table.digest,
+        "audit": verdict or NOT_AUDITED,
+        "holds": holds,
+        "error_of_file": None if error is None else {"against": "the table", **error.document()},
+        "tolerance": tolerance,
+        "error_of_table": None
+        if table.error is None
+        else {"against": "the model", **table.error.overall.model_dump(include={"p99", "l1"})},
+        "remarks": list(remarks),
+        "licence": f"{licence}; {_MEASURED}" if known.refractive_index else licence,
+        "program": f"brdfdb {version('brdfdb')}",
+    }
+
+
+def lines(document: dict[str, Any]) -> list[str]:
+    """Return a record as lines of text, "key: value", for headers that hold text; values are JSON but for strings."""
+    pairs = ((key, value if isinstance(value, str) else json.dumps(value)) for key, value in document.items())
+    return [f"{key}: {' '.join(value.split())}" for key, value in pairs]
+
+
+def of_lines(texts: list[str]) -> dict[str, Any]:
+    """Return the record that `lines` wrote; other lines are left out."""
+    document: dict[str, Any] = {}
+    for text in texts:
+        key, colon, value = text.partition(": ")
+        if colon:
+            try:
+                document[key] = json.loads(value)
+            except ValueError:
+                document[key] = value
+    return document

@@ -1,0 +1,140 @@
+"""The error that an exported file states: f_r as its reader sees it, against the table, at pairs drawn at random."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.formats._channels import Channels, channels_of
+from brdfdb.geometry import unit_vector
+from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
+from brdfdb.parameters import Floats
+from brdfdb.tables.error_measurement import WIDTHS
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+PAIRS = 10000  # pairs of each of the two draws
+SEED = 2018
+FLOOR = 1e-3  # share of the Lambertian BRDF with the albedo of the table
+# Rank of p99 among the values of a draw, from the largest: with a confidence of 99.9 %, no more than a hundredth of all
+# values lie beyond the value of that rank (a binomial of 10000 and 0.01 is below 70 with a chance of 0.08 %)
+_RANK = 70
+
+
+@dataclass(frozen=True)
+class FileError:
+    """Error of the values of a file against those of its table, abs(file - table) / max(table, floor).
+
+    Light and viewer are drawn cosine-weighted over the hemisphere. In a second draw the viewers are in the lobe. Each
+    number is that of the channel where it is largest.
+
+    Attributes
+    ----------
+    p99 : float [1]
+        Limit of 99 of 100 values, with a confidence of 99.9 %: the larger one of the two draws.
+    p99_hemisphere, p99_lobe : float [1]
+        The limit of each draw. They are equal if the source has no lobe.
+    l1 : float [1]
+        Mean of abs(file - table) over that of the table, cosine-weighted.
+    largest : float [1]
+        Largest error of all pairs.
+    """
+
+    p99: float
+    p99_hemisphere: float
+    p99_lobe: float
+    l1: float
+    largest: float
+
+    def document(self) -> dict[str, float]:
+        """Return the numbers by name, to three digits and rounded up."""
+        return {name: _up(getattr(self, name)) for name in self.__dataclass_fields__}
+
+
+def _up(value: float) -> float:
+    return float(f"{1.00501 * value:.3g}")
+
+
+class Comparison:
+    """Pairs of directions, and the f_r of a table there, that files are compared with.
+
+    Parameters
+    ----------
+    table : Table
+        Table that is exported.
+    channels : Channels
+        The channels of the file, by default those of the table.
+
+    Attributes
+    ----------
+    wi, wr : array (N, 3)
+        Unit vectors of light and viewer: first those over the hemisphere, then those in the lobe.
+    truth : array (N, C) [1/sr]
+        f_r of the table in the channels.
+    """
+
+    def __init__(self, table: Table, channels: Channels | None = None) -> None:
+        self.channels = channels_of(table) if channels is None else channels
+        rng = np.random.default_rng(SEED)
+        self.wi, over = _cosine_weighted(rng, 2 * PAIRS), _cosine_weighted(rng, 2 * PAIRS)
+        source = table.source
+        at = table.wavelength_nm
+        in_turn = None if at is None else at[np.arange(2 * PAIRS) % at.size]
+        lobe = None if source is None else source.lobe(self.wi[:, 2], in_turn)
+        density = over[:, 2] / np.pi
+        self.wr, self._lobe = over, slice(0, PAIRS)
+        if lobe is not None:
+            drawn = [
+                lobe._replace(share=np.ones(1), alpha_x=w * lobe.alpha_x, alpha_y=w * lobe.alpha_y, visible=False)
+                for w in WIDTHS
+            ]
+            u, angle = 1.0 - rng.random(2 * PAIRS), rng.uniform(0.0, 2.0 * np.pi, 2 * PAIRS)
+            mirrored = [mirrored_in_lobe(u, angle, self.wi, some) for some in drawn]
+            number = np.arange(2 * PAIRS)
+            self.wr = np.where((number < PAIRS)[:, np.newaxis], over, mirrored[0])
+            self.wr = np.where((number >= PAIRS + PAIRS // 2)[:, np.newaxis], mirrored[1], self.wr)
+            self._lobe = slice(PAIRS, 2 * PAIRS)
+            cosine = np.maximum(self.wr[:, 2], 0.0) / np.pi
+            density = 0.5 * cosine + 0.5 * np.mean([mixture_density(some, self.wi, self.wr) for some in drawn], axis=0)
+        self._above = self.wr[:, 2] > 0.0
+        self._weight = np.where(self._above, self.wr[:, 2], 0.0) / density
+        self.truth = self.channels.values(table, self.wi, self.wr)
+
+    @functools.cached_property
+    def floor(self) -> Floats:
+        """The floor [1/sr] of relative errors in each channel."""
+        return np.asarray(FLOOR / np.pi * np.abs(self._weight @ self.truth) / len(self.wi))
+
+    def error_of(self, evaluate: Callable[[Floats, Floats], Floats]) -> FileError:
+        """Return the error of a file, whose reader gives f_r [1/sr], shape (N, C), at unit vectors (N, 3)."""
+        values = evaluate(self.wi, self.wr)
+        wrong = np.abs(values - self.truth)
+        scale = np.maximum(self.truth, self.floor)
+        relative = np.divide(wrong, scale, out=np.where(wrong > 0.0, np.inf, 0.0), where=scale > 0.0)
+        whole = self._weight @ np.abs(self.truth)
+        l1 = np.divide(self._weight @ wrong, whole, out=np.zeros_like(whole), where=whole > 0.0)
+        hemisphere, lobe = self._p99(relative, slice(0, PAIRS)), self._p99(relative, self._lobe)
+        return FileError(
+            p99=max(hemisphere, lobe),
+            p99_hemisphere=hemisphere,
+            p99_lobe=lobe,
+            l1=float(l1.max()),
+            largest=float(relative[self._above].max()),
+        )
+
+    def _p99(self, relative: Floats, draw: slice) -> float:
+        some = relative[draw][self._above[draw]]
+        rank = max(1, _RANK * len(some) // PAIRS)
+        return float(np.partition(some, len(some) - rank, axis=0)[len(some) - rank].max())
+
+
+def _cosine_weighted(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+    """Return unit vectors (N, 3) whose density over the hemisphere is proportional to the cosine."""
+    theta = np.arcsin(np.sqrt(rng.random(count)))
+    return unit_vector(theta, rng.uniform(0.0, 2.0 * np.pi, count))

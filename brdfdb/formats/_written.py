@@ -1,0 +1,92 @@
+"""Writing of files of others: all files of an export are there whole, or none is."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brdfdb.errors import WriteError
+
+if TYPE_CHECKING:
+    from brdfdb.formats._stated_error import FileError
+
+
+@dataclass(frozen=True)
+class Written:
+    """The files of one table in another format, and what they state.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+        The file itself first, then those that stand beside it. A format may write a directory.
+    error : FileError or None
+        Error of the values in the file against those of the table; None of pictures and source code.
+    tolerance : float or None [1]
+        Largest p99 that was asked for; None where nothing was.
+    remarks : tuple of str
+        Sentences on what the format cannot hold of this table.
+    """
+
+    paths: tuple[Path, ...]
+    error: FileError | None = None
+    tolerance: float | None = None
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def within(self) -> bool:
+        """Return True if the file is as near to the table as was asked for."""
+        return self.error is None or self.tolerance is None or self.error.p99 <= self.tolerance
+
+    @property
+    def nbytes(self) -> int:
+        """Size [byte] of all files."""
+        return sum(_size(path) for path in self.paths)
+
+
+def _size(path: Path) -> int:
+    return sum(_size(part) for part in path.iterdir()) if path.is_dir() else path.stat().st_size
+
+
+@contextlib.contextmanager
+def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
+    """Give temporary paths to write, and rename them to `paths` when all are written; else none is left behind.
+
+    Parameters
+    ----------
+    paths : path
+        Files, or directories, of one export; those that are there are replaced at the end.
+
+    Raises
+    ------
+    WriteError
+        If one of them cannot be written: the directory is missing or a file, the disk is full, the name is that of a
+        directory.
+    """
+    final = tuple(Path(path) for path in paths)
+    mark = uuid.uuid4().hex
+    halves = tuple(path.with_name(f".{mark}{path.suffix}") for path in final)
+    try:
+        for path, half in zip(final, halves, strict=True):
+            if path.is_dir() and not half.suffix == ".zarr":
+                raise WriteError(f"cannot write {path}: it is a directory")
+        yield halves
+        for path, half in zip(final, halves, strict=True):
+            if half.is_dir() and path.exists():
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+            os.replace(half, path)
+    except OSError as error:
+        if isinstance(error, WriteError):
+            raise
+        raise WriteError(f"cannot write {final[0]}: {error.strerror or error}") from error
+    finally:
+        for half in halves:
+            if half.is_dir():
+                shutil.rmtree(half, ignore_errors=True)
+            else:
+                half.unlink(missing_ok=True)
