@@ -1,9 +1,8 @@
 """The closures of MaterialX as its GLSL evaluates them, and the surfaces OpenPBR and Standard Surface made of them.
 
 Transcribed from the formulas of the pixel shaders that MaterialX 1.39 generates: `mx_oren_nayar_diffuse_bsdf`,
-`mx_dielectric_bsdf`, `mx_generalized_schlick_bsdf` and `mx_conductor_bsdf`, with its analytic directional albedo. N.V and
-N.L are the cosines of viewer and light. The layers make the surfaces slightly different when light and viewer change
-places.
+`mx_dielectric_bsdf`, `mx_generalized_schlick_bsdf` and `mx_conductor_bsdf`, with its analytic directional albedo. The
+layers, and the compensation of facets, depend on the viewer alone: the surfaces are not quite reciprocal.
 """
 
 from __future__ import annotations

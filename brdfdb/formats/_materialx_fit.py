@@ -36,8 +36,8 @@ def fitted(kind: str, table: Table, channels: Channels) -> Surface:
     kind : str
         "open_pbr_surface" or "standard_surface".
     table : Table
-        Any table. Where nothing but the specular part is in its lobe, the facets of the surface mirror, with a roughness
-        of 0. Of others the specular part is left out.
+        Any table. Where nothing but the specular part is in its lobe, the facets of the surface mirror, with a
+        roughness of 0. Of others the specular part is left out.
     channels : Channels
         One channel, or red, green and blue.
 
@@ -50,7 +50,7 @@ def fitted(kind: str, table: Table, channels: Channels) -> Surface:
     -----
     The sum over all pairs of directions, with both cosines, of the squared difference of cube roots of f_r is made
     least. It is the distance "lightness" of `brdfdb.conversion.convert`, which keeps highlights. All numbers of all
-    channels are searched together by least squares, which takes a second at most; the simplexes of `convert`, for which
+    channels are searched together by least squares, which takes half a second. The simplexes of `convert`, for which
     any distance will do, take minutes for three channels.
     """
     source = table.source
@@ -58,7 +58,7 @@ def fitted(kind: str, table: Table, channels: Channels) -> Surface:
     symmetry = Symmetry(table.anisotropic, source is not None and source.elliptical)
 
     def lobe(cos: Array) -> Lobe | None:
-        return source.lobe(cos, at) if source is not None and source.has_lobe else None
+        return None if source is None else source.lobe(cos, at)
 
     def truth(wi: Floats, wr: Floats) -> Floats:
         return channels.values(table, wi, wr)
@@ -99,10 +99,14 @@ class _Search:
         colors = self._truth.shape[1]
         roughness, base = float(numbers[0]), tuple(numbers[1 : 1 + colors].tolist())
         if self.diffuse:
-            return Surface(self.kind, base, base_diffuse_roughness=roughness, specular_weight=0.0)
+            # OpenPBR takes the light of a black highlight from the body, at grazing: least of a rough one
+            rough = 1.0 if self.kind == OPEN_PBR else 0.3
+            return Surface(
+                self.kind, base, base_diffuse_roughness=roughness, specular_weight=0.0, specular_roughness=rough
+            )
         edge, rest = tuple(numbers[1 + colors : 1 + 2 * colors].tolist()), numbers[1 + 2 * colors :]
         root, metal, weight = rest[:3].tolist()
-        facets = {"specular_roughness": 0.0}
+        facets: dict[str, Any] = {"specular_roughness": 0.0}
         if self.widths.size:
             facets = of_alphas(self.kind, float(np.exp(rest[3])), float(np.exp(rest[-1])))
         return Surface(
@@ -126,7 +130,9 @@ class _Search:
             begin += [*([0.7] * colors), 0.3, metal, 0.7, *self.widths]
             low += [*([0.0] * (colors + 3)), *np.full(self.widths.size, np.log(_NARROWEST))]
             high += [*([1.0] * colors), np.sqrt(_MOST_F_0), 1.0, 1.0, *np.full(self.widths.size, np.log(_WIDEST))]
-        end = least_squares(self._left, begin, bounds=(low, high), ftol=_PRECISION, xtol=_PRECISION, max_nfev=_STEPS)
+        end = least_squares(
+            self._left, begin, bounds=(low, high), ftol=_PRECISION, xtol=_PRECISION, max_nfev=_STEPS, tr_solver="lsmr"
+        )
         return self.surface(end.x)
 
     def distance(self, surface: Surface) -> float:
