@@ -13,7 +13,7 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-from _site import api, commands, figures, http, libraries, materials, models, papers, results, schemas, store
+from _site import api, commands, figures, formats, http, libraries, materials, models, papers, results, schemas, store
 
 # Each has write(docs, store)
 _WRITERS = (api, commands, figures, http, libraries, materials, models, papers, results, schemas)

@@ -33,7 +33,9 @@ def write(table: Any, path: Path, *, tolerance: float = 0.02, verdict: str | Non
     return Written((path,), error, tolerance, remarks)
 
 
-LIST = SimpleNamespace(suffix=".list", media_type="text/plain", summary="lists", kinds=(), options=(), write=write)
+LIST = SimpleNamespace(
+    suffix=".list", media_type="text/plain", summary="lists", tools="", kinds=(), options=(), write=write
+)
 
 
 @pytest.fixture
