@@ -17,6 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from brdfdb.errors import (
     BrdfdbError,
     BusyError,
+    CannotHoldError,
+    FileFormatError,
     MaterialError,
     MissingExtraError,
     ParameterError,
@@ -47,6 +49,8 @@ ERRORS = [
     UnknownFamilyError("fome", ["foam"]),
     UnknownRevisionError("foam has no revision r000009"),
     WriteError("cannot write a.exr"),
+    CannotHoldError("foam: the format is isotropic"),
+    FileFormatError("a.bsdf: no format recognises it"),
     BusyError("another build is at work on foam"),
     MissingExtraError("uvicorn is not installed"),
 ]

@@ -17,8 +17,10 @@ from brdfdb.formats._interface import Exporter, Importer, Option, options_of, pa
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._written import Written
+    from brdfdb.tables.table import Table
 
-__all__ = ["EXPORTERS", "IMPORTERS", "Exporter", "Importer", "Option", "options_of", "parsed_options", "read"]
+__all__ = ["EXPORTERS", "IMPORTERS", "Exporter", "Importer", "Option", "options_of", "parsed_options", "read", "write"]
 
 _HEAD = 4096  # bytes of a file that tell its format
 
@@ -32,6 +34,60 @@ def _modules() -> dict[str, Any]:
 _MODULES = _modules()
 EXPORTERS: dict[str, Exporter] = {name: module for name, module in _MODULES.items() if hasattr(module, "write")}
 IMPORTERS: dict[str, Importer] = {name: module for name, module in _MODULES.items() if hasattr(module, "read")}
+
+
+def write(
+    table: Table, path: str | os.PathLike[str], file_format: str, *, verdict: str | None = None, **options: Any
+) -> Written:
+    """Write a table as a file of another format: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The file; one that is there is replaced. Some formats write a second file beside it.
+    file_format : str
+        One of `EXPORTERS`.
+    verdict : str, optional
+        Verdict of the audit of this revision, for the record in the file.
+    **options
+        Options of the format, as `brdfdb export FORMAT --help` lists them, with underscores.
+
+    Returns
+    -------
+    Written
+        The paths, and the error that the file states.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format or option, or an option cannot have its value.
+    CannotHoldError
+        If the format has no place for such a table.
+    WriteError
+        If a file cannot be written.
+
+    Examples
+    --------
+    >>> import brdfdb
+    >>> from brdfdb import formats
+    >>> brass = brdfdb.open()["rolled-brass"]  # doctest: +SKIP
+    >>> formats.write(brass, "brass.bsdf", "rgl", tolerance=0.05).error.p99 < 0.05  # doctest: +SKIP
+    True
+    """
+    if file_format not in EXPORTERS:
+        raise ParameterError(
+            "file_format", f"{file_format!r} is not one of {', '.join(EXPORTERS)}", file_format, tuple(EXPORTERS)
+        )
+    exporter = EXPORTERS[file_format]
+    parsed_options(exporter, {name: _text(value) for name, value in options.items()})
+    return exporter.write(table, Path(path), verdict=verdict, **options)
+
+
+def _text(value: Any) -> str:
+    """Return the value of an option as command line and HTTP give it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Samples:

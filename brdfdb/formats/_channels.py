@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb import spectra
-from brdfdb.errors import ParameterError
+from brdfdb.errors import CannotHoldError
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def channels_of(table: Table, colour: str = "") -> Channels:
 
     Raises
     ------
-    ParameterError
+    CannotHoldError
         If a colour is asked for and the wavelengths of the table do not reach from 420 to 680 nm.
     """
     at = table.wavelength_nm
@@ -82,11 +82,9 @@ def channels_of(table: Table, colour: str = "") -> Channels:
         return Channels(tuple(f"{value:g}nm" for value in at), at, None, "f_r at each wavelength")
     wavelengths = at if spectra.covers_visible(at) else spectra.picture_wavelengths(at)
     if wavelengths is None:
-        raise ParameterError(
-            "colour",
-            f"wavelengths of {at[0]:g} to {at[-1]:g} nm give no colour; it takes {spectra.VISIBLE_FROM_NM:g} to "
-            f"{spectra.VISIBLE_TO_NM:g} nm",
-            colour,
+        raise CannotHoldError(
+            f"{table.name}: wavelengths of {at[0]:g} to {at[-1]:g} nm give no colour; the format needs "
+            f"{spectra.VISIBLE_FROM_NM:g} to {spectra.VISIBLE_TO_NM:g} nm"
         )
     key = tuple(wavelengths.tolist())
     if colour == "rgb":

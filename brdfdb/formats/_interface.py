@@ -88,6 +88,8 @@ class Exporter(Protocol):
         Media type over HTTP.
     summary : str
         A few words on what is written.
+    tools : str
+        Programs that read such files.
     kinds : tuple of str
         Kinds of files, one file each, that are made of one table: values of the keyword argument `kind`. Empty if one
         file holds the table.
@@ -102,6 +104,7 @@ class Exporter(Protocol):
     suffix: str
     media_type: str
     summary: str
+    tools: str
     kinds: tuple[str, ...]
     options: tuple[Option, ...]
     write: Callable[..., Written]

@@ -81,29 +81,9 @@ class Comparison:
 
     def __init__(self, table: Table, channels: Channels | None = None) -> None:
         self.channels = channels_of(table) if channels is None else channels
-        rng = np.random.default_rng(SEED)
-        self.wi, over = _cosine_weighted(rng, 2 * PAIRS), _cosine_weighted(rng, 2 * PAIRS)
-        source = table.source
-        at = table.wavelength_nm
-        in_turn = None if at is None else at[np.arange(2 * PAIRS) % at.size]
-        lobe = None if source is None else source.lobe(self.wi[:, 2], in_turn)
-        density = over[:, 2] / np.pi
-        self.wr, self._lobe = over, slice(0, PAIRS)
-        if lobe is not None:
-            drawn = [
-                lobe._replace(share=np.ones(1), alpha_x=w * lobe.alpha_x, alpha_y=w * lobe.alpha_y, visible=False)
-                for w in WIDTHS
-            ]
-            u, angle = 1.0 - rng.random(2 * PAIRS), rng.uniform(0.0, 2.0 * np.pi, 2 * PAIRS)
-            mirrored = [mirrored_in_lobe(u, angle, self.wi, some) for some in drawn]
-            number = np.arange(2 * PAIRS)
-            self.wr = np.where((number < PAIRS)[:, np.newaxis], over, mirrored[0])
-            self.wr = np.where((number >= PAIRS + PAIRS // 2)[:, np.newaxis], mirrored[1], self.wr)
-            self._lobe = slice(PAIRS, 2 * PAIRS)
-            cosine = np.maximum(self.wr[:, 2], 0.0) / np.pi
-            density = 0.5 * cosine + 0.5 * np.mean([mixture_density(some, self.wi, self.wr) for some in drawn], axis=0)
-        self._above = self.wr[:, 2] > 0.0
-        self._weight = np.where(self._above, self.wr[:, 2], 0.0) / density
+        self.wi, self.wr, self._weight, lobe = _drawn(table)
+        self._above = self._weight > 0.0
+        self._draws = slice(0, PAIRS), slice(PAIRS, 2 * PAIRS) if lobe else slice(0, 2 * PAIRS)
         self.truth = self.channels.values(table, self.wi, self.wr)
 
     @functools.cached_property
@@ -119,7 +99,7 @@ class Comparison:
         relative = np.divide(wrong, scale, out=np.where(wrong > 0.0, np.inf, 0.0), where=scale > 0.0)
         whole = self._weight @ np.abs(self.truth)
         l1 = np.divide(self._weight @ wrong, whole, out=np.zeros_like(whole), where=whole > 0.0)
-        hemisphere, lobe = self._p99(relative, slice(0, PAIRS)), self._p99(relative, self._lobe)
+        hemisphere, lobe = (self._p99(relative, draw) for draw in self._draws)
         return FileError(
             p99=max(hemisphere, lobe),
             p99_hemisphere=hemisphere,
@@ -132,6 +112,40 @@ class Comparison:
         some = relative[draw][self._above[draw]]
         rank = max(1, _RANK * len(some) // PAIRS)
         return float(np.partition(some, len(some) - rank, axis=0)[len(some) - rank].max())
+
+
+def _drawn(table: Table) -> tuple[Floats, Floats, Floats, bool]:
+    """Draw lights and viewers for a table: first over the hemisphere, then in the lobe.
+
+    Returns
+    -------
+    wi, wr : array (2 PAIRS, 3)
+        Unit vectors.
+    weight : array (2 PAIRS,)
+        Cosine of the viewer over the density with which it was drawn; 0 below the horizon.
+    lobe : bool
+        False if the source has no lobe, or none is known: all viewers are then over the hemisphere.
+    """
+    rng = np.random.default_rng(SEED)
+    count = 2 * PAIRS
+    wi, over = _cosine_weighted(rng, count), _cosine_weighted(rng, count)
+    at = table.wavelength_nm
+    in_turn = None if at is None else at[np.arange(count) % at.size]
+    lobe = None if table.source is None else table.source.lobe(wi[:, 2], in_turn)
+    if lobe is None:
+        return wi, over, np.full(count, np.pi), False
+    lobes = [
+        lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False)
+        for width in WIDTHS
+    ]
+    u, angle = 1.0 - rng.random(count), rng.uniform(0.0, 2.0 * np.pi, count)
+    wr = over
+    for part, drawn in enumerate(lobes):  # the second half, in equal parts
+        start = PAIRS + part * PAIRS // len(lobes)
+        wr = np.where((np.arange(count) >= start)[:, np.newaxis], mirrored_in_lobe(u, angle, wi, drawn), wr)
+    cosine = np.maximum(wr[:, 2], 0.0)
+    density = 0.5 * cosine / np.pi + 0.5 * np.mean([mixture_density(drawn, wi, wr) for drawn in lobes], axis=0)
+    return wi, wr, cosine / density, True
 
 
 def _cosine_weighted(rng: np.random.Generator, count: int) -> NDArray[np.float64]:

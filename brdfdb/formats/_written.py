@@ -66,15 +66,17 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
     ------
     WriteError
         If one of them cannot be written: the directory is missing or a file, the disk is full, the name is that of a
-        directory.
+        directory. A zarr group, a directory, is replaced by another one only.
     """
     final = tuple(Path(path) for path in paths)
     mark = uuid.uuid4().hex
     halves = tuple(path.with_name(f".{mark}{path.suffix}") for path in final)
     try:
-        for path, half in zip(final, halves, strict=True):
-            if path.is_dir() and not half.suffix == ".zarr":
+        for path in final:
+            if path.is_dir() and path.suffix != ".zarr":
                 raise WriteError(f"cannot write {path}: it is a directory")
+            if path.is_dir() and not (path / "zarr.json").exists():
+                raise WriteError(f"cannot write {path}: it is a directory that is no zarr group")
         yield halves
         for path, half in zip(final, halves, strict=True):
             if half.is_dir() and path.exists():
@@ -89,4 +91,5 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
             if half.is_dir():
                 shutil.rmtree(half, ignore_errors=True)
             else:
-                half.unlink(missing_ok=True)
+                with contextlib.suppress(OSError):  # also where its directory is a file
+                    half.unlink()

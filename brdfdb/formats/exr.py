@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 suffix = ".exr"
 media_type = "image/x-exr"
 summary = "slices of a table as OpenEXR files"
+tools = "every viewer of OpenEXR; spectral channels in the layout of Fichet et al. (2021)"
 kinds = ("lobe", "half_difference", "in_plane")
 options = (
     Option("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),

@@ -13,10 +13,10 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-from _site import api, commands, figures, http, libraries, materials, models, papers, results, schemas, store
+from _site import api, commands, figures, formats, http, libraries, materials, models, papers, results, schemas, store
 
 # Each has write(docs, store)
-_WRITERS = (api, commands, figures, http, libraries, materials, models, papers, results, schemas)
+_WRITERS = (api, commands, figures, formats, http, libraries, materials, models, papers, results, schemas)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

@@ -51,8 +51,9 @@ def run(
     revisions = {name: store.head(name) for name in names or store}
     try:
         directory.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise WriteError(f"cannot write to {directory}: it is a file, not a directory") from None
+    except OSError as error:
+        reason = "it is a file, not a directory" if isinstance(error, FileExistsError) else error.strerror
+        raise WriteError(f"cannot write to {directory}: {reason}") from None
     verdicts = _verdicts(audit, revisions)
     write = partial(_write, store, directory=directory, file_format=file_format, options=options, verdicts=verdicts)
     exports: list[_Export] = []

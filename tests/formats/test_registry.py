@@ -34,6 +34,7 @@ LIST = SimpleNamespace(
     suffix=".list",
     media_type="text/csv",
     summary="f_r at the nodes of a table as text",
+    tools="people",
     kinds=(),
     options=(Option("digits", 4.0, "significant digits", low=1.0, high=9.0),),
     write=write,

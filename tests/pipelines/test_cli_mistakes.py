@@ -113,9 +113,9 @@ def test_a_store_that_cannot_be_written_is_one_sentence(recipe: Path, tmp_path: 
 
 def test_slices_that_cannot_be_written_are_one_sentence(built: Path, tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "file").write_text("precious")
-    for out in (tmp_path / "file", tmp_path / "file" / "exr"):
-        sentence = fails(capsys, "export", "exr", "foam", "--store", built, "--out", out)
-        assert sentence.startswith(f"brdfdb: {out}: ")
+    for out, reason in (("file", "it is a file, not a directory"), ("file/exr", "Not a directory")):
+        sentence = fails(capsys, "export", "exr", "foam", "--store", built, "--out", tmp_path / out)
+        assert sentence == f"brdfdb: cannot write to {tmp_path / out}: {reason}"
     assert (tmp_path / "file").read_text() == "precious"
 
 

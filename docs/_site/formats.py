@@ -1,0 +1,54 @@
+"""The table of file formats and their options, from the registry."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+from _site.files import write_page
+from _site.markup import plain, table
+from brdfdb.formats import EXPORTERS, IMPORTERS, Option, options_of
+
+
+def write(docs: Path, _: Path) -> None:
+    """Write ``reference/generated/formats.txt``, which ``reference/formats.md`` includes."""
+    rows = [
+        (
+            f"[`{name}`](#format-{name})",
+            f"`{exporter.suffix}`",
+            plain(exporter.summary),
+            plain(exporter.tools),
+            "yes" if name in IMPORTERS else "",
+        )
+        for name, exporter in EXPORTERS.items()
+    ]
+    parts = [table(("format", "files", "holds", "read by", "read again by brdfdb"), rows), *map(_section, EXPORTERS)]
+    write_page(docs / "reference" / "generated" / "formats.txt", "\n".join(parts))
+
+
+def _section(name: str) -> str:
+    exporter = EXPORTERS[name]
+    first, _, rest = (inspect.getdoc(exporter) or "").partition("\n\n")
+    rows = [
+        (f"`--{option.name.replace('_', '-')}`", plain(option.help), _allowed(option), _default(option))
+        for option in options_of(exporter).values()
+    ]
+    options = table(("option", "meaning", "values", "default"), rows) if rows else "It has no options.\n"
+    return "\n".join([f"(format-{name})=", f"## {name}\n", f"{plain(first)}\n", f"{_prose(rest)}\n", options])
+
+
+def _prose(text: str) -> str:
+    """Return paragraphs of a docstring as MyST: code in single backquotes."""
+    return text.replace("``", "`")
+
+
+def _allowed(option: Option) -> str:
+    if option.choices:
+        return ", ".join(f"`{choice}`" for choice in option.choices)
+    return "" if isinstance(option.default, bool) else f"{option.low:g} to {option.high:g}"
+
+
+def _default(option: Option) -> str:
+    if option.name == "kind":
+        return "a file of each kind"
+    return f"`{str(option.default).lower()}`" if option.default != "" else ""

@@ -1,0 +1,94 @@
+"""The export job: what is left out, what is beyond its tolerance, and whose verdict is written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from brdfdb.errors import CannotHoldError
+from brdfdb.formats import EXPORTERS
+from brdfdb.formats._stated_error import FileError
+from brdfdb.formats._written import Written, whole
+from brdfdb.materials import Material
+from brdfdb.store.publication import publish_dataset
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.tabulation import tabulate
+from tests.pipelines.command import Captured, run
+
+P99 = {"grey": 0.01, "dark": 0.03}
+
+
+def write(table: Any, path: Path, *, tolerance: float = 0.02, verdict: str | None = None) -> Written:
+    if table.name == "strange":
+        raise CannotHoldError("strange: this format holds nothing strange")
+    with whole(path) as (half,):
+        half.write_text(str(verdict))
+    error = FileError(P99[table.name], P99[table.name], P99[table.name], 0.0, 0.0)
+    remarks = ("a specular part is not in the file",) if table.name == "dark" else ()
+    return Written((path,), error, tolerance, remarks)
+
+
+LIST = SimpleNamespace(
+    suffix=".list", media_type="text/plain", summary="lists", tools="", kinds=(), options=(), write=write
+)
+
+
+@pytest.fixture
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A store with three grey tables, and the format in the registry."""
+    monkeypatch.setitem(EXPORTERS, "list", LIST)
+    grid = Grid({"theta_i": [0, 80], "theta_r": [0, 80], "delta_phi": [0, 90, 180]})
+    for name in ("grey", "dark", "strange"):
+        table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": 0.5}}
+        publish_dataset(tmp_path / "store", name, tabulate(Layout(Material.from_table(name, table), grid)))
+    return tmp_path / "store"
+
+
+def test_all_leaves_out_what_the_format_cannot_hold(store: Path, tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "out"
+    assert run("export", "list", "--all", "--store", store, "--out", out) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("2 LIST files, ")
+    assert "99 of 100 values within 3.00% (dark)" in text
+    assert "dark: 3.00%, beyond the tolerance of 2.00%\n" in text
+    assert "dark: a specular part is not in the file\n" in text
+    assert text.endswith("strange: this format holds nothing strange; left out\n")
+    assert sorted(path.name for path in out.iterdir()) == ["dark.list", "grey.list"]
+
+
+def test_a_material_that_is_named_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:
+    assert run("export", "list", "strange", "--store", store, "--out", tmp_path / "out") == 2
+    assert capsys.readouterr().err.endswith("brdfdb: strange: this format holds nothing strange\n")
+
+
+@pytest.mark.parametrize(("name", "code"), [("grey", 0), ("dark", 1)])
+def test_strict_fails_beyond_the_tolerance(store: Path, tmp_path: Path, name: str, code: int) -> None:
+    assert run("export", "list", name, "--strict", "--store", store, "--out", tmp_path) == code
+    assert (tmp_path / f"{name}.list").exists()
+
+
+def test_the_verdict_of_this_revision_is_written(store: Path, tmp_path: Path) -> None:
+    entries = [("grey", "r000001", "passes"), ("dark", "r000009", "violates")]
+    report = {"materials": [dict(zip(("material", "revision", "verdict"), entry, strict=True)) for entry in entries]}
+    (store / "audit.json").write_text(json.dumps(report))
+    assert run("export", "list", "grey", "dark", "--store", store, "--out", tmp_path) == 0
+    assert (tmp_path / "grey.list").read_text() == "passes"
+    assert (tmp_path / "dark.list").read_text() == "None"
+    (store / "audit.json").write_text("[")
+    assert run("export", "list", "grey", "--store", store, "--out", tmp_path) == 0
+    assert (tmp_path / "grey.list").read_text() == "None"
+
+
+def test_an_output_that_is_a_file_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:
+    (tmp_path / "out").write_text("a file")
+    assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == 2
+    assert capsys.readouterr().err == f"brdfdb: cannot write to {tmp_path / 'out'}: it is a file, not a directory\n"
+    (tmp_path / "grey.list").mkdir()
+    assert run("export", "list", "grey", "--store", store, "--out", tmp_path) == 2
+    assert capsys.readouterr().err.endswith("grey.list: it is a directory\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["grey.list", "out", "store"]
