@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from brdfdb.errors import CannotHoldError, FileFormatError
+from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
-from brdfdb.spectra import VISIBLE_FROM_NM, VISIBLE_TO_NM, picture_wavelengths
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 suffix = ".mtlx"
 media_type = "application/mtlx+xml"
 summary = "surfaces of MaterialX that come closest to tables"
+tools = "MaterialX and the programs with it: USD, Maya, Houdini, Blender, Arnold, RenderMan"
 kinds = (OPEN_PBR, STANDARD)
 options = (
     replace(
@@ -148,7 +148,11 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     material = root.find("surfacematerial")
     document = _record(None if material is None else material.get("doc"))
     name = document.get("name") or node.get("name") or path.stem
-    return FileTable(str(name), RGB, None, _three(surface).brdf, document)
+    surface = replace(surface, base_color=_colors(surface.base_color), specular_color=_colors(surface.specular_color))
+    grey = all(len(set(color)) == 1 for color in (surface.base_color, surface.specular_color))
+    if grey:
+        surface = replace(surface, base_color=surface.base_color[:1], specular_color=surface.specular_color[:1])
+    return FileTable(str(name), ("grey",) if grey else RGB, None, surface.brdf, document)
 
 
 def _channels(table: Table) -> tuple[Channels, tuple[str, ...]]:
@@ -158,11 +162,6 @@ def _channels(table: Table) -> tuple[Channels, tuple[str, ...]]:
         return channels_of(table), ()
     if at.size == 1:
         return channels_of(table), (f"grey: the table has one wavelength, {at[0]:g} nm",)
-    if picture_wavelengths(at) is None:
-        raise CannotHoldError(
-            f"{table.name}: MaterialX holds colours, and wavelengths of {at[0]:g} to {at[-1]:g} nm give none; it takes "
-            f"{VISIBLE_FROM_NM:g} to {VISIBLE_TO_NM:g} nm"
-        )
     return channels_of(table, "rgb"), ()
 
 
@@ -177,10 +176,9 @@ def _rounded(surface: Surface) -> Surface:
     return Surface(**{name: digits(value) for name, value in asdict(surface).items()})
 
 
-def _three(surface: Surface) -> Surface:
-    """Return a surface with three channels."""
-    base, edge = ((*color, *color[:1], *color[:1])[:3] for color in (surface.base_color, surface.specular_color))
-    return replace(surface, base_color=base, specular_color=edge)
+def _colors(color: tuple[float, ...]) -> tuple[float, ...]:
+    """Return red, green and blue of a colour, which may be one number."""
+    return color if len(color) == len(RGB) else color[:1] * len(RGB)
 
 
 def _document(name: str, surface: Surface, doc: str) -> str:
@@ -198,8 +196,8 @@ def _document(name: str, surface: Surface, doc: str) -> str:
         ElementTree.SubElement(turn, "input", name="axis", type="vector3", nodename=f"{shader}_normal")
     element = ElementTree.SubElement(root, surface.kind, name=shader, type="surfaceshader")
     for ours, open_pbr, standard, kind in _INPUTS:
-        value = getattr(_three(surface), ours)
-        words = ", ".join(f"{part:.6g}" for part in (value if isinstance(value, tuple) else (value,)))
+        value = getattr(surface, ours)
+        words = ", ".join(f"{part:.6g}" for part in (_colors(value) if kind == "color3" else (value,)))
         _input(element, open_pbr if surface.kind == OPEN_PBR else standard, kind, words)
     if turned:
         ElementTree.SubElement(element, "input", name=_TANGENT, type="vector3", nodename=f"{shader}_y")

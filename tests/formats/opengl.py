@@ -55,7 +55,7 @@ def _gl() -> Any:
 
 
 def run(source: str, wi: NDArray[np.float64], wr: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return the values (N, 3) of the function ``vec3 judged(vec3 wi, vec3 wr)`` of a source for unit vectors (N, 3)."""
+    """Return the values (N, 3) of ``vec3 judged(vec3 wi, vec3 wr)`` of a source at unit vectors (N, 3)."""
     return run_whole(source + _PAIRS, wi, wr)
 
 
