@@ -60,12 +60,11 @@ def write_source(table: Table, path: str | os.PathLike[str], language: Language,
     model, parameters, channels, remarks = _closed_form(table)
 
     def evaluate(wi: Floats, wr: Floats) -> Floats:
-        count = len(channels.names)
-        each = [
-            {name: np.ravel(value)[channel % np.size(value)] for name, value in parameters.items()}
-            for channel in range(count)
-        ]
-        return np.stack([MODELS[model].vectors(wi, wr, **one) for one in each], axis=-1)
+        values = []
+        for channel in range(len(channels.names)):
+            numbers = {name: np.ravel(value)[channel % np.size(value)] for name, value in parameters.items()}
+            values.append(MODELS[model].vectors(wi, wr, **numbers))
+        return np.stack(values, axis=-1)
 
     error = Comparison(table, channels).error_of(evaluate)
     if table.specular is not None:
