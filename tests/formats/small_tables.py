@@ -32,7 +32,7 @@ def small_table(name: str) -> Table:
     if material.anisotropic:
         phis = np.linspace(0.0, 360.0, 49).tolist()
         axes = {"theta_i": _THETAS, "phi_i": [0.0, 30.0, 60.0, 90.0], "theta_r": _THETAS, "phi_r": phis}
-    wavelengths = {SPECTRAL: np.linspace(420.0, 680.0, 5), SMOOTH: np.array([460.0])}.get(name)
+    wavelengths = {SPECTRAL: np.arange(420.0, 681.0, 20.0), SMOOTH: np.array([460.0])}.get(name)
     with tempfile.TemporaryDirectory() as folder:
         publish_dataset(Path(folder), name, tabulate(Layout(material, Grid(axes), wavelengths)))
         return brdfdb.open(folder)[name]
