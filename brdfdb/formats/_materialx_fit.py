@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.conversion.nodes import COARSE, Nodes
+from brdfdb.errors import import_extra
 from brdfdb.formats._channels import Channels
 from brdfdb.formats._materialx_closures import OPEN_PBR, Surface
 from brdfdb.integrals.pairs import Symmetry
@@ -122,8 +123,7 @@ class _Search:
 
     def descent(self, metal: float) -> Surface:
         """Return the surface at the end of a descent that begins with a share of metal."""
-        from scipy.optimize import least_squares
-
+        least_squares = import_extra("scipy.optimize").least_squares
         colors = self._truth.shape[1]
         begin, low, high = [0.3] * (1 + colors), [0.0] * (1 + colors), [1.0] * (1 + colors)
         if not self.diffuse:

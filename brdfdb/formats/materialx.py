@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -38,6 +37,7 @@ HOLDS = "parameters of a surface; f_r [1/sr] as the GLSL of MaterialX 1.39 evalu
 _FITTED = "a surface of MaterialX that was fitted to the table, by cube roots of f_r; the error tells how near it is"
 _SMOOTH = "its facets mirror: a roughness of 0 is a Dirac delta in MaterialX, which is no part of f_r"
 _LARGEST = 1 << 22  # bytes of a document that are read
+_MOST = 1000.0  # largest number of a parameter, far above those that mean anything
 _NOT_EVALUATED = "this input is not evaluated here"
 
 # Names of the parameters: of `Surface`, OpenPBR and Standard Surface, and the type
@@ -234,7 +234,9 @@ def _surface(path: Path, node: ElementTree.Element) -> Surface:
             ours, kind = names[name]
             numbers = _numbers(text)
             if len(numbers) != (3 if kind == "color3" else 1) or "nodename" in element.attrib:
-                raise FileFormatError(f"{path}: input {name}: {text!r:.60} is not a {kind} of finite numbers")
+                raise FileFormatError(
+                    f"{path}: input {name}: {text!r:.60} is not a {kind} of numbers in [0, {_MOST:g}]"
+                )
             values[ours] = numbers if kind == "color3" else numbers[0]
         else:
             raise FileFormatError(f"{path}: input {name}: {_NOT_EVALUATED}")
@@ -242,12 +244,12 @@ def _surface(path: Path, node: ElementTree.Element) -> Surface:
 
 
 def _numbers(text: str) -> tuple[float, ...]:
-    """Return the finite numbers of a text; empty if it has others."""
+    """Return the numbers of a text; empty if it has others, or one out of range."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
         return ()
-    return numbers if all(math.isfinite(number) for number in numbers) else ()
+    return numbers if all(0.0 <= number <= _MOST for number in numbers) else ()
 
 
 def _record(doc: str | None) -> dict[str, Any]:

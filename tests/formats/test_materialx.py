@@ -191,6 +191,7 @@ def test_brass_is_brightest_across_its_grain(tmp_path: Path) -> None:
         ("<materialx/>", "no node open_pbr_surface or standard_surface"),
         ('<materialx><open_pbr_surface><input name="coat_weight" value="1"/></open_pbr_surface></materialx>', "coat"),
         ('<materialx><standard_surface><input name="base" value="nan"/></standard_surface></materialx>', "input base"),
+        ('<materialx><standard_surface><input name="specular_IOR" value="-1"/></standard_surface></materialx>', "_IOR"),
         ('<materialx><standard_surface><input name="base_color" value="1,2"/></standard_surface></materialx>', "'1,2'"),
     ],
 )
