@@ -141,9 +141,9 @@ def test_export_takes_names_or_all_and_its_options_anywhere(
     assert out.startswith("8 EXR files, ")
     assert out.endswith(f" in {tmp_path / 'some'}\n")
     assert "exporting" in err
-    assert len(list((tmp_path / "some").iterdir())) == 6
+    assert len(list((tmp_path / "some").iterdir())) == 8
     assert run("export", "exr", "--all", "--half", "--out", tmp_path / "all", "--store", built) == 0
-    assert capsys.readouterr().out.startswith("15 EXR files, ")
+    assert capsys.readouterr().out.startswith("20 EXR files, ")
     assert {path.name.rsplit("_")[0] for path in (tmp_path / "all").iterdir()} == set(names)
 
 
