@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb.geometry import HALF_PI, unit_vector
-
-Array = NDArray[np.float64]
+from brdfdb.parameters import Floats
 
 # Cosine of the lowest direction at which a table is looked up: at 90 degrees f_r of many models has a pole
 LOWEST = float(np.cos(np.deg2rad(89.5)))
@@ -39,31 +37,31 @@ class System(Protocol):
     @property
     def ends(self) -> tuple[float, ...]: ...
 
-    def angles(self, wi: Array, wr: Array) -> Array:
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
         """Return the angles [rad], shape (N, axes), of unit vectors (N, 3) of light and viewer."""
 
-    def directions(self, angles: Array) -> tuple[Array, Array]:
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
         """Return unit vectors (N, 3) of light and viewer above the horizon for angles [rad] of shape (N, axes)."""
 
 
-def _polar(w: Array) -> Array:
+def _polar(w: Floats) -> Floats:
     return np.asarray(np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]))
 
 
-def _azimuth(x: Array, y: Array) -> Array:
+def _azimuth(x: Floats, y: Floats) -> Floats:
     """Return azimuths [rad] in [0, 2 pi)."""
     phi = np.arctan2(y, x)
     return np.where(phi < 0.0, phi + 2.0 * np.pi, phi) % (2.0 * np.pi)
 
 
-def _turned(w: Array, phi: Array) -> Array:
+def _turned(w: Floats, phi: Floats) -> Floats:
     """Return vectors (N, 3) turned about the normal by an azimuth [rad]."""
     c, s = np.cos(phi), np.sin(phi)
     return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], axis=1)
 
 
-def _tilted(w: Array, theta: Array) -> Array:
-    """Return vectors (N, 3) tilted in the plane of x and z: the normal comes to the polar angle theta [rad], towards x."""
+def _tilted(w: Floats, theta: Floats) -> Floats:
+    """Return vectors (N, 3) tilted in the plane of x and z, so that the normal moves by theta [rad] towards x."""
     c, s = np.cos(theta), np.sin(theta)
     return np.stack([c * w[:, 0] + s * w[:, 2], w[:, 1], c * w[:, 2] - s * w[:, 0]], axis=1)
 
@@ -92,14 +90,14 @@ class Spherical:
         turn = np.pi if self.mirrored else 2.0 * np.pi
         return (HALF_PI, 2.0 * np.pi, HALF_PI, turn) if self.anisotropic else (HALF_PI, HALF_PI, turn)
 
-    def angles(self, wi: Array, wr: Array) -> Array:
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
         phi_i, phi_r = _azimuth(wi[:, 0], wi[:, 1]), _azimuth(wr[:, 0], wr[:, 1])
         if not self.anisotropic:
             phi_r = (phi_r - phi_i) % (2.0 * np.pi)
         phi_r = _folded(phi_r) if self.mirrored else phi_r
         return np.stack([_polar(wi), *([phi_i] if self.anisotropic else []), _polar(wr), phi_r], axis=1)
 
-    def directions(self, angles: Array) -> tuple[Array, Array]:
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
         columns = list(angles.T)
         phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_i, theta_r, phi_r = columns
@@ -133,14 +131,14 @@ class Specular:
         turn = np.pi if self.mirrored else 2.0 * np.pi
         return (HALF_PI, 2.0 * np.pi, np.pi, turn) if self.anisotropic else (HALF_PI, np.pi, turn)
 
-    def angles(self, wi: Array, wr: Array) -> Array:
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
         theta_i, phi_i = _polar(wi), _azimuth(wi[:, 0], wi[:, 1])
         w = _tilted(_turned(wr, -phi_i), theta_i)
         phi_s = _azimuth(w[:, 0], w[:, 1])
         phi_s = _folded(phi_s) if self.mirrored else phi_s
         return np.stack([theta_i, *([phi_i] if self.anisotropic else []), _polar(w), phi_s], axis=1)
 
-    def directions(self, angles: Array) -> tuple[Array, Array]:
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
         columns = list(angles.T)
         phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_i, theta_s, phi_s = columns
@@ -179,7 +177,7 @@ class HalfDifference:
         turn = 2.0 * np.pi / (1 + self.mirrored) / (1 + self.reciprocal)
         return (HALF_PI, 2.0 * np.pi, HALF_PI, turn) if self.anisotropic else (HALF_PI, HALF_PI, turn)
 
-    def angles(self, wi: Array, wr: Array) -> Array:
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
         half = wi + wr
         half /= np.linalg.norm(half, axis=1, keepdims=True)
         theta_h, phi_h = _polar(half), _azimuth(half[:, 0], half[:, 1])
@@ -193,7 +191,7 @@ class HalfDifference:
         theta_d = np.minimum(_polar(d), HALF_PI)
         return np.stack([theta_h, *([phi_h] if self.anisotropic else []), theta_d, phi_d], axis=1)
 
-    def directions(self, angles: Array) -> tuple[Array, Array]:
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
         columns = list(angles.T)
         phi_h = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_h, theta_d, phi_d = columns
@@ -207,7 +205,7 @@ class HalfDifference:
         return _turned(_tilted(d, theta_h), phi_h), _turned(_tilted(opposite, theta_h), phi_h)
 
 
-def _folded(phi: Array) -> Array:
+def _folded(phi: Floats) -> Floats:
     """Return azimuths [rad] of the mirror image with an azimuth in [0, pi]."""
     phi = np.abs(phi) % (2.0 * np.pi)
     return np.minimum(phi, 2.0 * np.pi - phi)

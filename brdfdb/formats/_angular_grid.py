@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from brdfdb.formats._stated_error import Comparison, FileError
     from brdfdb.tables.table import Table
 
-Array = NDArray[np.float64]
-
 _AT_ONCE = 1 << 22  # values that are interpolated, or looked up, at a time
 _FIRST = 8  # intervals of each axis before any is halved
 _HALVINGS = 14
@@ -52,11 +50,11 @@ class AngularGrid:
     """
 
     system: System
-    nodes: tuple[Array, ...]
+    nodes: tuple[Floats, ...]
     values: NDArray[np.float32]
 
     def evaluate(self, wi: Floats, wr: Floats) -> Floats:
-        """Return f_r [1/sr], shape (N, C), at unit vectors (N, 3): beyond the first and last node on a straight line."""
+        """Return f_r [1/sr], shape (N, C), at unit vectors (N, 3). Lines continue beyond the first and last node."""
         channels = self.values.shape[-1]
         values = np.empty((len(wi), channels))
         step = max(1, _AT_ONCE // (channels << len(self.nodes)))
@@ -65,9 +63,9 @@ class AngularGrid:
             values[some] = self._interpolated(self.system.angles(wi[some], wr[some]))
         return values
 
-    def _interpolated(self, angles: Array) -> Floats:
+    def _interpolated(self, angles: Floats) -> Floats:
         flat = self.values.reshape(-1, self.values.shape[-1])
-        corners: list[tuple[tuple[NDArray[np.intp], Array], ...]] = []
+        corners: list[tuple[tuple[NDArray[np.intp], Floats], ...]] = []
         for nodes, angle in zip(self.nodes, angles.T, strict=True):
             below = np.clip(np.searchsorted(nodes, angle, side="right") - 1, 0, max(nodes.size - 2, 0))
             if nodes.size == 1:
@@ -83,7 +81,7 @@ class AngularGrid:
         return total
 
 
-def filled(table: Table, comparison: Comparison, system: System, nodes: Sequence[Array]) -> AngularGrid:
+def filled(table: Table, comparison: Comparison, system: System, nodes: Sequence[Floats]) -> AngularGrid:
     """Return a grid with f_r of a table, in the channels of the comparison, at nodes [rad] of each angle."""
     shape = tuple(axis.size for axis in nodes)
     count, channels = math.prod(shape), len(comparison.channels.names)
@@ -126,7 +124,7 @@ class Plan:
         self._shares = np.ones(len(system.ends))
         self._lines = [self._halved(axis, end, target) for axis, end in enumerate(system.ends)]
 
-    def nodes(self, target: float) -> tuple[Array, ...]:
+    def nodes(self, target: float) -> tuple[Floats, ...]:
         """Return nodes [rad] of each angle, between which linear interpolation is wrong by about `target`."""
         axes = []
         for (edges, errors), share in zip(self._lines, self._shares, strict=True):
@@ -149,7 +147,7 @@ class Plan:
             low, high = (low, middle) if self.count(middle) <= most else (middle, high)
         return high
 
-    def balance(self, nodes: Sequence[Array]) -> None:
+    def balance(self, nodes: Sequence[Floats]) -> None:
         """Shift nodes between the angles, so that each is wrong by the same: then their product is the smallest."""
         every = np.arange(len(self._angles))
         wrong = np.empty(len(nodes))
@@ -160,19 +158,19 @@ class Plan:
         wrong = np.maximum(wrong, 1e-3 * wrong.max()) + 1e-12
         self._shares *= np.clip(wrong / np.exp(np.log(wrong).mean()), 1 / 4, 4.0)
 
-    def _wrong(self, some: NDArray[np.intp], axis: int, low: Array, high: Array) -> Array:
+    def _wrong(self, some: NDArray[np.intp], axis: int, low: Floats, high: Floats) -> Floats:
         """Return relative errors of the lines of one angle at some pairs, between `low` and `high` [rad]."""
         share = ((self._angles[some, axis] - low) / (high - low))[:, np.newaxis]
         line = (1.0 - share) * self._values(some, axis, low) + share * self._values(some, axis, high)
         return np.asarray((np.abs(line - self._truth[some]) / self._scale[some]).max(axis=1))
 
-    def _values(self, some: NDArray[np.intp], axis: int, at: Array) -> Floats:
+    def _values(self, some: NDArray[np.intp], axis: int, at: Floats) -> Floats:
         moved = self._angles[some].copy()
         moved[:, axis] = at
         return self._comparison.channels.values(self._table, *self.system.directions(moved))
 
-    def _halved(self, axis: int, end: float, target: float) -> tuple[Array, Array]:
-        """Return edges [rad] of intervals from 0 to `end`, and the error over each, halved until it is within `target`."""
+    def _halved(self, axis: int, end: float, target: float) -> tuple[Floats, Floats]:
+        """Return edges [rad] of intervals from 0 to `end`, and the error over each, by halving."""
         angle = self._angles[:, axis]
         edges = np.linspace(0.0, end, _FIRST + 1)
         errors = np.full(_FIRST, np.nan)

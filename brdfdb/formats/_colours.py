@@ -26,14 +26,15 @@ def colours_of(table: Table, colour: str) -> tuple[Channels, tuple[str, ...]]:
     at = table.wavelength_nm
     names = {"rgb": ("R", "G", "B"), "xyz": ("X", "Y", "Z"), "grey": ("grey",)}[colour]
     if at is not None and at.size == 1:
-        meaning = f"all channels are f_r at {at[0]:g} nm"
+        meaning = f"{'all channels are ' if len(names) > 1 else ''}f_r at {at[0]:g} nm"
         return Channels(names, at, np.ones((1, len(names))), meaning), (meaning,)
     try:
         channels = channels_of(table, "" if at is None and colour == "grey" else colour)
     except ParameterError as error:
         raise CannotHoldError(f"{table.name}: {error.sentence}") from None
-    remark = "all channels are the same: the table is grey" if at is None else f"of the spectrum: {channels.meaning}"
-    return channels, (remark,)
+    if at is None:
+        return channels, ("all channels are the same: the table is grey",) if len(names) > 1 else ()
+    return channels, (f"of the spectrum: {channels.meaning}",)
 
 
 def specular_remark(table: Table) -> tuple[str, ...]:

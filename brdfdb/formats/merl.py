@@ -95,9 +95,9 @@ def write(
     comparison = Comparison(table, channels)
     planes = np.full((3, *SHAPE), INVALID)
     half = reciprocal(table, comparison)  # then the numbers at phi_d and pi - phi_d are the same
-    here = valid & (np.arange(SHAPE[2]) <= SHAPE[2] // 2) if half else valid
-    numbers = channels.values(table, *_SYSTEM.directions(angles[here[valid]]))
-    planes[:, here] = np.maximum(numbers, 0.0).T / SCALE[:, np.newaxis]
+    looked_up = valid & (np.arange(SHAPE[2]) <= SHAPE[2] // 2) if half else valid
+    numbers = channels.values(table, *_SYSTEM.directions(angles[looked_up[valid]]))
+    planes[:, looked_up] = np.maximum(numbers, 0.0).T / SCALE[:, np.newaxis]
     if half:
         first = 0 if samples == "centres" else 1
         planes[..., SHAPE[2] // 2 :] = planes[..., first : first + SHAPE[2] // 2][..., ::-1]
@@ -141,8 +141,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     return FileTable(name, ("R", "G", "B"), None, _Reader(planes, samples), known)
 
 
-def _nodes(samples: str) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Return the bins that readers look up for directions above the horizon, and angles [rad] (N, 3) of their values."""
+def _nodes(samples: str) -> tuple[NDArray[np.bool_], Floats]:
+    """Return the bins that are read for directions above the horizon, and angles [rad] (N, 3) of their values."""
     offset = 0.5 if samples == "centres" else 0.0
     at = tuple(np.arange(count) + offset for count in SHAPE)
     # the corner closest to the normal, and the azimuth closest to 90 degrees, of all that the number is read for
@@ -158,7 +158,7 @@ def _nodes(samples: str) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     return valid, angles
 
 
-def _degrees_h(index: NDArray[np.float64]) -> NDArray[np.float64]:
+def _degrees_h(index: Floats) -> Floats:
     """Return theta_h [degree] of an index: finer close to the normal."""
     return np.asarray(index**2 / SHAPE[0])
 
@@ -182,7 +182,5 @@ class _Reader:
             return self._grid.evaluate(wi, wr)
         theta_h, theta_d, phi_d = _SYSTEM.angles(wi, wr).T
         parts = np.sqrt(theta_h / HALF_PI) * SHAPE[0], theta_d / HALF_PI * SHAPE[1], phi_d / np.pi * SHAPE[2]
-        index = tuple(
-            np.clip(part.astype(np.intp), 0, count - 1) for part, count in zip(parts, SHAPE, strict=True)
-        )
+        index = tuple(np.clip(part.astype(np.intp), 0, count - 1) for part, count in zip(parts, SHAPE, strict=True))
         return np.asarray(self._f_r[index])

@@ -87,18 +87,17 @@ def write(
     grid, error = chosen(table, comparison, _systems(table, comparison), tolerance, most)
     document = record(table, error, verdict, tolerance=tolerance)
     software = f"brdfdb-{version('brdfdb')}"
-    with whole(path) as (file,):
-        with file.open("wb") as stream:
-            stream.write(_ssdd_file.header(software, lines(document)))
-            stream.write(_ssdd_file.block(_entries(table, grid), _four(grid), data == "binary"))
-            if table.specular is not None:
-                stream.write(_specular(table, data == "binary"))
+    with whole(path) as (file,), file.open("wb") as stream:
+        stream.write(_ssdd_file.header(software, lines(document)))
+        stream.write(_ssdd_file.block(_entries(table, grid), _four(grid), data == "binary"))
+        if table.specular is not None:
+            stream.write(_specular(table, data == "binary"))
     return Written((Path(path),), error, tolerance)
 
 
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of an SSDD file."""
-    return head.lstrip().startswith(b"VERSION ") and b"\n" in head or (head.startswith(b"#") and b"\nVERSION " in head)
+    return head.startswith(b"VERSION ") or (head.startswith(b"#") and b"\nVERSION " in head)
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
@@ -158,7 +157,7 @@ def _decoded(numbers: Floats, encoding: str) -> Floats:
 class _Reader:
     """f_r [1/sr], shape (N, 3), at unit vectors (N, 3), of numbers on the grid with the first azimuths repeated."""
 
-    def __init__(self, numbers: NDArray[np.float64], encoding: str) -> None:
+    def __init__(self, numbers: Floats, encoding: str) -> None:
         self._grid = AngularGrid(_SYSTEM, _NODES, numbers.astype(np.float32))
         self._encoding = encoding
 
