@@ -26,7 +26,8 @@ _AT_ONCE = 1 << 22  # values that are interpolated, or looked up, at a time
 _FIRST = 8  # intervals of each axis before any is halved
 _HALVINGS = 14
 _FEWEST = 60  # pairs in an interval that is halved: of fewer, the percentile says nothing
-_LEAST = 1 / 64  # smallest error of an interval, as a share of the target: the density of nodes is never 0
+# Smallest error of an interval, as a share of the target: of the first ones, and of those that were halved
+_LEAST, _LEAST_OF_HALVES = 1 / 64, 1 / 4
 _MOST = 0.97  # share of the pairs of an interval that its error stands for
 _BALANCES = 2
 _DECIMALS = 5  # of nodes in degrees, so that text holds them
@@ -190,7 +191,25 @@ class Plan:
             middle = (edges[:-1] + edges[1:])[split] / 2.0
             errors = np.repeat(np.where(split, np.nan, errors), np.where(split, 2, 1))
             edges = np.sort(np.concatenate([edges, middle]))
-        return edges, np.clip(np.nan_to_num(errors, nan=target), _LEAST * target, None)
+        return _graded(edges, np.nan_to_num(errors, nan=target), target)
+
+
+def _graded(edges: Floats, errors: Floats, target: float) -> tuple[Floats, Floats]:
+    """Return intervals none of which is more than twice as long as the next, with errors that are never 0.
+
+    Else a node beside a kink could be the end of a long straight line, which would miss the kink.
+    """
+    longest = (edges[-1] - edges[0]) / _FIRST
+    while True:
+        widths = np.diff(edges)
+        beside = np.minimum(np.append(widths[1:], np.inf), np.append(np.inf, widths[:-1]))
+        split = widths > 2.01 * beside
+        if not split.any():
+            break
+        errors = np.repeat(np.where(split, errors / 4.0, errors), np.where(split, 2, 1))
+        edges = np.sort(np.concatenate([edges, (edges[:-1] + edges[1:])[split] / 2.0]))
+    least = np.where(np.diff(edges) < 0.99 * longest, _LEAST_OF_HALVES, _LEAST)
+    return edges, np.maximum(errors, least * target)
 
 
 def chosen(
@@ -227,14 +246,23 @@ def chosen(
     finest = plan.finest(most)
     target = max(target, finest)
     best: tuple[AngularGrid, FileError] | None = None
+    within, beyond = 0.0, math.inf  # targets whose grids are, and are not, within the tolerance
     for _ in range(_SEARCHES):
         grid = written(filled(table, comparison, plan.system, plan.nodes(target)))
         error = comparison.error_of(grid.evaluate)
         if best is None or _rank(grid, error, tolerance) < _rank(*best, tolerance):
             best = grid, error
-        if _NEAR * tolerance <= error.p99 <= tolerance or (error.p99 > tolerance and target == finest):
+        if error.p99 <= tolerance:
+            within = max(within, target)
+        else:
+            beyond = min(beyond, target)
+        if _NEAR * tolerance <= error.p99 <= tolerance or beyond == finest or within > 0.8 * beyond:
             break
-        target = max(finest, target * float(np.clip(0.95 * tolerance / max(error.p99, 1e-9), 0.1, 8.0)))
+        if 0.0 < within and beyond < math.inf:
+            target = math.sqrt(within * beyond)
+        else:
+            target *= float(np.clip(0.9 * tolerance / max(error.p99, 1e-9), 0.1, 8.0))
+        target = max(target, finest)
     assert best is not None
     return best
 

@@ -30,7 +30,7 @@ summary = "ASTM E1392 in Cornell's dialect: rows of angles and f_r at all wavele
 kinds = ()
 options = (
     TOLERANCE,
-    Option("size", 32.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
 )
 
 _TITLE = b"ASTM E1392\n"
@@ -44,7 +44,7 @@ def write(
     path: str | os.PathLike[str],
     *,
     tolerance: float = 0.02,
-    size: float = 32.0,
+    size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
     """Write a table as an ASTM E1392 file: whole, or not at all. The record is in its header.

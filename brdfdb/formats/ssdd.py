@@ -30,7 +30,7 @@ kinds = ()
 options = (
     TOLERANCE,
     Option("data", "binary", "form of the values", choices=("binary", "ascii")),
-    Option("size", 32.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
 )
 
 _NAMES = {
@@ -48,7 +48,7 @@ def write(
     *,
     tolerance: float = 0.02,
     data: str = "binary",
-    size: float = 32.0,
+    size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
     """Write a table as an SSDD file: whole, or not at all. The record is in its comments.

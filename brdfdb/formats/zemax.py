@@ -30,7 +30,7 @@ kinds = ()
 options = (
     TOLERANCE,
     Option("colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")),
-    Option("size", 32.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
 )
 
 _CHARACTERS = 10  # of a value
@@ -43,7 +43,7 @@ def write(
     *,
     tolerance: float = 0.02,
     colour: str = "auto",
-    size: float = 32.0,
+    size: float = 16.0,
     verdict: str | None = None,
 ) -> Written:
     """Write a table as a Zemax BSDF file: whole, or not at all. The record is in its comments.
