@@ -258,7 +258,7 @@ def chosen(
             beyond = min(beyond, target)
         if _NEAR * tolerance <= error.p99 <= tolerance or beyond == finest or within > 0.8 * beyond:
             break
-        if 0.0 < within and beyond < math.inf:
+        if within > 0.0 and beyond < math.inf:
             target = math.sqrt(within * beyond)
         else:
             target *= float(np.clip(0.9 * tolerance / max(error.p99, 1e-9), 0.1, 8.0))

@@ -34,6 +34,7 @@ options = (
 )
 
 _CHARACTERS = 10  # of a value
+_TIS_TOLERANCE = 1e-4  # absolute, of an albedo
 _HOLDS = f"{CONVENTION}; the sample is turned by phi_i, and angles of incidence and TIS are those of the table"
 
 
@@ -157,7 +158,7 @@ def _albedo(
     """Return the directional albedo [1] of a table without its specular part, shape (C, phi_i, theta_i)."""
     from brdfdb.tables.albedo import directional_albedo
 
-    known = directional_albedo(table)
+    known = directional_albedo(table, tolerance=_TIS_TOLERANCE)
     at = table.wavelength_nm
     albedo = known.albedo
     if channels.wavelength_nm is not None and at is not None:

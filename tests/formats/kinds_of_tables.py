@@ -50,7 +50,9 @@ def table_of(kind: str) -> Table:
     model, parameters, about, axes, wavelength_nm = _FACTS[kind]
     name = kind.replace(" ", "-")
     entries = {"title": name, "model": model, "source": "no paper", "parameters": parameters, **about}
-    layout = Layout(Material.from_table(name, entries), Grid(axes), None if not wavelength_nm else np.array(wavelength_nm))
+    layout = Layout(
+        Material.from_table(name, entries), Grid(axes), None if not wavelength_nm else np.array(wavelength_nm)
+    )
     dataset = tabulate(layout)
     arrays = {str(key): np.asarray(variable.values) for key, variable in dataset.variables.items()}
     return table_from(name, "r000001", arrays, dataset.attrs)

@@ -12,6 +12,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats import EXPORTERS, IMPORTERS, astm
 from brdfdb.formats._readings import FileTable, Samples
 from brdfdb.formats._stated_error import Comparison
+from brdfdb.formats._written import Written
 from tests.formats.kinds_of_tables import KINDS, table_of
 
 SIZE = 0.3  # MB, so that tests are quick
@@ -25,12 +26,18 @@ ROWS = [
 ]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_file_holds_what_it_states(tmp_path: Path, kind: str) -> None:
+@pytest.fixture(scope="module", params=KINDS)
+def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Written]:
+    """A kind of table, and its file."""
+    path = tmp_path_factory.mktemp("astm") / "a.astm"
+    return request.param, astm.write(table_of(request.param), path, size=SIZE, verdict="sound")
+
+
+def test_a_file_holds_what_it_states(exported: tuple[str, Written]) -> None:
+    kind, written = exported
     table = table_of(kind)
-    written = astm.write(table, tmp_path / "a.astm", size=SIZE, verdict="sound")
     assert written.nbytes < 1.2e6 * SIZE
-    reading = formats.read(tmp_path / "a.astm")
+    reading = formats.read(written.paths[0])
     assert isinstance(reading, FileTable)
     assert written.error is not None
     again = Comparison(table).error_of(reading.evaluate)
@@ -39,11 +46,10 @@ def test_a_file_holds_what_it_states(tmp_path: Path, kind: str) -> None:
     assert (reading.wavelength_nm is None) == (kind != "copper")
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_rows_are_f_r_of_the_table(tmp_path: Path, kind: str) -> None:
+def test_rows_are_f_r_of_the_table(exported: tuple[str, Written]) -> None:
+    kind, written = exported
     table = table_of(kind)
-    astm.write(table, tmp_path / "a.astm", size=SIZE)
-    head, rows = (tmp_path / "a.astm").read_text(encoding="utf-8").split("VARS ")
+    head, rows = written.paths[0].read_text(encoding="utf-8").split("VARS ")
     names, *texts = rows.strip().split("\n")
     assert f"NUM_POINTS {len(texts)}\n" in head
     assert names.startswith("theta_i,phi_i,theta_s,phi_s,")

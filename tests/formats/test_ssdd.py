@@ -50,8 +50,7 @@ def entries_of(path: Path) -> list[str]:
     return [line.split(" ")[0] for line in lines if line and not line.startswith("#")]
 
 
-@pytest.mark.parametrize("data", ["binary", "ascii"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("kind", "data"), [*((kind, "binary") for kind in KINDS), ("copper", "ascii")])
 def test_a_file_holds_what_it_states(tmp_path: Path, kind: str, data: str) -> None:
     table = table_of(kind)
     written = ssdd.write(table, tmp_path / "a.ssdd", size=SIZE, data=data, verdict="sound")

@@ -15,6 +15,7 @@ from brdfdb.formats import utia
 from brdfdb.formats._colours import colours_of
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
+from brdfdb.geometry import unit_vector
 from tests.formats.kinds_of_tables import KINDS, table_of
 
 PLANE = 288 * 288
@@ -56,10 +57,10 @@ def test_places_by_hand(tmp_path: Path) -> None:
     table = table_of("anisotropic ward")
     utia.write(table, tmp_path / "a.bin")
     numbers = np.fromfile(tmp_path / "a.bin", "<f8")
-    light, viewer = np.deg2rad([45.0, 15.0]), np.deg2rad([30.0, 202.5])  # numbers 3, 2, 2 and 27
+    wi, wr = unit_vector(*np.deg2rad([45.0, 15.0])), unit_vector(*np.deg2rad([30.0, 202.5]))  # numbers 3, 2, 2 and 27
     for plane in range(3):
         index = plane * PLANE + (3 * 48 + 2) * 288 + 2 * 48 + 27
-        assert numbers[index] == pytest.approx(float(table.lookup(*light, *viewer)), rel=1e-6)
+        assert numbers[index] == pytest.approx(float(table.lookup_vectors(wi, wr)), rel=1e-6)
 
 
 def test_dj_brdf_decodes_its_encoding(tmp_path: Path) -> None:
