@@ -89,4 +89,5 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
             if half.is_dir():
                 shutil.rmtree(half, ignore_errors=True)
             else:
-                half.unlink(missing_ok=True)
+                with contextlib.suppress(OSError):  # a parent that is a file, which was said already
+                    half.unlink(missing_ok=True)
