@@ -75,6 +75,7 @@ def dense_table(
     resolution: float = 0.0,
     most_values: int = MOST_BYTES // 4,
     digits: int = 0,
+    last_deg: float = 90.0,
 ) -> DenseTable:
     """Return a table on the smallest plain grid that is within a tolerance, or on a regular one.
 
@@ -96,6 +97,9 @@ def dense_table(
     digits : int
         Significant digits that values are rounded to; 0: float32.
 
+    last_deg : float [degree]
+        Last polar angle of light and viewer that the format takes.
+
     Raises
     ------
     ParameterError
@@ -105,7 +109,7 @@ def dense_table(
     few = _at_few_wavelengths(table, whole)
     names = _names(table)
     tried = [names[axes]] if axes != "smallest" else list(names.values())
-    plans = [_Plan(table, few, some) for some in tried]
+    plans = [_Plan(table, few, some, last_deg) for some in tried]
     if resolution:
         regular = min((plan.regular(resolution) for plan in plans), key=lambda grid: math.prod(grid.shape))
         size = math.prod(regular.shape) * len(whole.channels.names)
@@ -211,10 +215,10 @@ def _chosen(plans: list[_Plan], tolerance: float, most_nodes: int) -> _Choice:
 class _Plan:
     """The nodes that a table needs on axes of one kind, in proportion to a level of error."""
 
-    def __init__(self, table: Table, comparison: Comparison, names: tuple[str, ...]) -> None:
+    def __init__(self, table: Table, comparison: Comparison, names: tuple[str, ...], last_deg: float) -> None:
         self.table, self.comparison, self.names = table, comparison, names
-        pole = _has_pole(table)
-        ends = {name: _end(table, name, pole=pole) for name in names}
+        last_deg = min(last_deg, _LAST_DEG) if _has_pole(table) else last_deg
+        ends = {name: _end(table, name, last_deg) for name in names}
         self.coarsest = Grid({name: np.array([0.0, end]) for name, end in ends.items()})
         above = comparison.wr[:, 2] > 0.0
         x = points(self.coarsest, comparison.wi[above], comparison.wr[above])
@@ -269,7 +273,8 @@ class _Plan:
     def regular(self, step_deg: float) -> Grid:
         """Return a grid with equal steps on each axis, at most so wide."""
         ends = {name: float(nodes[-1]) for name, nodes in self.coarsest.axes.items()}
-        return Grid({name: np.linspace(0.0, end, 1 + math.ceil(end / step_deg - 1e-9)) for name, end in ends.items()})
+        counts = {name: 1 + math.ceil(end / step_deg - 1e-9) for name, end in ends.items()}
+        return Grid({name: np.round(np.linspace(0.0, end, counts[name]), 4) for name, end in ends.items()})
 
     def smallest(self, tolerance: float, most_nodes: int) -> _Choice:
         """Return the largest level whose p99 is within the tolerance, or else the smallest that is not too large."""
@@ -327,10 +332,10 @@ def _corners(axes: int) -> Iterator[tuple[int, ...]]:
     return itertools.product((0, 1), repeat=axes)
 
 
-def _end(table: Table, name: str, *, pole: bool) -> float:
+def _end(table: Table, name: str, last_deg: float) -> float:
     """Return the last node of an axis [degree]."""
     if name in ("theta_i", "theta_r"):
-        return _LAST_DEG if pole else 90.0
+        return last_deg
     if name in ("phi_i", "phi_h"):
         return 360.0 / table.grid.copies
     if name == "phi_d":

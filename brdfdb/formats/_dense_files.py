@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable
+from brdfdb.formats._readings import FileTable, Samples
 from brdfdb.formats._record import CONVENTION, record
 
 if TYPE_CHECKING:
@@ -166,3 +166,65 @@ def file_table(
         evaluate=lambda wi, wr: np.asarray(table.lookup_vectors(wi, wr)).reshape(len(wi), len(channels)),
         record=known,
     )
+
+
+def reading_of_rows(
+    path: Path,
+    angles: Mapping[str, NDArray[np.float64]],
+    values: NDArray[np.float64],
+    wavelength_nm: NDArray[np.float64] | None,
+    known: Mapping[str, Any],
+) -> FileTable | Samples:
+    """Return f_r of rows of angles [degree]: interpolated linearly if the rows are those of a grid, else as samples.
+
+    Parameters
+    ----------
+    path : path
+        The file, for errors and names.
+    angles : mapping of str to array (N,) [degree]
+        A column an axis.
+    values : array (N, C) [1/sr]
+        A column a wavelength, or one.
+    wavelength_nm : array (C,) [nm] or None
+        Wavelengths of the columns.
+    known : mapping
+        The record of the file.
+
+    Raises
+    ------
+    FileFormatError
+        If the rows are over half and difference vectors and no grid, or there are more values than wavelengths.
+    """
+    if values.shape[1] != (1 if wavelength_nm is None else wavelength_nm.size):
+        raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")
+    nodes = {name: np.unique(column) for name, column in angles.items()}
+    shape = tuple(column.size for column in nodes.values())
+    if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, nodes):
+        ordered = values.reshape(*shape, -1)
+        return file_table(path, nodes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
+    if not {"theta_i", "theta_r"} <= set(angles):
+        raise FileFormatError(f"{path}: rows over {', '.join(angles)} are not those of a grid")
+    zero = np.zeros(len(values))
+    turned = {name: np.deg2rad(column) for name, column in angles.items()}
+    phi_i = turned.get("phi_i", zero)
+    return Samples(
+        name=str(known.get("name") or path.stem),
+        theta_i=turned["theta_i"],
+        phi_i=phi_i,
+        theta_r=turned["theta_r"],
+        phi_r=phi_i + turned["delta_phi"] if "delta_phi" in turned else turned.get("phi_r", zero),
+        channels=("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm),
+        wavelength_nm=wavelength_nm,
+        values=values,
+        record=known,
+    )
+
+
+def _is_grid(angles: Mapping[str, NDArray[np.float64]], nodes: Mapping[str, NDArray[np.float64]]) -> bool:
+    """Return True if the rows are all nodes of a grid of a table, the last axis fastest."""
+    from brdfdb.tables.grids import KINDS
+
+    if tuple(nodes) not in KINDS or any(column.size < 2 or column[0] != 0.0 for column in nodes.values()):
+        return False
+    expected = np.meshgrid(*nodes.values(), indexing="ij")
+    return all(np.array_equal(grid.reshape(-1), angles[name]) for grid, name in zip(expected, nodes, strict=True))

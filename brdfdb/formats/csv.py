@@ -5,18 +5,19 @@ from __future__ import annotations
 import itertools
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table, specular_remarks
-from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows, specular_remarks
+from brdfdb.formats._readings import Samples
 from brdfdb.formats._record import lines, of_lines
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.table import Table
 
 suffix = ".csv"
@@ -128,13 +129,11 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         raise FileFormatError(f"{path}: the columns {', '.join(names)[:200]} are not angles, then values of f_r")
     known = of_lines(comments)
     at = _wavelengths(names[len(angles) :])
-    nodes = {name: np.unique(numbers[:, index]) for index, name in enumerate(angles)}
-    shape = tuple(column.size for column in nodes.values())
-    values = numbers[:, len(angles) :]
-    if np.prod(shape, dtype=object) == len(numbers) and _in_order(numbers[:, : len(angles)], nodes):
-        values = values.reshape(*shape, -1)
-        return file_table(path, nodes, values[..., 0] if at is None else values, at, known)
-    return _samples(path, {name: numbers[:, index] for index, name in enumerate(angles)}, values, at, known)
+    columns = {name: numbers[:, index] for index, name in enumerate(angles)}
+    reading = reading_of_rows(path, columns, numbers[:, len(angles) :], at, known)
+    if isinstance(reading, Samples) and _COLUMNS in comments:
+        raise FileFormatError(f"{path}: rows of the grid are missing")
+    return reading
 
 
 def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:
@@ -142,38 +141,3 @@ def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:
         return np.array([float(name.removesuffix("nm")) for name in names])
     except ValueError:
         return None
-
-
-def _in_order(rows: NDArray[np.float64], nodes: dict[str, NDArray[np.float64]]) -> bool:
-    expected = np.meshgrid(*nodes.values(), indexing="ij")
-    return all(np.array_equal(column.reshape(-1), rows[:, index]) for index, column in enumerate(expected))
-
-
-def _samples(
-    path: Path,
-    angles: dict[str, NDArray[np.float64]],
-    values: NDArray[np.float64],
-    at: NDArray[np.float64] | None,
-    known: dict[str, Any],
-) -> Samples:
-    """Return the rows of a text as samples."""
-    turned = {name: np.deg2rad(column) for name, column in angles.items()}
-    if not {"theta_i", "theta_r"} <= set(angles):
-        raise FileFormatError(f"{path}: rows over {', '.join(angles)} are not those of a grid")
-    zero = np.zeros(len(values))
-    phi_i = turned.get("phi_i", zero)
-    phi_r = phi_i + turned["delta_phi"] if "delta_phi" in turned else turned.get("phi_r", zero)
-    channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
-    if values.shape[1] != len(channels):
-        raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")
-    return Samples(
-        name=str(known.get("name") or path.stem),
-        theta_i=turned["theta_i"],
-        phi_i=phi_i,
-        theta_r=turned["theta_r"],
-        phi_r=phi_r,
-        channels=channels,
-        wavelength_nm=at,
-        values=values,
-        record=known,
-    )
