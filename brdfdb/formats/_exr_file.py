@@ -11,8 +11,8 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from brdfdb import spectra
 from brdfdb.errors import ParameterError, WriteError
+from brdfdb.formats._pictures import rgb_of
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
 from brdfdb.tables.slices import Slice
@@ -21,10 +21,8 @@ from brdfdb.tables.table import Table
 QUANTITY = "f_r"
 UNIT = "1/sr"
 HALF_MAX = 65504.0
-
-RGB_COLOUR = "linear sRGB, D65"
-RGB_GREY = "grey: colour was not measured"
-RGB_MEAN = "grey: colour was not measured, mean over the wavelengths"
+SPHERE = 512  # pixels across the picture of a sphere
+LIT = "radiance of a lit sphere, linear sRGB under D65; a white Lambertian one has 0.8 where it is brightest"
 
 
 def _dirac(specular: NDArray[np.float32]) -> str:
@@ -70,10 +68,9 @@ def write_slice(
     100 values of the table stay within, as the table states it.
     """
     path = Path(path)
-    rgb, rgb_meaning = _rgb(image)
+    rgb, rgb_meaning = rgb_of(image)
     pixels = {name: rgb[..., index] for index, name in enumerate("RGB")}
-    header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    header |= _attributes(image, table)
+    header = _attributes(image, table)
     header["brdf:record"] = json.dumps(record(table, None, verdict))
     header["brdf:rgb"] = rgb_meaning
     if image.wavelength_nm is not None:
@@ -85,26 +82,19 @@ def write_slice(
         clipped = sum(int(np.count_nonzero(np.abs(array) > HALF_MAX)) for array in pixels.values())
         header["brdf:half"] = f"values above {HALF_MAX:g} are written as {HALF_MAX:g}: {clipped} in all channels"
         pixels = {name: np.clip(array, -HALF_MAX, HALF_MAX).astype(np.float16) for name, array in pixels.items()}
+    return _write(path, header, pixels)
 
+
+def _write(path: Path, header: dict[str, Any], pixels: dict[str, NDArray[Any]]) -> Written:
     # OpenEXR reads a strided array as if it were contiguous: wrong pixels and no error.
     channels = {name: np.ascontiguousarray(array) for name, array in pixels.items()}
+    begin = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with whole(path) as (temporary,):
         try:
-            OpenEXR.File(header, channels).write(str(temporary))
+            OpenEXR.File(begin | header, channels).write(str(temporary))
         except RuntimeError as error:  # what OpenEXR raises for a missing directory and for a full disk alike
             raise WriteError(f"cannot write {path}: {error}") from error
     return Written((path,))
-
-
-def _rgb(image: Slice) -> tuple[NDArray[np.float32], str]:
-    """Return R, G, B of a slice, shape (H, W, 3), and their meaning in words."""
-    if image.wavelength_nm is None:
-        grey, meaning = image.values, RGB_GREY
-    elif spectra.covers_visible(image.wavelength_nm):
-        return np.asarray(spectra.linear_srgb(image.wavelength_nm, image.values), dtype=np.float32), RGB_COLOUR
-    else:
-        grey, meaning = image.values.mean(axis=-1, dtype=np.float64).astype(np.float32), RGB_MEAN
-    return np.repeat(grey[..., np.newaxis], 3, axis=-1), meaning
 
 
 def _attributes(image: Slice, table: Table) -> dict[str, Any]:
@@ -143,3 +133,23 @@ def _spectral_channels(wavelength_nm: NDArray[Any]) -> list[str]:
     if repeated:
         raise ParameterError("wavelength_nm", f"the wavelength of channel {repeated[0]} occurs twice")
     return names
+
+
+def write_sphere(path: str | os.PathLike[str], table: Table, half: bool = False, verdict: str | None = None) -> Written:
+    """Write the lit sphere of a table as an OpenEXR file, ZIP compressed: whole, or not at all.
+
+    The channels are linear sRGB, in which a white Lambertian sphere has 0.8 where it is brightest, and A, the coverage,
+    by which the others are multiplied.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written.
+    """
+    from brdfdb.scenes.lit_sphere import linear_sphere
+
+    linear = linear_sphere(table, SPHERE)
+    linear[..., :3] *= linear[..., 3:]
+    linear = np.minimum(linear, HALF_MAX).astype(np.float16 if half else np.float32)
+    header = {"brdf:material": str(table.name), "brdf:record": json.dumps(record(table, None, verdict, holds=LIT))}
+    return _write(Path(path), header, {name: linear[..., index] for index, name in enumerate("RGBA")})

@@ -1,4 +1,4 @@
-"""OpenEXR: slices of a table as images, with one channel a wavelength."""
+"""OpenEXR: slices of a table as images, with one channel a wavelength, and its lit sphere."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 
 suffix = ".exr"
 media_type = "image/x-exr"
-summary = "slices of a table as OpenEXR files"
+summary = "slices and lit spheres of tables as OpenEXR files"
 tools = "every viewer of OpenEXR; spectral channels in the layout of Fichet et al. (2021)"
-kinds = ("lobe", "half_difference", "in_plane")
+SPHERE = "sphere"
+kinds = ("lobe", "half_difference", "in_plane", SPHERE)
 options = (
     Option("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
     Option("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
@@ -33,7 +34,7 @@ def write(
     half: bool = False,
     verdict: str | None = None,
 ) -> Written:
-    """Write one slice of a table as an OpenEXR file: whole, or not at all.
+    """Write a slice, or the lit sphere, of a table as an OpenEXR file: whole, or not at all.
 
     Parameters
     ----------
@@ -42,7 +43,8 @@ def write(
     path : path
         The file; one that is there is replaced.
     kind : str
-        "half_difference", "in_plane" or "lobe", as in `brdfdb.tables.slices`.
+        "half_difference", "in_plane" or "lobe", as in `brdfdb.tables.slices`; or "sphere", the picture of
+        `brdfdb.scenes.lit_sphere` in linear light.
     theta_i, phi_i : float [degree]
         Direction of the light. theta_i matters for a lobe only, phi_i for anisotropic tables only; it is the azimuth of
         the half vector in a half/difference slice.
@@ -58,13 +60,9 @@ def write(
     WriteError
         If the file cannot be written.
     """
-    from brdfdb.formats._exr_file import write_slice
-    from brdfdb.tables import slices
+    from brdfdb.formats._exr_file import write_slice, write_sphere
+    from brdfdb.formats._pictures import slice_of
 
-    if kind == "lobe":
-        image = slices.lobe_map(table, theta_i_deg=theta_i, phi_i_deg=phi_i)
-    elif kind == "in_plane":
-        image = slices.in_plane_slice(table, phi_i_deg=phi_i)
-    else:
-        image = slices.half_difference_slice(table, phi_h_deg=phi_i)
-    return write_slice(path, image, table, half, verdict)
+    if kind == SPHERE:
+        return write_sphere(path, table, half, verdict)
+    return write_slice(path, slice_of(table, kind, theta_i, phi_i), table, half, verdict)

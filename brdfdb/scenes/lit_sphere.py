@@ -75,6 +75,24 @@ def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = stu
     between its wavelengths, as by any lookup. A table whose wavelengths do not reach from 420 to 680 nm is grey, at the
     first of them.
     """
+    linear = linear_sphere(surface, size, light)
+    encoded = colour_science().cctf_encoding(np.clip(linear[..., :3], 0.0, 1.0), function="sRGB")
+    return np.concatenate([encoded, linear[..., 3:]], axis=-1)
+
+
+def linear_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = studio) -> Array:
+    """Return the picture of `lit_sphere` in linear sRGB (size, size, 4), not clipped, with its coverage at the end.
+
+    Parameters
+    ----------
+    surface, size, light
+        As of `lit_sphere`.
+
+    Raises
+    ------
+    ParameterError
+        If `size` is out of range.
+    """
     if not 1 <= size <= MOST_SIZE:
         raise ParameterError("size", f"{size} is not a number of pixels from 1 to {MOST_SIZE}", size, (1, MOST_SIZE))
     fine = (np.arange(size * _ACROSS) + 0.5) / _ACROSS - size / 2.0
@@ -86,8 +104,7 @@ def lit_sphere(surface: Source | BaseTable, size: int = SIZE, light: Light = stu
     total = _averaged(covered[..., np.newaxis] * radiance)
     coverage = _averaged(covered)
     linear = WHITE / _tabulated(light).brightest * total / np.maximum(coverage, 1e-9)[..., np.newaxis]
-    encoded = colour_science().cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB")
-    return np.concatenate([encoded, coverage[..., np.newaxis]], axis=-1)
+    return np.concatenate([linear, coverage[..., np.newaxis]], axis=-1)
 
 
 def sphere_radiance(surface: Source | BaseTable, theta: Array, phi: Array, light: Light) -> Array:

@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 
 import brdfdb
 from brdfdb.errors import counted
+from brdfdb.formats._written import whole
 from brdfdb.materials import presets
-from brdfdb.scenes.lit_sphere import WHITE, lit_sphere
-from brdfdb.spectra import VISIBLE_FROM_NM, VISIBLE_TO_NM, picture_wavelengths
+from brdfdb.scenes.image import write_channels
+from brdfdb.scenes.lit_sphere import WHITE, linear_sphere, lit_sphere
+from brdfdb.spectra import VISIBLE_FROM_NM, VISIBLE_TO_NM, colour_science, picture_wavelengths
 from brdfdb.store.files import write_file
 from brdfdb.tables.table_base import BaseTable
 from brdfdb_pipelines import terminal
@@ -49,22 +51,31 @@ CAPTION = (
 
 
 def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
-    """Write the contact sheet of materials of a store, by default of all, as a PNG, and print its size."""
+    """Write the contact sheet of materials of a store, by default of all, as PNG or EXR, and print its size.
+
+    An EXR is in linear light, and light brighter than white is not clipped.
+    """
     store = brdfdb.open(root)
     tables = {name: store[name] for name in names or store}
     out.parent.mkdir(parents=True, exist_ok=True)
+    linear = out.suffix.lower() == ".exr"
     with terminal.progress() as bar, ThreadPoolExecutor(jobs) as pool:
         task = bar.add_task("rendering", total=len(tables))
 
         def picture(table: BaseTable) -> Array:
-            sphere = lit_sphere(table, SPHERE)
+            sphere = (linear_sphere if linear else lit_sphere)(table, SPHERE)
             bar.advance(task)
             return sphere
 
         spheres = dict(zip(tables, pool.map(picture, tables.values()), strict=True))
-    image, encoded = sheet(sections(tables), spheres), io.BytesIO()
-    imsave(encoded, image, format="png", pil_kwargs={"optimize": True})
-    write_file(out, encoded.getvalue(), out.parent)
+    image = sheet(sections(tables), spheres, linear)
+    if linear:
+        with whole(out) as (temporary,):
+            write_channels(temporary, {}, {name: image[..., index] for index, name in enumerate("RGB")})
+    else:
+        encoded = io.BytesIO()
+        imsave(encoded, np.round(255.0 * image).astype(np.uint8), format="png", pil_kwargs={"optimize": True})
+        write_file(out, encoded.getvalue(), out.parent)
     print(f"{out}: {counted(len(tables), 'material')}, {image.shape[1]} x {image.shape[0]} pixels")
     for line in remarks(tables.values()):
         print(line)
@@ -90,8 +101,8 @@ def _paper(source: str | None) -> str:
     return (source or "Other materials").partition(",")[0]
 
 
-def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array]) -> NDArray[np.uint8]:
-    """Return the contact sheet as sRGB bytes (height, width, 3)."""
+def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array], linear: bool = False) -> Array:
+    """Return the contact sheet as sRGB (height, width, 3), with or without its transfer curve, as the spheres have."""
     columns = (WIDTH - 2 * _MARGIN) // _CELL
     rows = [-(-len(tables) // columns) for tables in papers.values()]
     cells = [SPHERE + _LABEL + (_SOURCE if paper == OTHERS else 0) for paper in papers]
@@ -119,11 +130,13 @@ def sheet(papers: Mapping[str, Sequence[BaseTable]], spheres: Mapping[str, Array
         top += tall + _BETWEEN
     page.write(_MARGIN, top + 16, CAPTION, 13.5, _MUTED)
     image = page.drawn()
+    if linear:
+        image = np.asarray(colour_science().cctf_decoding(image, function="sRGB"))
     for name, (upper, left) in corners.items():
         part = image[upper : upper + SPHERE, left : left + SPHERE]
         colour, coverage = spheres[name][..., :3], spheres[name][..., 3:]
         part += coverage * (colour - part)
-    return np.round(255.0 * image).astype(np.uint8)
+    return image
 
 
 def colour_known(table: BaseTable) -> str:

@@ -85,7 +85,7 @@ def test_modules_of_the_room_are_found() -> None:
 @pytest.mark.parametrize(
     ("texts", "sentence"),
     [
-        ({"kind": "map"}, "kind: 'map' is not one of lobe, half_difference, in_plane"),
+        ({"kind": "map"}, "kind: 'map' is not one of lobe, half_difference, in_plane, sphere"),
         ({"half": "perhaps"}, "half: 'perhaps' is neither true nor false"),
         ({"theta_i": "91"}, "theta_i: '91' is not a number in [0, 90]"),
         ({"theta_i": "nan"}, "theta_i: 'nan' is not a number in [0, 90]"),

@@ -138,7 +138,7 @@ def test_export_takes_names_or_all_and_its_options_anywhere(
     assert fails(capsys, "export", "exr", "foam", "--all", "--store", built) == said
     assert run("export", "exr", "--store", built, "--out", tmp_path / "some", "foam", "mirror") == 0
     out, err = capsys.readouterr()
-    assert out.startswith("6 EXR files, ")
+    assert out.startswith("8 EXR files, ")
     assert out.endswith(f" in {tmp_path / 'some'}\n")
     assert "exporting" in err
     assert len(list((tmp_path / "some").iterdir())) == 6

@@ -89,7 +89,7 @@ def test_exported_slices_hold_what_a_lookup_gives(name: str, built: Path, tmp_pa
     assert cli.main(["export", "exr", name, "--store", str(built), "--out", str(tmp_path)]) == 0
     table = brdfdb.open(built)[name]
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        f"{name}_{kind}.exr" for kind in ("half_difference", "in_plane", "lobe")
+        f"{name}_{kind}.exr" for kind in ("half_difference", "in_plane", "lobe", "sphere")
     ]
     with OpenEXR.File(str(tmp_path / f"{name}_in_plane.exr"), separate_channels=True) as file:
         channels = {channel: values.pixels.copy() for channel, values in file.channels().items()}

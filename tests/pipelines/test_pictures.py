@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import OpenEXR
 import pytest
 from matplotlib.image import imread
 
@@ -58,6 +59,17 @@ def test_gallery_has_a_sphere_of_each_material(built: Path, tmp_path: Path, caps
     middle = sphere[contact_sheet.SPHERE // 2, contact_sheet.SPHERE // 2, :3]
     differences = np.abs(image - middle).max(axis=-1)
     assert differences[:400, :200].min() < 2.0 / 255.0
+
+
+def test_gallery_in_linear_light_is_the_same_sheet(built: Path, tmp_path: Path) -> None:
+    for suffix in (".png", ".exr"):
+        assert run("gallery", "foam", "--store", built, "--out", tmp_path / f"sheet{suffix}") == 0
+    screen = imread(tmp_path / "sheet.png")[..., :3]
+    with OpenEXR.File(str(tmp_path / "sheet.exr"), separate_channels=True) as file:
+        linear = np.stack([file.channels()[name].pixels for name in "RGB"], axis=-1).clip(0.0, 1.0)
+    encoded = np.where(linear > 0.0031308, 1.055 * linear ** (1.0 / 2.4) - 0.055, 12.92 * linear)
+    # edges of spheres are mixed with the page with and without the transfer curve
+    assert np.mean(np.abs(encoded - screen).max(axis=-1) < 1.0 / 255.0) > 0.995
 
 
 @pytest.fixture

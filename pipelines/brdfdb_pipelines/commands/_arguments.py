@@ -80,14 +80,14 @@ def whole_number(most: int | None = None) -> Callable[[str], int]:
     return number
 
 
-def png_file(text: str) -> Path:
-    """Return the path of a PNG to write; a directory and other suffixes are refused, before time is spent."""
-    return _file_to_write(text, ".png")
-
-
 def picture_file(text: str) -> Path:
-    """Return the path of an SVG or PNG to write, as `png_file` does."""
+    """Return the path of an SVG or PNG to write; a directory and other suffixes are refused, before time is spent."""
     return _file_to_write(text, ".svg", ".png")
+
+
+def sheet_file(text: str) -> Path:
+    """Return the path of a PNG or EXR to write, as `picture_file` does."""
+    return _file_to_write(text, ".png", ".exr")
 
 
 def _file_to_write(text: str, *suffixes: str) -> Path:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from brdfdb_pipelines.commands._arguments import add_jobs, add_store, png_file
+from brdfdb_pipelines.commands._arguments import add_jobs, add_store, sheet_file
 
-HELP = "Draw a contact sheet: a lit sphere of each material, as PNG."
+HELP = "Draw a contact sheet: a lit sphere of each material, as PNG or EXR."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,10 +17,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_jobs(parser, "threads")
     parser.add_argument(
         "--out",
-        type=png_file,
+        type=sheet_file,
         default=Path("brdf-gallery.png"),
         metavar="FILE",
-        help="the PNG to write (default: %(default)s)",
+        help="the PNG, or EXR in linear light, to write (default: %(default)s)",
     )
 
 

@@ -1,0 +1,97 @@
+"""PNG: pictures for people, the lit sphere of a table and its slices."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brdfdb.errors import import_extra
+from brdfdb.formats._interface import Option
+from brdfdb.formats._record import record
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+SPHERE = "sphere"
+suffix = ".png"
+media_type = "image/png"
+summary = "lit spheres and slices of tables as PNG files"
+tools = "every viewer of pictures; the numbers are in the other formats"
+kinds = (SPHERE, "lobe", "half_difference", "in_plane")
+options = (
+    Option("size", 160.0, "pixels across a sphere", low=16.0, high=2048.0),
+    Option("theta_i", 45.0, "polar angle of the light of a lobe [degrees]", low=0.0, high=90.0),
+    Option("phi_i", 0.0, "azimuth of the light, or of the half vector [degrees]", low=-720.0, high=720.0),
+)
+
+_TONES = "sRGB of x / (1 + x), x = pi f_r: a white Lambertian surface is half as bright as the brightest light"
+_LIT = "sRGB of a lit sphere; a white Lambertian one has 80 % of the screen's white where it is brightest"
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    kind: str = SPHERE,
+    size: float = 160.0,
+    theta_i: float = 45.0,
+    phi_i: float = 0.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write a picture of a table as a PNG file of 8 bits: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The file; one that is there is replaced.
+    kind : str
+        "sphere", as `brdfdb.scenes.lit_sphere`; "lobe", "half_difference" or "in_plane", as in `brdfdb.tables.slices`.
+    size : float [pixel]
+        Pixels across a sphere, rounded. Slices have a size of their own.
+    theta_i, phi_i : float [degree]
+        Direction of the light, as of the format exr.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If an option is outside its range.
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    All tables have the same exposure. Values of slices are compressed, x / (1 + x) of x = pi f_r, so that a diffuse
+    surface and a highlight a thousand times brighter are both seen. Texts in the file are the record, and how its
+    colours were made.
+    """
+    from brdfdb.formats._pictures import rgb_of, slice_of
+    from brdfdb.scenes.lit_sphere import lit_sphere
+    from brdfdb.spectra import colour_science
+
+    imsave = import_extra("matplotlib.image").imsave
+    if kind == SPHERE:
+        pixels, tones = lit_sphere(table, round(size)), _LIT
+    else:
+        image = slice_of(table, kind, theta_i, phi_i)
+        values, meaning = rgb_of(image)
+        bright = np.pi * np.maximum(values, 0.0).astype(np.float64)
+        pixels = np.asarray(colour_science().cctf_encoding(bright / (1.0 + bright), function="sRGB"))
+        tones = f"{_TONES}; {meaning}; {image.description}"
+    texts: dict[str, Any] = {
+        "Software": "brdfdb",
+        "Title": f"{table.name}: {kind}",
+        "Description": tones,
+        "Comment": json.dumps(record(table, None, verdict, holds=tones)),
+    }
+    with whole(path) as (temporary,):
+        imsave(temporary, np.round(255.0 * pixels).astype(np.uint8), format="png", metadata=texts)
+    return Written((Path(path),))
