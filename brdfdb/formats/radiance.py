@@ -1,0 +1,200 @@
+"""Radiance: tensor trees of variable resolution, and the material that scenes include."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats import _bsdf_xml
+from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block
+from brdfdb.formats._channels import channels_of
+from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._readings import FileTable
+from brdfdb.formats._square_disk import ANISOTROPIC, ISOTROPIC
+from brdfdb.formats._tensor_colour import trees_of, xyz_of
+from brdfdb.formats._tensor_growth import Growth
+from brdfdb.formats._tensor_tree import Tree, parsed, rounded
+from brdfdb.formats._written import Written, whole
+from brdfdb.parameters import Floats
+
+if TYPE_CHECKING:
+    from brdfdb.formats._channels import Channels
+    from brdfdb.formats._stated_error import Comparison, FileError
+    from brdfdb.tables.table import Table
+
+suffix = ".xml"
+media_type = "application/xml"
+summary = "BSDF files of Radiance, tensor trees, and materials that include them"
+kinds = ()
+options = (
+    TOLERANCE,
+    Option("cells", 200_000.0, "most cells of the tree, of about 7 bytes each", low=1.0, high=2e7),
+)
+
+_STRUCTURES = {"tensortree3": ISOTROPIC, "tensortree4": ANISOTROPIC}
+_BASIS = "LBNL/Shirley-Chiu"
+_WAVELENGTHS = (VISIBLE, "CIE-u", "CIE-v")
+_FIRST = 16  # cells of the first tree that is compared with the table
+_GROWTH = 0.3  # share of cells that a round adds; small, because the cells of a round are chosen at once
+# The error falls with the third to fourth root of the number of cells: with this power the tree does not become larger
+# than needed, and few trees are compared
+_POWER, _LEAST, _MOST = 1.5, 1.15, 8.0
+_HOLDS = (
+    "f_r [1/sr] without the cosine, as averages over cells of equal projected solid angle of the viewer; "
+    "Visible is CIE Y under equal energy"
+)
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    cells: float = 200_000.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write a table as a tensor tree and a material of Radiance: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The XML file; the material beside it ends in ``.rad``. Files that are there are replaced.
+    tolerance : float [1]
+        Largest p99 of the error; the smallest tree within it is written.
+    cells : float
+        Most cells of a tree. Narrow lobes need more than any scene can load; the file then states the error it has.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If the wavelengths of the table do not reach over the visible ones.
+    WriteError
+        If a file cannot be written.
+
+    Notes
+    -----
+    Isotropic tables become trees of rank 3, others of rank 4. Colour is written as CIE-u and CIE-v blocks, which are
+    what Radiance reads in trees. A table of one wavelength is written as the Visible block.
+    """
+    from brdfdb.formats._radiance_material import material_text
+    from brdfdb.formats._record import record
+    from brdfdb.formats._stated_error import Comparison
+
+    path = Path(path)
+    channels = _channels(table)
+    comparison = Comparison(table, channels)
+    trees, error = _grown(table, channels, comparison, tolerance, int(cells))
+    remarks = remarks_of(table)
+    document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
+    blocks = (
+        Block(wavelength, FRONT_OF_RADIANCE, _BASIS, "", tree.text(), "BRDF")
+        for wavelength, tree in zip(_WAVELENGTHS, trees, strict=False)
+    )
+    structure = f"<IncidentDataStructure>TensorTree{trees[0].rank}</IncidentDataStructure>"
+    material = path.with_suffix(".rad")
+    with whole(path, material) as (xml, rad):
+        with xml.open("w", encoding="utf-8") as file:
+            title = table.metadata.title or ""
+            file.writelines(_bsdf_xml.text_of(table.name, title, (), (structure,), blocks, document))
+        rad.write_text(material_text(table, path.name, document), encoding="utf-8")
+    return Written((path, material), error, tolerance, remarks)
+
+
+def _channels(table: Table) -> Channels:
+    """Return CIE XYZ of a spectral table, the values themselves of others."""
+    spectral = table.wavelength_nm is not None and table.wavelength_nm.size > 1
+    return channels_of(table, "xyz" if spectral else "")
+
+
+def remarks_of(table: Table) -> tuple[str, ...]:
+    """Return what XML files of Radiance and WINDOW cannot hold of a table."""
+    remarks = []
+    if table.specular is not None and np.any(table.specular > 0.0):
+        remarks.append("the specular part (a Dirac delta) is left out; add a mirror to the scene for it")
+    if table.wavelength_nm is not None and table.wavelength_nm.size == 1:
+        remarks.append(f"f_r at {table.wavelength_nm[0]:g} nm stands in the block of visible light")
+    return tuple(remarks)
+
+
+def _grown(
+    table: Table, channels: Channels, comparison: Comparison, tolerance: float, most: int
+) -> tuple[tuple[Tree, ...], FileError]:
+    """Return the smallest trees within the tolerance, or those of `most` cells, and their error."""
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        return np.maximum(channels.values(table, wi, wr), 0.0)
+
+    growth = Growth(brdf, ANISOTROPIC if table.anisotropic else ISOTROPIC, len(channels.names))
+    kin, target = 1 << growth.rank, float(min(_FIRST, most))
+    while True:
+        varies = True
+        while varies and len(growth) < target:
+            room = (min(target, most) - len(growth)) / (kin - 1)
+            if room < 1.0:
+                break
+            varies = growth.split(max(1, int(min(room, _GROWTH * len(growth) / (kin - 1)))))
+        tree, mean = growth.tree()
+        trees = trees_of(tree, mean) if mean.shape[1] > 1 else (replace(tree, values=rounded(mean[:, 0])),)
+        error = comparison.error_of(lambda wi, wr: evaluated(trees, wi, wr))
+        if error.p99 <= tolerance or not varies or len(growth) + kin - 1 > most:
+            return trees, error
+        target = min(most, len(growth) * float(np.clip((error.p99 / tolerance) ** _POWER, _LEAST, _MOST)))
+
+
+def evaluated(trees: tuple[Tree, ...], wi: Floats, wr: Floats) -> Floats:
+    """Return f_r [1/sr] as Radiance evaluates trees, shape (N, 1), or X, Y and Z (N, 3), at unit vectors (N, 3)."""
+    values = [tree.at_vectors(wi, wr) for tree in trees]
+    return xyz_of(*values) if len(values) > 1 else values[0][:, np.newaxis]
+
+
+def recognises(head: bytes) -> bool:
+    """Return True if the first bytes of a file are those of a tensor tree."""
+    return _bsdf_xml.is_window_element(head) and b"TensorTree" in head
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of the front of a tensor tree, evaluated as Radiance does: the value of the cell.
+
+    Parameters
+    ----------
+    path : path
+        File of this package, or of others.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged or is no tensor tree.
+    OSError
+        If it cannot be read.
+
+    Notes
+    -----
+    Radiance varies the values by up to 2e-4 from cell to cell, so that it can tell cells apart; this is left out.
+    """
+    file = _bsdf_xml.read(path)
+    rank = _STRUCTURES.get(file.structure.lower())
+    if rank is None:
+        raise FileFormatError(f"{path}: its structure {file.structure!r} is not TensorTree3 or TensorTree4")
+    names = [name for name in _WAVELENGTHS if name.lower() in file.blocks]
+    names = names if len(names) == len(_WAVELENGTHS) else [VISIBLE]
+    trees = []
+    for name in names:
+        block = file.blocks[name.lower()]
+        if block.basis.lower() != _BASIS.lower():
+            raise FileFormatError(f"{path}: the angle basis {block.basis!r} of block {name} is not {_BASIS}")
+        try:
+            trees.append(parsed(block.numbers, rank))
+        except ValueError as error:
+            raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
+    of_colour = ("X", "Y", "Z") if len(trees) > 1 else ("grey",)
+    kept = tuple(trees)
+    return FileTable(file.name, of_colour, None, lambda wi, wr: evaluated(kept, wi, wr), file.record)
