@@ -40,17 +40,20 @@ def _risen(xy: Floats) -> NDArray[np.float64]:
     return np.concatenate([xy, z], axis=-1)
 
 
-def directions(position: Floats) -> tuple[Floats, Floats]:
-    """Return unit vectors (N, 3) of light and viewer at positions (N, rank) in the unit cube of a tree.
+def lights(place: Floats) -> Floats:
+    """Return unit vectors (..., 3) of the light at the first one (rank 3) or two (rank 4) coordinates of positions.
 
-    Rank 4: the square of the mirrored light, then that of the viewer. Rank 3: (1 - sin theta) / 2 of the light, whose
-    azimuth is pi, then the square of the viewer.
+    Rank 4: the square of the mirrored light. Rank 3: (1 - sin theta) / 2, with an azimuth of pi.
     """
-    if position.shape[-1] == ANISOTROPIC:
-        return _risen(-disk(position[..., :2])), _risen(disk(position[..., 2:]))
-    light = np.zeros((*position.shape[:-1], 2))
-    light[..., 0] = 2.0 * position[..., 0] - 1.0
-    return _risen(light), _risen(disk(position[..., 1:]))
+    if place.shape[-1] == 2:
+        return _risen(-disk(place))
+    along = 2.0 * place - 1.0
+    return _risen(np.concatenate([along, np.zeros_like(along)], axis=-1))
+
+
+def viewers(place: Floats) -> Floats:
+    """Return unit vectors (..., 3) of the viewer at the last two coordinates of positions."""
+    return _risen(disk(place))
 
 
 def positions(wi: Floats, wr: Floats, rank: int) -> Floats:

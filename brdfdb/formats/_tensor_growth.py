@@ -6,16 +6,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-from brdfdb.formats._square_disk import ISOTROPIC, directions
-from brdfdb.formats._tensor_tree import DEEPEST, Index, Tree
+from brdfdb.formats._square_disk import ISOTROPIC, lights, viewers
+from brdfdb.formats._tensor_tree import Index, Tree
 from brdfdb.parameters import Floats
 
-Evaluate = Callable[[Floats, Floats], Floats]  # f_r (N, C) at unit vectors (N, 3) of light and viewer
+Evaluate = Callable[[Floats, Floats], Floats]  # f_r (..., C) at unit vectors (..., 3) of light and viewer
 
 _DENSE = {3: 5, 4: 4}  # level by rank down to which all cells are looked at, so that no lobe is missed
 _NODE = 0.5 / np.sqrt(3.0)  # distance of the two Gauss-Legendre nodes of an axis from the middle of a cell of length 1
 _AT_ONCE = 1 << 16  # cells that are evaluated at a time
 _DARK = 0.03  # [1/sr] added to the root of the average in the measure of Radiance's rttree_reduce
+# Levels below the root: Radiance samples as many lights as the smallest cell has room for, which takes long, and its
+# smallest cell is then 0.45 degrees
+_DEEPEST = 8
+_ROUND = 0.3  # share of the cells that a round adds: those of a round are chosen at once
 _NONE = -1
 
 
@@ -28,7 +32,7 @@ class Growth:
     Parameters
     ----------
     evaluate : callable
-        f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer.
+        f_r [1/sr], shape (..., C), at unit vectors (..., 3) of light and viewer, which broadcast.
     rank : int
         3 or 4.
     channels : int
@@ -74,16 +78,26 @@ class Growth:
         for start in range(0, len(live), _AT_ONCE):
             some = live[start : start + _AT_ONCE]
             place = (corner[some, np.newaxis] + offsets) * 0.5 ** level[some, np.newaxis, np.newaxis]
-            light, viewer = directions(place.reshape(-1, self.rank))
-            values = self._evaluate(light, viewer).reshape(-1, self._kin, self._channels)
+            # The first bits of a node are those of the light, the last two those of the viewer
+            light, viewer = lights(place[:, : self._kin // 4, :-2]), viewers(place[:, :: self._kin // 4, -2:])
+            values = self._evaluate(light[:, np.newaxis], viewer[:, :, np.newaxis])
+            values = values.reshape(-1, self._kin, self._channels)
             mean[some], low[some], high[some] = values.mean(axis=1), values.min(axis=1), values.max(axis=1)
         return mean, low, high
 
     def _measured(self, mean: Floats, spread: Floats, level: Index) -> Floats:
         measure = (spread / (np.sqrt(np.maximum(mean, 0.0)) + _DARK)).max(axis=-1) * 0.5 ** (0.5 * self.rank * level)
-        return np.asarray(np.where(level < DEEPEST, measure, 0.0))
+        return np.asarray(np.where(level < _DEEPEST, measure, 0.0))
 
-    def split(self, count: int) -> bool:
+    def to(self, cells: float) -> bool:
+        """Grow to at least a number of cells, by one division at most beyond; return False if nothing varies."""
+        while len(self) < cells:
+            wanted = min(cells - len(self), _ROUND * len(self)) / (self._kin - 1)
+            if not self._split(max(1, int(wanted))):
+                return False
+        return True
+
+    def _split(self, count: int) -> bool:
         """Divide `count` leaves with the largest measure; return False if there is none that varies."""
         measure = self._measure[self._leaves]
         count = min(count, len(self._leaves))

@@ -33,17 +33,18 @@ summary = "BSDF files of Radiance, tensor trees, and materials that include them
 kinds = ()
 options = (
     TOLERANCE,
-    Option("cells", 200_000.0, "most cells of the tree, of about 7 bytes each", low=1.0, high=2e7),
+    Option("cells", 600_000.0, "most cells of a tree, of about 7 bytes each; a third where all would not be enough", low=1.0, high=2e7),
 )
 
 _STRUCTURES = {"tensortree3": ISOTROPIC, "tensortree4": ANISOTROPIC}
 _BASIS = "LBNL/Shirley-Chiu"
 _WAVELENGTHS = (VISIBLE, "CIE-u", "CIE-v")
-_FIRST = 16  # cells of the first tree that is compared with the table
-_GROWTH = 0.3  # share of cells that a round adds; small, because the cells of a round are chosen at once
+_FIRST = 16.0  # cells of the first tree that is compared with the table
 # The error falls with the third to fourth root of the number of cells: with this power the tree does not become larger
 # than needed, and few trees are compared
 _POWER, _LEAST, _MOST = 1.5, 1.15, 8.0
+# Share of the cells that are spent where all of them would not do: the error falls slowly, the size of the file does not
+_OUT_OF_REACH = 1.0 / 3.0
 _HOLDS = (
     "f_r [1/sr] without the cosine, as averages over cells of equal projected solid angle of the viewer; "
     "Visible is CIE Y under equal energy"
@@ -55,7 +56,7 @@ def write(
     path: str | os.PathLike[str],
     *,
     tolerance: float = 0.02,
-    cells: float = 200_000.0,
+    cells: float = 600_000.0,
     verdict: str | None = None,
 ) -> Written:
     """Write a table as a tensor tree and a material of Radiance: whole, or not at all.
@@ -69,7 +70,8 @@ def write(
     tolerance : float [1]
         Largest p99 of the error; the smallest tree within it is written.
     cells : float
-        Most cells of a tree. Narrow lobes need more than any scene can load; the file then states the error it has.
+        Most cells of a tree, of about 7 bytes each. Narrow lobes would need more than any scene can load: where the
+        tolerance is out of reach, a third of these cells is spent, and the file states the error it has.
     verdict : str, optional
         Verdict of the audit of this revision.
 
@@ -92,7 +94,7 @@ def write(
     path = Path(path)
     channels = _channels(table)
     comparison = Comparison(table, channels)
-    trees, error = _grown(table, channels, comparison, tolerance, int(cells))
+    trees, error = _grown(table, channels, comparison, tolerance, cells)
     remarks = remarks_of(table)
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
     blocks = (
@@ -126,7 +128,7 @@ def remarks_of(table: Table) -> tuple[str, ...]:
 
 
 def _grown(
-    table: Table, channels: Channels, comparison: Comparison, tolerance: float, most: int
+    table: Table, channels: Channels, comparison: Comparison, tolerance: float, most: float
 ) -> tuple[tuple[Tree, ...], FileError]:
     """Return the smallest trees within the tolerance, or those of `most` cells, and their error."""
 
@@ -134,20 +136,22 @@ def _grown(
         return np.maximum(channels.values(table, wi, wr), 0.0)
 
     growth = Growth(brdf, ANISOTROPIC if table.anisotropic else ISOTROPIC, len(channels.names))
-    kin, target = 1 << growth.rank, float(min(_FIRST, most))
+    target = min(_FIRST, most)
     while True:
-        varies = True
-        while varies and len(growth) < target:
-            room = (min(target, most) - len(growth)) / (kin - 1)
-            if room < 1.0:
-                break
-            varies = growth.split(max(1, int(min(room, _GROWTH * len(growth) / (kin - 1)))))
-        tree, mean = growth.tree()
-        trees = trees_of(tree, mean) if mean.shape[1] > 1 else (replace(tree, values=rounded(mean[:, 0])),)
+        grows = growth.to(target)
+        trees = _trees(*growth.tree())
         error = comparison.error_of(lambda wi, wr: evaluated(trees, wi, wr))
-        if error.p99 <= tolerance or not varies or len(growth) + kin - 1 > most:
+        excess = error.p99 / tolerance
+        within_reach = len(growth) * excess**growth.rank <= most
+        limit = most if within_reach else most * _OUT_OF_REACH
+        if excess <= 1.0 or not grows or len(growth) >= limit:
             return trees, error
-        target = min(most, len(growth) * float(np.clip((error.p99 / tolerance) ** _POWER, _LEAST, _MOST)))
+        target = min(limit, len(growth) * float(np.clip(excess**_POWER, _LEAST, _MOST)))
+
+
+def _trees(tree: Tree, mean: Floats) -> tuple[Tree, ...]:
+    """Return the trees of a file from one tree and the averages of its leaves."""
+    return trees_of(tree, mean) if mean.shape[1] > 1 else (replace(tree, values=rounded(mean[:, 0])),)
 
 
 def evaluated(trees: tuple[Tree, ...], wi: Floats, wr: Floats) -> Floats:
