@@ -81,7 +81,11 @@ class BsdfFile:
 
 
 def text_of(
-    name: str, title: str, material: Iterable[str], definition: Iterable[str], blocks: Iterable[Block],
+    name: str,
+    title: str,
+    material: Iterable[str],
+    definition: Iterable[str],
+    blocks: Iterable[Block],
     record: dict[str, Any],
 ) -> Iterable[str]:
     """Yield the text of a file in pieces.

@@ -125,7 +125,7 @@ class Growth:
         self._open = np.concatenate([self._open, np.zeros(len(corner), dtype=bool)])
 
     def tree(self) -> tuple[Tree, Floats]:
-        """Return the tree, with numbers of leaves as values, and the averages [1/sr] of the leaves, shape (leaves, C)."""
+        """Return the tree, with the numbers of its leaves as values, and their averages [1/sr], shape (leaves, C)."""
         inner, leaves = np.flatnonzero(self._open), np.sort(self._leaves)
         code = np.zeros(len(self._child), dtype=np.int64)
         code[inner], code[leaves] = np.arange(len(inner)), -1 - np.arange(len(leaves))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,8 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _bsdf_xml
+from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block
-from brdfdb.formats._channels import channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._square_disk import ANISOTROPIC, ISOTROPIC
@@ -33,7 +34,13 @@ summary = "BSDF files of Radiance, tensor trees, and materials that include them
 kinds = ()
 options = (
     TOLERANCE,
-    Option("cells", 600_000.0, "most cells of a tree, of about 7 bytes each; a third where all would not be enough", low=1.0, high=2e7),
+    Option(
+        "cells",
+        600_000.0,
+        "most cells of a tree, of about 7 bytes each; a third where all would not be enough",
+        low=1.0,
+        high=2e7,
+    ),
 )
 
 _STRUCTURES = {"tensortree3": ISOTROPIC, "tensortree4": ANISOTROPIC}
@@ -43,7 +50,7 @@ _FIRST = 16.0  # cells of the first tree that is compared with the table
 # The error falls with the third to fourth root of the number of cells: with this power the tree does not become larger
 # than needed, and few trees are compared
 _POWER, _LEAST, _MOST = 1.5, 1.15, 8.0
-# Share of the cells that are spent where all of them would not do: the error falls slowly, the size of the file does not
+# Share of the cells that is spent where all of them would not do: the error falls more slowly than the file grows
 _OUT_OF_REACH = 1.0 / 3.0
 _HOLDS = (
     "f_r [1/sr] without the cosine, as averages over cells of equal projected solid angle of the viewer; "
@@ -92,7 +99,7 @@ def write(
     from brdfdb.formats._stated_error import Comparison
 
     path = Path(path)
-    channels = _channels(table)
+    channels = visible_channels(table)
     comparison = Comparison(table, channels)
     trees, error = _grown(table, channels, comparison, tolerance, cells)
     remarks = remarks_of(table)
@@ -111,22 +118,6 @@ def write(
     return Written((path, material), error, tolerance, remarks)
 
 
-def _channels(table: Table) -> Channels:
-    """Return CIE XYZ of a spectral table, the values themselves of others."""
-    spectral = table.wavelength_nm is not None and table.wavelength_nm.size > 1
-    return channels_of(table, "xyz" if spectral else "")
-
-
-def remarks_of(table: Table) -> tuple[str, ...]:
-    """Return what XML files of Radiance and WINDOW cannot hold of a table."""
-    remarks = []
-    if table.specular is not None and np.any(table.specular > 0.0):
-        remarks.append("the specular part (a Dirac delta) is left out; add a mirror to the scene for it")
-    if table.wavelength_nm is not None and table.wavelength_nm.size == 1:
-        remarks.append(f"f_r at {table.wavelength_nm[0]:g} nm stands in the block of visible light")
-    return tuple(remarks)
-
-
 def _grown(
     table: Table, channels: Channels, comparison: Comparison, tolerance: float, most: float
 ) -> tuple[tuple[Tree, ...], FileError]:
@@ -140,7 +131,7 @@ def _grown(
     while True:
         grows = growth.to(target)
         trees = _trees(*growth.tree())
-        error = comparison.error_of(lambda wi, wr: evaluated(trees, wi, wr))
+        error = comparison.error_of(functools.partial(evaluated, trees))
         excess = error.p99 / tolerance
         within_reach = len(growth) * excess**growth.rank <= most
         limit = most if within_reach else most * _OUT_OF_REACH
@@ -200,5 +191,4 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         except ValueError as error:
             raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
     of_colour = ("X", "Y", "Z") if len(trees) > 1 else ("grey",)
-    kept = tuple(trees)
-    return FileTable(file.name, of_colour, None, lambda wi, wr: evaluated(kept, wi, wr), file.record)
+    return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record)
