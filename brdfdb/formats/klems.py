@@ -114,7 +114,8 @@ def _blocks(basis: Basis, texts: list[str]) -> Iterator[Block]:
 
 
 def _text(matrix: Floats) -> str:
-    return "\n".join(" ".join([f"{value:.4g}" for value in row]) for row in matrix.tolist())
+    """Return a matrix as text: a line a row, and a comma after each number, which WINDOW's reader wants."""
+    return "\n".join("".join([f"{value:.4g}," for value in row]) for row in matrix.tolist())
 
 
 def _numbers(text: str) -> Floats:
