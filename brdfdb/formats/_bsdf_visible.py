@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 
-def visible_channels(table: Table) -> Channels:
-    """Return CIE XYZ of a spectral table, the values themselves of others."""
+def visible_channels(table: Table, *, colour: bool = True) -> Channels:
+    """Return CIE XYZ of a spectral table, or its Y alone, and the values themselves of others."""
     spectral = table.wavelength_nm is not None and table.wavelength_nm.size > 1
-    return channels_of(table, "xyz" if spectral else "")
+    return channels_of(table, ("xyz" if colour else "grey") if spectral else "")
 
 
 def remarks_of(table: Table) -> tuple[str, ...]:

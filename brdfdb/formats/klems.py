@@ -16,6 +16,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats import _bsdf_xml
 from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
+from brdfdb.formats._interface import Option
 from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written, whole
@@ -28,7 +29,7 @@ suffix = ".xml"
 media_type = "application/xml"
 summary = "BSDF files of WINDOW, matrices over the patches of Klems"
 kinds = tuple(BASES)
-options = ()
+options = (Option("colour", False, "blocks of colour for Radiance; pyWinCalc refuses files that have them"),)
 
 SOLAR, CIE_X, CIE_Z = "Solar", "CIE-X", "CIE-Z"
 _ONE_SHEET = "both sides reflect alike and nothing is transmitted; thickness and thermal properties are placeholders"
@@ -49,7 +50,9 @@ _MATERIAL = (
 _MOST_RINGS, _MOST_PATCHES = 46, 100_000  # of a basis that a file defines; Radiance has room for so many rings
 
 
-def write(table: Table, path: str | os.PathLike[str], *, kind: str = "full", verdict: str | None = None) -> Written:
+def write(
+    table: Table, path: str | os.PathLike[str], *, kind: str = "full", colour: bool = False, verdict: str | None = None
+) -> Written:
     """Write a table as a Klems matrix: whole, or not at all.
 
     Parameters
@@ -60,6 +63,8 @@ def write(table: Table, path: str | os.PathLike[str], *, kind: str = "full", ver
         The file; one that is there is replaced.
     kind : str
         "full" with 145 patches, "half" with 77, or "quarter" with 41.
+    colour : bool
+        Add the blocks CIE-X and CIE-Z of a spectral table, which Radiance reads. WINDOW's engine refuses such files.
     verdict : str, optional
         Verdict of the audit of this revision.
 
@@ -72,13 +77,12 @@ def write(table: Table, path: str | os.PathLike[str], *, kind: str = "full", ver
 
     Notes
     -----
-    WINDOW's front is outdoors and Radiance's indoors: the block Reflection Back is Radiance's front. Colour is written
-    as CIE-X and CIE-Z blocks of that side, which Radiance reads and WINDOW skips.
+    WINDOW's front is outdoors and Radiance's indoors: the block Reflection Back is Radiance's front.
     """
     from brdfdb.formats._record import record
     from brdfdb.formats._stated_error import Comparison
 
-    basis, channels = BASES[kind], visible_channels(table)
+    basis, channels = BASES[kind], visible_channels(table, colour=colour)
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return np.maximum(channels.values(table, wi, wr), 0.0)
