@@ -113,7 +113,7 @@ class Fields:
         for di, dj, weight in ((0, 0, (1 - u) * (1 - v)), (1, 0, u * (1 - v)), (0, 1, (1 - u) * v), (1, 1, u * v)):
             values += weight[:, np.newaxis] * mixture.of(self._last_channels, j + dj, i + di)
         if self.jacobian:
-            values *= (_bilinear(self.ndf, *places.u_m) / (4.0 * _bilinear(self.sigma, *places.u_i)))[:, np.newaxis]
+            values *= (bilinear(self.ndf, *places.u_m) / (4.0 * bilinear(self.sigma, *places.u_i)))[:, np.newaxis]
         return np.asarray(values / places.cosine[:, np.newaxis])
 
     def mixture(self, places: Places) -> Mixture:
@@ -161,9 +161,9 @@ class Places:
         m = m / np.linalg.norm(m, axis=-1, keepdims=True)
         theta_i, theta_m = _polar_angle(wi), _polar_angle(m)
         phi_i, phi_m = np.arctan2(wi[:, 1], wi[:, 0]), np.arctan2(m[:, 1], m[:, 0])
-        u_y = _of_azimuth(phi_m - phi_i if isotropic else phi_m)
-        u_m = np.stack([_of_polar_angle(theta_m), u_y - np.floor(u_y)])
-        return cls(theta_i, phi_i, np.stack([_of_polar_angle(theta_i), _of_azimuth(phi_i)]), u_m, wr[:, 2])
+        u_y = of_azimuth(phi_m - phi_i if isotropic else phi_m)
+        u_m = np.stack([of_polar_angle(theta_m), u_y - np.floor(u_y)])
+        return cls(theta_i, phi_i, np.stack([of_polar_angle(theta_i), of_azimuth(phi_i)]), u_m, wr[:, 2])
 
 
 def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> Fields:
@@ -217,11 +217,13 @@ def _polar_angle(w: Array) -> Array:
     return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * np.hypot(np.hypot(w[:, 0], w[:, 1]), w[:, 2] - 1.0), 1.0)))
 
 
-def _of_polar_angle(theta: Array) -> Array:
+def of_polar_angle(theta: Array) -> Array:
+    """Return the coordinate in the unit square of theta [rad]."""
     return np.asarray(np.sqrt(theta * (2.0 / np.pi)))
 
 
-def _of_azimuth(phi: Array) -> Array:
+def of_azimuth(phi: Array) -> Array:
+    """Return the coordinate in the unit square of phi [rad]."""
     return np.asarray((phi + np.pi) / (2.0 * np.pi))
 
 
@@ -234,7 +236,7 @@ def _between(nodes: Floats32, wanted: Array) -> tuple[NDArray[np.int64], Array]:
     return index, np.clip((wanted - exact[index]) / (exact[index + 1] - exact[index]), 0.0, 1.0)
 
 
-def _bilinear(values: Floats32, x: Array, y: Array) -> Array:
+def bilinear(values: Floats32, x: Array, y: Array) -> Array:
     """Return values (rows, columns) at points of the unit square."""
     (i, u), (j, v) = cell(x, values.shape[1]), cell(y, values.shape[0])
     exact = values.astype(np.float64)

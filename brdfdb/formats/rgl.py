@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._interface import TOLERANCE
+from brdfdb.formats._interface import TOLERANCE, Option
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -22,13 +22,22 @@ suffix = ".bsdf"
 media_type = "application/octet-stream"
 summary = "tensor file of RGL for Mitsuba 3 (`measured`), pbrt-v4 and RGL's loader"
 kinds = ("spectral", "rgb")
-options = (TOLERANCE,)
+options = (
+    TOLERANCE,
+    Option("megabytes", 10.0, "largest size of a file that is tried for the tolerance [MB]", low=0.01, high=2000.0),
+    Option(
+        "azimuth",
+        "reduced",
+        "azimuths of the light of anisotropic tables: those that symmetry leaves, for Mitsuba 3, or all",
+        choices=("reduced", "full"),
+    ),
+)
 
 HOLDS = (
     "spectra * ndf(half vector) / (4 sigma(light)) is f_r cos(theta_r) [1/sr], the cosine included; "
     "half vectors are warped by vndf"
 )
-GREY_NM = 550.0  # the wavelength of grey tables; readers continue a single one to all
+SPECULAR = "the specular part is left out: the format has no place for light in the exact mirror direction alone"
 
 
 def write(
@@ -37,6 +46,8 @@ def write(
     *,
     kind: str = "spectral",
     tolerance: float = 0.02,
+    megabytes: float = 10.0,
+    azimuth: str = "reduced",
     verdict: str | None = None,
 ) -> Written:
     """Write a table as a tensor file.
@@ -51,7 +62,12 @@ def write(
         "spectral" for spectral renderers: all wavelengths of the table. "rgb" for others: linear sRGB under D65. They
         are files of their own, because no reader takes the other kind.
     tolerance : float [1]
-        Largest error against the table that 99 of 100 values may have.
+        Largest error against the table that 99 of 100 values may have: the smallest file within it is written.
+    megabytes : float [1e6 byte]
+        Largest size that is tried; where it is not enough, the file with the least error of that size is written.
+    azimuth : str
+        "reduced" leaves out azimuths of the light that follow from the symmetry of an anisotropic table, as only
+        Mitsuba 3 knows it. "full" is also for pbrt-v4 and RGL's loader; the file may be four times as large.
     verdict : str, optional
         Verdict of the audit of this revision.
 
@@ -66,13 +82,16 @@ def write(
     from brdfdb.formats._written import Written, whole
 
     path = Path(path)
-    found = smallest(table, kind, tolerance)
-    document = record(table, found.error, verdict, holds=HOLDS, remarks=found.remarks, tolerance=tolerance)
-    document["channels"] = found.channels
+    found = smallest(table, kind, tolerance, 1e6 * megabytes, azimuth == "full")
+    remarks = found.remarks
+    if table.specular is not None and table.specular.max() > 0.0:
+        remarks += (SPECULAR,)
+    document = record(table, found.error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
+    document["channels"] = list(found.channels)
     fields = replace(found.fields, description=json.dumps(document))
     with whole(path) as (temporary,):
         write_tensors(temporary, fields.tensors())
-    return Written((path,), found.error, tolerance, found.remarks)
+    return Written((path,), found.error, tolerance, remarks)
 
 
 def recognises(head: bytes) -> bool:
