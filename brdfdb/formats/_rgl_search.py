@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,12 +22,14 @@ if TYPE_CHECKING:
 
 GREY_NM = 550.0  # the wavelength of grey tables; readers continue a single one to all
 _HORIZON = 0.94  # share of rows above the horizon, of warps that end there
-# Rungs of isotropic tables: size and lights; and of anisotropic ones: size, lights, azimuths of a quarter
-_ISOTROPIC = ((10, 8), (14, 12), (20, 18), (28, 26), (36, 34), (44, 42), (52, 50), (64, 60), (80, 72), (96, 84))
-_ANISOTROPIC = ((16, 10, 7), (24, 14, 9), (32, 20, 11), (40, 24, 13), (48, 26, 15), (56, 32, 17), (64, 40, 21))
+# Rungs from small to large: size, lights, and azimuths of a quarter
+_ISOTROPIC = ((10, 8), (14, 11), (20, 15), (28, 22), (36, 28), (44, 34), (52, 40), (64, 50), (80, 62), (96, 76))
+_ANISOTROPIC = ((16, 8, 5), (24, 12, 7), (32, 16, 9), (40, 19, 11), (48, 23, 13), (56, 26, 15), (64, 30, 17), (80, 36, 21))
+_FIRST = 5  # rung that is tried first
+_STEP = 1.4  # factor by which the error falls, about, from rung to rung
 _COARSE = 30  # size below which densities have half of the nodes
 _FEW = 3  # channels that rungs are compared by
-_OF_SPECTRUM = 0.25  # share of the tolerance that straight lines between wavelengths may take
+_OF_SPECTRUM = 0.5  # share of the tolerance that straight lines between wavelengths may take
 _PAIRS = 4001  # pairs of directions that they are tested with
 COLOURLESS = "the colour was not measured: R, G and B are equal"
 REDUCED = (
@@ -67,9 +70,9 @@ def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full:
     search = _Search(table, Comparison(table, channels), kind, tolerance, full)
     if search.surface.reduction > 1:
         remarks += (REDUCED,)
-    tried = [search.best(plans) for plans in search.ladders(most_bytes)]
-    within = [one for one in tried if one[1].p99 <= tolerance]
-    fields, error = min(within, key=lambda one: one[0].nbytes) if within else min(tried, key=lambda one: one[1].p99)
+    ladders = search.ladders(most_bytes)
+    first = [search.p99(plans[min(_FIRST, len(plans) - 1)]) for plans in ladders]
+    fields, error = search.best(ladders[int(np.argmin(first))])
     names = channels.names if search.nodes is None else tuple(f"{value:g}nm" for value in search.nodes)
     return Found(fields, error, names, remarks)
 
@@ -84,6 +87,8 @@ class _Search:
         self._kept = np.arange(len(channels.names)) if at is None else _thinned(comparison, at, tolerance)
         self.nodes = None if at is None else at[self._kept]
         self._mixing = None if at is None else _lines(at, at[self._kept])
+        self._known: dict[Plan, float] = {}
+        self._last: tuple[Plan, Fields] | None = None
         self._of_file: Floats32 | None = None
         if kind == "spectral":
             self._of_file = np.array([GREY_NM] if self.nodes is None else self.nodes, np.float32)
@@ -103,35 +108,44 @@ class _Search:
             parts = 4 // self.surface.reduction
             most_bytes *= parts
             ladders = [
-                [Plan(s, n, parts * (p - 1) + 1, 17, 33 if s > _COARSE else 17) for s, n, p in _ANISOTROPIC]
+                [Plan(s, n, parts * (p - 1) + 1, *((33, 33) if s > _COARSE else (17, 17))) for s, n, p in _ANISOTROPIC]
             ]
         return [[plan for plan in ladder if self._nbytes(plan) <= most_bytes] or ladder[:1] for ladder in ladders]
 
     def best(self, ladder: list[Plan]) -> tuple[Fields, FileError]:
         """Return the first of a ladder within the tolerance, else the last."""
-        low, high = 0, len(ladder) - 1
-        if self._sampled(ladder[high]) > self._tolerance:
-            low = high
+        low, high, rung = 0, len(ladder) - 1, min(_FIRST, len(ladder) - 1)
         while low < high:
-            middle = (low + high) // 2
-            low, high = (low, middle) if self._sampled(ladder[middle]) <= self._tolerance else (middle + 1, high)
+            p99 = self.p99(ladder[rung])
+            low, high = (low, rung) if p99 <= self._tolerance else (min(rung + 1, high), high)
+            steps = round(math.log(max(p99, 1e-9) / self._tolerance) / math.log(_STEP))
+            rung = min(max(rung + steps, low), max(low, high - 1))
         for plan in ladder[low:]:
-            fields = build(self.surface, plan, self._of_file)
+            fields = self._built(plan)
             error = self._comparison.error_of(lambda wi, wr, file=fields: self._mixed(file.evaluate(wi, wr)))
             if error.p99 <= self._tolerance:
                 break
         return fields, error
 
-    def _sampled(self, plan: Plan) -> float:
+    def _built(self, plan: Plan) -> Fields:
+        """Return the fields of a plan with all channels; those of the last one are kept."""
+        if self._last is None or self._last[0] != plan:
+            self._last = plan, build(self.surface, plan, self._of_file)
+        return self._last[1]
+
+    def p99(self, plan: Plan) -> float:
         """Return p99 of a plan over a few channels."""
-        fields = build(self._sample, plan, self._of_file)
+        if plan not in self._known:
+            whole = self._sample is self.surface
+            fields = self._built(plan) if whole else build(self._sample, plan, self._of_file)
 
-        def evaluate(wi: Array, wr: Array) -> Array:
-            values = self._comparison.truth.copy()
-            values[:, self._kept[self._few]] = fields.evaluate(wi, wr)
-            return values
+            def evaluate(wi: Array, wr: Array) -> Array:
+                values = self._comparison.truth.copy()
+                values[:, self._kept[self._few]] = fields.evaluate(wi, wr)
+                return values
 
-        return self._comparison.error_of(evaluate).p99
+            self._known[plan] = self._comparison.error_of(evaluate).p99
+        return self._known[plan]
 
     def _mixed(self, values: Array) -> Array:
         """Return values at the wavelengths of the table from those of the file."""

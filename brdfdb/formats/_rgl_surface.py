@@ -20,7 +20,7 @@ _LOWEST = 0.002  # cosine of theta_r below which f_r is continued: some models h
 _SYMMETRIES = {4: ((1.0, -1.0), (-1.0, 1.0)), 2: ((-1.0, -1.0),)}  # signs of x and y that leave f_r as it is
 _DRAWN, _SAME = 2000, 1e-3  # pairs that symmetries are tested with, and their largest relative difference
 # Nodes of the factors: of the half vector, of the light, and lights that the former is averaged over
-_COLUMNS, _ROWS, _LIGHTS, _SIDES = 384, 97, 12, 12
+_COLUMNS, _ROWS, _LIGHTS, _SIDES = 384, 97, 8, 12
 _DARKEST = 1e-3  # share of the mean f_r that is added before logarithms are taken
 _NEAR_HORIZON = 0.05  # cosine of theta_r from which on values count for the factors
 
@@ -63,7 +63,17 @@ class Surface:
         self.reduction = 1 if full or self.isotropic else _reduction(table, channels)
 
     def values(self, wi: Array, x: Array, y: Array) -> Values:
-        """Return the values at lights (..., 3) and half vectors x, y of the unit square."""
+        """Return the values at lights (slices, 1, 1, 3) and half vectors x, y (slices, rows, columns).
+
+        The rows are those of the unit square from 0 to 1. Of isotropic tables only half of them are looked up.
+        """
+        rows = x.shape[1]
+        if not self.isotropic:
+            return self._looked_up(wi, x, y)
+        half = self._looked_up(wi, x[:, : (rows + 1) // 2], y[:, : (rows + 1) // 2])
+        return Values(*(_mirrored(part, rows // 2) for part in (half.brdf, half.cosine, half.solid_angle)))
+
+    def _looked_up(self, wi: Array, x: Array, y: Array) -> Values:
         m = directions(x, y)
         along = np.sum(wi * m, axis=-1)
         wr = 2.0 * along[..., np.newaxis] * m - wi
@@ -83,13 +93,13 @@ class Surface:
         ln f_r is taken as a sum of a function of the half vector and one of theta_i, as near as least squares come.
         """
         theta_i = np.linspace(0.0, LAST_THETA, _LIGHTS)
-        phi_i = np.zeros(1) if self.isotropic else np.linspace(-np.pi, -np.pi + 2.0 * np.pi / self.reduction, 3)
+        phi_i = np.zeros(1) if self.isotropic else np.linspace(-np.pi, -np.pi + 2.0 * np.pi / self.reduction, 2)
         wi = lights(theta_i, phi_i).reshape(-1, 1, 1, 3)
         # of isotropic tables the factor is the same at all azimuths, and one side of the plane of incidence is enough
         rows = (np.arange(_SIDES) + 0.5) / (2 * _SIDES) if self.isotropic else np.linspace(0.0, 1.0, _ROWS)
         columns = np.linspace(0.0, 1.0, _COLUMNS)
         x, y = (np.broadcast_to(u, (len(wi), rows.size, _COLUMNS)) for u in np.meshgrid(columns, rows))
-        values = self.values(wi, x, y)
+        values = self._looked_up(wi, x, y)
         weight = np.where(values.cosine > _NEAR_HORIZON, values.cosine, 0.0)
         f_r = np.maximum(values.brdf.mean(axis=-1) / np.maximum(values.cosine, _NEAR_HORIZON), 0.0)
         counted = weight * values.solid_angle
@@ -111,6 +121,11 @@ class Surface:
         of_theta = np.interp(u**2 * (np.pi / 2.0), theta_i, of_light.reshape(phi_i.size, -1).mean(axis=0))
         sigma = 0.25 * np.exp(-of_theta)
         return ndf.astype(np.float32), np.stack([sigma, sigma]).astype(np.float32)
+
+
+def _mirrored(values: Array, count: int) -> Array:
+    """Return rows with as many of them again, in reverse order: the other side of the plane of incidence."""
+    return np.concatenate([values, values[:, :count][:, ::-1]], axis=1)
 
 
 def lights(theta_i: Array, phi_i: Array) -> Array:
