@@ -123,7 +123,7 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
                 "file_format", f"{file_format!r} is not one of {', '.join(IMPORTERS)}", file_format, tuple(IMPORTERS)
             )
         return IMPORTERS[file_format].read(path)
-    with path.open("rb") as file:
+    with (path / "zarr.json" if path.is_dir() else path).open("rb") as file:  # a zarr group is a directory
         head = file.read(_HEAD)
     by_suffix = sorted(IMPORTERS.values(), key=lambda importer: not path.name.endswith(importer.suffix))
     for importer in by_suffix:

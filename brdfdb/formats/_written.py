@@ -92,4 +92,4 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
                 shutil.rmtree(half, ignore_errors=True)
             else:
                 with contextlib.suppress(OSError):  # also where its directory is a file
-                    half.unlink()
+                    half.unlink(missing_ok=True)

@@ -72,7 +72,7 @@ def test_a_format_of_fifteen_lines_is_an_address(store: Path) -> None:
     assert client.get("/v1/materials/grey").json()["links"]["export/list"] == "/v1/materials/grey/export/list"
     assert client.problem("GET", "/v1/materials/grey/export/list?digits=x", 422)["parameter"] == "digits"
     assert client.problem("GET", "/v1/materials/grey/export/list?kind=lobe", 422)["parameter"] == "kind"
-    assert "there are exr" in client.problem("GET", "/v1/materials/grey/export/merl", 404)["detail"]
+    assert ", exr, " in client.problem("GET", "/v1/materials/grey/export/paper", 404)["detail"]
 
 
 def test_modules_of_the_room_are_found() -> None:

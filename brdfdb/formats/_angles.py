@@ -1,0 +1,211 @@
+"""Angles of pairs of directions as programs of measurement and optical design name them, and the directions of angles.
+
+Every system begins at 0 on each axis. Directions of nodes below the horizon do not exist. Interpolation next to the
+horizon needs values there, so that the value at such a node is that of the closest direction above the horizon: of the
+same half vector, or on the same line to the specular direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from brdfdb.geometry import HALF_PI, unit_vector
+from brdfdb.parameters import Floats
+
+# Cosine of the lowest direction at which a table is looked up: at 90 degrees f_r of many models has a pole
+LOWEST = float(np.cos(np.deg2rad(89.5)))
+_STEEPEST = float(np.arccos(LOWEST))
+
+
+class System(Protocol):
+    """A system of angles [rad] of a pair of directions.
+
+    Attributes
+    ----------
+    axes : tuple of str
+        Names of the angles.
+    ends : tuple of float [rad]
+        Largest value of each.
+    """
+
+    @property
+    def axes(self) -> tuple[str, ...]: ...
+
+    @property
+    def ends(self) -> tuple[float, ...]: ...
+
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
+        """Return the angles [rad], shape (N, axes), of unit vectors (N, 3) of light and viewer."""
+
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        """Return unit vectors (N, 3) of light and viewer above the horizon for angles [rad] of shape (N, axes)."""
+
+
+def _polar(w: Floats) -> Floats:
+    return np.asarray(np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]))
+
+
+def _azimuth(x: Floats, y: Floats) -> Floats:
+    """Return azimuths [rad] in [0, 2 pi)."""
+    phi = np.arctan2(y, x)
+    return np.where(phi < 0.0, phi + 2.0 * np.pi, phi) % (2.0 * np.pi)
+
+
+def _turned(w: Floats, phi: Floats) -> Floats:
+    """Return vectors (N, 3) turned about the normal by an azimuth [rad]."""
+    c, s = np.cos(phi), np.sin(phi)
+    return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], axis=1)
+
+
+def _tilted(w: Floats, theta: Floats) -> Floats:
+    """Return vectors (N, 3) tilted in the plane of x and z, so that the normal moves by theta [rad] towards x."""
+    c, s = np.cos(theta), np.sin(theta)
+    return np.stack([c * w[:, 0] + s * w[:, 2], w[:, 1], c * w[:, 2] - s * w[:, 0]], axis=1)
+
+
+@dataclass(frozen=True)
+class Spherical:
+    """Polar angle and azimuth of light and viewer.
+
+    Attributes
+    ----------
+    anisotropic : bool
+        False: without the azimuth of the light, and that of the viewer counts from the light.
+    mirrored : bool
+        f_r is the same for -phi_r, so that it ends at pi.
+    """
+
+    anisotropic: bool
+    mirrored: bool
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        return ("theta_i", "phi_i", "theta_r", "phi_r") if self.anisotropic else ("theta_i", "theta_r", "phi_r")
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        turn = np.pi if self.mirrored else 2.0 * np.pi
+        return (HALF_PI, 2.0 * np.pi, HALF_PI, turn) if self.anisotropic else (HALF_PI, HALF_PI, turn)
+
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
+        phi_i, phi_r = _azimuth(wi[:, 0], wi[:, 1]), _azimuth(wr[:, 0], wr[:, 1])
+        if not self.anisotropic:
+            phi_r = (phi_r - phi_i) % (2.0 * np.pi)
+        phi_r = _folded(phi_r) if self.mirrored else phi_r
+        return np.stack([_polar(wi), *([phi_i] if self.anisotropic else []), _polar(wr), phi_r], axis=1)
+
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        columns = list(angles.T)
+        phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
+        theta_i, theta_r, phi_r = columns
+        return unit_vector(np.minimum(theta_i, _STEEPEST), phi_i), unit_vector(np.minimum(theta_r, _STEEPEST), phi_r)
+
+
+@dataclass(frozen=True)
+class Specular:
+    """The light, and the viewer about the specular direction.
+
+    The polar angle of the viewer is that from the specular direction. Its azimuth is 0 from there towards the normal
+    and grows counter-clockwise as seen from above (libbsdf, ``SpecularCoordinateSystem``; Zemax has the same).
+
+    Attributes
+    ----------
+    anisotropic : bool
+        False: without the azimuth of the light.
+    mirrored : bool
+        f_r is the same for -phi_s, so that it ends at pi.
+    """
+
+    anisotropic: bool
+    mirrored: bool
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        return ("theta_i", "phi_i", "theta_s", "phi_s") if self.anisotropic else ("theta_i", "theta_s", "phi_s")
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        turn = np.pi if self.mirrored else 2.0 * np.pi
+        return (HALF_PI, 2.0 * np.pi, np.pi, turn) if self.anisotropic else (HALF_PI, np.pi, turn)
+
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
+        theta_i, phi_i = _polar(wi), _azimuth(wi[:, 0], wi[:, 1])
+        w = _tilted(_turned(wr, -phi_i), theta_i)
+        phi_s = _azimuth(w[:, 0], w[:, 1])
+        phi_s = _folded(phi_s) if self.mirrored else phi_s
+        return np.stack([theta_i, *([phi_i] if self.anisotropic else []), _polar(w), phi_s], axis=1)
+
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        columns = list(angles.T)
+        phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
+        theta_i, theta_s, phi_s = columns
+        theta_i = np.minimum(theta_i, _STEEPEST)
+        # the cosine to the normal is length cos(theta_s - inclined): it is the lowest one at the largest theta_s
+        inclined = np.arctan2(np.sin(theta_i) * np.cos(phi_s), np.cos(theta_i))
+        length = np.hypot(np.cos(theta_i), np.sin(theta_i) * np.cos(phi_s))
+        largest = inclined + np.arccos(np.minimum(LOWEST / length, 1.0))
+        w = unit_vector(np.minimum(theta_s, np.maximum(largest, 0.0)), phi_s)
+        return unit_vector(theta_i, phi_i), _turned(_tilted(w, -theta_i), phi_i)
+
+
+@dataclass(frozen=True)
+class HalfDifference:
+    """The half vector, and the light about it (Rusinkiewicz 1998, ``rusinkiewicz1998``).
+
+    Attributes
+    ----------
+    anisotropic : bool
+        False: without the azimuth of the half vector.
+    mirrored, reciprocal : bool
+        f_r is the same for -phi_d, and for phi_d + pi, where light and viewer are exchanged. Each halves the range of
+        phi_d.
+    """
+
+    anisotropic: bool
+    mirrored: bool = True
+    reciprocal: bool = True
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        return ("theta_h", "phi_h", "theta_d", "phi_d") if self.anisotropic else ("theta_h", "theta_d", "phi_d")
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        turn = 2.0 * np.pi / (1 + self.mirrored) / (1 + self.reciprocal)
+        return (HALF_PI, 2.0 * np.pi, HALF_PI, turn) if self.anisotropic else (HALF_PI, HALF_PI, turn)
+
+    def angles(self, wi: Floats, wr: Floats) -> Floats:
+        half = wi + wr
+        half /= np.linalg.norm(half, axis=1, keepdims=True)
+        theta_h, phi_h = _polar(half), _azimuth(half[:, 0], half[:, 1])
+        d = _tilted(_turned(wi, -phi_h), -theta_h)
+        phi_d = _azimuth(d[:, 0], d[:, 1])
+        if self.mirrored:
+            phi_d = _folded(phi_d)
+            phi_d = np.minimum(phi_d, np.pi - phi_d) if self.reciprocal else phi_d
+        elif self.reciprocal:
+            phi_d = phi_d % np.pi
+        theta_d = np.minimum(_polar(d), HALF_PI)
+        return np.stack([theta_h, *([phi_h] if self.anisotropic else []), theta_d, phi_d], axis=1)
+
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        columns = list(angles.T)
+        phi_h = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
+        theta_h, theta_d, phi_d = columns
+        theta_h = np.minimum(theta_h, _STEEPEST)
+        # the lower one of the two directions has the cosine length cos(theta_d + inclined) to the normal
+        inclined = np.arctan2(np.sin(theta_h) * np.abs(np.cos(phi_d)), np.cos(theta_h))
+        length = np.hypot(np.cos(theta_h), np.sin(theta_h) * np.cos(phi_d))
+        largest = np.maximum(np.arccos(np.minimum(LOWEST / length, 1.0)) - inclined, 0.0)
+        d = unit_vector(np.minimum(theta_d, largest), phi_d)
+        opposite = d * np.array([-1.0, -1.0, 1.0])
+        return _turned(_tilted(d, theta_h), phi_h), _turned(_tilted(opposite, theta_h), phi_h)
+
+
+def _folded(phi: Floats) -> Floats:
+    """Return azimuths [rad] of the mirror image with an azimuth in [0, pi]."""
+    phi = np.abs(phi) % (2.0 * np.pi)
+    return np.minimum(phi, 2.0 * np.pi - phi)

@@ -1,0 +1,193 @@
+"""The XML files that Radiance and WINDOW share: a frame around blocks of numbers, one a channel and side."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._record import lines, of_lines
+
+# Names of the sides in these files are those of WINDOW, whose front is outdoors. Radiance's front is the back
+FRONT_OF_RADIANCE = "Reflection Back"
+VISIBLE = "Visible"
+_NAMESPACE = "http://windows.lbl.gov"
+_HEAD = f"""<?xml version="1.0" encoding="UTF-8"?>
+<WindowElement xmlns="{_NAMESPACE}" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">
+<WindowElementType>System</WindowElementType>
+<FileType>BSDF</FileType>
+<Optical>
+<Layer>
+"""
+_TAIL = "</Layer>\n</Optical>\n</WindowElement>\n"
+
+
+@dataclass(frozen=True)
+class Block:
+    """Numbers of one channel and one side.
+
+    Attributes
+    ----------
+    wavelength : str
+        "Visible", "Solar", or a channel of a colour, such as "CIE-X".
+    side : str
+        "Reflection Back", and so on.
+    basis : str
+        Name of the angle basis: of the columns, in a matrix.
+    row_basis : str
+        Name of the basis of the rows; empty of a tree.
+    numbers : str
+        The numbers as text.
+    kind : str
+        Type of the data; the schema of WINDOW knows BTDF alone, for reflection, too.
+    """
+
+    wavelength: str
+    side: str
+    basis: str
+    row_basis: str
+    numbers: str
+    kind: str = "BTDF"
+
+
+@dataclass(frozen=True)
+class BsdfFile:
+    """What a file says.
+
+    Attributes
+    ----------
+    name : str
+        Name of the material.
+    structure : str
+        "TensorTree3", "TensorTree4", "Columns" or "Rows".
+    definition : Element
+        Definition of the data, with the angle bases.
+    record : mapping
+        Our record; empty of files of other programs.
+    blocks : mapping
+        Blocks of the front of Radiance, by wavelength.
+    """
+
+    name: str
+    structure: str
+    definition: ElementTree.Element
+    record: Mapping[str, Any]
+    blocks: Mapping[str, Block]
+
+
+def text_of(
+    name: str,
+    title: str,
+    material: Iterable[str],
+    definition: Iterable[str],
+    blocks: Iterable[Block],
+    record: dict[str, Any],
+) -> Iterable[str]:
+    """Yield the text of a file in pieces.
+
+    Parameters
+    ----------
+    name, title : str
+        Of the material.
+    material, definition : iterable of str
+        Lines of XML on the material, and on the structure of the data.
+    blocks : iterable of Block
+        The numbers.
+    record : dict
+        The record; it goes into the comments of the definition.
+    """
+    yield _HEAD
+    product = f"<ProductName>{escape(title)}</ProductName>\n" if title else ""
+    yield f"<Material>\n<Name>{escape(name)}</Name>\n{product}<Manufacturer>brdfdb</Manufacturer>\n"
+    yield "".join(f"{line}\n" for line in (*material, "</Material>", "<DataDefinition>", *definition))
+    yield f"<Comments>\n{escape(chr(10).join(lines(record)))}\n</Comments>\n</DataDefinition>\n"
+    for block in blocks:
+        yield from _text_of_block(block)
+    yield _TAIL
+
+
+def _text_of_block(block: Block) -> Iterable[str]:
+    rows = [
+        "<WavelengthData>",
+        "<LayerNumber>System</LayerNumber>",
+        f'<Wavelength unit="Integral">{block.wavelength}</Wavelength>',
+        "<SourceSpectrum>Equal energy</SourceSpectrum>",
+        f"<DetectorSpectrum>{_DETECTORS.get(block.wavelength, 'None')}</DetectorSpectrum>",
+        "<WavelengthDataBlock>",
+        f"<WavelengthDataDirection>{block.side}</WavelengthDataDirection>",
+    ]
+    if block.row_basis:
+        rows += [
+            f"<ColumnAngleBasis>{block.basis}</ColumnAngleBasis>",
+            f"<RowAngleBasis>{block.row_basis}</RowAngleBasis>",
+        ]
+    else:
+        rows += [f"<AngleBasis>{block.basis}</AngleBasis>"]
+    yield "\n".join([*rows, f"<ScatteringDataType>{block.kind}</ScatteringDataType>", "<ScatteringData>\n"])
+    yield block.numbers
+    yield "\n</ScatteringData>\n</WavelengthDataBlock>\n</WavelengthData>\n"
+
+
+_DETECTORS = {
+    VISIBLE: "ASTM E308 1931 Y.dsp",
+    "CIE-X": "ASTM E308 1931 X.dsp",
+    "CIE-Z": "ASTM E308 1931 Z.dsp",
+    "CIE-u": "CIE 1976 u'",
+    "CIE-v": "CIE 1976 v'",
+}
+
+
+def is_window_element(head: bytes) -> bool:
+    """Return True if the first bytes of a file are those of such a file."""
+    return b"<WindowElement" in head
+
+
+def read(path: str | os.PathLike[str]) -> BsdfFile:
+    """Return what a file says of the side that is Radiance's front.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is not XML of this kind, or has no numbers for that side.
+    OSError
+        If it cannot be read.
+    """
+    data = Path(path).read_bytes()
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities may grow without limit
+        raise FileFormatError(f"{path}: it declares a document type, which these files do not have")
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise FileFormatError(f"{path}: it is not XML: {error}") from None
+    layer, definition = root.find("{*}Optical/{*}Layer"), root.find("{*}Optical/{*}Layer/{*}DataDefinition")
+    if layer is None or definition is None:
+        raise FileFormatError(f"{path}: it has no DataDefinition in Optical, Layer")
+    blocks: dict[str, Block] = {}
+    for entry in layer.findall("{*}WavelengthData"):
+        for part in entry.findall("{*}WavelengthDataBlock"):
+            if _text(part, "WavelengthDataDirection").lower() == FRONT_OF_RADIANCE.lower():
+                wavelength = _text(entry, "Wavelength")
+                basis = _text(part, "AngleBasis") or _text(part, "ColumnAngleBasis")
+                numbers = _text(part, "ScatteringData")
+                blocks[wavelength.lower()] = Block(
+                    wavelength, FRONT_OF_RADIANCE, basis, _text(part, "RowAngleBasis"), numbers
+                )
+    if VISIBLE.lower() not in blocks:
+        raise FileFormatError(f"{path}: it has no {VISIBLE} block of {FRONT_OF_RADIANCE}, which is Radiance's front")
+    return BsdfFile(
+        _text(layer, "Material/{*}Name") or Path(path).stem,
+        _text(definition, "IncidentDataStructure"),
+        definition,
+        of_lines(_text(definition, "Comments").splitlines()),
+        blocks,
+    )
+
+
+def _text(parent: ElementTree.Element, name: str) -> str:
+    """Return the text of a child, without the space around it; empty where there is no such child."""
+    return (parent.findtext(f"{{*}}{name}") or "").strip()

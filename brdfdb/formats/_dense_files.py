@@ -1,0 +1,230 @@
+"""Files of dense tables: what netCDF, zarr, NumPy and CSV have in common."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._record import CONVENTION, record
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from brdfdb.formats._dense_grid import DenseTable
+    from brdfdb.tables.table import Table
+
+OPTIONS = (
+    TOLERANCE,
+    Option(
+        "axes",
+        "smallest",
+        "angles of the grid: light and viewer, half and difference vector, or those that take fewer values",
+        choices=("smallest", "light_viewer", "half_difference"),
+    ),
+    Option(
+        "resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few nodes, where f_r bends", low=0.0, high=45.0
+    ),
+)
+INTERPOLATION = "linear along all axes; at angles beyond the last node f_r is that of the node; 0 below the horizon"
+_CONTINUED = "where light or viewer is below the horizon f_r is 0; values of such nodes only serve interpolation"
+_TURNED = {
+    "theta_i": "polar angle of the light",
+    "theta_r": "polar angle of the viewer",
+    "phi_i": "azimuth of the light",
+    "phi_r": "azimuth of the viewer",
+    "delta_phi": "azimuth of the viewer minus that of the light; 180 is the side of the mirror direction",
+    "theta_h": "polar angle of the half vector",
+    "phi_h": "azimuth of the half vector",
+    "theta_d": "angle between the light and the half vector",
+    "phi_d": "azimuth of the light about the half vector",
+}
+_MOST_VALUES = 1 << 28  # of a file that is read
+
+
+def dense_record(
+    table: Table, dense: DenseTable, verdict: str | None, tolerance: float | None, *, specular: bool
+) -> dict[str, Any]:
+    """Return the record of a file with a dense table; `specular` says that the file holds the specular part, too."""
+    remarks = () if specular else specular_remarks(table)
+    document = record(table, dense.error, verdict, holds=CONVENTION, remarks=remarks, tolerance=tolerance)
+    continued = [_CONTINUED] if dense.grid.half_difference else []
+    return {**document, "interpolation": "; ".join([INTERPOLATION, *continued]), "symmetries": dense.grid.symmetries}
+
+
+def specular_remarks(table: Table) -> tuple[str, ...]:
+    """Return a sentence on the specular part of a table; none if it has none."""
+    if table.specular is None or not table.specular.any():
+        return ()
+    return (f"not in the file: up to {table.specular.max():.3g} of the light leaves in the exact mirror direction",)
+
+
+def dataset(table: Table, dense: DenseTable, verdict: str | None, tolerance: float | None) -> xr.Dataset:
+    """Return a dense table as a Dataset: ``brdf``, the specular part, units and the record as attributes."""
+    import xarray as xr
+
+    from brdfdb.tables.xarray_view import plain_attributes
+
+    at = dense.channels.wavelength_nm
+    spectral = () if at is None else ("wavelength",)
+    coordinates: dict[str, Any] = {
+        name: (name, nodes, {"units": "degree", "long_name": _TURNED[name]}) for name, nodes in dense.grid.axes.items()
+    }
+    if at is not None:
+        names = {"standard_name": "radiation_wavelength", "long_name": "wavelength", "units": "nm"}
+        coordinates["wavelength"] = ("wavelength", at, names)
+    values = dense.values if spectral else dense.values[..., 0]
+    quantity = {"long_name": "bidirectional reflectance distribution function", "units": "sr-1"}
+    variables: dict[str, Any] = {"brdf": ((*dense.grid.names, *spectral), values, quantity)}
+    if specular_remarks(table) and table.specular is not None:
+        nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
+        coordinates["specular_theta_i"] = ("specular_theta_i", nodes, {"units": "degree", "long_name": "theta_i"})
+        share = {"long_name": "reflectance of the specular part, in the exact mirror direction", "units": "1"}
+        variables["specular_reflectance"] = (("specular_theta_i", *spectral), table.specular, share)
+    known = dense_record(table, dense, verdict, tolerance, specular=True)
+    return xr.Dataset(variables, coordinates, plain_attributes(known))
+
+
+def record_of_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the record in attributes, whose objects and lists are JSON text."""
+    document = {}
+    for key, value in attributes.items():
+        document[key] = value.item() if isinstance(value, np.generic) else value
+        if isinstance(value, str) and value[:1] in ("{", "["):
+            try:
+                document[key] = json.loads(value)
+            except ValueError:
+                continue
+    return document
+
+
+def read_dataset(path: Path, opened: xr.Dataset) -> FileTable:
+    """Return f_r of a dataset that a file holds; FileFormatError if it is no dense table."""
+    from brdfdb.tables.grids import axes_among
+
+    if "brdf" not in opened.data_vars:
+        raise FileFormatError(
+            f"{path}: it has no variable brdf, only {', '.join(map(str, opened.data_vars)) or 'none'}"
+        )
+    brdf = opened["brdf"]
+    try:
+        names = axes_among(brdf.dims)
+    except ParameterError as error:
+        raise FileFormatError(f"{path}: {error}") from None
+    spectral = ("wavelength",) if "wavelength" in brdf.dims else ()
+    if set(brdf.dims) != {*names, *spectral} or not set(brdf.dims) <= set(opened.coords):
+        raise FileFormatError(f"{path}: brdf over {', '.join(map(str, brdf.dims))} lacks axes or has too many")
+    if brdf.size > _MOST_VALUES:
+        raise FileFormatError(f"{path}: {brdf.size} values are more than {_MOST_VALUES}")
+    values = brdf.transpose(*names, *spectral).values
+    at = opened["wavelength"].values if spectral else None
+    axes = {name: opened[name].values for name in names}
+    return file_table(path, axes, values, at, record_of_attributes(opened.attrs))
+
+
+def file_table(
+    path: str | os.PathLike[str],
+    axes: Mapping[str, NDArray[Any]],
+    values: NDArray[Any],
+    wavelength_nm: NDArray[Any] | None,
+    known: Mapping[str, Any],
+) -> FileTable:
+    """Return f_r that is interpolated linearly on the grid of a file.
+
+    Raises
+    ------
+    FileFormatError
+        If the axes, the wavelengths or the shape are not those of a table, or a value is not a finite number.
+    """
+    from brdfdb.formats._dense_grid import interpolated
+    from brdfdb.tables.grids import Grid, check_wavelengths
+
+    try:
+        grid = Grid(axes)
+        at = None if wavelength_nm is None else check_wavelengths(wavelength_nm)
+    except (ValueError, TypeError) as error:
+        raise FileFormatError(f"{path}: {error}") from None
+    shape = grid.shape if at is None else (*grid.shape, at.size)
+    if values.shape != shape or values.dtype.kind not in "iuf":
+        raise FileFormatError(f"{path}: brdf is {values.dtype} of shape {values.shape}, not numbers of shape {shape}")
+    if not np.all(np.isfinite(values)):
+        raise FileFormatError(f"{path}: brdf holds values that are not finite")
+    table = interpolated(grid, values.astype(np.float32), at)
+    channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
+    return FileTable(
+        name=str(known.get("name") or Path(path).stem),
+        channels=channels,
+        wavelength_nm=at,
+        evaluate=lambda wi, wr: np.asarray(table.lookup_vectors(wi, wr)).reshape(len(wi), len(channels)),
+        record=known,
+    )
+
+
+def reading_of_rows(
+    path: Path,
+    angles: Mapping[str, NDArray[np.float64]],
+    values: NDArray[np.float64],
+    wavelength_nm: NDArray[np.float64] | None,
+    known: Mapping[str, Any],
+) -> FileTable | Samples:
+    """Return f_r of rows of angles [degree]: interpolated linearly if the rows are those of a grid, else as samples.
+
+    Parameters
+    ----------
+    path : path
+        The file, for errors and names.
+    angles : mapping of str to array (N,) [degree]
+        A column an axis.
+    values : array (N, C) [1/sr]
+        A column a wavelength, or one.
+    wavelength_nm : array (C,) [nm] or None
+        Wavelengths of the columns.
+    known : mapping
+        The record of the file.
+
+    Raises
+    ------
+    FileFormatError
+        If the rows are over half and difference vectors and no grid, or there are more values than wavelengths.
+    """
+    if values.shape[1] != (1 if wavelength_nm is None else wavelength_nm.size):
+        raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")
+    nodes = {name: np.unique(column) for name, column in angles.items()}
+    shape = tuple(column.size for column in nodes.values())
+    if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, nodes):
+        ordered = values.reshape(*shape, -1)
+        return file_table(path, nodes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
+    if not {"theta_i", "theta_r"} <= set(angles):
+        raise FileFormatError(f"{path}: rows over {', '.join(angles)} are not those of a grid")
+    zero = np.zeros(len(values))
+    turned = {name: np.deg2rad(column) for name, column in angles.items()}
+    phi_i = turned.get("phi_i", zero)
+    return Samples(
+        name=str(known.get("name") or path.stem),
+        theta_i=turned["theta_i"],
+        phi_i=phi_i,
+        theta_r=turned["theta_r"],
+        phi_r=phi_i + turned["delta_phi"] if "delta_phi" in turned else turned.get("phi_r", zero),
+        channels=("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm),
+        wavelength_nm=wavelength_nm,
+        values=values,
+        record=known,
+    )
+
+
+def _is_grid(angles: Mapping[str, NDArray[np.float64]], nodes: Mapping[str, NDArray[np.float64]]) -> bool:
+    """Return True if the rows are all nodes of a grid of a table, the last axis fastest."""
+    from brdfdb.tables.grids import KINDS
+
+    if tuple(nodes) not in KINDS or any(column.size < 2 or column[0] != 0.0 for column in nodes.values()):
+        return False
+    expected = np.meshgrid(*nodes.values(), indexing="ij")
+    return all(np.array_equal(grid.reshape(-1), angles[name]) for grid, name in zip(expected, nodes, strict=True))

@@ -1,0 +1,244 @@
+"""The fields of RGL's files, and f_r of them as Mitsuba's `measured`, pbrt-v4 and RGL's loader evaluate it."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._rgl_warp import Array, Mixture, Warp, cell
+
+_REQUIRED = {"theta_i": 1, "phi_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "luminance": 4, "jacobian": 1}
+_BYTES = ("description", "jacobian")
+
+Floats32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """The fields of a file.
+
+    Attributes
+    ----------
+    theta_i : array (N,) [rad]
+        Polar angles of the light.
+    phi_i : array (P,) [rad]
+        Azimuths of the light: one of isotropic materials.
+    ndf : array (h, w)
+        A factor over the half vector.
+    sigma : array (h, w)
+        A divisor, four times, over the light.
+    vndf : array (P, N, h, w)
+        The density over the half vector whose warp the next two are stored by.
+    luminance : array (P, N, S, S)
+        The density over the uniform numbers of that warp that samples are drawn from.
+    spectra : array (P, N, W, S, S)
+        Values: with the factors above f_r cos(theta_r) [1/sr]. Channels are wavelengths, or R, G, B.
+    wavelength_nm : array (W,) [nm] or None
+        Wavelengths; None where the channels are R, G, B.
+    jacobian : bool
+        True if the factors count.
+    description : str
+        Text of the file.
+    """
+
+    theta_i: Floats32
+    phi_i: Floats32
+    ndf: Floats32
+    sigma: Floats32
+    vndf: Floats32
+    luminance: Floats32
+    spectra: Floats32
+    wavelength_nm: Floats32 | None
+    jacobian: bool = True
+    description: str = ""
+
+    @property
+    def isotropic(self) -> bool:
+        """True if the readers take the azimuth of the half vector from that of the light."""
+        return self.phi_i.size <= 2
+
+    @property
+    def reduction(self) -> int:
+        """Parts of the circle, of which the file holds one azimuth of the light: 1, 2 or 4."""
+        if self.isotropic:
+            return 1
+        span = float(self.phi_i[-1] - self.phi_i[0])
+        return int(np.rint(2.0 * np.pi / span))
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the arrays [byte]."""
+        return sum(array.nbytes for array in self.tensors().values())
+
+    def tensors(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays by the names that they have in the file."""
+        names = ("theta_i", "phi_i", "ndf", "sigma", "vndf", "luminance")
+        arrays: dict[str, NDArray[Any]] = {
+            "description": np.frombuffer(self.description.encode(), np.uint8),
+            **{name: getattr(self, name) for name in names},
+            "spectra" if self.wavelength_nm is not None else "rgb": self.spectra,
+            "jacobian": np.array([self.jacobian], np.uint8),
+        }
+        return arrays if self.wavelength_nm is None else arrays | {"wavelengths": self.wavelength_nm}
+
+    @functools.cached_property
+    def warp(self) -> Warp:
+        """The warp of the values."""
+        return Warp(self.vndf.reshape(-1, *self.vndf.shape[2:]))
+
+    @functools.cached_property
+    def _last_channels(self) -> Array:
+        """The values with the channels last: (slices, S, S, W)."""
+        stored = self.spectra.reshape(-1, *self.spectra.shape[2:])
+        return np.ascontiguousarray(np.moveaxis(stored, 1, -1), dtype=np.float64)
+
+    def evaluate(self, wi: Array, wr: Array) -> Array:
+        """Return f_r [1/sr], shape (M, W), at unit vectors (M, 3) above the horizon."""
+        return self.at(Places.of(wi, wr, self.isotropic, self.reduction))
+
+    def at(self, places: Places) -> Array:
+        """Return f_r [1/sr], shape (M, W), at places."""
+        mixture = self.mixture(places)
+        s_x, s_y = self.warp.inverse(mixture, places.u_m[0], places.u_m[1])
+        size = self.spectra.shape[-1]
+        (i, u), (j, v) = cell(s_x, size), cell(s_y, size)
+        values = np.zeros((len(i), self.spectra.shape[2]))
+        for di, dj, weight in ((0, 0, (1 - u) * (1 - v)), (1, 0, u * (1 - v)), (0, 1, (1 - u) * v), (1, 1, u * v)):
+            values += weight[:, np.newaxis] * mixture.of(self._last_channels, j + dj, i + di)
+        if self.jacobian:
+            values *= (bilinear(self.ndf, *places.u_m) / (4.0 * bilinear(self.sigma, *places.u_i)))[:, np.newaxis]
+        return np.asarray(values / places.cosine[:, np.newaxis])
+
+    def mixture(self, places: Places) -> Mixture:
+        """Return the slices that are mixed at places."""
+        j, v = _between(self.theta_i, places.theta_i)
+        if self.phi_i.size == 1:
+            step = min(1, self.theta_i.size - 1)
+            return Mixture(np.stack([j, j + step]), np.stack([1.0 - v, v]))
+        i, u = _between(self.phi_i, places.phi_i)
+        step, count = min(1, self.theta_i.size - 1), self.theta_i.size
+        numbers = [i * count + j, i * count + j + step, (i + 1) * count + j, (i + 1) * count + j + step]
+        return Mixture(np.stack(numbers), np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v]))
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Pairs of directions in the coordinates of a file.
+
+    Attributes
+    ----------
+    theta_i, phi_i : array (M,) [rad]
+        Light, its azimuth in the part of the circle that the file holds.
+    u_i, u_m : array (2, M)
+        Light and half vector in the unit square: first of the polar angle, then of the azimuth.
+    cosine : array (M,) [1]
+        Cosine of theta_r.
+    """
+
+    theta_i: Array
+    phi_i: Array
+    u_i: Array
+    u_m: Array
+    cosine: Array
+
+    @classmethod
+    def of(cls, wi: Array, wr: Array, isotropic: bool, reduction: int = 1) -> Places:
+        """Return the places of unit vectors (M, 3) of light and viewer."""
+        wi, wr = wi.astype(np.float64), wr.astype(np.float64)
+        if reduction >= 2:  # the light is mirrored, or turned, into the part of the circle from -pi on
+            flip_y = np.where(wi[:, 1] > 0.0, -1.0, 1.0)
+            flip_x = np.where(wi[:, 0] > 0.0, -1.0, 1.0) if reduction == 4 else flip_y
+            flips = np.stack([flip_x, flip_y, np.ones_like(flip_x)], axis=-1)
+            wi, wr = wi * flips, wr * flips
+        m = wi + wr
+        m = m / np.linalg.norm(m, axis=-1, keepdims=True)
+        theta_i, theta_m = _polar_angle(wi), _polar_angle(m)
+        phi_i, phi_m = np.arctan2(wi[:, 1], wi[:, 0]), np.arctan2(m[:, 1], m[:, 0])
+        u_y = of_azimuth(phi_m - phi_i if isotropic else phi_m)
+        u_m = np.stack([of_polar_angle(theta_m), u_y - np.floor(u_y)])
+        return cls(theta_i, phi_i, np.stack([of_polar_angle(theta_i), of_azimuth(phi_i)]), u_m, wr[:, 2])
+
+
+def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> Fields:
+    """Return the fields of a tensor file, checked as its readers check them; FileFormatError if one is not right."""
+    spectral = "wavelengths" in arrays
+    values = "spectra" if spectral else "rgb"
+    axes = _REQUIRED | {values: 5} | ({"wavelengths": 1} if spectral else {}) | {"description": 1}
+    for name, count in axes.items():
+        if name not in arrays:
+            raise FileFormatError(f"{path}: it has no field {name!r}, so it is no measured material of RGL")
+        dtype = np.dtype(np.uint8 if name in _BYTES else np.float32)
+        if arrays[name].ndim != count or arrays[name].dtype != dtype:
+            raise FileFormatError(f"{path}: field {name!r} is not of {count} axes and of type {dtype}")
+        if dtype == np.float32 and not np.all(np.isfinite(arrays[name])):
+            raise FileFormatError(f"{path}: field {name!r} has numbers that are not finite")
+    slices = (arrays["phi_i"].size, arrays["theta_i"].size)
+    channels, size = (arrays["wavelengths"].size if spectral else 3), arrays["luminance"].shape[-1]
+    expected = {
+        "vndf": (*slices, *arrays["vndf"].shape[2:]),
+        "luminance": (*slices, size, size),
+        values: (*slices, channels, size, size),
+        "jacobian": (1,),
+    }
+    for name, shape in expected.items():
+        if arrays[name].shape != shape:
+            raise FileFormatError(f"{path}: field {name!r} has the shape {arrays[name].shape}; its axes say {shape}")
+    for name in ("ndf", "sigma", "vndf", "luminance"):
+        if min(arrays[name].shape) < 1 or min(arrays[name].shape[-2:]) < 2:
+            raise FileFormatError(f"{path}: field {name!r} of shape {arrays[name].shape} is too small")
+    for name in ("theta_i", "phi_i", *(("wavelengths",) if spectral else ())):
+        if arrays[name].size < 1 or not np.all(np.diff(arrays[name]) > 0.0):
+            raise FileFormatError(f"{path}: field {name!r} does not ascend")
+    return Fields(
+        **{name: arrays[name] for name in ("theta_i", "phi_i", "ndf", "sigma", "vndf", "luminance")},
+        spectra=arrays[values],
+        wavelength_nm=arrays["wavelengths"] if spectral else None,
+        jacobian=bool(arrays["jacobian"][0]),
+        description=arrays["description"].tobytes().decode("utf-8", "replace"),
+    )
+
+
+def directions(u_x: Array, u_y: Array) -> Array:
+    """Return unit vectors (..., 3) of points of the unit square."""
+    theta, phi = u_x**2 * (np.pi / 2.0), (2.0 * u_y - 1.0) * np.pi
+    sine = np.sin(theta)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.broadcast_to(np.cos(theta), phi.shape)], axis=-1)
+
+
+def _polar_angle(w: Array) -> Array:
+    """Return theta [rad] of unit vectors without the loss of digits near the normal."""
+    return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * np.hypot(np.hypot(w[:, 0], w[:, 1]), w[:, 2] - 1.0), 1.0)))
+
+
+def of_polar_angle(theta: Array) -> Array:
+    """Return the coordinate in the unit square of theta [rad]."""
+    return np.asarray(np.sqrt(theta * (2.0 / np.pi)))
+
+
+def of_azimuth(phi: Array) -> Array:
+    """Return the coordinate in the unit square of phi [rad]."""
+    return np.asarray((phi + np.pi) / (2.0 * np.pi))
+
+
+def _between(nodes: Floats32, wanted: Array) -> tuple[NDArray[np.int64], Array]:
+    """Return the interval of ascending nodes that holds numbers, and the place in it, in [0, 1]."""
+    if nodes.size == 1:
+        return np.zeros(wanted.shape, np.int64), np.zeros(wanted.shape)
+    exact = nodes.astype(np.float64)
+    index = np.clip(np.searchsorted(exact, wanted) - 1, 0, nodes.size - 2)
+    return index, np.clip((wanted - exact[index]) / (exact[index + 1] - exact[index]), 0.0, 1.0)
+
+
+def bilinear(values: Floats32, x: Array, y: Array) -> Array:
+    """Return values (rows, columns) at points of the unit square."""
+    (i, u), (j, v) = cell(x, values.shape[1]), cell(y, values.shape[0])
+    exact = values.astype(np.float64)
+    low = (1.0 - u) * exact[j, i] + u * exact[j, i + 1]
+    return np.asarray((1.0 - v) * low + v * ((1.0 - u) * exact[j + 1, i] + u * exact[j + 1, i + 1]))

@@ -1,0 +1,201 @@
+"""The smallest file of RGL's format that is as near to a table as was asked for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.formats._rgl_build import Plan, build
+from brdfdb.formats._rgl_fields import Fields, Floats32
+from brdfdb.formats._rgl_surface import Surface
+from brdfdb.formats._rgl_warp import Array
+
+if TYPE_CHECKING:
+    from brdfdb.formats._channels import Channels
+    from brdfdb.formats._stated_error import Comparison, FileError
+    from brdfdb.tables.table import Table
+
+GREY_NM = 550.0  # the wavelength of grey tables; readers continue a single one to all
+_HORIZON = 0.94  # share of rows above the horizon, of warps that end there
+# Rungs from small to large: size, lights, and azimuths of a quarter
+_ISOTROPIC = ((10, 8), (14, 11), (20, 15), (28, 22), (36, 28), (44, 34), (52, 40), (64, 50), (80, 62), (96, 76))
+_ANISOTROPIC = ((16, 8, 5), (24, 12, 7), (32, 16, 9), (40, 19, 11), (48, 23, 13), (56, 26, 15), (64, 30, 17), (80, 36, 21))
+_FIRST = 5  # rung that is tried first
+_STEP = 1.4  # factor by which the error falls, about, from rung to rung
+_COARSE = 30  # size below which densities have half of the nodes
+_FEW = 3  # channels that rungs are compared by
+_OF_SPECTRUM = 0.5  # share of the tolerance that straight lines between wavelengths may take
+_PAIRS = 4001  # pairs of directions that they are tested with
+COLOURLESS = "the colour was not measured: R, G and B are equal"
+REDUCED = (
+    "the file holds a quarter or half of the azimuths of the light, which Mitsuba 3 mirrors; "
+    "pbrt-v4 and RGL's loader take files with azimuth full"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The fields of a file, its error, the names of its channels, and remarks."""
+
+    fields: Fields
+    error: FileError
+    channels: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+
+def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool = False) -> Found:
+    """Return the smallest file within a tolerance, or the best one of at most so many bytes.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    kind : str
+        "spectral" or "rgb".
+    tolerance : float [1]
+        Largest p99.
+    most_bytes : float
+        Largest size that is tried; of files with all azimuths as many times larger as they are reduced otherwise.
+    full : bool
+        The file holds all azimuths of the light.
+    """
+    from brdfdb.formats._stated_error import Comparison
+
+    channels, remarks = _channels(table, kind)
+    search = _Search(table, Comparison(table, channels), kind, tolerance, full)
+    if search.surface.reduction > 1:
+        remarks += (REDUCED,)
+    ladders = search.ladders(most_bytes)
+    first = [search.p99(plans[min(_FIRST, len(plans) - 1)]) for plans in ladders]
+    fields, error = search.best(ladders[int(np.argmin(first))])
+    names = channels.names if search.nodes is None else tuple(f"{value:g}nm" for value in search.nodes)
+    return Found(fields, error, names, remarks)
+
+
+class _Search:
+    """Files of one table, compared with it."""
+
+    def __init__(self, table: Table, comparison: Comparison, kind: str, tolerance: float, full: bool) -> None:
+        self._comparison, self._tolerance = comparison, tolerance
+        channels = comparison.channels
+        at = channels.wavelength_nm if kind == "spectral" else None
+        self._kept = np.arange(len(channels.names)) if at is None else _thinned(comparison, at, tolerance)
+        self.nodes = None if at is None else at[self._kept]
+        self._mixing = None if at is None else _lines(at, at[self._kept])
+        self._known: dict[Plan, float] = {}
+        self._last: tuple[Plan, Fields] | None = None
+        self._of_file: Floats32 | None = None
+        if kind == "spectral":
+            self._of_file = np.array([GREY_NM] if self.nodes is None else self.nodes, np.float32)
+        self.surface = Surface(table, _some(channels, self._kept), full)
+        few = np.unique(np.linspace(0, self._kept.size - 1, _FEW).astype(np.int64))
+        self._few, self._sample = few, self.surface
+        if few.size < self._kept.size:
+            self._sample = Surface(table, _some(channels, self._kept[few]), full)
+
+    def ladders(self, most_bytes: float) -> list[list[Plan]]:
+        """Return plans from small to large: of isotropic tables with both kinds of warps."""
+        if self.surface.isotropic:
+            soft = [Plan(s, n, 1, *((33, 65) if s > _COARSE else (17, 33))) for s, n in _ISOTROPIC]
+            hard = [Plan(s, n, 1, *((65, 65) if s > _COARSE else (33, 33)), _HORIZON) for s, n in _ISOTROPIC]
+            ladders = [soft, hard]
+        else:
+            parts = 4 // self.surface.reduction
+            most_bytes *= parts
+            ladders = [
+                [Plan(s, n, parts * (p - 1) + 1, *((33, 33) if s > _COARSE else (17, 17))) for s, n, p in _ANISOTROPIC]
+            ]
+        return [[plan for plan in ladder if self._nbytes(plan) <= most_bytes] or ladder[:1] for ladder in ladders]
+
+    def best(self, ladder: list[Plan]) -> tuple[Fields, FileError]:
+        """Return the first of a ladder within the tolerance, else the last."""
+        low, high, rung = 0, len(ladder) - 1, min(_FIRST, len(ladder) - 1)
+        while low < high:
+            p99 = self.p99(ladder[rung])
+            low, high = (low, rung) if p99 <= self._tolerance else (min(rung + 1, high), high)
+            steps = round(math.log(max(p99, 1e-9) / self._tolerance) / math.log(_STEP))
+            rung = min(max(rung + steps, low), max(low, high - 1))
+        for plan in ladder[low:]:
+            fields = self._built(plan)
+            error = self._comparison.error_of(lambda wi, wr, file=fields: self._mixed(file.evaluate(wi, wr)))
+            if error.p99 <= self._tolerance:
+                break
+        return fields, error
+
+    def _built(self, plan: Plan) -> Fields:
+        """Return the fields of a plan with all channels; those of the last one are kept."""
+        if self._last is None or self._last[0] != plan:
+            self._last = plan, build(self.surface, plan, self._of_file)
+        return self._last[1]
+
+    def p99(self, plan: Plan) -> float:
+        """Return p99 of a plan over a few channels."""
+        if plan not in self._known:
+            whole = self._sample is self.surface
+            fields = self._built(plan) if whole else build(self._sample, plan, self._of_file)
+
+            def evaluate(wi: Array, wr: Array) -> Array:
+                values = self._comparison.truth.copy()
+                values[:, self._kept[self._few]] = fields.evaluate(wi, wr)
+                return values
+
+            self._known[plan] = self._comparison.error_of(evaluate).p99
+        return self._known[plan]
+
+    def _mixed(self, values: Array) -> Array:
+        """Return values at the wavelengths of the table from those of the file."""
+        return values if self._mixing is None else np.asarray(values @ self._mixing)
+
+    def _nbytes(self, plan: Plan) -> int:
+        texels = (self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
+        return 4 * plan.lights * plan.azimuths * texels
+
+
+def _channels(table: Table, kind: str) -> tuple[Channels, tuple[str, ...]]:
+    """Return the channels of a kind of file, and remarks."""
+    from brdfdb.formats._channels import RGB, Channels, channels_of
+
+    if kind == "spectral":
+        return channels_of(table), ()
+    at = table.wavelength_nm
+    try:
+        return channels_of(table, "rgb"), (COLOURLESS,) if at is None else ()
+    except ParameterError:
+        assert at is not None
+        return Channels(RGB, at, np.full((at.size, 3), 1.0 / at.size), "mean over the wavelengths"), (COLOURLESS,)
+
+
+def _some(channels: Channels, kept: NDArray[np.int64]) -> Channels:
+    """Return some of the channels."""
+    from brdfdb.formats._channels import Channels
+
+    names = tuple(channels.names[index] for index in kept)
+    if channels.wavelength_nm is None:
+        return Channels(names, None, None, channels.meaning)
+    if channels.weights is None:
+        return Channels(names, channels.wavelength_nm[kept], None, channels.meaning)
+    return Channels(names, channels.wavelength_nm, channels.weights[:, kept], channels.meaning)
+
+
+def _thinned(comparison: Comparison, at: Array, tolerance: float) -> NDArray[np.int64]:
+    """Return the numbers of wavelengths [nm] that are enough, because readers join them by straight lines."""
+    truth = comparison.truth[:_PAIRS]
+    scale = np.maximum(truth, comparison.floor) + 1e-30
+    kept = [0, at.size - 1] if at.size > 1 else [0]
+    while len(kept) < at.size:
+        wrong = np.abs(truth[:, kept] @ _lines(at, at[kept]) - truth) / scale
+        p99 = np.percentile(wrong, 99.0, axis=0)
+        if p99.max() <= _OF_SPECTRUM * tolerance:
+            break
+        kept = sorted({*kept, int(np.argmax(p99))})
+    return np.array(kept)
+
+
+def _lines(at: Array, nodes: Array) -> Array:
+    """Return the matrix (nodes, wavelengths) of straight lines between nodes."""
+    return np.stack([np.interp(at, nodes, one) for one in np.eye(nodes.size)])

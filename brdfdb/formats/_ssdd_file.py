@@ -1,0 +1,139 @@
+"""The text of SSDD files: a header, and blocks of lists of angles with their values, in ASCII or binary."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.parameters import Floats
+
+VERSION = "0.3"
+LISTS = ("PARAM0_LIST", "PARAM1_LIST", "PARAM2_LIST", "PARAM3_LIST")
+_TYPES = ("brdf", "btdf", "specular_reflectance", "specular_transmittance")
+_CHANNELS = {"monochrome": 1, "rgb": 3, "xyz": 3}
+_SPACES = b" \t\n\v\f\r"
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A block of data.
+
+    Attributes
+    ----------
+    entries : mapping of str
+        The entries before the values, by name.
+    angles : tuple of array [degree]
+        The lists of angles that are there, from PARAM0_LIST on; (0,) for one that is left out.
+    values : float32 array (n0, n1, ..., C)
+        Values over the lists, and last the channels.
+    """
+
+    entries: Mapping[str, str]
+    angles: tuple[NDArray[np.float64], ...]
+    values: NDArray[np.float32]
+
+    @property
+    def wavelength_nm(self) -> NDArray[np.float64] | None:
+        """Wavelengths [nm] of the channels; None if they are none."""
+        if self.entries["COLOR_MODEL"] != "spectrum":
+            return None
+        return np.array([float(text) for text in self.entries["WAVELENGTH_LIST"].split()])
+
+
+def header(software: str, comments: Sequence[str]) -> bytes:
+    """Return the beginning of a file, with comments."""
+    return "\n".join([f"VERSION {VERSION}", *(f"# {line}" for line in comments), f"SOFTWARE {software}", ""]).encode()
+
+
+def block(entries: Mapping[str, str], values: Floats, binary: bool) -> bytes:
+    """Return a block of entries, in their order, and values (n0, n1, ..., C), whose first index runs fastest.
+
+    libbsdf looks for comments after each line, and so at the beginning of binary values too. There a "#" behind bytes
+    that are white space would be taken for one: the first value is changed in its last digit then.
+    """
+    lines = [f"{name} {text}" for name, text in entries.items() if text]
+    channels = values.shape[-1]
+    rows = np.moveaxis(values, -1, 0).T.reshape(-1, channels).astype("<f4")
+    if not binary:
+        text = "%.7g" + " %.7g" * (channels - 1)
+        data = "\n".join([text] * len(rows)) % tuple(rows.reshape(-1).tolist())
+        return "\n".join(["", *lines, "DATA ascii", data, ""]).encode()
+    while rows.reshape(-1)[:64].tobytes().lstrip(_SPACES).startswith(b"#"):
+        rows[0, 0] = np.nextafter(rows[0, 0], np.float32(np.inf))
+    return "\n".join(["", *lines, "DATA binary", ""]).encode() + rows.tobytes() + b"\n"
+
+
+def parsed(path: Path) -> tuple[list[str], list[Block]]:
+    """Return the comments and the blocks of a file.
+
+    Raises
+    ------
+    FileFormatError
+        If it is not an SSDD file, or damaged.
+    OSError
+        If it cannot be read.
+    """
+    data = path.read_bytes()
+    comments: list[str] = []
+    blocks: list[Block] = []
+    entries: dict[str, str] = {}
+    at = 0
+    while at < len(data):
+        end = data.find(b"\n", at)
+        end = len(data) if end < 0 else end
+        line = data[at:end].decode("utf-8", "replace").strip()
+        at = end + 1
+        if line.startswith("#"):
+            comments.append(line[1:].strip())
+            continue
+        name, _, text = line.partition(" ")
+        if name == "DATA_TYPE":
+            entries = {}
+        if name:
+            entries[name] = text.strip()
+        if name == "DATA":
+            values, at = _values(path, data, at, entries)
+            blocks.append(values)
+    return comments, blocks
+
+
+def _values(path: Path, data: bytes, at: int, entries: Mapping[str, str]) -> tuple[Block, int]:
+    """Return the block whose values begin at a byte, and the byte behind it."""
+    if entries.get("DATA_TYPE") not in _TYPES or "PARAM0_LIST" not in entries:
+        raise FileFormatError(f"{path}: a block of data has no DATA_TYPE of {', '.join(_TYPES)}, or no PARAM0_LIST")
+    try:
+        lists = {name: np.array([float(text) for text in entries.get(name, "0").split()]) for name in LISTS}
+        model = entries.get("COLOR_MODEL", "")
+        channels = len(entries["WAVELENGTH_LIST"].split()) if model == "spectrum" else _CHANNELS[model]
+    except (KeyError, ValueError):
+        raise FileFormatError(f"{path}: COLOR_MODEL, or a list of angles or wavelengths, cannot be read") from None
+    angles = tuple(lists.values())
+    if not channels or not all(nodes.size and np.all(np.diff(nodes) > 0.0) for nodes in angles):
+        raise FileFormatError(f"{path}: a list of angles is empty or does not increase")
+    count = channels * math.prod(nodes.size for nodes in angles)
+    if entries["DATA"] == "binary":
+        end = at + 4 * count
+        if end > len(data):
+            raise FileFormatError(f"{path}: {len(data) - at} bytes of values, its lists of angles need {4 * count}")
+        flat = np.frombuffer(data, "<f4", count, at)
+    else:
+        end = data.find(b"\nDATA_TYPE", at)
+        end = len(data) if end < 0 else end
+        lines = (line for line in data[at:end].split(b"\n") if not line.lstrip().startswith(b"#"))
+        try:
+            flat = np.array(b" ".join(lines).split(), np.float32)
+        except ValueError:
+            raise FileFormatError(f"{path}: a value is not a number") from None
+        if flat.size != count:
+            raise FileFormatError(f"{path}: {flat.size} values, its lists of angles need {count}")
+    if not np.all(np.isfinite(flat)):
+        raise FileFormatError(f"{path}: a value is not finite")
+    shape = tuple(nodes.size for nodes in reversed(angles))
+    values = np.moveaxis(flat.reshape(*shape, channels), -1, 0).T
+    return Block(dict(entries), angles, np.ascontiguousarray(values)), end

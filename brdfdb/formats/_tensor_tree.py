@@ -1,0 +1,195 @@
+"""Tensor trees: averages over cells of the unit cube, which are small where f_r varies and large where it does not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.formats._square_disk import positions
+from brdfdb.parameters import Floats
+
+Index = NDArray[np.int64]
+
+DIGITS = 4  # of values in files
+DEEPEST = 24  # levels below the root; a cell is then smaller than what float32 resolves
+_TOKEN = re.compile(r"\{([^{}]*)\}|([{}])|[^{}\s,]+")
+_SHOWN = 20  # characters of a wrong word that a sentence repeats
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """A tree of cells: each divides into 2^rank children, or is a leaf with a grid of values.
+
+    Bit j of the number of a child is the half of dimension j. In a grid dimension 0 varies slowest.
+
+    Attributes
+    ----------
+    rank : int
+        Dimensions of the cube.
+    children : int array (inner, 2^rank)
+        Inner nodes: the number of an inner node, or ``-1 - leaf``. The root is node 0, or leaf 0 if there is no node.
+    start : int array (leaves,)
+        Place of the first value of each leaf.
+    halvings : int array (leaves,)
+        Each axis of the grid of a leaf has 2^halvings cells.
+    values : array (N,)
+        Values of all leaves.
+    """
+
+    rank: int
+    children: Index
+    start: Index
+    halvings: Index
+    values: Floats
+
+    def at(self, place: Floats) -> Floats:
+        """Return the values (N,) at positions (N, rank) in the unit cube."""
+        rest = place.copy()
+        node = np.full(len(place), 0 if len(self.children) else -1, dtype=np.int64)
+        bits = 1 << np.arange(self.rank)
+        inner = np.flatnonzero(node >= 0)
+        while inner.size:
+            doubled = 2.0 * rest[inner]
+            upper = doubled >= 1.0
+            rest[inner] = doubled - upper
+            node[inner] = self.children[node[inner], upper @ bits]
+            inner = inner[node[inner] >= 0]
+        leaf = -1 - node
+        halvings = self.halvings[leaf]
+        cell = (rest * (1 << halvings)[:, np.newaxis]).astype(np.int64)
+        offset = np.zeros(len(place), dtype=np.int64)
+        for j in range(self.rank):
+            offset = (offset << halvings) + cell[:, j]
+        return np.asarray(self.values[self.start[leaf] + offset])
+
+    def at_vectors(self, wi: Floats, wr: Floats) -> Floats:
+        """Return the values (N,) at unit vectors (N, 3) of light and viewer."""
+        return self.at(positions(wi, wr, self.rank))
+
+    def text(self) -> str:
+        """Return the tree as Radiance reads it."""
+        numbers = [f"{value:.{DIGITS}g}".removeprefix("0") or "0" for value in self.values.tolist()]
+        if not len(self.children):
+            return f"{{{' '.join(numbers)}}}"
+        return "".join(_braces(self, numbers))
+
+
+def rounded(values: Floats) -> Floats:
+    """Return values with the digits that files have."""
+    exponent = np.floor(np.log10(np.abs(values), out=np.zeros_like(values), where=values != 0.0))
+    unit = 10.0 ** (exponent - (DIGITS - 1))
+    return np.asarray(np.rint(values / unit) * unit)
+
+
+def reduced(tree: Tree, parts: Floats, weight: Floats, tolerance: float) -> Tree:
+    """Return a tree of single cells with children merged where their values differ little.
+
+    Parameters
+    ----------
+    tree : Tree
+        Each leaf has one value, and children have larger numbers than their parents.
+    parts, weight : array (leaves,)
+        Values of the leaves, and their weights in averages.
+    tolerance : float
+        Largest difference of the values below a node that becomes a leaf.
+    """
+    inner = len(tree.children)
+    # Of all nodes; leaf k, whose code is -1 - k, stands at that place from the end
+    mass, total = np.zeros((2, inner + len(parts)))
+    low, high = np.full(len(mass), np.inf), np.full(len(mass), -np.inf)
+    dark = weight <= 0.0
+    mass[inner:], total[inner:] = weight[::-1], (weight * parts)[::-1]
+    low[inner:], high[inner:] = np.where(dark, np.inf, parts)[::-1], np.where(dark, -np.inf, parts)[::-1]
+    for node in range(inner - 1, -1, -1):
+        below = tree.children[node]
+        mass[node], total[node] = mass[below].mean(), total[below].mean()
+        low[node], high[node] = low[below].min(), high[below].max()
+    mean = np.divide(total, mass, out=np.full(len(mass), parts[0]), where=mass > 0.0)
+    kept = high[:inner] - low[:inner] > tolerance
+    if not np.any(kept):
+        return Tree(tree.rank, tree.children[:0], np.zeros(1, np.int64), np.zeros(1, np.int64), mean[:1])
+    below = tree.children[kept]
+    inside = (below >= 0) & np.append(kept, False)[np.maximum(below, -1)]
+    values = mean[below[~inside]]
+    children = np.empty_like(below)
+    children[inside] = (np.cumsum(kept) - 1)[below[inside]]
+    children[~inside] = -1 - np.arange(len(values))
+    return Tree(tree.rank, children, np.arange(len(values)), np.zeros(len(values), np.int64), values)
+
+
+def _braces(tree: Tree, numbers: list[str]) -> Iterator[str]:
+    """Yield the pieces of the text of a tree: a node whose children are single cells is a grid of two cells an axis."""
+    # Dimension 0 is the first bit of a child, and the last one of a place in a grid
+    order = [sum((k >> j & 1) << (tree.rank - 1 - j) for j in range(tree.rank)) for k in range(1 << tree.rank)]
+    leaf_of = np.where(tree.children < 0, -1 - tree.children, 0)
+    grids = np.all((tree.children < 0) & (tree.halvings[leaf_of] == 0), axis=1).tolist()
+    children, start, halvings = tree.children.tolist(), tree.start.tolist(), tree.halvings.tolist()
+    stack: list[int | str] = [0]
+    while stack:
+        top = stack.pop()
+        if isinstance(top, str):
+            yield top
+        elif top < 0:
+            leaf = -1 - top
+            yield f"{{{' '.join(numbers[start[leaf] : start[leaf] + (1 << tree.rank * halvings[leaf])])}}}"
+        elif grids[top]:
+            yield f"{{{' '.join([numbers[start[-1 - children[top][k]]] for k in order])}}}\n"
+        else:
+            yield "{"
+            stack.append("}\n")
+            stack.extend(reversed(children[top]))
+
+
+def parsed(text: str, rank: int) -> Tree:
+    """Return the tree that a text describes; negative values are 0, as Radiance reads them.
+
+    Raises
+    ------
+    ValueError
+        If the text is no tree; the sentence says why.
+    """
+    start: list[int] = []
+    halvings: list[int] = []
+    values: list[float] = []
+    nodes: list[list[int]] = []  # children before their parents
+    path: list[list[int]] = [[]]  # the children, so far, of all open nodes; the first list is that of the root
+    for match in _TOKEN.finditer(text):
+        grid, brace = match.groups()
+        if grid is not None:
+            numbers = grid.replace(",", " ").split()
+            start.append(len(values))
+            halvings.append(_halvings(len(numbers), rank))
+            values.extend(map(float, numbers))
+            path[-1].append(-len(start))
+        elif brace == "{":
+            if len(path) > DEEPEST:
+                raise ValueError(f"it has more than {DEEPEST} levels")
+            path.append([])
+        elif brace == "}" and len(path) > 1:
+            closed = path.pop()
+            if len(closed) != 1 << rank:
+                raise ValueError(f"a node has {len(closed)} children instead of {1 << rank}")
+            path[-1].append(len(nodes))
+            nodes.append(closed)
+        else:
+            raise ValueError(f"{match.group()[:_SHOWN]!r} stands outside of the braces")
+    if len(path) != 1 or len(path[0]) != 1:
+        raise ValueError("a brace is not closed" if len(path) != 1 else f"it has {len(path[0])} roots")
+    numbers_read = np.array(values)
+    if not np.all(np.isfinite(numbers_read)):
+        raise ValueError("a value is not finite")
+    inner = np.array(nodes, dtype=np.int64).reshape(-1, 1 << rank)
+    inner = np.where(inner >= 0, len(nodes) - 1 - inner, inner)[::-1]  # the root is the first node, not the last
+    return Tree(rank, inner, np.array(start), np.array(halvings), np.maximum(numbers_read, 0.0))
+
+
+def _halvings(count: int, rank: int) -> int:
+    """Return how often each axis of a grid of `count` values is halved."""
+    halvings = max(0, count.bit_length() - 1) // rank
+    if count != 1 << rank * halvings:
+        raise ValueError(f"a grid of {count} values is not of the same length along {rank} axes")
+    return halvings

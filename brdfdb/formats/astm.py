@@ -1,0 +1,183 @@
+"""ASTM E1392: f_r at pairs of directions as rows of text, in the dialect of Cornell's measurements."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._angles import Spherical
+from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
+from brdfdb.formats._colours import specular_remark
+from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._record import lines, of_lines, record
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+suffix = ".astm"
+media_type = "text/plain"
+summary = "ASTM E1392 in Cornell's dialect: rows of angles and f_r at all wavelengths (libbsdf, ALTA)"
+kinds = ()
+options = (
+    TOLERANCE,
+    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+)
+
+_TITLE = b"ASTM E1392\n"
+_ANGLES = ("theta_i", "phi_i", "theta_s", "phi_s")
+_CHARACTERS = 10  # of a number
+_LONGEST_HEADER = 1000  # lines
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    size: float = 16.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write a table as an ASTM E1392 file: whole, or not at all. The record is in its header.
+
+    Parameters
+    ----------
+    table : Table
+        Any.
+    path : path
+        The file; one that is there is replaced.
+    tolerance : float [1]
+        Largest p99.
+    size : float [MB]
+        Largest file.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    After libbsdf's ``AstmReader.cpp``: polar angles and azimuths [rad] of light and viewer, the channels behind them.
+    The rows form a grid, because libbsdf interpolates linearly over each angle and fills what is missing with the
+    nearest row. Isotropic tables have the viewers of one side, from 0 to pi, and those at 2 pi, which libbsdf would
+    look for.
+    """
+    from brdfdb.formats._stated_error import Comparison
+
+    comparison = Comparison(table)
+    channels = len(comparison.channels.names)
+    grid, error = chosen(
+        table,
+        comparison,
+        [Spherical(table.anisotropic, mirrored=not table.anisotropic)],
+        tolerance,
+        int(size * 1e6 / _CHARACTERS / (4 + channels)),
+        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
+    )
+    remarks = specular_remark(table)
+    document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
+    names = comparison.channels.names if table.wavelength_nm is not None else ("BRDF",)
+    with whole(path) as (file,), file.open("wb") as stream:
+        stream.write(_TITLE + "".join(f"COMMENT {line}\n" for line in lines(document)).encode())
+        _write_rows(stream, grid, names)
+    return Written((Path(path),), error, tolerance, remarks)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of an ASTM E1392 file in Cornell's dialect."""
+    return head.startswith(_TITLE) or b"\nVARS theta_i,phi_i,theta_s,phi_s," in b"\n" + head
+
+
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+    """Return f_r of an ASTM E1392 file as libbsdf sees it if its rows are a grid, else its rows.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is not such a file, or damaged.
+    OSError
+        If it cannot be read.
+    """
+    path = Path(path)
+    comments, names, rows = _parsed(path)
+    document = of_lines(comments)
+    at = _wavelengths(names)
+    if at is None and len(names) == 1:
+        names = ("grey",)
+    name = str(document.get("name") or path.stem)
+    nodes = tuple(np.unique(column) for column in rows[:, :4].T)
+    count = math.prod(axis.size for axis in nodes)
+    if count != len(rows) or (nodes[1].size == 1 and nodes[1][0] != 0.0):
+        theta_i, phi_i, theta_r, phi_r = rows[:, :4].T
+        return Samples(name, theta_i, phi_i, theta_r, phi_r, names, at, rows[:, 4:], document)
+    order = np.lexsort(rows[:, 3::-1].T)
+    values = rows[order, 4:].reshape(*(axis.size for axis in nodes), len(names)).astype(np.float32)
+    anisotropic = nodes[1].size > 1
+    one_side = not anisotropic and not np.any((nodes[3] > np.pi + 1e-6) & (nodes[3] < 2.0 * np.pi - 1e-6))
+    if not anisotropic:
+        nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
+    if one_side:
+        nodes, values = (*nodes[:2], nodes[2][nodes[2] < 4.0]), values[:, :, nodes[2] < 4.0]
+    return FileTable(name, names, at, AngularGrid(Spherical(anisotropic, one_side), nodes, values).evaluate, document)
+
+
+def _write_rows(stream: BinaryIO, grid: AngularGrid, names: tuple[str, ...]) -> None:
+    """Write the number of rows, the names of the columns, and the rows."""
+    nodes, values = list(grid.nodes), grid.values
+    if len(nodes) == 3:
+        nodes = [nodes[0], np.zeros(1), nodes[1], np.append(nodes[2], 2.0 * np.pi)]
+        values = np.concatenate([values, values[:, :, :1]], axis=2)[:, np.newaxis]
+    stream.write(f"NUM_POINTS {values[..., 0].size}\nVARS {','.join((*_ANGLES, *names))}\n".encode())
+    # libbsdf compares angles as 32 bit floats: nine digits are the same one, 2 pi among them
+    texts = [[f"{angle:.9g}" for angle in axis] for axis in nodes]
+    numbers = ",%.5g" * values.shape[-1] + "\n"
+    for number_i, theta_i in enumerate(texts[0]):
+        for number, phi_i in enumerate(texts[1]):
+            rows = [f"{theta_i},{phi_i},{theta_s},{phi_s}{numbers}" for theta_s in texts[2] for phi_s in texts[3]]
+            stream.write(("".join(rows) % tuple(values[number_i, number].reshape(-1).tolist())).encode())
+
+
+def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]]:
+    """Return comments, the names of the channels, and the rows."""
+    comments: list[str] = []
+    columns: tuple[str, ...] = ()
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in itertools.islice(file, _LONGEST_HEADER):
+            word, _, rest = line.strip().partition(" ")
+            if word == "VARS":
+                columns = tuple(text.strip() for text in rest.split(","))
+                break
+            comments.append(rest)
+        if columns[:4] != _ANGLES or len(columns) < 5:
+            raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} with channels behind it")
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")  # an empty file
+                rows = np.loadtxt(file, delimiter=",", ndmin=2)
+        except (ValueError, UserWarning):
+            raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none") from None
+    if rows.shape[1] != len(columns) or not np.all(np.isfinite(rows)):
+        raise FileFormatError(f"{path}: a row has no {len(columns)} finite numbers")
+    rows[:, :4] = np.where(rows[:, :4] < 0.0, rows[:, :4] + 2.0 * np.pi, rows[:, :4])
+    rows[:, 4:] = np.maximum(rows[:, 4:], 0.0)  # as libbsdf
+    return comments, columns[4:], rows
+
+
+def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:
+    """Return the wavelengths [nm] of channels such as 550nm; None if a channel is none."""
+    try:
+        return np.array([float(name.removesuffix("nm")) for name in names]) if names[0].endswith("nm") else None
+    except ValueError:
+        return None

@@ -1,0 +1,209 @@
+"""BiRD: the universal BRDF format 1.0 of the project BiRD, JSON with one entry a direction and wavelength."""
+
+from __future__ import annotations
+
+import json
+import os
+import uuid
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._dense_files import dense_record, reading_of_rows, specular_remarks
+from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._json_tables import MOST_BYTES, column, degrees_of, parsed, title_of
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.tables.table import Table
+
+suffix = ".json"
+media_type = "application/json"
+summary = "universal BRDF JSON of the project BiRD"
+kinds = ()
+options = (
+    TOLERANCE,
+    Option("resolution", 0.0, "distance of nodes on all axes [degrees]; 0: few, where f_r bends", low=0.0, high=45.0),
+)
+SCHEMA = "https://raw.githubusercontent.com/BiRD-project/BiRD_view/master/BRDF_JSON_schema/brdf_json_schema_v1.0.json"
+_LAST_DEG = 89.99  # polar angles stay below 90
+_DIGITS, _ENTRY_BYTES = 5, 45  # of a number, and of the numbers of one entry
+_ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
+_NOT_STATED = "not stated"
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    resolution: float = 0.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write f_r on a grid of light and viewer as universal BRDF JSON: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The file; one that is there is replaced.
+    tolerance, resolution
+        As of `brdfdb.formats._dense_grid.dense_table`. The file has 40 MB at most, about.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If a grid of the resolution is too large.
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    The lists theta_i, phi_i, theta_r, phi_r [degree], BRDF [1/sr] and, of spectral tables, wavelength_i [nm] have one
+    entry for each direction and wavelength, the wavelength fastest. Isotropic tables have phi_i = 0 and phi_r up to
+    180: the other half is its mirror image. The record is the section adhoc_section.
+    """
+    from brdfdb.formats._dense_grid import dense_table, rounded
+
+    dense = dense_table(
+        table,
+        tolerance,
+        axes="light_viewer",
+        resolution=resolution,
+        most_values=MOST_BYTES // _ENTRY_BYTES,
+        digits=_DIGITS,
+        last_deg=_LAST_DEG,
+    )
+    wanted = None if resolution else tolerance
+    known = dense_record(table, dense, verdict, wanted, specular=False)
+    nodes, values = list(dense.grid.axes.values()), dense.values
+    for axis, name in enumerate(dense.grid.names):  # 360 degrees are 0 again, and not allowed
+        if nodes[axis][-1] == 360.0 and name.startswith("phi"):
+            nodes[axis], values = nodes[axis][:-1], np.delete(values, -1, axis)
+    if not table.anisotropic:
+        nodes.insert(1, np.zeros(1))
+    at = dense.channels.wavelength_nm
+    spectral = [] if at is None else [at]
+    columns = [grid.reshape(-1) for grid in np.meshgrid(*nodes, *spectral, indexing="ij")]
+    data = {name: {"unit": "deg", "values": angle.tolist()} for name, angle in zip(_ANGLES, columns, strict=False)}
+    data["BRDF"] = {"unit": "1/sr", "values": rounded(values.reshape(-1), _DIGITS).tolist()}
+    if at is not None:
+        data["wavelength_i"] = {"unit": "nm", "values": columns[-1].tolist()}
+    document = {"metadata": _metadata(table, known), "data": data}
+    with whole(path) as (half,):
+        half.write_text(json.dumps(document, ensure_ascii=False, separators=(",", ":")), encoding="utf-8")
+    return Written((Path(path),), dense.error, wanted, specular_remarks(table))
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of a file that names the schema, or the section ``metadata`` and its type."""
+    return head.lstrip().startswith(b"{") and (b"brdf_json_schema" in head or b'"type":"BRDF"' in head)
+
+
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+    """Return f_r of a universal BRDF file: interpolated linearly on a grid of light and viewer, else its samples.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is no JSON, or lacks a list, or lists of different lengths stand in it.
+    """
+    path = Path(path)
+    document = parsed(path)
+    data, metadata = document.get("data"), document.get("metadata")
+    lists = _lists(path, data if isinstance(data, dict) else {})
+    known = metadata.get("adhoc_section", {}) if isinstance(metadata, dict) else {}
+    values, at = lists.pop("BRDF")[:, np.newaxis], lists.pop("wavelength_i", None)
+    if at is not None:
+        nodes = np.unique(at)
+        if len(values) % nodes.size or not np.array_equal(at, np.tile(nodes, len(values) // nodes.size)):
+            raise FileFormatError(f"{path}: not each direction has the same wavelengths, in order")
+        values, at = values.reshape(-1, nodes.size), nodes
+        lists = {name: angle[:: nodes.size] for name, angle in lists.items()}
+    if not np.any(lists["phi_i"]) and np.max(lists["phi_r"]) <= 180.0:
+        lists = {"theta_i": lists["theta_i"], "theta_r": lists["theta_r"], "delta_phi": lists["phi_r"]}
+    else:
+        lists, values = _closed(lists, values)
+    return reading_of_rows(path, lists, values, at, known if isinstance(known, dict) else {})
+
+
+def _lists(path: Path, data: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
+    """Return the lists of a file: angles [degree], f_r [1/sr] and wavelengths [nm]."""
+    lists: dict[str, NDArray[np.float64]] = {}
+    for name in (*_ANGLES, "BRDF", "wavelength_i", "wavelength_r"):
+        entry = data.get(name)
+        if isinstance(entry, dict):
+            numbers, unit = column(path, name, entry.get("values")), str(entry.get("unit", ""))
+            lists[name] = degrees_of(numbers, unit) if name in _ANGLES else numbers * (1e3 if unit == "μm" else 1.0)
+        elif name in (*_ANGLES, "BRDF"):
+            raise FileFormatError(f"{path}: data has no object {name}")
+    if "wavelength_r" in lists:
+        lists.setdefault("wavelength_i", lists["wavelength_r"])
+        del lists["wavelength_r"]
+    if len({values.size for values in lists.values()}) != 1:
+        raise FileFormatError(f"{path}: {', '.join(lists)} are not of the same length")
+    return lists
+
+
+def _closed(
+    lists: dict[str, NDArray[np.float64]], values: NDArray[np.float64]
+) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+    """Return the rows of a grid with those at 360 degrees, which a file leaves out; other rows as they are."""
+    nodes = [np.unique(lists[name]) for name in _ANGLES]
+    shape = tuple(axis.size for axis in nodes)
+    if np.prod(shape, dtype=object) != len(values) or nodes[3][0] != 0.0:
+        return lists, values
+    dense = values.reshape(*shape, -1)
+    for axis in (1, 3):
+        if nodes[axis].size > 1 and 180.0 < nodes[axis][-1] < 360.0:
+            nodes[axis] = np.append(nodes[axis], 360.0)
+            dense = np.concatenate([dense, np.take(dense, [0], axis)], axis)
+    expected = [grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij")]
+    return dict(zip(_ANGLES, expected, strict=True)), dense.reshape(-1, values.shape[1])
+
+
+def _metadata(table: Table, known: dict[str, Any]) -> dict[str, Any]:
+    """Return the section ``metadata`` of a file; what a table does not have is said to be not stated."""
+    place = dict.fromkeys(("country", "city", "street", "building_nr", "postal_code"), _NOT_STATED)
+    parameters = [
+        {"name": name, "description": f"parameter {name} of the model", "value": value, "unit": ""}
+        for name, value in known["parameters"].items()
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    ]
+    model = {"name": str(known["model"]), "description": known["source"] or _NOT_STATED, "parameters": parameters}
+    return {
+        "schema": SCHEMA,
+        "id": f"urn:uuid:{uuid.uuid5(uuid.NAMESPACE_URL, f'{table.name}/{table.revision}/{table.digest}')}",
+        "type": "BRDF",
+        "timestamp": datetime.now(UTC).isoformat(timespec="seconds"),
+        "provenance": {
+            "organization": _NOT_STATED,
+            "location": place,
+            "email": "not@stated.invalid",
+            "contact_person": _NOT_STATED,
+            "comments": known["source"],
+        },
+        "license": {"type": "other", "rights_holder": _NOT_STATED, "proprietary": known["licence"]},
+        "description": title_of(known),
+        "method": "simulation",
+        "instrumentation": "NA",
+        "software": {"name": "brdfdb", "version": known["program"].removeprefix("brdfdb "), "simulation_model": model},
+        "sample": {
+            "name": table.name,
+            "type": "virtual",
+            "shape": "plane",
+            "dimensions": {},
+            "zero_azimuth_location": "x axis of the surface",
+            "properties_symmetry": "none stated" if table.anisotropic else "isotropic",
+        },
+        "environment": "NA",
+        "adhoc_section": known,
+    }

@@ -1,0 +1,143 @@
+"""CSV: f_r on a plain grid of angles, a row a pair of directions and a column a wavelength."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows, specular_remarks
+from brdfdb.formats._readings import Samples
+from brdfdb.formats._record import lines, of_lines
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.tables.table import Table
+
+suffix = ".csv"
+media_type = "text/csv"
+summary = "f_r on a plain grid of angles as text"
+kinds = ()
+options = OPTIONS
+_DIGITS = 5
+_ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
+_MOST_READ = 1 << 30  # of a file that is read
+_ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
+_COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    axes: str = "smallest",
+    resolution: float = 0.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write f_r on a plain grid of angles as text with commas: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The file; one that is there is replaced.
+    tolerance, axes, resolution
+        As of `brdfdb.formats._dense_grid.dense_table`. The file has 40 MB at most, about.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If a grid of the resolution is too large.
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    Lines that begin with # hold the record. The next line names the columns: the angles [degree], then ``brdf`` of a
+    grey table, or wavelengths such as ``550nm``. f_r [1/sr] has five significant digits.
+    """
+    from brdfdb.formats._dense_grid import dense_table, rounded
+
+    count = 1 if table.wavelength_nm is None else table.wavelength_nm.size
+    row_bytes = _ANGLE_BYTES * (4 if table.anisotropic else 3) + _VALUE_BYTES * count
+    most = _MOST_BYTES // row_bytes * count
+    dense = dense_table(table, tolerance, axes=axes, resolution=resolution, most_values=most, digits=_DIGITS)
+    wanted = None if resolution else tolerance
+    known = dense_record(table, dense, verdict, wanted, specular=False)
+    names = dense.channels.names if dense.channels.wavelength_nm is not None else ("brdf",)
+    header = [*(f"# {line}" for line in (*lines(known), _COLUMNS)), ",".join((*dense.grid.names, *names))]
+    columns = [[repr(float(node)) for node in nodes] for nodes in dense.grid.axes.values()]
+    width = len(columns[-1])
+    rows = dense.values.reshape(-1, width, len(names))
+    with whole(path) as (half,), half.open("w", encoding="utf-8", newline="\n") as file:
+        file.write("\n".join(header) + "\n")
+        for leading, block in zip(itertools.product(*columns[:-1]), rows, strict=True):
+            start = ",".join(leading)
+            numbers = rounded(block, _DIGITS).tolist()
+            file.writelines(
+                f"{start},{last},{','.join(map(repr, row))}\n" for last, row in zip(columns[-1], numbers, strict=True)
+            )
+    return Written((Path(path),), dense.error, wanted, specular_remarks(table))
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of a text whose columns begin with angles, or that says so."""
+    try:
+        text = head.decode("utf-8", "ignore")
+    except ValueError:
+        return False
+    first = [line for line in text.splitlines() if not line.startswith("#")][:1]
+    return f"# {_COLUMNS}" in text or bool(first and first[0].partition(",")[0].strip() in _ANGLES)
+
+
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+    """Return f_r of a text, interpolated linearly if its rows are those of a grid; else the samples that it lists.
+
+    Raises
+    ------
+    FileFormatError
+        If the columns are not angles [degree] and values, a number cannot be read, or the file has more than 1 GiB.
+    """
+    path = Path(path)
+    if path.stat().st_size > _MOST_READ:
+        raise FileFormatError(f"{path}: it has more than {_MOST_READ} bytes")
+    comments: list[str] = []
+    try:
+        with path.open(encoding="utf-8") as file:
+            for line in file:
+                if not line.startswith("#"):
+                    break
+                comments.append(line[1:].strip())
+            else:
+                line = ""
+            names = tuple(name.strip() for name in line.split(","))
+            numbers = np.loadtxt(file, delimiter=",", ndmin=2, dtype=np.float64)
+    except ValueError as error:
+        raise FileFormatError(f"{path}: it is no table of numbers ({error})") from error
+    angles = tuple(name for name in names if name in _ANGLES)
+    if not angles or numbers.shape[1] != len(names) or names[: len(angles)] != angles or len(names) == len(angles):
+        raise FileFormatError(f"{path}: the columns {', '.join(names)[:200]} are not angles, then values of f_r")
+    known = of_lines(comments)
+    at = _wavelengths(names[len(angles) :])
+    columns = {name: numbers[:, index] for index, name in enumerate(angles)}
+    reading = reading_of_rows(path, columns, numbers[:, len(angles) :], at, known)
+    if isinstance(reading, Samples) and _COLUMNS in comments:
+        raise FileFormatError(f"{path}: rows of the grid are missing")
+    return reading
+
+
+def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:
+    try:
+        return np.array([float(name.removesuffix("nm")) for name in names])
+    except ValueError:
+        return None

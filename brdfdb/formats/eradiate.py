@@ -1,0 +1,257 @@
+"""Eradiate: tables of its BSDF ``mqdiffuse``, measured and almost diffuse, as netCDF."""
+
+from __future__ import annotations
+
+import bisect
+import functools
+import itertools
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError, import_extra
+from brdfdb.formats._dense_files import record_of_attributes, specular_remarks
+from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._readings import FileTable
+from brdfdb.formats._record import record
+from brdfdb.formats._written import Written, whole
+from brdfdb.parameters import Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from brdfdb.formats._channels import Channels
+    from brdfdb.formats._stated_error import Comparison
+    from brdfdb.tables.table import Table
+
+suffix = ".nc"
+media_type = "application/netcdf"
+summary = "netCDF tables of Eradiate's mqdiffuse, at one wavelength"
+kinds = ()
+options = (
+    TOLERANCE,
+    Option("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6),
+    Option("resolution", 0.0, "number of cosines of light and viewer; 0: as few as the tolerance takes", high=513.0),
+)
+_DIMS = ("cos_theta_o", "phi_d", "cos_theta_i")
+_COSINES = (2, 4, 6, 9, 13, 19, 28, 41, 60, 88, 129, 193)
+_AZIMUTHS = (3, 5, 7, 9, 13, 19, 27, 41, 61, 91, 131, 193, 257)  # odd: a node is at the mirror direction
+_FROM_POLE = 0.25  # cosine in steps of the grid that stands for 0 where f_r has a pole at the horizon
+_MOST_VALUES = 1 << 28  # of a file that is read
+HOLDS = (
+    "f_r [1/sr], the BRDF without the cosine, as Eradiate's kernel reads it: its node d of phi_d is at "
+    "2 pi d / (N - 1), so that the last node is the first again; cos_theta_o is that of the viewer"
+)
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    wavelength: float = 550.0,
+    resolution: float = 0.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write f_r at one wavelength for Eradiate's ``mqdiffuse``: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Isotropic table in memory.
+    path : path
+        The file; one that is there is replaced.
+    tolerance : float [1]
+        Largest p99 of the error against the table. If a grid of 38 MB is not within it, the nearest one is written.
+    wavelength : float [nm]
+        Wavelength of a table of several.
+    resolution : float
+        Number of cosines, and of azimuths; 0: the smallest grid within the tolerance.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    CannotHoldError
+        If the table is anisotropic.
+    ParameterError
+        If the table does not reach the wavelength, or the resolution is not a whole number of at least 3.
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    The dimensions are cos_theta_o, phi_d and cos_theta_i: cosines from 0 to 1 and azimuths from 0 to 2 pi, both in
+    equal steps. Eradiate checks that the coordinates phi_d are 2 pi d / N, but its kernel (eradiate-mitsuba 0.5) reads
+    node d at 2 pi d / (N - 1). The values are those for its kernel, which renders with them.
+    """
+    from brdfdb.formats._stated_error import Comparison
+
+    import_extra("scipy.io")
+    if table.anisotropic:
+        raise CannotHoldError(f"{table.name}: is anisotropic, and mqdiffuse holds isotropic tables only")
+    channels = _channels(table, wavelength)
+    if resolution and (resolution < 3.0 or resolution != int(resolution)):
+        raise ParameterError("resolution", f"{resolution:g} is not a whole number of at least 3", resolution)
+    comparison = Comparison(table, channels)
+    count = int(resolution)
+    shape = (count, count | 1, count) if count else _smallest(table, comparison, tolerance)
+    values = _values(table, channels, shape)
+    error = comparison.error_of(functools.partial(_evaluated, values))
+    remarks = specular_remarks(table)
+    if channels.wavelength_nm is not None:
+        remarks = (*remarks, f"of the wavelengths of the table the file holds {channels.names[0]}")
+    wanted = None if resolution else tolerance
+    known = record(table, error, verdict, holds=HOLDS, remarks=remarks, tolerance=wanted)
+    known["wavelength_nm"] = None if channels.wavelength_nm is None else float(channels.wavelength_nm[0])
+    with whole(path) as (half,):
+        _dataset(values, known).to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")
+    return Written((Path(path),), error, wanted, remarks)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of a netCDF 3 file with the dimensions of ``mqdiffuse``."""
+    return head.startswith((b"CDF\x01", b"CDF\x02")) and all(name.encode() in head for name in _DIMS)
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of a table of ``mqdiffuse`` as Eradiate's kernel interpolates it.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, or ``brdf`` is not over the three dimensions in equal steps.
+    """
+    import xarray as xr
+
+    import_extra("scipy.io")
+    try:
+        with xr.open_dataset(path, engine="scipy") as opened:
+            values, known = _checked(opened, Path(path)), record_of_attributes(opened.attrs)
+    except (FileFormatError, FileNotFoundError):
+        raise
+    except Exception as error:  # SciPy raises what its parser comes to
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
+    name = str(known.get("name") or Path(path).stem)
+    return FileTable(name, ("grey",), None, functools.partial(_evaluated, values), known)
+
+
+def _channels(table: Table, wavelength: float) -> Channels:
+    """Return the one channel of a file: grey, or a wavelength of the table."""
+    from brdfdb.formats._channels import Channels, channels_of
+
+    at = table.wavelength_nm
+    if at is None or at.size == 1:
+        return channels_of(table)
+    if not at[0] <= wavelength <= at[-1]:
+        raise ParameterError(
+            "wavelength", f"{wavelength:g} nm is outside [{at[0]:g}, {at[-1]:g}] nm of {table.name}", wavelength
+        )
+    return Channels((f"{wavelength:g}nm",), np.array([wavelength]), None, "f_r at one wavelength")
+
+
+def _smallest(table: Table, comparison: Comparison, tolerance: float) -> tuple[int, int, int]:
+    """Return the shape of the smallest grid within the tolerance, or of the nearest one."""
+    known: dict[tuple[int, int, int], float] = {}
+
+    def within(cosines: int, azimuths: int) -> bool:
+        shape = (cosines, azimuths, cosines)
+        node = functools.partial(_node, table, comparison.channels, shape)
+        known[shape] = comparison.error_of(functools.partial(_interpolated, shape, node)).p99
+        return known[shape] <= tolerance
+
+    def order(shape: tuple[int, int, int]) -> tuple[float, int]:
+        return max(known[shape], tolerance), math.prod(shape)
+
+    for cosines in _COSINES:
+        if known and (best := min(known, key=order)) and known[best] <= tolerance:
+            if cosines**2 * _AZIMUTHS[0] >= math.prod(best):
+                break
+            if not within(cosines, max(n for n in _AZIMUTHS if cosines**2 * n < math.prod(best) or n == 3)):
+                continue
+        elif not within(cosines, _AZIMUTHS[-1]):
+            continue
+        bisect.bisect_left(_AZIMUTHS[:-1], True, key=functools.partial(within, cosines))
+    return min(known, key=order)
+
+
+def _node(table: Table, channels: Channels, shape: tuple[int, int, int], viewer: Any, turn: Any, light: Any) -> Floats:
+    """Return f_r [1/sr] of a table at nodes of a grid, shape (N, 1)."""
+    from brdfdb.geometry import unit_vector
+
+    lowest = _FROM_POLE if table.source is None or table.source.grazing_pole else 0.0
+    theta_r, theta_i = (np.arccos(np.maximum(node, lowest) / (shape[0] - 1)) for node in (viewer, light))
+    azimuth = np.minimum(turn, shape[1] - 1 - turn) * (2.0 * np.pi / (shape[1] - 1))
+    wi, wr = unit_vector(theta_i, np.zeros(1)), unit_vector(theta_r, azimuth)
+    for w in (wi, wr):
+        w[..., 2] = np.maximum(w[..., 2], 0.0)  # rounding at the horizon
+    return channels.values(table, wi, wr)
+
+
+def _values(table: Table, channels: Channels, shape: tuple[int, int, int]) -> NDArray[np.float32]:
+    """Return f_r [1/sr] at all nodes of a grid."""
+    nodes = np.arange(shape[1]), np.arange(shape[2])
+    rows = [_node(table, channels, shape, np.array([row]), *np.ix_(*nodes))[..., 0] for row in range(shape[0])]
+    return np.stack(rows).astype(np.float32)
+
+
+def _interpolated(
+    shape: tuple[int, int, int], node: Callable[[Any, Any, Any], Floats], wi: Floats, wr: Floats
+) -> Floats:
+    """Return f_r [1/sr], shape (N, 1), as Eradiate's kernel interpolates the nodes of a grid."""
+    turn = np.arctan2(wi[:, 1], wi[:, 0]) - np.arctan2(wr[:, 1], wr[:, 0])
+    x = np.stack([wr[:, 2], np.mod(turn / (2.0 * np.pi), 1.0), wi[:, 2]]) * (np.array(shape)[:, np.newaxis] - 1)
+    x = np.maximum(x, 0.0)  # viewers below the horizon, whose values do not count
+    first = np.minimum(x.astype(np.int64), np.array(shape)[:, np.newaxis] - 2)
+    share = x - first
+    total: Floats = np.zeros((len(wi), 1))
+    for corner in itertools.product((0, 1), repeat=3):
+        side = np.array(corner)[:, np.newaxis]
+        weight = np.prod(np.where(side == 1, share, 1.0 - share), axis=0)
+        total = total + weight[:, np.newaxis] * node(*(first + side))
+    return np.where(wr[:, 2:] > 0.0, total, 0.0)
+
+
+def _evaluated(values: NDArray[Any], wi: Floats, wr: Floats) -> Floats:
+    shape = (values.shape[0], values.shape[1], values.shape[2])
+    return _interpolated(shape, lambda *at: values[at][:, np.newaxis].astype(np.float64), wi, wr)
+
+
+def _coordinates(shape: tuple[int, ...]) -> dict[str, tuple[str, NDArray[np.float64], dict[str, str]]]:
+    """Return the coordinates that Eradiate checks."""
+    viewer, azimuths, light = shape
+    return {
+        "cos_theta_o": ("cos_theta_o", np.linspace(0.0, 1.0, viewer), {"units": "dimensionless"}),
+        "phi_d": ("phi_d", np.linspace(0.0, 2.0 * np.pi, azimuths, endpoint=False), {"units": "rad"}),
+        "cos_theta_i": ("cos_theta_i", np.linspace(0.0, 1.0, light), {"units": "dimensionless"}),
+    }
+
+
+def _dataset(values: NDArray[np.float32], known: dict[str, Any]) -> xr.Dataset:
+    import xarray as xr
+
+    from brdfdb.tables.xarray_view import plain_attributes
+
+    brdf = (_DIMS, values, {"units": "sr-1", "long_name": "bidirectional reflectance f_r", "comment": HOLDS})
+    return xr.Dataset({"brdf": brdf}, _coordinates(values.shape), plain_attributes(known))
+
+
+def _checked(opened: xr.Dataset, path: Path) -> NDArray[Any]:
+    """Return the values of a file; FileFormatError where Eradiate would refuse it."""
+    if "brdf" not in opened.data_vars or set(opened["brdf"].dims) != set(_DIMS):
+        raise FileFormatError(f"{path}: it has no variable brdf over {', '.join(_DIMS)}")
+    brdf = opened["brdf"].transpose(*_DIMS)
+    if brdf.size > _MOST_VALUES or min(brdf.shape) < 2 or brdf.shape[1] < 2:
+        raise FileFormatError(f"{path}: brdf has the shape {brdf.shape}; it takes at least two nodes an axis")
+    for name, (_, expected, _) in _coordinates(brdf.shape).items():
+        if name not in opened.coords or not np.allclose(opened[name], expected):
+            raise FileFormatError(f"{path}: the coordinates {name} are not in the equal steps of mqdiffuse")
+    values = brdf.values
+    if values.dtype.kind not in "iuf" or not np.all(np.isfinite(values)):
+        raise FileFormatError(f"{path}: brdf holds values that are not finite numbers")
+    return np.asarray(values, np.float32)

@@ -1,0 +1,222 @@
+"""Klems matrices: averages over patches of the hemisphere, for WINDOW, EnergyPlus and Radiance."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats import _bsdf_xml
+from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
+from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
+from brdfdb.formats._interface import Option
+from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
+from brdfdb.formats._readings import FileTable
+from brdfdb.formats._written import Written, whole
+from brdfdb.parameters import Floats
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+suffix = ".xml"
+media_type = "application/xml"
+summary = "BSDF files of WINDOW, matrices over the patches of Klems"
+kinds = tuple(BASES)
+options = (Option("colour", False, "blocks of colour for Radiance; pyWinCalc refuses files that have them"),)
+
+SOLAR, CIE_X, CIE_Z = "Solar", "CIE-X", "CIE-Z"
+_ONE_SHEET = "both sides reflect alike and nothing is transmitted; thickness and thermal properties are placeholders"
+_SOLAR = "the block of solar light repeats that of visible light"
+_HOLDS = (
+    "f_r [1/sr] without the cosine, as averages over patches of light and viewer with projected solid angles as "
+    "weights; Visible is CIE Y under equal energy"
+)
+# WINDOW needs these, and an empty <Thickness> stops its reader
+_MATERIAL = (
+    '<Thickness unit="Millimeter">1</Thickness>',
+    "<DeviceType>Other</DeviceType>",
+    "<ThermalConductivity>1</ThermalConductivity>",
+    "<EmissivityFront>0.9</EmissivityFront>",
+    "<EmissivityBack>0.9</EmissivityBack>",
+    "<TIR>0</TIR>",
+)
+_MOST_RINGS, _MOST_PATCHES = 46, 100_000  # of a basis that a file defines; Radiance has room for so many rings
+
+
+def write(
+    table: Table, path: str | os.PathLike[str], *, kind: str = "full", colour: bool = False, verdict: str | None = None
+) -> Written:
+    """Write a table as a Klems matrix: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The file; one that is there is replaced.
+    kind : str
+        "full" with 145 patches, "half" with 77, or "quarter" with 41.
+    colour : bool
+        Add the blocks CIE-X and CIE-Z of a spectral table, which Radiance reads. WINDOW's engine refuses such files.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If the wavelengths of the table do not reach over the visible ones.
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    WINDOW's front is outdoors and Radiance's indoors: the block Reflection Back is Radiance's front.
+    """
+    from brdfdb.formats._record import record
+    from brdfdb.formats._stated_error import Comparison
+
+    basis, channels = BASES[kind], visible_channels(table, colour=colour)
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        return np.maximum(channels.values(table, wi, wr), 0.0)
+
+    matrix = averages(brdf, basis, len(channels.names), isotropic=not table.anisotropic)
+    texts = [_text(matrix[..., channel]) for channel in range(matrix.shape[-1])]
+    read_back = np.stack([_numbers(text) for text in texts], axis=-1).reshape(matrix.shape)
+    error = Comparison(table, channels).error_of(functools.partial(evaluated, read_back, basis, basis))
+    remarks = (*remarks_of(table), _ONE_SHEET, _SOLAR)
+    document = record(table, error, verdict, holds=_HOLDS, remarks=remarks)
+    definition = ["<IncidentDataStructure>Columns</IncidentDataStructure>", *_definition(basis)]
+    with whole(path) as (half,), half.open("w", encoding="utf-8") as file:
+        title = table.metadata.title or ""
+        file.writelines(_bsdf_xml.text_of(table.name, title, _MATERIAL, definition, _blocks(basis, texts), document))
+    return Written((Path(path),), error, None, remarks)
+
+
+def _blocks(basis: Basis, texts: list[str]) -> Iterator[Block]:
+    """Yield the blocks of a file: both sides and both spectra for WINDOW, the colour for Radiance."""
+    visible = texts[1] if len(texts) > 1 else texts[0]
+    dark = _text(np.zeros((len(basis), len(basis))))
+    for wavelength in (VISIBLE, SOLAR):
+        for side, text in (
+            ("Transmission Front", dark),
+            ("Transmission Back", dark),
+            ("Reflection Front", visible),
+            (FRONT_OF_RADIANCE, visible),
+        ):
+            yield Block(wavelength, side, basis.name, basis.name, text)
+    if len(texts) > 1:
+        yield Block(CIE_X, FRONT_OF_RADIANCE, basis.name, basis.name, texts[0])
+        yield Block(CIE_Z, FRONT_OF_RADIANCE, basis.name, basis.name, texts[2])
+
+
+def _text(matrix: Floats) -> str:
+    """Return a matrix as text: a line a row, and a comma after each number, which WINDOW's reader wants."""
+    return "\n".join("".join([f"{value:.4g}," for value in row]) for row in matrix.tolist())
+
+
+def _numbers(text: str) -> Floats:
+    return np.maximum(np.array(text.replace(",", " ").split(), dtype=np.float64), 0.0)
+
+
+def _definition(basis: Basis) -> Iterator[str]:
+    """Yield the lines of XML that define a basis."""
+    yield f"<AngleBasis>\n<AngleBasisName>{basis.name}</AngleBasisName>"
+    for low, high, count in zip(basis.bounds_deg[:-1], basis.bounds_deg[1:], basis.counts, strict=True):
+        middle = 0.0 if low == 0.0 else 0.5 * (low + high)
+        yield (
+            f"<AngleBasisBlock>\n<Theta>{middle:g}</Theta>\n<ThetaBounds><LowerTheta>{low:g}</LowerTheta>"
+            f"<UpperTheta>{high:g}</UpperTheta></ThetaBounds>\n<nPhis>{count}</nPhis>\n</AngleBasisBlock>"
+        )
+    yield "</AngleBasis>"
+
+
+def evaluated(matrix: Floats, viewers: Basis, lights: Basis, wi: Floats, wr: Floats) -> Floats:
+    """Return f_r [1/sr] of a matrix (viewers, lights, C) as Radiance evaluates it, at unit vectors (N, 3)."""
+    return np.asarray(matrix[viewers.patches(wr), lights.patches(wi * FLIPPED)])
+
+
+def recognises(head: bytes) -> bool:
+    """Return True if the first bytes of a file are those of a BSDF file without a tensor tree."""
+    return _bsdf_xml.is_window_element(head) and b"TensorTree" not in head
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of the side that is Radiance's front, evaluated as Radiance does: the value of the pair of patches.
+
+    Parameters
+    ----------
+    path : path
+        File of this package, or of others: in bases of Klems or in one that it defines itself.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged or holds no matrix.
+    OSError
+        If it cannot be read.
+
+    Notes
+    -----
+    Radiance varies the values by up to 3e-4 from pair to pair, and keeps 8 bits of each chromaticity; both is left out.
+    """
+    file = _bsdf_xml.read(path)
+    if file.structure.lower() not in ("columns", "rows"):
+        raise FileFormatError(f"{path}: its structure {file.structure!r} is not Columns or Rows")
+    bases = {basis.name.lower(): basis for basis in BASES.values()}
+    for element in file.definition.findall("{*}AngleBasis"):
+        basis = _defined(path, element)
+        bases.setdefault(basis.name.lower(), basis)  # names that are known keep their meaning, as in Radiance
+    names = [CIE_X, VISIBLE, CIE_Z] if {CIE_X.lower(), CIE_Z.lower()} <= set(file.blocks) else [VISIBLE]
+    visible = file.blocks[VISIBLE.lower()]
+    for name in (visible.basis, visible.row_basis):
+        if name.lower() not in bases:
+            raise FileFormatError(f"{path}: the angle basis {name!r} is not defined")
+    lights, viewers = bases[visible.basis.lower()], bases[visible.row_basis.lower()]
+    matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
+    of_colour = ("X", "Y", "Z") if len(names) > 1 else ("grey",)
+    return FileTable(file.name, of_colour, None, functools.partial(evaluated, matrix, viewers, lights), file.record)
+
+
+def _matrix(path: str | os.PathLike[str], file: BsdfFile, name: str, viewers: Basis, lights: Basis) -> Floats:
+    """Return the matrix (viewers, lights) of a block."""
+    block = file.blocks[name.lower()]
+    if (block.basis.lower(), block.row_basis.lower()) != (lights.name.lower(), viewers.name.lower()):
+        raise FileFormatError(f"{path}: block {name} has other angle bases than block {VISIBLE}")
+    try:
+        numbers = _numbers(block.numbers)
+    except ValueError as error:
+        raise FileFormatError(f"{path}: block {name}: {error}") from None
+    if numbers.size != len(viewers) * len(lights) or not np.all(np.isfinite(numbers)):
+        wanted = f"{len(viewers)} x {len(lights)}"
+        raise FileFormatError(
+            f"{path}: block {name} has {numbers.size} numbers instead of {wanted}, all of them finite"
+        )
+    if file.structure.lower() == "rows":
+        return numbers.reshape(len(lights), len(viewers)).T
+    return numbers.reshape(len(viewers), len(lights))
+
+
+def _defined(path: str | os.PathLike[str], element: ElementTree.Element) -> Basis:
+    """Return a basis that a file defines."""
+    name = (element.findtext("{*}AngleBasisName") or "").strip()
+    bounds, counts = [0.0], []
+    try:
+        for ring in element.findall("{*}AngleBasisBlock"):
+            bounds.append(float(ring.findtext("{*}ThetaBounds/{*}UpperTheta") or "nan"))
+            counts.append(int(ring.findtext("{*}nPhis") or "0"))
+    except ValueError as error:
+        raise FileFormatError(f"{path}: angle basis {name!r}: {error}") from None
+    rising = all(low < high for low, high in itertools.pairwise(bounds)) and bounds[-1] == 90.0
+    if not (rising and all(count > 0 for count in counts) and len(counts) <= _MOST_RINGS):
+        raise FileFormatError(f"{path}: angle basis {name!r} has no rings of patches that rise to 90 degrees")
+    if sum(counts) > _MOST_PATCHES:
+        raise FileFormatError(f"{path}: angle basis {name!r} has {sum(counts)} patches, more than {_MOST_PATCHES}")
+    return Basis(name, tuple(bounds), tuple(counts))

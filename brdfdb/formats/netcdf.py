@@ -1,0 +1,93 @@
+"""netCDF: f_r on a plain grid of angles, which xarray and every other reader of netCDF opens."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brdfdb.errors import FileFormatError, import_extra
+from brdfdb.formats._dense_files import OPTIONS, dataset, read_dataset
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.tables.table import Table
+
+suffix = ".nc"
+media_type = "application/netcdf"
+summary = "f_r on a plain grid of angles as netCDF"
+kinds = ()
+options = OPTIONS
+_MAGIC = (b"CDF\x01", b"CDF\x02")
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    axes: str = "smallest",
+    resolution: float = 0.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write f_r on a plain grid of angles as netCDF 3 (64-bit offset): whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The file; one that is there is replaced.
+    tolerance, axes, resolution
+        As of `brdfdb.formats._dense_grid.dense_table`. The values take 100 MB at most.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If a grid of the resolution is too large.
+    MissingExtraError
+        If SciPy, which writes netCDF, is not installed.
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    ``brdf`` [1/sr] is float32 over the angles [degree] and, last, the wavelengths [nm]. ``specular_reflectance`` is
+    the specular part. Units and names follow the CF conventions. The record is in the attributes.
+    """
+    from brdfdb.formats._dense_grid import dense_table
+
+    import_extra("scipy.io")
+    dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
+    wanted = None if resolution else tolerance
+    with whole(path) as (half,):
+        dataset(table, dense, verdict, wanted).to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")
+    return Written((Path(path),), dense.error, wanted)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of a netCDF 3 file with a variable ``brdf`` over the axes of a grid."""
+    return head.startswith(_MAGIC) and any(name in head for name in (b"theta_r", b"theta_h"))
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, or ``brdf`` is not over the axes of a grid.
+    """
+    import xarray as xr
+
+    import_extra("scipy.io")
+    try:
+        with xr.open_dataset(path, engine="scipy") as opened:
+            return read_dataset(Path(path), opened)
+    except (FileFormatError, FileNotFoundError):
+        raise
+    except Exception as error:  # SciPy raises what its parser comes to
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error

@@ -1,0 +1,124 @@
+"""NumPy: f_r on a plain grid of angles as an .npz archive of arrays."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table, specular_remarks
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.tables.table import Table
+
+suffix = ".npz"
+media_type = "application/x-npz"
+summary = "f_r on a plain grid of angles as NumPy arrays"
+kinds = ()
+options = OPTIONS
+_MOST_BYTES = 1 << 30  # of an array that is read
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    axes: str = "smallest",
+    resolution: float = 0.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write f_r on a plain grid of angles as an .npz archive: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The file; one that is there is replaced.
+    tolerance, axes, resolution
+        As of `brdfdb.formats._dense_grid.dense_table`. The values take 100 MB at most.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If a grid of the resolution is too large.
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    ``axes`` lists the dimensions of ``brdf`` [1/sr, float32]; each of them is an array of its own, angles in degrees
+    and ``wavelength`` in nm. ``specular_reflectance`` over ``specular_theta_i`` is the specular part. ``record`` is
+    JSON text. No array is pickled.
+    """
+    from brdfdb.formats._dense_grid import dense_table
+
+    dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
+    wanted = None if resolution else tolerance
+    at = dense.channels.wavelength_nm
+    arrays: dict[str, NDArray[Any]] = dict(dense.grid.axes)
+    if at is not None:
+        arrays["wavelength"] = at
+    known = dense_record(table, dense, verdict, wanted, specular=True)
+    arrays |= {"axes": np.array(list(arrays)), "record": np.array(json.dumps(known, ensure_ascii=False))}
+    if specular_remarks(table) and table.specular is not None:
+        nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
+        arrays |= {"specular_theta_i": nodes, "specular_reflectance": table.specular}
+    arrays["brdf"] = dense.values[..., 0] if at is None else dense.values
+    with whole(path) as (half,), half.open("wb") as file:
+        np.savez(file, allow_pickle=False, **arrays)
+    return Written((Path(path),), dense.error, wanted)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of an archive whose first array is an axis of a grid."""
+    return head.startswith(b"PK\x03\x04") and head[30:].startswith((b"theta_i.npy", b"theta_h.npy"))
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of an .npz archive with ``brdf`` and the axes that it lists, interpolated linearly.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, lacks an array, or holds one of more than 1 GiB.
+    """
+    path = Path(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [str(name) for name in _array(archive, "axes")]
+            at = _array(archive, "wavelength") if "wavelength" in names else None
+            axes = {name: _array(archive, name) for name in names if name != "wavelength"}
+            known = json.loads(str(_array(archive, "record"))) if "record.npy" in archive.namelist() else {}
+            values = _array(archive, "brdf")
+    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, EOFError, NotImplementedError) as error:
+        raise FileFormatError(f"{path}: it is no archive of NumPy arrays, or is damaged ({error})") from error
+    return file_table(path, axes, values, at, known if isinstance(known, dict) else {})
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Return an array of an archive; its header says no more than the archive holds."""
+    member = archive.getinfo(f"{name}.npy")
+    if member.file_size > _MOST_BYTES:
+        raise ValueError(f"{name} has {member.file_size} bytes")
+    data = io.BytesIO(archive.read(member))
+    header = np.lib.format.read_magic(data)
+    parse = np.lib.format.read_array_header_1_0 if header == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = parse(data)
+    size = member.file_size - data.tell()
+    if dtype.hasobject or int(np.prod(shape, dtype=object)) * dtype.itemsize != size:
+        raise ValueError(f"{name} says {dtype} of shape {shape} and has {size} bytes")
+    data.seek(0)
+    return np.asarray(np.lib.format.read_array(data, allow_pickle=False))

@@ -1,0 +1,194 @@
+"""Radiance: tensor trees of variable resolution, and the material that scenes include."""
+
+from __future__ import annotations
+
+import functools
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats import _bsdf_xml
+from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
+from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block
+from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._readings import FileTable
+from brdfdb.formats._square_disk import ANISOTROPIC, ISOTROPIC
+from brdfdb.formats._tensor_colour import trees_of, xyz_of
+from brdfdb.formats._tensor_growth import Growth
+from brdfdb.formats._tensor_tree import Tree, parsed, rounded
+from brdfdb.formats._written import Written, whole
+from brdfdb.parameters import Floats
+
+if TYPE_CHECKING:
+    from brdfdb.formats._channels import Channels
+    from brdfdb.formats._stated_error import Comparison, FileError
+    from brdfdb.tables.table import Table
+
+suffix = ".xml"
+media_type = "application/xml"
+summary = "BSDF files of Radiance, tensor trees, and materials that include them"
+kinds = ()
+options = (
+    TOLERANCE,
+    Option(
+        "cells",
+        600_000.0,
+        "most cells of a tree, of about 7 bytes each; a third where all would not be enough",
+        low=1.0,
+        high=2e7,
+    ),
+)
+
+_STRUCTURES = {"tensortree3": ISOTROPIC, "tensortree4": ANISOTROPIC}
+_BASIS = "LBNL/Shirley-Chiu"
+_WAVELENGTHS = (VISIBLE, "CIE-u", "CIE-v")
+_FIRST = 16.0  # cells of the first tree that is compared with the table
+# The error falls with the third to fourth root of the number of cells: with this power the tree does not become larger
+# than needed, and few trees are compared
+_POWER, _LEAST, _MOST = 1.5, 1.15, 8.0
+# Share of the cells that is spent where all of them would not do: the error falls more slowly than the file grows
+_OUT_OF_REACH = 1.0 / 3.0
+_HOLDS = (
+    "f_r [1/sr] without the cosine, as averages over cells of equal projected solid angle of the viewer; "
+    "Visible is CIE Y under equal energy"
+)
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    cells: float = 600_000.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write a table as a tensor tree and a material of Radiance: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The XML file; the material beside it ends in ``.rad``. Files that are there are replaced.
+    tolerance : float [1]
+        Largest p99 of the error; the smallest tree within it is written.
+    cells : float
+        Most cells of a tree, of about 7 bytes each. Narrow lobes would need more than any scene can load: where the
+        tolerance is out of reach, a third of these cells is spent, and the file states the error it has.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If the wavelengths of the table do not reach over the visible ones.
+    WriteError
+        If a file cannot be written.
+
+    Notes
+    -----
+    Isotropic tables become trees of rank 3, others of rank 4. Colour is written as CIE-u and CIE-v blocks, which are
+    what Radiance reads in trees. A table of one wavelength is written as the Visible block.
+    """
+    from brdfdb.formats._radiance_material import material_text
+    from brdfdb.formats._record import record
+    from brdfdb.formats._stated_error import Comparison
+
+    path = Path(path)
+    channels = visible_channels(table)
+    comparison = Comparison(table, channels)
+    trees, error = _grown(table, channels, comparison, tolerance, cells)
+    remarks = remarks_of(table)
+    document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
+    blocks = (
+        Block(wavelength, FRONT_OF_RADIANCE, _BASIS, "", tree.text(), "BRDF")
+        for wavelength, tree in zip(_WAVELENGTHS, trees, strict=False)
+    )
+    structure = f"<IncidentDataStructure>TensorTree{trees[0].rank}</IncidentDataStructure>"
+    material = path.with_suffix(".rad")
+    with whole(path, material) as (xml, rad):
+        with xml.open("w", encoding="utf-8") as file:
+            title = table.metadata.title or ""
+            file.writelines(_bsdf_xml.text_of(table.name, title, (), (structure,), blocks, document))
+        rad.write_text(material_text(table, path.name, document), encoding="utf-8")
+    return Written((path, material), error, tolerance, remarks)
+
+
+def _grown(
+    table: Table, channels: Channels, comparison: Comparison, tolerance: float, most: float
+) -> tuple[tuple[Tree, ...], FileError]:
+    """Return the smallest trees within the tolerance, or those of `most` cells, and their error."""
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        return np.maximum(channels.values(table, wi, wr), 0.0)
+
+    growth = Growth(brdf, ANISOTROPIC if table.anisotropic else ISOTROPIC, len(channels.names))
+    target = min(_FIRST, most)
+    while True:
+        grows = growth.to(target)
+        trees = _trees(*growth.tree())
+        error = comparison.error_of(functools.partial(evaluated, trees))
+        excess = error.p99 / tolerance
+        within_reach = len(growth) * excess**growth.rank <= most
+        limit = most if within_reach else most * _OUT_OF_REACH
+        if excess <= 1.0 or not grows or len(growth) >= limit:
+            return trees, error
+        target = min(limit, len(growth) * float(np.clip(excess**_POWER, _LEAST, _MOST)))
+
+
+def _trees(tree: Tree, mean: Floats) -> tuple[Tree, ...]:
+    """Return the trees of a file from one tree and the averages of its leaves."""
+    return trees_of(tree, mean) if mean.shape[1] > 1 else (replace(tree, values=rounded(mean[:, 0])),)
+
+
+def evaluated(trees: tuple[Tree, ...], wi: Floats, wr: Floats) -> Floats:
+    """Return f_r [1/sr] as Radiance evaluates trees, shape (N, 1), or X, Y and Z (N, 3), at unit vectors (N, 3)."""
+    values = [tree.at_vectors(wi, wr) for tree in trees]
+    return xyz_of(*values) if len(values) > 1 else values[0][:, np.newaxis]
+
+
+def recognises(head: bytes) -> bool:
+    """Return True if the first bytes of a file are those of a tensor tree."""
+    return _bsdf_xml.is_window_element(head) and b"TensorTree" in head
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of the front of a tensor tree, evaluated as Radiance does: the value of the cell.
+
+    Parameters
+    ----------
+    path : path
+        File of this package, or of others.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged or is no tensor tree.
+    OSError
+        If it cannot be read.
+
+    Notes
+    -----
+    Radiance varies the values by up to 2e-4 from cell to cell, so that it can tell cells apart; this is left out.
+    """
+    file = _bsdf_xml.read(path)
+    rank = _STRUCTURES.get(file.structure.lower())
+    if rank is None:
+        raise FileFormatError(f"{path}: its structure {file.structure!r} is not TensorTree3 or TensorTree4")
+    names = [name for name in _WAVELENGTHS if name.lower() in file.blocks]
+    names = names if len(names) == len(_WAVELENGTHS) else [VISIBLE]
+    trees = []
+    for name in names:
+        block = file.blocks[name.lower()]
+        if block.basis.lower() != _BASIS.lower():
+            raise FileFormatError(f"{path}: the angle basis {block.basis!r} of block {name} is not {_BASIS}")
+        try:
+            trees.append(parsed(block.numbers, rank))
+        except ValueError as error:
+            raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
+    of_colour = ("X", "Y", "Z") if len(trees) > 1 else ("grey",)
+    return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record)

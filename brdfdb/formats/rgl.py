@@ -1,0 +1,131 @@
+"""RGL's tensor files: measured materials of Mitsuba 3, pbrt-v4 and RGL's own loader."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._interface import TOLERANCE, Option
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._written import Written
+    from brdfdb.tables.table import Table
+
+suffix = ".bsdf"
+media_type = "application/octet-stream"
+summary = "tensor file of RGL for Mitsuba 3 (`measured`), pbrt-v4 and RGL's loader"
+kinds = ("spectral", "rgb")
+options = (
+    TOLERANCE,
+    Option("megabytes", 12.0, "largest size of a file that is tried for the tolerance [MB]", low=0.01, high=2000.0),
+    Option(
+        "azimuth",
+        "reduced",
+        "azimuths of the light of anisotropic tables: those that symmetry leaves, for Mitsuba 3, or all",
+        choices=("reduced", "full"),
+    ),
+)
+
+HOLDS = (
+    "spectra * ndf(half vector) / (4 sigma(light)) is f_r cos(theta_r) [1/sr], the cosine included; "
+    "half vectors are warped by vndf"
+)
+SPECULAR = "the specular part is left out: the format has no place for light in the exact mirror direction alone"
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    kind: str = "spectral",
+    tolerance: float = 0.02,
+    megabytes: float = 12.0,
+    azimuth: str = "reduced",
+    verdict: str | None = None,
+) -> Written:
+    """Write a table as a tensor file.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The file; one that is there is replaced.
+    kind : str
+        "spectral" for spectral renderers: all wavelengths of the table. "rgb" for others: linear sRGB under D65. They
+        are files of their own, because no reader takes the other kind.
+    tolerance : float [1]
+        Largest error against the table that 99 of 100 values may have: the smallest file within it is written.
+    megabytes : float [1e6 byte]
+        Largest size that is tried; where it is not enough, the file with the least error of that size is written.
+    azimuth : str
+        "reduced" leaves out azimuths of the light that follow from the symmetry of an anisotropic table, as only
+        Mitsuba 3 knows it. "full" is also for pbrt-v4 and RGL's loader; the file may be four times as large.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written.
+    """
+    from brdfdb.formats._record import record
+    from brdfdb.formats._rgl_search import smallest
+    from brdfdb.formats._rgl_tensor import write_tensors
+    from brdfdb.formats._written import Written, whole
+
+    path = Path(path)
+    found = smallest(table, kind, tolerance, 1e6 * megabytes, azimuth == "full")
+    remarks = found.remarks
+    if table.specular is not None and table.specular.max() > 0.0:
+        remarks += (SPECULAR,)
+    document = record(table, found.error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
+    document["channels"] = list(found.channels)
+    fields = replace(found.fields, description=json.dumps(document))
+    with whole(path) as (temporary,):
+        write_tensors(temporary, fields.tensors())
+    return Written((path,), found.error, tolerance, remarks)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True if the first bytes of a file are those of a tensor file with a material of RGL."""
+    from brdfdb.formats._rgl_tensor import MAGIC
+
+    return head.startswith(MAGIC) and b"vndf" in head
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of a tensor file as Mitsuba's `measured` evaluates it.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, or no measured material of RGL.
+    OSError
+        If it cannot be read.
+    """
+    from brdfdb.formats._channels import RGB
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._rgl_fields import fields_of
+    from brdfdb.formats._rgl_tensor import read_tensors
+
+    fields = fields_of(path, read_tensors(path))
+    try:
+        document = json.loads(fields.description)
+    except ValueError:
+        document = {}
+    document = document if isinstance(document, dict) else {}
+    name = str(document.get("name") or Path(path).stem)
+    if fields.wavelength_nm is None:
+        return FileTable(name, RGB, None, fields.evaluate, document)
+    if document.get("channels") == ["grey"] and fields.wavelength_nm.size == 1:
+        return FileTable(name, ("grey",), None, fields.evaluate, document)
+    at = fields.wavelength_nm.astype(np.float64)
+    return FileTable(name, tuple(f"{value:g}nm" for value in at), at, fields.evaluate, document)

@@ -1,0 +1,165 @@
+"""UTIA: tables in three colours on the fixed anisotropic grid of the UTIA BRDF database (Filip and Vavra 2014)."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._angles import Spherical
+from brdfdb.formats._angular_grid import AngularGrid, filled
+from brdfdb.formats._beside import beside, record_beside
+from brdfdb.formats._colours import colours_of, specular_remark
+from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._readings import FileTable
+from brdfdb.formats._record import record
+from brdfdb.formats._written import Written, whole
+from brdfdb.parameters import Floats
+
+if TYPE_CHECKING:
+    from brdfdb.tables.table import Table
+
+suffix = ".bin"
+media_type = "application/octet-stream"
+summary = "UTIA: tables as RGB on a fixed grid of 15 degrees by 7.5 degrees, anisotropic ones too (ALTA, UTIA's reader)"
+kinds = ()
+options = (
+    TOLERANCE,
+    Option(
+        "encoding",
+        "linear",
+        "numbers are f_r, as UTIA's own reader and ALTA give them back (linear), or 140 times the sRGB curve of f_r / "
+        "100, as dj_brdf decodes them (dj_brdf)",
+        choices=("linear", "dj_brdf"),
+    ),
+)
+
+SHAPE = (6, 48, 6, 48)  # theta_i, phi_i, theta_v, phi_v
+STEPS_DEG = (15.0, 7.5, 15.0, 7.5)
+_BYTES = 3 * 8 * SHAPE[0] * SHAPE[1] * SHAPE[2] * SHAPE[3]
+_SYSTEM = Spherical(anisotropic=True, mirrored=False)
+_NODES = tuple(np.deg2rad(step * np.arange(count + count // 48)) for step, count in zip(STEPS_DEG, SHAPE, strict=True))
+_LINEAR = "f_r [1/sr], the BRDF without the cosine, linear sRGB, no scale: as UTIA's own reader gives it back"
+_DJ = "140 * s, where s is the sRGB curve of f_r [1/sr] / 100: as dj_brdf decodes it"
+_LIKELY = 1e5  # no number of such a file is larger
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    encoding: str = "linear",
+    verdict: str | None = None,
+) -> Written:
+    """Write a table as a UTIA file, with its record as JSON beside it: both whole, or none.
+
+    Parameters
+    ----------
+    table : Table
+        Any; spectral ones become linear sRGB.
+    path : path
+        The file; one that is there is replaced.
+    tolerance : float [1]
+        Largest p99. The grid is fixed: a larger error is stated.
+    encoding : str
+        "linear" or "dj_brdf".
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    CannotHoldError
+        If the wavelengths of the table give no colour.
+    WriteError
+        If a file cannot be written.
+
+    Notes
+    -----
+    Three planes (R, G, B) of 64 bit floats: 6 polar angles of the light in steps of 15 degrees, 48 azimuths in steps of
+    7.5, then those of the viewer. UTIA's own reader (``TBDRF.cpp`` of J. Filip) interpolates linearly over the four
+    angles and continues the last interval of a polar angle to 90 degrees; it neither scales nor decodes. dj_brdf takes
+    the same lines, divides by 140 and decodes an sRGB curve.
+    """
+    from brdfdb.formats._stated_error import Comparison
+
+    channels, remarks = colours_of(table, "rgb")
+    comparison = Comparison(table, channels)
+    grid = filled(table, comparison, _SYSTEM, _NODES)
+    numbers = _encoded(np.maximum(grid.values.astype(np.float64), 0.0), encoding)
+    error = comparison.error_of(_Reader(numbers, encoding))
+    remarks = (*remarks, *specular_remark(table))
+    holds = _LINEAR if encoding == "linear" else _DJ
+    document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
+    paths = Path(path), beside(Path(path))
+    with whole(*paths) as (file, beside_it):
+        file.write_bytes(np.moveaxis(numbers[:, :-1, :, :-1], -1, 0).astype("<f8").tobytes())
+        beside_it.write_text(json.dumps(document | {"encoding": encoding}, indent=1) + "\n", encoding="utf-8")
+    return Written(paths, error, tolerance, remarks)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of a UTIA file, which has no header: all of them are likely values of f_r."""
+    numbers = np.frombuffer(head[: len(head) // 8 * 8], "<f8")
+    if numbers.size < 512:
+        return False
+    with np.errstate(invalid="ignore"):
+        size = np.abs(numbers)
+        return bool(np.all((numbers == 0.0) | ((size > 1.0 / _LIKELY**2) & (size < _LIKELY))))
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of a UTIA file as UTIA's own reader sees it, or dj_brdf if its record says so.
+
+    Raises
+    ------
+    FileFormatError
+        If the file does not have the size of a UTIA file, or a number is not finite.
+    OSError
+        If it cannot be read.
+    """
+    path = Path(path)
+    size = path.stat().st_size
+    if size != _BYTES:
+        raise FileFormatError(f"{path}: {size} bytes are not the {_BYTES} of a UTIA file")
+    planes = np.fromfile(path, "<f8").reshape(3, *SHAPE)
+    if not np.all(np.isfinite(planes)):
+        raise FileFormatError(f"{path}: a number is not finite")
+    known = record_beside(path)
+    numbers = np.pad(np.moveaxis(planes, 0, -1), [(0, 0), (0, 1), (0, 0), (0, 1), (0, 0)], mode="wrap")
+    evaluate = _Reader(numbers, "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear")
+    return FileTable(str(known.get("name") or path.stem), ("R", "G", "B"), None, evaluate, known)
+
+
+def _encoded(f_r: Floats, encoding: str) -> Floats:
+    """Return the numbers of a file for f_r [1/sr]."""
+    if encoding == "linear":
+        return f_r
+    part = f_r / 100.0
+    # dj_brdf decodes numbers up to 0.0375 by the straight part of the curve
+    curve = np.where(part > 0.0375 / 12.92, 1.055 * part ** (1.0 / 2.4) - 0.055, 12.92 * part)
+    return np.asarray(140.0 * curve)
+
+
+def _decoded(numbers: Floats, encoding: str) -> Floats:
+    """Return f_r [1/sr] of interpolated numbers."""
+    if encoding == "linear":
+        return numbers
+    part = numbers / 140.0
+    curve = np.where(part > 0.0375, ((np.maximum(part, 0.0) + 0.055) / 1.055) ** 2.4, part / 12.92)
+    return np.asarray(np.maximum(100.0 * curve, 0.0))
+
+
+class _Reader:
+    """f_r [1/sr], shape (N, 3), at unit vectors (N, 3), of numbers on the grid with the first azimuths repeated."""
+
+    def __init__(self, numbers: Floats, encoding: str) -> None:
+        self._grid = AngularGrid(_SYSTEM, _NODES, numbers.astype(np.float32))
+        self._encoding = encoding
+
+    def __call__(self, wi: Floats, wr: Floats) -> Floats:
+        return _decoded(self._grid.evaluate(wi, wr), self._encoding)

@@ -1,0 +1,89 @@
+"""zarr 3: f_r on a plain grid of angles, a directory that xarray and zarr open."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._dense_files import OPTIONS, dataset, read_dataset
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.tables.table import Table
+
+suffix = ".zarr"
+media_type = "application/zip"  # of the directory over HTTP
+summary = "f_r on a plain grid of angles as zarr 3"
+kinds = ()
+options = OPTIONS
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    axes: str = "smallest",
+    resolution: float = 0.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write f_r on a plain grid of angles as a zarr 3 group, a directory: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Table in memory.
+    path : path
+        The directory; one that is there is replaced.
+    tolerance, axes, resolution
+        As of `brdfdb.formats._dense_grid.dense_table`. The values take 100 MB at most, before compression.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    ParameterError
+        If a grid of the resolution is too large.
+    WriteError
+        If the directory cannot be written.
+
+    Notes
+    -----
+    Arrays and attributes are those of the netCDF files.
+    """
+    from brdfdb.formats._dense_grid import dense_table
+
+    dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
+    wanted = None if resolution else tolerance
+    with whole(path) as (half,):
+        dataset(table, dense, verdict, wanted).to_zarr(half, mode="w", zarr_format=3, consolidated=False)
+    return Written((Path(path),), dense.error, wanted)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of ``zarr.json`` of a group with an angular grid."""
+    return b'"zarr_format"' in head and b'"group"' in head
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of a zarr group with ``brdf`` over angles [degree], interpolated linearly.
+
+    Raises
+    ------
+    FileFormatError
+        If the group is damaged, or ``brdf`` is not over the axes of a grid.
+    """
+    import xarray as xr
+
+    try:
+        with xr.open_zarr(os.fspath(path), chunks=None, consolidated=False) as opened:
+            return read_dataset(Path(path), opened)
+    except FileFormatError:
+        raise
+    except Exception as error:  # codecs and parsers raise what they come to
+        if not Path(path).exists():
+            raise FileNotFoundError(f"no directory {path}") from None
+        raise FileFormatError(f"{path}: it is no zarr group, or is damaged ({error})") from error

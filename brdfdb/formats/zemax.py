@@ -1,0 +1,184 @@
+"""Zemax (Radiant) BSDF files: f_r about the specular direction as text, one value or CIE XYZ."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats import _zemax_file
+from brdfdb.formats._angles import Specular
+from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
+from brdfdb.formats._colours import colours_of, specular_remark
+from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._readings import FileTable
+from brdfdb.formats._record import CONVENTION, lines, of_lines, record
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.formats._channels import Channels
+    from brdfdb.tables.table import Table
+
+suffix = ".bsdf"
+media_type = "text/plain"
+summary = "Zemax (Radiant) BSDF: angles about the specular direction, one value or CIE XYZ (OpticStudio, libbsdf)"
+kinds = ()
+options = (
+    TOLERANCE,
+    Option("colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")),
+    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+)
+
+_CHARACTERS = 10  # of a value
+_TIS_TOLERANCE = 1e-4  # absolute, of an albedo
+_HOLDS = f"{CONVENTION}; the sample is turned by phi_i, and angles of incidence and TIS are those of the table"
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    colour: str = "auto",
+    size: float = 16.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write a table as a Zemax BSDF file: whole, or not at all. The record is in its comments.
+
+    Parameters
+    ----------
+    table : Table
+        Isotropic ones are written as PlaneSymmetrical, anisotropic ones as ASymmetrical4D.
+    path : path
+        The file; one that is there is replaced.
+    tolerance : float [1]
+        Largest p99.
+    colour : str
+        "xyz", "grey" (Y of it), or "auto": CIE XYZ of spectral tables, else one value.
+    size : float [MB]
+        Largest file.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    CannotHoldError
+        If the wavelengths of the table give no colour.
+    WriteError
+        If the file cannot be written.
+
+    Notes
+    -----
+    After Zemax's article on the format (1500005486801) and libbsdf's ``ZemaxBsdfReader.cpp``: polar angles from the
+    specular direction, azimuths from there towards the normal, counter-clockwise from above. The error is that of
+    linear interpolation over each angle, as libbsdf does it. TIS is the directional albedo of the table, without its
+    specular part. OpticStudio's own model and libbsdf read files of one rotation only, those of isotropic tables.
+    """
+    from brdfdb.formats._stated_error import Comparison
+
+    spectral = table.wavelength_nm is not None and table.wavelength_nm.size > 1
+    channels, remarks = colours_of(table, ("xyz" if spectral else "grey") if colour == "auto" else colour)
+    count = len(channels.names)
+    system = Specular(table.anisotropic, mirrored=not table.anisotropic)
+    grid, error = chosen(
+        table,
+        Comparison(table, channels),
+        [system],
+        tolerance,
+        int(size * 1e6 / count / _CHARACTERS),
+        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
+    )
+    remarks = (*remarks, *specular_remark(table))
+    document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
+    angles = [np.rad2deg(axis) for axis in grid.nodes]
+    values = grid.values
+    if not table.anisotropic:
+        angles.insert(1, np.zeros(1))
+        values = values[:, np.newaxis]
+    text = _zemax_file.Text(
+        comments=tuple(lines(document)),
+        symmetry="ASymmetrical4D" if table.anisotropic else "PlaneSymmetrical",
+        content="XYZ" if count == 3 else "Monochrome",
+        scatter="BRDF",
+        angles=(angles[1], angles[0], angles[3], angles[2]),
+        tis=_albedo(table, channels, angles[0], angles[1]),
+        values=values.transpose(4, 1, 0, 3, 2),
+    )
+    with whole(path) as (file,), file.open("wb") as stream:
+        _zemax_file.write(stream, text)
+    return Written((Path(path),), error, tolerance, remarks)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of a Zemax BSDF file; those of an RGL file, with the same suffix, are binary."""
+    if head.startswith(f"# {_zemax_file.TITLE}\n".encode()):
+        return True
+    lines_of_words = (line.split() for line in head.split(b"\n") if not line.lstrip().startswith(b"#"))
+    first = next((words[0] for words in lines_of_words if words), b"")
+    return first in (b"Source", b"Symmetry", b"SpectralContent")
+
+
+def read(path: str | os.PathLike[str]) -> FileTable:
+    """Return f_r of a Zemax BSDF file as libbsdf sees it; an anisotropic one in the same way.
+
+    The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg".
+
+    Raises
+    ------
+    FileFormatError
+        If the file is not a Zemax BSDF file of a BRDF, or is damaged.
+    OSError
+        If it cannot be read.
+    """
+    path = Path(path)
+    text = _zemax_file.parsed(path)
+    if text.scatter != "BRDF":
+        raise FileFormatError(f"{path}: its ScatterType is {text.scatter!r}; only BRDF is read")
+    turns, incidences, azimuths, radials = (np.deg2rad(axis) for axis in text.angles)
+    values = text.values.transpose(2, 1, 4, 3, 0)
+    both_sides = text.symmetry == "PlaneSymmetrical"
+    if both_sides and azimuths[-1] < np.pi:  # the interval around 180 degrees has its mirror image at the other end
+        azimuths, values = np.append(azimuths, np.pi), np.concatenate([values, values[..., -1:, :]], axis=3)
+    anisotropic = turns.size > 1
+    nodes = (incidences, turns, radials, azimuths) if anisotropic else (incidences, radials, azimuths)
+    grid = AngularGrid(Specular(anisotropic, both_sides), nodes, values if anisotropic else values[:, 0])
+    document = of_lines(list(text.comments))
+    document |= {"theta_i_deg": text.angles[1].tolist(), "tis": np.moveaxis(text.tis, 0, -1).tolist()}
+    names = ("X", "Y", "Z") if text.content == "XYZ" else ("grey",)
+    return FileTable(str(document.get("name") or path.stem), names, None, grid.evaluate, document)
+
+
+def _albedo(
+    table: Table, channels: Channels, theta_i_deg: NDArray[np.float64], phi_i_deg: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the directional albedo [1] of a table without its specular part, shape (C, phi_i, theta_i)."""
+    from brdfdb.tables.albedo import directional_albedo
+
+    known = directional_albedo(table, tolerance=_TIS_TOLERANCE)
+    at = table.wavelength_nm
+    albedo = known.albedo
+    if channels.wavelength_nm is not None and at is not None:
+        nearest = np.abs(at[:, np.newaxis] - channels.wavelength_nm).argmin(axis=0)
+        albedo = albedo[..., nearest]
+    of_channels = channels.of_spectra(albedo[..., 0] if channels.wavelength_nm is None else albedo)
+    over_theta = np.stack(
+        [
+            [np.interp(theta_i_deg, known.theta_i_deg, column) for column in of_channels[:, turn].T]
+            for turn in range(of_channels.shape[1])
+        ]
+    )
+    if over_theta.shape[0] == 1:
+        return np.repeat(over_theta.transpose(1, 0, 2), phi_i_deg.size, axis=1)
+    turn = known.phi_i_deg[-1]
+    phi = phi_i_deg % max(turn, 180.0)  # it repeats itself after half a turn or a whole one
+    phi = np.where(phi > turn, 180.0 - phi, phi)  # and, where a quarter is known, is its mirror image
+    return np.stack(
+        [
+            [np.interp(phi, known.phi_i_deg, over_theta[:, c, t]) for t in range(theta_i_deg.size)]
+            for c in range(over_theta.shape[1])
+        ]
+    ).transpose(0, 2, 1)

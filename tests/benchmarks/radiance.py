@@ -1,0 +1,167 @@
+"""Files for Radiance and WINDOW, judged by both: ``python tests/benchmarks/radiance.py --store DIR``.
+
+Each material of a store is written as a tensor tree and as Klems matrices. The total of checkBSDF is compared with the
+albedo of the table, averaged as checkBSDF averages; f_r at random pairs, as Radiance evaluates the file, with the table
+and with what the file states. pyWinCalc reads every matrix. Exits with 1 if a total is more than 0.5 % off, beyond the
+digit that checkBSDF prints, or f_r is not within the stated error. Needs pyradiance and pywincalc.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import brdfdb
+from brdfdb.formats import klems, radiance
+from brdfdb.formats._bsdf_visible import visible_channels
+from brdfdb.formats._klems_basis import BASES
+from brdfdb.formats._stated_error import Comparison
+from brdfdb.formats._written import Written
+from brdfdb.geometry import unit_vector
+from brdfdb.tables.table import Table
+from tests.benchmarks.recording import Column, Run
+from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried, traced, tree_total
+
+REQUIRED = 5e-3  # of totals, relative
+PRINTED = 5e-4  # half of the last digit of checkBSDF
+PAIRS = 2000
+QUICK = ("rolled-brass", "clay-vase", "scene-copper-sphere")
+MEASURED = "Totals and f_r as Radiance and pyWinCalc see the files, against the tables, and the size and time of each."
+# The lobe that Radiance's own plastic2 evaluates; wide, because cells blur narrow ones
+BOUNDED = {"rho_d": 0.2, "rho_s": 0.3, "alpha_x": 0.3, "alpha_y": 0.45}
+SUN = (0.4, 0.2, 0.9)  # direction of the sun in the picture
+WIDTH = 64  # pixels along the picture
+
+
+def off(total: float, expected: float) -> float:
+    """Return the relative difference of a total from what it should be, less what printing may have rounded off."""
+    beyond = max(0.0, abs(total - expected) - PRINTED)
+    return float(np.copysign(beyond / expected if expected > 0.0 else beyond, total - expected))
+
+
+def at_random(table: Table, path: Path) -> float:
+    """Return the p99 of f_r as Radiance evaluates a file against the table, for light and viewer cosine-weighted."""
+    rng = np.random.default_rng(7)
+    theta, phi = np.arcsin(np.sqrt(rng.random((2, PAIRS)))), rng.uniform(0.0, 2.0 * np.pi, (2, PAIRS))
+    wi, wr = unit_vector(theta[0], phi[0]), unit_vector(theta[1], phi[1])
+    channels = visible_channels(table)
+    truth = channels.values(table, wi, wr)
+    values = queried(path, wi, wr)
+    values = values if truth.shape[1] > 1 else values[:, 1:2]
+    wrong = np.abs(values - truth)
+    scale = np.maximum(truth, np.maximum(Comparison(table, channels).floor, 1e-30))
+    return float(np.quantile(wrong / scale, 0.99, axis=0).max())
+
+
+def picture(folder: Path) -> tuple[float, float, float, float]:
+    """Return the differences of a picture of a lit ball, the file against plastic2, and both against the table.
+
+    They are the relative difference of the whole light, the median of all pixels, and the same median of both pictures
+    against the table.
+    """
+    table = made("ward_bounded", BOUNDED, tolerance=2e-3)
+    radiance.write(table, folder / "ball.xml")
+    grid = (np.arange(WIDTH) + 0.5) / WIDTH * 2.0 - 1.0
+    x, y = (axis.reshape(-1) for axis in np.meshgrid(grid, grid))
+    normal = np.stack([x, y, np.sqrt(np.maximum(0.0, 1.0 - x * x - y * y))], axis=-1)
+    sun = np.array(SUN) / np.linalg.norm(SUN)
+    seen = (normal[:, 2] > 0.1) & (normal @ sun > 0.1)
+    normal = normal[seen]
+    rays = np.concatenate([normal * [1, 1, 0] + [0, 0, 5], np.tile([0.0, 0.0, -1.0], (len(normal), 1))], axis=1)
+    text = (folder / "ball.rad").read_text(encoding="utf-8")
+    light = f"void light sun\n0\n0\n3 1e5 1e5 1e5\nsun source disk\n0\n0\n4 {sun[0]} {sun[1]} {sun[2]} 0.5\n"
+    pictures = [
+        traced(f"{light}{text}\n{name} sphere ball\n0\n0\n4 0 0 0 1\n", rays, folder, *options)
+        for name, options in (("made-up", ("-ss", "64")), ("made-up_plastic", ()))
+    ]
+    # The frame of the table at each point: its y axis is the up vector, less what is along the normal
+    y_axis = np.array([0.0, 1.0, 0.0]) - normal[:, 1:2] * normal
+    y_axis /= np.linalg.norm(y_axis, axis=1, keepdims=True)
+    frame = np.stack([np.cross(y_axis, normal), y_axis, normal], axis=1)
+    solid_angle = 2.0 * np.pi * (1.0 - np.cos(np.radians(0.25)))
+    wi, wr = frame @ sun, frame @ np.array([0.0, 0.0, 1.0])
+    expected = np.asarray(table.lookup_vectors(wi, wr)) * wi[:, 2] * 1e5 * solid_angle
+    of_file, plastic = pictures
+    return (
+        float(of_file.sum() / plastic.sum() - 1.0),
+        float(np.median(np.abs(of_file / plastic - 1.0))),
+        float(np.median(np.abs(of_file / expected - 1.0))),
+        float(np.median(np.abs(plastic / expected - 1.0))),
+    )
+
+
+def timed(write: object, *arguments: object, **options: object) -> tuple[Written, float]:
+    """Return what was written and the time [s] of the processor."""
+    began = time.process_time()
+    written: Written = write(*arguments, **options)  # type: ignore[operator]
+    return written, time.process_time() - began
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write, judge and print all materials."""
+    run = Run("radiance", "accuracy", "Files for Radiance and WINDOW", MEASURED)
+    parser = run.parser(__doc__)
+    parser.add_argument("--store", type=Path, required=True)
+    options = run.parse(parser, arguments)
+    store = brdfdb.open(options.store)
+    names = QUICK if options.quick else tuple(store)
+    numbers = ("MB", "time s", "p99 stated", "p99 hemisphere", "p99 of Radiance", "l1", "total", "total off")
+    trees = run.table("Tensor trees", Column(name="material", width=34), *numbers)
+    matrices = run.table(
+        "Klems matrices", Column(name="material", width=34), "kind", *numbers[:3], *numbers[5:], "WINDOW off"
+    )
+    worst, beyond = 0.0, []
+    with tempfile.TemporaryDirectory() as home:
+        folder = Path(home)
+        for name in names:
+            table, path = store[name], folder / f"{name}.xml"
+            written, seconds = timed(radiance.write, table, path)
+            error = written.error
+            assert error is not None
+            seen = at_random(table, path)
+            _, total = check_bsdf(path)
+            wrong = off(total, tree_total(table))
+            worst = max(worst, abs(wrong))
+            if seen > 1.1 * error.p99_hemisphere + 1e-3:
+                beyond.append(name)
+            trees.add(
+                name, written.nbytes / 1e6, seconds, error.p99, error.p99_hemisphere, seen, error.l1, total, wrong
+            )
+            for kind in klems.kinds:
+                written, seconds = timed(klems.write, table, path, kind=kind)
+                error = written.error
+                assert error is not None
+                largest, normal = klems_total(table, BASES[kind])
+                _, total = check_bsdf(path)
+                wrong = off(total, largest)
+                shares = in_window(path, kind)
+                window = max(
+                    (abs(share - normal) / max(normal, 1e-9) for share in shares if normal > 0.0), default=None
+                )
+                worst = max(worst, abs(wrong), window or 0.0)
+                matrices.add(name, kind, written.nbytes / 1e6, seconds, error.p99, error.l1, total, wrong, window)
+        whole, median, file_off, plastic_off = picture(folder)
+    for title, rows in (("trees", trees.rows), ("matrices", matrices.rows)):
+        column = 2 if title == "trees" else 3
+        run.say(
+            f"All {len(rows)} {title} took {sum(float(row[column] or 0.0) for row in rows):.0f} s of one processor."
+        )
+    run.say(f"Totals are off by {worst:.2%} at most, beyond rounding; at most {REQUIRED:.1%} is required.")
+    run.say(f"f_r is within the stated error for {len(names) - len(beyond)} of {len(names)} trees. {' '.join(beyond)}")
+    run.say(
+        f"A picture of a ball of bounded Ward differs from plastic2 by {whole:.2%} in all, by {median:.2%} in the median "
+        f"pixel; from the table the file differs by {file_off:.2%} and plastic2 by {plastic_off:.2%} in the median."
+    )
+    run.end()
+    return 0 if worst <= REQUIRED and not beyond and abs(whole) <= 0.01 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,114 @@
+"""ASTM E1392 files: the rows by hand, grids and lists of rows, round trips, damage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from brdfdb.errors import FileFormatError
+from brdfdb.formats import EXPORTERS, IMPORTERS, astm
+from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._stated_error import Comparison
+from brdfdb.formats._written import Written
+from tests.formats.kinds_of_tables import KINDS, table_of
+
+SIZE = 0.3  # MB, so that tests are quick
+ERROR_RTOL = 1e-4  # of p99 of a file that is read again, whose angles have nine digits: worst measured 5e-6
+HEAD = "A measurement\nNUM_POINTS 8\nVARS theta_i,phi_i,theta_s,phi_s,400nm,500nm\n"
+ROWS = [
+    f"{theta_i},0,{theta_s},{phi_s},{number},{10 * number}"
+    for number, (theta_i, theta_s, phi_s) in enumerate(
+        (theta_i, theta_s, phi_s) for phi_s in (0.0, 3.1415927) for theta_s in (0.5, 1.0) for theta_i in (0.0, 1.0)
+    )
+]
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Written]:
+    """A kind of table, and its file."""
+    path = tmp_path_factory.mktemp("astm") / "a.astm"
+    return request.param, astm.write(table_of(request.param), path, size=SIZE, verdict="sound")
+
+
+def test_a_file_holds_what_it_states(exported: tuple[str, Written]) -> None:
+    kind, written = exported
+    table = table_of(kind)
+    assert written.nbytes < 1.2e6 * SIZE
+    reading = formats.read(written.paths[0])
+    assert isinstance(reading, FileTable)
+    assert written.error is not None
+    again = Comparison(table).error_of(reading.evaluate)
+    assert again.p99 == pytest.approx(written.error.p99, rel=ERROR_RTOL)
+    assert reading.record["audit"] == "sound"
+    assert (reading.wavelength_nm is None) == (kind != "copper")
+
+
+def test_rows_are_f_r_of_the_table(exported: tuple[str, Written]) -> None:
+    kind, written = exported
+    table = table_of(kind)
+    head, rows = written.paths[0].read_text(encoding="utf-8").split("VARS ")
+    names, *texts = rows.strip().split("\n")
+    assert f"NUM_POINTS {len(texts)}\n" in head
+    assert names.startswith("theta_i,phi_i,theta_s,phi_s,")
+    numbers = np.array([[float(number) for number in text.split(",")] for text in texts])
+    assert len(np.unique(numbers[:, :4].astype(np.float32), axis=0)) == len(numbers)  # libbsdf has 32 bit angles
+    above = (numbers[:, [0, 2]] < np.deg2rad(89.4)).all(axis=1)
+    f_r = np.asarray(table.lookup(*numbers[above, :4].T))
+    np.testing.assert_allclose(numbers[above, 4:], f_r.reshape(len(f_r), -1), rtol=6e-5, atol=1e-12)
+    ends = np.unique(numbers[:, 3].astype(np.float32))[[0, -1]]
+    np.testing.assert_array_equal(ends, np.array([0.0, 2.0 * np.pi], np.float32))  # else libbsdf looks for them
+
+
+def test_a_grid_by_hand(tmp_path: Path) -> None:
+    path = tmp_path / "a.astm"
+    path.write_text(HEAD + "\n".join(ROWS[::-1]) + "\n", encoding="utf-8")
+    reading = formats.read(path)
+    assert isinstance(reading, FileTable)
+    np.testing.assert_array_equal(reading.wavelength_nm, [400.0, 500.0])
+    np.testing.assert_allclose(reading.lookup(1.0, 0.7, 0.5, 0.7), [1, 10], rtol=1e-6)
+    np.testing.assert_allclose(reading.lookup(0.0, 0.0, 1.0, 0.0), [2, 20], rtol=1e-6)
+    for side in (0.5, 1.5):
+        np.testing.assert_allclose(reading.lookup(0.5, 0.0, 0.75, side * np.pi), [3.5, 35], rtol=1e-6)
+    assert reading.lookup(1.0, 0.0, 0.5, 0.0, 450.0) == pytest.approx(5.5)
+
+
+def test_rows_that_are_no_grid_are_samples(tmp_path: Path) -> None:
+    path = tmp_path / "a.astm"
+    path.write_text(HEAD + "\n".join(ROWS[:-1]) + "\n0.1,-0.5,0.2,0.3,-4,5\n", encoding="utf-8")
+    reading = astm.read(path)
+    assert isinstance(reading, Samples)
+    assert reading.values.shape == (8, 2)
+    assert reading.phi_i[-1] == pytest.approx(2.0 * np.pi - 0.5)
+    assert reading.values[-1].tolist() == [0.0, 5.0]  # libbsdf takes negative values for 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "NUM_POINTS 8\n",
+        HEAD,
+        HEAD.replace(",400nm,500nm", ""),
+        HEAD.replace("theta_i,phi_i", "phi_i,theta_i") + ROWS[0],
+        HEAD + ROWS[0] + ",7\n",
+        HEAD + ROWS[0].replace("0,", "x,", 1),
+        HEAD + ROWS[0].rsplit(",", 1)[0] + ",nan",
+    ],
+)
+def test_damaged_files(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.astm"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(FileFormatError, match=r"a\.astm: "):
+        astm.read(path)
+
+
+@pytest.mark.parametrize("name", ["utia", "ssdd", "zemax", "astm"])
+def test_a_file_is_recognised_by_its_own_format_alone(tmp_path: Path, name: str) -> None:
+    options = {} if name == "utia" else {"size": 0.1}
+    EXPORTERS[name].write(table_of("oren-nayar"), tmp_path / "a", **options)
+    with (tmp_path / "a").open("rb") as file:
+        head = file.read(4096)
+    assert [other for other, importer in IMPORTERS.items() if importer.recognises(head)] == [name]

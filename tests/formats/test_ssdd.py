@@ -1,0 +1,156 @@
+"""SSDD files: the order of entries and values, all wavelengths, the specular part, what libbsdf trips over, damage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from brdfdb.errors import FileFormatError
+from brdfdb.formats import _ssdd_file, ssdd
+from brdfdb.formats._readings import FileTable
+from brdfdb.formats._stated_error import Comparison
+from tests.formats.kinds_of_tables import KINDS, table_of
+
+SIZE = 0.5  # MB, so that tests are quick
+ERROR_RTOL = 1e-4  # of p99 of a file that is read again, whose angles have ten digits: worst measured 3e-6
+ORDER = (
+    *("VERSION", "SOFTWARE", "DATA_TYPE", "COLOR_MODEL", "WAVELENGTH_LIST", "PARAM_TYPE", "REDUCTION_TYPE"),
+    *("PARAM0_LIST", "PARAM1_LIST", "PARAM2_LIST", "PARAM3_LIST", "NAME", "SOURCE_TYPE", "DATA"),
+)
+BY_HAND = """VERSION 0.3
+# by hand
+DATA_TYPE brdf
+COLOR_MODEL rgb
+PARAM_TYPE {kind}
+{reduction}
+PARAM0_LIST 0 80
+PARAM2_LIST 0 40
+PARAM3_LIST {azimuths}
+DATA ascii
+{values}
+DATA_TYPE specular_reflectance
+COLOR_MODEL monochrome
+PARAM0_LIST 0 90
+DATA ascii
+0.25
+0.5
+"""
+SPHERICAL = "spherical_coordinate_system"
+ROWS = [f"{number} {10 * number} {100 * number}" for number in range(8)]
+
+
+def entries_of(path: Path) -> list[str]:
+    """Return the names of the entries of the first block."""
+    head = path.read_bytes()
+    head = head[: head.index(b"\nDATA ") + 6]
+    lines = head.decode().split("\n")
+    return [line.split(" ")[0] for line in lines if line and not line.startswith("#")]
+
+
+@pytest.mark.parametrize(("kind", "data"), [*((kind, "binary") for kind in KINDS), ("copper", "ascii")])
+def test_a_file_holds_what_it_states(tmp_path: Path, kind: str, data: str) -> None:
+    table = table_of(kind)
+    written = ssdd.write(table, tmp_path / "a.ssdd", size=SIZE, data=data, verdict="sound")
+    assert written.nbytes < 1.2e6 * SIZE
+    reading = formats.read(tmp_path / "a.ssdd")
+    assert isinstance(reading, FileTable)
+    assert written.error is not None
+    again = Comparison(table).error_of(reading.evaluate)
+    assert again.p99 == pytest.approx(written.error.p99, rel=ERROR_RTOL)
+    assert reading.record["audit"] == "sound"
+    assert reading.record["error_of_file"]["p99"] == written.error.document()["p99"]
+    if table.wavelength_nm is None:
+        assert reading.wavelength_nm is None
+    else:
+        np.testing.assert_array_equal(reading.wavelength_nm, table.wavelength_nm)
+    names = entries_of(tmp_path / "a.ssdd")
+    assert names == [name for name in ORDER if name in names]
+
+
+def test_the_specular_part_has_a_block_of_its_own(tmp_path: Path) -> None:
+    table = table_of("copper")
+    ssdd.write(table, tmp_path / "a.ssdd", size=SIZE)
+    record = ssdd.read(tmp_path / "a.ssdd").record
+    assert table.specular is not None
+    np.testing.assert_allclose(record["specular_reflectance"], table.specular, rtol=1e-6)
+    assert record["specular_theta_i_deg"][0] == 0.0
+    assert "remarks" in record
+    assert record["remarks"] == []
+
+
+def test_the_first_angle_runs_fastest(tmp_path: Path) -> None:
+    path = tmp_path / "a.ssdd"
+    text = BY_HAND.format(kind=SPHERICAL, reduction="", azimuths="0 180", values="\n".join(["# PARAM3: 0", *ROWS]))
+    path.write_text(text, encoding="utf-8")
+    reading = formats.read(path)
+    assert isinstance(reading, FileTable)
+    assert reading.channels == ("R", "G", "B")
+    turn = np.deg2rad
+    np.testing.assert_allclose(reading.lookup(turn(80.0), 0.0, 0.0, 0.0), [1, 10, 100], rtol=1e-6)
+    np.testing.assert_allclose(reading.lookup(0.0, 0.0, turn(40.0), 0.0), [2, 20, 200], rtol=1e-6)
+    np.testing.assert_allclose(reading.lookup(0.0, 0.0, turn(40.0), np.pi), [6, 60, 600], rtol=1e-6)
+    np.testing.assert_allclose(reading.lookup(turn(40.0), 0.0, turn(20.0), np.pi / 2), [3.5, 35, 350], rtol=1e-6)
+    assert reading.record["specular_reflectance"] == [[0.25], [0.5]]
+
+
+def test_symmetries_are_filled_in(tmp_path: Path) -> None:
+    path = tmp_path / "a.ssdd"
+    kind, both = "half_difference_coordinate_system", "REDUCTION_TYPE bilateral_symmetry reciprocity"
+    text = BY_HAND.format(kind=kind, reduction=both, azimuths="0 90", values="\n".join(ROWS))
+    path.write_text(text, encoding="utf-8")
+    reading = ssdd.read(path)
+    light, viewer = (np.deg2rad(45.0), 0.3), (np.deg2rad(20.0), 2.0)
+    expected = reading.lookup(*light, *viewer)
+    np.testing.assert_allclose(reading.lookup(*viewer, *light), expected)
+    np.testing.assert_allclose(reading.lookup(light[0], -light[1], viewer[0], -viewer[1]), expected)
+
+
+def test_binary_values_never_look_like_a_comment() -> None:
+    hashes = np.frombuffer(b"\n #\x3e" + b"\0\0\x80\x3f" * 7, "<f4").reshape(2, 1, 2, 2, 1)
+    data = _ssdd_file.block({"DATA_TYPE": "brdf"}, hashes, binary=True)
+    values = data[data.index(b"binary\n") + 7 :]
+    assert not values.lstrip().startswith(b"#")
+    np.testing.assert_allclose(np.frombuffer(values[:32], "<f4"), hashes.reshape(-1), rtol=1e-4)
+
+
+def test_values_of_a_block_are_read_back_where_they_were(tmp_path: Path) -> None:
+    values = np.arange(2 * 3 * 2 * 4 * 3, dtype=np.float32).reshape(2, 3, 2, 4, 3)
+    lists = {"PARAM0_LIST": "0 1", "PARAM1_LIST": "0 1 2", "PARAM2_LIST": "0 1", "PARAM3_LIST": "0 1 2 3"}
+    entries = {"DATA_TYPE": "brdf", "COLOR_MODEL": "xyz", **lists}
+    for binary in (True, False):
+        data = _ssdd_file.header("test", ["a comment"]) + _ssdd_file.block(entries, values, binary) * 2
+        (tmp_path / "a.ssdd").write_bytes(data)
+        comments, blocks = _ssdd_file.parsed(tmp_path / "a.ssdd")
+        assert comments == ["a comment"]
+        for block in blocks:
+            np.testing.assert_allclose(block.values, values, rtol=1e-6, atol=1e-40)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("DATA_TYPE brdf", "DATA_TYPE btdf"),
+        ("DATA_TYPE brdf", "DATA_TYPE light"),
+        ("rgb", "cmyk"),
+        ("rgb", "spectrum"),
+        (SPHERICAL, "distorted_spherical_coordinate_system"),
+        ("PARAM0_LIST 0 80\n", ""),
+        ("PARAM0_LIST 0 80", "PARAM0_LIST 80 0"),
+        ("PARAM0_LIST 0 80", "PARAM0_LIST 0 80\nPARAM4_LIST 0 5"),
+        ("PARAM0_LIST 0 80", "PARAM0_LIST zero 80"),
+        ("7 70 700", "7 70"),
+        ("7 70 700", "7 70 nan"),
+        ("7 70 700", "7 70 x"),
+        ("DATA ascii\n0 ", "DATA binary\n0 "),
+    ],
+)
+def test_damaged_files(tmp_path: Path, old: str, new: str) -> None:
+    path = tmp_path / "a.ssdd"
+    text = BY_HAND.format(kind=SPHERICAL, reduction="", azimuths="0 180", values="\n".join(ROWS))
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(FileFormatError, match=r"a\.ssdd: "):
+        ssdd.read(path)
