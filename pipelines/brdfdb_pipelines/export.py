@@ -122,7 +122,7 @@ def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
         assert files.error is not None
         print(f"{name}: {files.error.p99:.2%}, beyond the tolerance of {files.tolerance:.2%}")
     for remark in sorted({remark for _, files in written for remark in files.remarks}):
-        names = [name for name, files in written if remark in files.remarks]
+        names = list(dict.fromkeys(name for name, files in written if remark in files.remarks))
         print(f"{', '.join(names) if len(names) < 4 else counted(len(names), 'material')}: {remark}")
     for export in exports:
         if export.refusal is not None:

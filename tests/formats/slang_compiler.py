@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import importlib.util
+import os
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +26,19 @@ void judge(
 """
 
 
+def folder() -> Path | None:
+    """Return the folder of slangpy: of this environment, or below $BRDFDB_SLANG; None where it is missing."""
+    if root := os.environ.get("BRDFDB_SLANG"):
+        return Path(root) / "slangpy"
+    spec = importlib.util.find_spec("slangpy")
+    return None if spec is None or spec.origin is None else Path(spec.origin).parent
+
+
 @functools.cache
 def _library() -> Any:
-    spec = importlib.util.find_spec("slangpy")
-    assert spec is not None
-    assert spec.origin is not None
-    path = next(Path(spec.origin).parent.glob("libslang-compiler.so*"))
-    library = ctypes.CDLL(str(path))
+    package = folder()
+    assert package is not None
+    library = ctypes.CDLL(str(next(package.glob("libslang-compiler.so*"))))
     for name in ("spCreateSession", "spCreateCompileRequest"):
         getattr(library, name).restype = ctypes.c_void_p
     for name in ("spGetDiagnosticOutput", "spGetEntryPointSource"):

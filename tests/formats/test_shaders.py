@@ -83,7 +83,8 @@ def test_glsl_is_the_model(model: str) -> None:
 @pytest.mark.usefixtures("machine")
 @pytest.mark.parametrize("model", PARAMETERS)
 def test_slang_is_the_model(model: str) -> None:
-    pytest.importorskip("slangpy")
+    if slang_compiler.folder() is None:
+        pytest.skip("slangpy is not installed")
     wi, wr = pairs()
     text = slang_compiler.glsl_of(source(model, PARAMETERS[model], slang.LANGUAGE, "a-b"))
     assert_is_model(model, opengl.run_whole(text, wi, wr), wi, wr)
