@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +24,16 @@ GREY_NM = 550.0  # the wavelength of grey tables; readers continue a single one 
 _HORIZON = 0.94  # share of rows above the horizon, of warps that end there
 # Rungs from small to large: size, lights, and azimuths of a quarter
 _ISOTROPIC = ((10, 8), (14, 11), (20, 15), (28, 22), (36, 28), (44, 34), (52, 40), (64, 50), (80, 62), (96, 76))
-_ANISOTROPIC = ((16, 8, 5), (24, 12, 7), (32, 16, 9), (40, 19, 11), (48, 23, 13), (56, 26, 15), (64, 30, 17), (80, 36, 21))
+_ANISOTROPIC = (
+    (16, 8, 5),
+    (24, 12, 7),
+    (32, 16, 9),
+    (40, 19, 11),
+    (48, 23, 13),
+    (56, 26, 15),
+    (64, 30, 17),
+    (80, 36, 21),
+)
 _FIRST = 5  # rung that is tried first
 _STEP = 1.4  # factor by which the error falls, about, from rung to rung
 _COARSE = 30  # size below which densities have half of the nodes
@@ -87,6 +96,9 @@ class _Search:
         self._kept = np.arange(len(channels.names)) if at is None else _thinned(comparison, at, tolerance)
         self.nodes = None if at is None else at[self._kept]
         self._mixing = None if at is None else _lines(at, at[self._kept])
+        self._copies = 1
+        if kind == "rgb" and channels.wavelength_nm is None:  # one channel is enough, three times
+            self._kept, self._mixing, self._copies = np.zeros(1, np.int64), np.ones((1, 3)), 3
         self._known: dict[Plan, float] = {}
         self._last: tuple[Plan, Fields] | None = None
         self._of_file: Floats32 | None = None
@@ -125,6 +137,8 @@ class _Search:
             error = self._comparison.error_of(lambda wi, wr, file=fields: self._mixed(file.evaluate(wi, wr)))
             if error.p99 <= self._tolerance:
                 break
+        if self._copies > 1:
+            fields = replace(fields, spectra=np.repeat(fields.spectra, self._copies, axis=2))
         return fields, error
 
     def _built(self, plan: Plan) -> Fields:
@@ -152,7 +166,7 @@ class _Search:
         return values if self._mixing is None else np.asarray(values @ self._mixing)
 
     def _nbytes(self, plan: Plan) -> int:
-        texels = (self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
+        texels = (self._copies * self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
         return 4 * plan.lights * plan.azimuths * texels
 
 

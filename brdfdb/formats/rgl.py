@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brdfdb.errors import FileFormatError
 from brdfdb.formats._interface import TOLERANCE, Option
 
 if TYPE_CHECKING:
