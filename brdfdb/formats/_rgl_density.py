@@ -43,7 +43,7 @@ def densities(surface: Surface, wi: Array, ndf: Floats32, rows: int, columns: in
         return np.ones((len(wi), 2, 2), np.float32)
     shape = (len(wi), rows, columns)
     u, v = np.linspace(0.0, 1.0, columns), np.linspace(0.0, 1.0, rows)
-    x, y = (np.broadcast_to(each, shape) for each in np.meshgrid(u, v))
+    x, y = (np.broadcast_to(axis, shape) for axis in np.meshgrid(u, v))
     values = surface.values(wi, x, y)
     ramp = np.clip(1.0 + values.cosine / _RAMP, _LEAST, 1.0)
     factor = bilinear(ndf, x[0], y[0])

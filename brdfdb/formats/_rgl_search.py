@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.formats._rgl_build import Plan, build
 from brdfdb.formats._rgl_fields import Fields, Floats32
 from brdfdb.formats._rgl_surface import Surface
-from brdfdb.formats._rgl_warp import Array
+from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
@@ -32,7 +33,6 @@ _ANISOTROPIC = (
     (48, 23, 13),
     (56, 26, 15),
     (64, 30, 17),
-    (80, 36, 21),
 )
 _FIRST = 5  # rung that is tried first
 _STEP = 1.4  # factor by which the error falls, about, from rung to rung
@@ -48,7 +48,7 @@ REDUCED = (
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Fit:
     """The fields of a file, its error, the names of its channels, and remarks."""
 
     fields: Fields
@@ -57,7 +57,7 @@ class Found:
     remarks: tuple[str, ...]
 
 
-def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool = False) -> Found:
+def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool = False) -> Fit:
     """Return the smallest file within a tolerance, or the best one of at most so many bytes.
 
     Parameters
@@ -83,7 +83,7 @@ def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full:
     first = [search.p99(plans[min(_FIRST, len(plans) - 1)]) for plans in ladders]
     fields, error = search.best(ladders[int(np.argmin(first))])
     names = channels.names if search.nodes is None else tuple(f"{value:g}nm" for value in search.nodes)
-    return Found(fields, error, names, remarks)
+    return Fit(fields, error, names, remarks)
 
 
 class _Search:
@@ -134,7 +134,7 @@ class _Search:
             rung = min(max(rung + steps, low), max(low, high - 1))
         for plan in ladder[low:]:
             fields = self._built(plan)
-            error = self._comparison.error_of(lambda wi, wr, file=fields: self._mixed(file.evaluate(wi, wr)))
+            error = self._comparison.error_of(functools.partial(self._evaluated, fields))
             if error.p99 <= self._tolerance:
                 break
         if self._copies > 1:
@@ -153,7 +153,7 @@ class _Search:
             whole = self._sample is self.surface
             fields = self._built(plan) if whole else build(self._sample, plan, self._of_file)
 
-            def evaluate(wi: Array, wr: Array) -> Array:
+            def evaluate(wi: Floats, wr: Floats) -> Floats:
                 values = self._comparison.truth.copy()
                 values[:, self._kept[self._few]] = fields.evaluate(wi, wr)
                 return values
@@ -161,8 +161,9 @@ class _Search:
             self._known[plan] = self._comparison.error_of(evaluate).p99
         return self._known[plan]
 
-    def _mixed(self, values: Array) -> Array:
-        """Return values at the wavelengths of the table from those of the file."""
+    def _evaluated(self, fields: Fields, wi: Floats, wr: Floats) -> Floats:
+        """Return f_r [1/sr] of a file at the wavelengths of the table."""
+        values = fields.evaluate(wi, wr)
         return values if self._mixing is None else np.asarray(values @ self._mixing)
 
     def _nbytes(self, plan: Plan) -> int:
@@ -196,7 +197,7 @@ def _some(channels: Channels, kept: NDArray[np.int64]) -> Channels:
     return Channels(names, channels.wavelength_nm, channels.weights[:, kept], channels.meaning)
 
 
-def _thinned(comparison: Comparison, at: Array, tolerance: float) -> NDArray[np.int64]:
+def _thinned(comparison: Comparison, at: Floats, tolerance: float) -> NDArray[np.int64]:
     """Return the numbers of wavelengths [nm] that are enough, because readers join them by straight lines."""
     truth = comparison.truth[:_PAIRS]
     scale = np.maximum(truth, comparison.floor) + 1e-30
@@ -210,6 +211,6 @@ def _thinned(comparison: Comparison, at: Array, tolerance: float) -> NDArray[np.
     return np.array(kept)
 
 
-def _lines(at: Array, nodes: Array) -> Array:
+def _lines(at: Floats, nodes: Floats) -> Floats:
     """Return the matrix (nodes, wavelengths) of straight lines between nodes."""
     return np.stack([np.interp(at, nodes, one) for one in np.eye(nodes.size)])

@@ -19,10 +19,8 @@ _VERSION = bytes((1, 0))
 _ALIGNMENT = 8  # bytes
 _MOST_FIELDS, _MOST_AXES, _MOST_NAME = 256, 16, 256  # more of them is a damaged header
 # Types of elements by their number in the file
-_TYPES = {
-    number: np.dtype(f"<{name}")
-    for number, name in enumerate(["u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8"], 1)
-}
+_LETTERS = ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8")
+_TYPES = {number: np.dtype(f"<{letters}") for number, letters in enumerate(_LETTERS, 1)}
 _NUMBERS = {dtype: number for number, dtype in _TYPES.items()}
 
 
