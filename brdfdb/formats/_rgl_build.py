@@ -14,10 +14,13 @@ from brdfdb.formats._rgl_surface import LAST_THETA, Surface, lights
 from brdfdb.formats._rgl_warp import Array, Mixture, Warp
 
 _TOWARDS_GRAZING = 1.5  # power of the spacing of theta_i: nodes are closer at grazing incidence
-_LEAST_LUMINANCE = 1e-3  # share of the mean density of samples that each place has at least
+_LEAST_LUMINANCE = 1e-6  # share of the mean density of samples that each place has at least
 # Readers join values by straight lines, which lie above a bend by h**2/8 f''. Values that are lower by a part of that
 # leave half of it on either side
 _LOWERED = 1.0 / 20.0
+# Mitsuba reads a light in the plane y = 0 as one at +pi, and continues the last azimuth to it. In files of a quarter it
+# is one more, with the values of -pi, which no other light reads; the quarter is still one [rad]
+_BEYOND = 0.2
 
 
 @dataclass(frozen=True)
@@ -72,13 +75,17 @@ def build(surface: Surface, plan: Plan, wavelength_nm: Floats32 | None) -> Field
     spectra = spectra - _LOWERED * sum(
         _bend(spectra, axis, at) for axis, at in ((0, phi_i), (1, theta_i), (3, nodes), (4, nodes))
     )
+    vndf, luminance = vndf.reshape(*shape, *vndf.shape[1:]), luminance.reshape(*shape, *luminance.shape[1:])
+    if surface.reduction == 4:
+        phi_i = np.append(phi_i, np.float32(phi_i[-1] + _BEYOND))
+        vndf, luminance, spectra = (np.concatenate([part, part[:1]]) for part in (vndf, luminance, spectra))
     return Fields(
         theta_i=theta_i,
         phi_i=phi_i,
         ndf=ndf,
         sigma=sigma,
-        vndf=vndf.reshape(*shape, *vndf.shape[1:]),
-        luminance=luminance.astype(np.float32).reshape(*shape, *luminance.shape[1:]),
+        vndf=vndf,
+        luminance=luminance.astype(np.float32),
         spectra=spectra.astype(np.float32),
         wavelength_nm=wavelength_nm,
     )

@@ -20,6 +20,7 @@ _SHARE = 0.5  # share of a density that follows the bends; the rest is even
 _RAMP = 0.3  # cosine of theta_r below the horizon at which the even part of a ramp ends
 _LEAST = 0.02  # density there
 _SMOOTHINGS = 3
+_CENTRE = 0.15  # place up to which densities grow from 0 along rows: theta_m then grows as the uniform numbers
 
 
 def densities(surface: Surface, wi: Array, ndf: Floats32, rows: int, columns: int, horizon: float) -> Floats32:
@@ -42,7 +43,7 @@ def densities(surface: Surface, wi: Array, ndf: Floats32, rows: int, columns: in
         return np.ones((len(wi), 2, 2), np.float32)
     shape = (len(wi), rows, columns)
     u, v = np.linspace(0.0, 1.0, columns), np.linspace(0.0, 1.0, rows)
-    x, y = (np.broadcast_to(each, shape) for each in np.meshgrid(u, v))
+    x, y = (np.broadcast_to(axis, shape) for axis in np.meshgrid(u, v))
     values = surface.values(wi, x, y)
     ramp = np.clip(1.0 + values.cosine / _RAMP, _LEAST, 1.0)
     factor = bilinear(ndf, x[0], y[0])
@@ -52,6 +53,7 @@ def densities(surface: Surface, wi: Array, ndf: Floats32, rows: int, columns: in
     else:
         azimuth = 0.0 if surface.isotropic else np.arctan2(wi[..., 1], wi[..., 0])[..., 0]
         line = _up_to_horizon(along, u, _horizon(wi[:, 0], (2.0 * v - 1.0) * np.pi - azimuth), horizon)
+    line = line * np.clip(u / _CENTRE, 1e-3, 1.0)
     whole = np.sum(line[..., 1:] + line[..., :-1], axis=-1)
     row = _SHARE * across / across.mean(axis=-1, keepdims=True) + (1.0 - _SHARE)
     density = line * (row / whole)[..., np.newaxis]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._rgl_warp import Array, Mixture, Warp, cell
+from brdfdb.parameters import Floats
 
 _REQUIRED = {"theta_i": 1, "phi_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "luminance": 4, "jacobian": 1}
 _BYTES = ("description", "jacobian")
@@ -99,7 +100,7 @@ class Fields:
         stored = self.spectra.reshape(-1, *self.spectra.shape[2:])
         return np.ascontiguousarray(np.moveaxis(stored, 1, -1), dtype=np.float64)
 
-    def evaluate(self, wi: Array, wr: Array) -> Array:
+    def evaluate(self, wi: Floats, wr: Floats) -> Floats:
         """Return f_r [1/sr], shape (M, W), at unit vectors (M, 3) above the horizon."""
         return self.at(Places.of(wi, wr, self.isotropic, self.reduction))
 
@@ -149,21 +150,21 @@ class Places:
     cosine: Array
 
     @classmethod
-    def of(cls, wi: Array, wr: Array, isotropic: bool, reduction: int = 1) -> Places:
+    def of(cls, wi: Floats, wr: Floats, isotropic: bool, reduction: int = 1) -> Places:
         """Return the places of unit vectors (M, 3) of light and viewer."""
-        wi, wr = wi.astype(np.float64), wr.astype(np.float64)
+        light, viewer = wi.astype(np.float64), wr.astype(np.float64)
         if reduction >= 2:  # the light is mirrored, or turned, into the part of the circle from -pi on
-            flip_y = np.where(wi[:, 1] > 0.0, -1.0, 1.0)
-            flip_x = np.where(wi[:, 0] > 0.0, -1.0, 1.0) if reduction == 4 else flip_y
+            flip_y = np.where(light[:, 1] > 0.0, -1.0, 1.0)
+            flip_x = np.where(light[:, 0] > 0.0, -1.0, 1.0) if reduction == 4 else flip_y
             flips = np.stack([flip_x, flip_y, np.ones_like(flip_x)], axis=-1)
-            wi, wr = wi * flips, wr * flips
-        m = wi + wr
+            light, viewer = light * flips, viewer * flips
+        m = light + viewer
         m = m / np.linalg.norm(m, axis=-1, keepdims=True)
-        theta_i, theta_m = _polar_angle(wi), _polar_angle(m)
-        phi_i, phi_m = np.arctan2(wi[:, 1], wi[:, 0]), np.arctan2(m[:, 1], m[:, 0])
+        theta_i, theta_m = _polar_angle(light), _polar_angle(m)
+        phi_i, phi_m = np.arctan2(light[:, 1], light[:, 0]), np.arctan2(m[:, 1], m[:, 0])
         u_y = of_azimuth(phi_m - phi_i if isotropic else phi_m)
         u_m = np.stack([of_polar_angle(theta_m), u_y - np.floor(u_y)])
-        return cls(theta_i, phi_i, np.stack([of_polar_angle(theta_i), of_azimuth(phi_i)]), u_m, wr[:, 2])
+        return cls(theta_i, phi_i, np.stack([of_polar_angle(theta_i), of_azimuth(phi_i)]), u_m, viewer[:, 2])
 
 
 def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> Fields:

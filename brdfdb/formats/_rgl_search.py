@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.formats._rgl_build import Plan, build
 from brdfdb.formats._rgl_fields import Fields, Floats32
 from brdfdb.formats._rgl_surface import Surface
-from brdfdb.formats._rgl_warp import Array
+from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
@@ -24,7 +25,15 @@ GREY_NM = 550.0  # the wavelength of grey tables; readers continue a single one 
 _HORIZON = 0.94  # share of rows above the horizon, of warps that end there
 # Rungs from small to large: size, lights, and azimuths of a quarter
 _ISOTROPIC = ((10, 8), (14, 11), (20, 15), (28, 22), (36, 28), (44, 34), (52, 40), (64, 50), (80, 62), (96, 76))
-_ANISOTROPIC = ((16, 8, 5), (24, 12, 7), (32, 16, 9), (40, 19, 11), (48, 23, 13), (56, 26, 15), (64, 30, 17), (80, 36, 21))
+_ANISOTROPIC = (
+    (16, 8, 5),
+    (24, 12, 7),
+    (32, 16, 9),
+    (40, 19, 11),
+    (48, 23, 13),
+    (56, 26, 15),
+    (64, 30, 17),
+)
 _FIRST = 5  # rung that is tried first
 _STEP = 1.4  # factor by which the error falls, about, from rung to rung
 _COARSE = 30  # size below which densities have half of the nodes
@@ -39,7 +48,7 @@ REDUCED = (
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Fit:
     """The fields of a file, its error, the names of its channels, and remarks."""
 
     fields: Fields
@@ -48,7 +57,7 @@ class Found:
     remarks: tuple[str, ...]
 
 
-def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool = False) -> Found:
+def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool = False) -> Fit:
     """Return the smallest file within a tolerance, or the best one of at most so many bytes.
 
     Parameters
@@ -74,7 +83,7 @@ def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full:
     first = [search.p99(plans[min(_FIRST, len(plans) - 1)]) for plans in ladders]
     fields, error = search.best(ladders[int(np.argmin(first))])
     names = channels.names if search.nodes is None else tuple(f"{value:g}nm" for value in search.nodes)
-    return Found(fields, error, names, remarks)
+    return Fit(fields, error, names, remarks)
 
 
 class _Search:
@@ -87,6 +96,9 @@ class _Search:
         self._kept = np.arange(len(channels.names)) if at is None else _thinned(comparison, at, tolerance)
         self.nodes = None if at is None else at[self._kept]
         self._mixing = None if at is None else _lines(at, at[self._kept])
+        self._copies = 1
+        if kind == "rgb" and channels.wavelength_nm is None:  # one channel is enough, three times
+            self._kept, self._mixing, self._copies = np.zeros(1, np.int64), np.ones((1, 3)), 3
         self._known: dict[Plan, float] = {}
         self._last: tuple[Plan, Fields] | None = None
         self._of_file: Floats32 | None = None
@@ -122,9 +134,11 @@ class _Search:
             rung = min(max(rung + steps, low), max(low, high - 1))
         for plan in ladder[low:]:
             fields = self._built(plan)
-            error = self._comparison.error_of(lambda wi, wr, file=fields: self._mixed(file.evaluate(wi, wr)))
+            error = self._comparison.error_of(functools.partial(self._evaluated, fields))
             if error.p99 <= self._tolerance:
                 break
+        if self._copies > 1:
+            fields = replace(fields, spectra=np.repeat(fields.spectra, self._copies, axis=2))
         return fields, error
 
     def _built(self, plan: Plan) -> Fields:
@@ -139,7 +153,7 @@ class _Search:
             whole = self._sample is self.surface
             fields = self._built(plan) if whole else build(self._sample, plan, self._of_file)
 
-            def evaluate(wi: Array, wr: Array) -> Array:
+            def evaluate(wi: Floats, wr: Floats) -> Floats:
                 values = self._comparison.truth.copy()
                 values[:, self._kept[self._few]] = fields.evaluate(wi, wr)
                 return values
@@ -147,12 +161,13 @@ class _Search:
             self._known[plan] = self._comparison.error_of(evaluate).p99
         return self._known[plan]
 
-    def _mixed(self, values: Array) -> Array:
-        """Return values at the wavelengths of the table from those of the file."""
+    def _evaluated(self, fields: Fields, wi: Floats, wr: Floats) -> Floats:
+        """Return f_r [1/sr] of a file at the wavelengths of the table."""
+        values = fields.evaluate(wi, wr)
         return values if self._mixing is None else np.asarray(values @ self._mixing)
 
     def _nbytes(self, plan: Plan) -> int:
-        texels = (self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
+        texels = (self._copies * self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
         return 4 * plan.lights * plan.azimuths * texels
 
 
@@ -182,7 +197,7 @@ def _some(channels: Channels, kept: NDArray[np.int64]) -> Channels:
     return Channels(names, channels.wavelength_nm, channels.weights[:, kept], channels.meaning)
 
 
-def _thinned(comparison: Comparison, at: Array, tolerance: float) -> NDArray[np.int64]:
+def _thinned(comparison: Comparison, at: Floats, tolerance: float) -> NDArray[np.int64]:
     """Return the numbers of wavelengths [nm] that are enough, because readers join them by straight lines."""
     truth = comparison.truth[:_PAIRS]
     scale = np.maximum(truth, comparison.floor) + 1e-30
@@ -196,6 +211,6 @@ def _thinned(comparison: Comparison, at: Array, tolerance: float) -> NDArray[np.
     return np.array(kept)
 
 
-def _lines(at: Array, nodes: Array) -> Array:
+def _lines(at: Floats, nodes: Floats) -> Floats:
     """Return the matrix (nodes, wavelengths) of straight lines between nodes."""
     return np.stack([np.interp(at, nodes, one) for one in np.eye(nodes.size)])

@@ -10,6 +10,7 @@ import numpy as np
 
 from brdfdb.formats._rgl_fields import Floats32, directions
 from brdfdb.formats._rgl_warp import Array
+from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
@@ -128,7 +129,7 @@ def _mirrored(values: Array, count: int) -> Array:
     return np.concatenate([values, values[:, :count][:, ::-1]], axis=1)
 
 
-def lights(theta_i: Array, phi_i: Array) -> Array:
+def lights(theta_i: Floats, phi_i: Floats) -> Array:
     """Return unit vectors (P, N, 3) of all polar angles and azimuths [rad]."""
     phi, theta = np.meshgrid(phi_i.astype(np.float64), theta_i.astype(np.float64), indexing="ij")
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)

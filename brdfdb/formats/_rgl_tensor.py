@@ -19,7 +19,8 @@ _VERSION = bytes((1, 0))
 _ALIGNMENT = 8  # bytes
 _MOST_FIELDS, _MOST_AXES, _MOST_NAME = 256, 16, 256  # more of them is a damaged header
 # Types of elements by their number in the file
-_TYPES = {number: np.dtype(f"<{name}") for number, name in enumerate("u1 i1 u2 i2 u4 i4 u8 i8 f2 f4 f8".split(), 1)}
+_LETTERS = ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f2", "f4", "f8")
+_TYPES = {number: np.dtype(f"<{letters}") for number, letters in enumerate(_LETTERS, 1)}
 _NUMBERS = {dtype: number for number, dtype in _TYPES.items()}
 
 
@@ -90,7 +91,9 @@ class _Header:
         name = self.take(length).decode("utf-8", "replace")
         axes, number, offset = self.unpack("<HBQ")
         if axes > _MOST_AXES or number not in _TYPES:
-            raise FileFormatError(f"{self._path}: damaged: field {name!r} has {axes} axes and elements of type {number}")
+            raise FileFormatError(
+                f"{self._path}: damaged: field {name!r} has {axes} axes and elements of type {number}"
+            )
         shape, dtype = self.unpack(f"<{axes}Q"), _TYPES[number]
         size = math.prod(shape)  # of Python's integers, which do not overflow
         if offset + size * dtype.itemsize > len(self._content):

@@ -55,7 +55,11 @@ class Warp:
         rows = np.zeros(ends.shape)
         np.cumsum(0.5 * (ends[:, :-1] + ends[:, 1:]), axis=-1, out=rows[:, 1:])
         scale = 1.0 / rows[:, -1:]
-        self._density, self._columns, self._rows = exact * scale[..., np.newaxis], columns * scale[..., np.newaxis], rows * scale
+        self._density, self._columns, self._rows = (
+            exact * scale[..., np.newaxis],
+            columns * scale[..., np.newaxis],
+            rows * scale,
+        )
 
     def density(self, mixture: Mixture, x: Array, y: Array) -> Array:
         """Return the density at points (M,) of the unit square."""
@@ -113,4 +117,6 @@ def _interval(nodes: Array, wanted: Array) -> NDArray[np.int64]:
 def _root(area: Array, low: Array, high: Array) -> Array:
     """Return where the integral of a line from `low` to `high` over [0, 1] is `area`."""
     area = np.maximum(area, 0.0)
-    return np.asarray(np.minimum(2.0 * area / (low + np.sqrt(np.maximum(low**2 + 2.0 * area * (high - low), 0.0))), 1.0))
+    return np.asarray(
+        np.minimum(2.0 * area / (low + np.sqrt(np.maximum(low**2 + 2.0 * area * (high - low), 0.0))), 1.0)
+    )

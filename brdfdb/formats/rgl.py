@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brdfdb.errors import FileFormatError
 from brdfdb.formats._interface import TOLERANCE, Option
 
 if TYPE_CHECKING:
@@ -82,16 +81,16 @@ def write(
     from brdfdb.formats._written import Written, whole
 
     path = Path(path)
-    found = smallest(table, kind, tolerance, 1e6 * megabytes, azimuth == "full")
-    remarks = found.remarks
+    fit = smallest(table, kind, tolerance, 1e6 * megabytes, azimuth == "full")
+    remarks = fit.remarks
     if table.specular is not None and table.specular.max() > 0.0:
         remarks += (SPECULAR,)
-    document = record(table, found.error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
-    document["channels"] = list(found.channels)
-    fields = replace(found.fields, description=json.dumps(document))
+    document = record(table, fit.error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
+    document["channels"] = list(fit.channels)
+    fields = replace(fit.fields, description=json.dumps(document))
     with whole(path) as (temporary,):
         write_tensors(temporary, fields.tensors())
-    return Written((path,), found.error, tolerance, remarks)
+    return Written((path,), fit.error, tolerance, remarks)
 
 
 def recognises(head: bytes) -> bool:
