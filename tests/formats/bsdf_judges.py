@@ -23,7 +23,7 @@ from brdfdb.tables.table import Table, table_from
 from brdfdb.tables.tabulation import tabulate
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-_ALBEDO_TOLERANCE = 1e-4
+_ALBEDO_TOLERANCE = 3e-4
 _QUERY = """
 import sys
 import numpy as np
