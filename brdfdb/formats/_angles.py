@@ -7,7 +7,7 @@ same half vector, or on the same line to the specular direction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -15,9 +15,10 @@ import numpy as np
 from brdfdb.geometry import HALF_PI, unit_vector
 from brdfdb.parameters import Floats
 
-# Cosine of the lowest direction at which a table is looked up: at 90 degrees f_r of many models has a pole
-LOWEST = float(np.cos(np.deg2rad(89.5)))
-_STEEPEST = float(np.arccos(LOWEST))
+# Largest polar angles [rad] at which a table is looked up. At 90 degrees f_r of many models has a pole: a node there
+# with a finite value of the right size is better. Others have lobes that lie closer to the horizon.
+STEEPEST = float(np.deg2rad(89.5))
+STEEPER = float(np.deg2rad(89.95))
 
 
 class System(Protocol):
@@ -42,6 +43,9 @@ class System(Protocol):
 
     def directions(self, angles: Floats) -> tuple[Floats, Floats]:
         """Return unit vectors (N, 3) of light and viewer above the horizon for angles [rad] of shape (N, axes)."""
+
+    def steeper(self) -> System:
+        """Return the same system with directions of nodes that come closer to the horizon."""
 
 
 def _polar(w: Floats) -> Floats:
@@ -76,10 +80,16 @@ class Spherical:
         False: without the azimuth of the light, and that of the viewer counts from the light.
     mirrored : bool
         f_r is the same for -phi_r, so that it ends at pi.
+    steepest : float [rad]
+        Largest polar angle of directions of nodes.
     """
 
     anisotropic: bool
     mirrored: bool
+    steepest: float = STEEPEST
+
+    def steeper(self) -> System:
+        return replace(self, steepest=STEEPER)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -101,7 +111,9 @@ class Spherical:
         columns = list(angles.T)
         phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_i, theta_r, phi_r = columns
-        return unit_vector(np.minimum(theta_i, _STEEPEST), phi_i), unit_vector(np.minimum(theta_r, _STEEPEST), phi_r)
+        return unit_vector(np.minimum(theta_i, self.steepest), phi_i), unit_vector(
+            np.minimum(theta_r, self.steepest), phi_r
+        )
 
 
 @dataclass(frozen=True)
@@ -117,10 +129,16 @@ class Specular:
         False: without the azimuth of the light.
     mirrored : bool
         f_r is the same for -phi_s, so that it ends at pi.
+    steepest : float [rad]
+        Largest polar angle of directions of nodes.
     """
 
     anisotropic: bool
     mirrored: bool
+    steepest: float = STEEPEST
+
+    def steeper(self) -> System:
+        return replace(self, steepest=STEEPER)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -142,11 +160,11 @@ class Specular:
         columns = list(angles.T)
         phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_i, theta_s, phi_s = columns
-        theta_i = np.minimum(theta_i, _STEEPEST)
+        theta_i = np.minimum(theta_i, self.steepest)
         # the cosine to the normal is length cos(theta_s - inclined): it is the lowest one at the largest theta_s
         inclined = np.arctan2(np.sin(theta_i) * np.cos(phi_s), np.cos(theta_i))
         length = np.hypot(np.cos(theta_i), np.sin(theta_i) * np.cos(phi_s))
-        largest = inclined + np.arccos(np.minimum(LOWEST / length, 1.0))
+        largest = inclined + np.arccos(np.minimum(np.cos(self.steepest) / length, 1.0))
         w = unit_vector(np.minimum(theta_s, np.maximum(largest, 0.0)), phi_s)
         return unit_vector(theta_i, phi_i), _turned(_tilted(w, -theta_i), phi_i)
 
@@ -162,11 +180,17 @@ class HalfDifference:
     mirrored, reciprocal : bool
         f_r is the same for -phi_d, and for phi_d + pi, where light and viewer are exchanged. Each halves the range of
         phi_d.
+    steepest : float [rad]
+        Largest polar angle of directions of nodes.
     """
 
     anisotropic: bool
     mirrored: bool = True
     reciprocal: bool = True
+    steepest: float = STEEPEST
+
+    def steeper(self) -> System:
+        return replace(self, steepest=STEEPER)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -195,11 +219,11 @@ class HalfDifference:
         columns = list(angles.T)
         phi_h = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_h, theta_d, phi_d = columns
-        theta_h = np.minimum(theta_h, _STEEPEST)
+        theta_h = np.minimum(theta_h, self.steepest)
         # the lower one of the two directions has the cosine length cos(theta_d + inclined) to the normal
         inclined = np.arctan2(np.sin(theta_h) * np.abs(np.cos(phi_d)), np.cos(theta_h))
         length = np.hypot(np.cos(theta_h), np.sin(theta_h) * np.cos(phi_d))
-        largest = np.maximum(np.arccos(np.minimum(LOWEST / length, 1.0)) - inclined, 0.0)
+        largest = np.maximum(np.arccos(np.minimum(np.cos(self.steepest) / length, 1.0)) - inclined, 0.0)
         d = unit_vector(np.minimum(theta_d, largest), phi_d)
         opposite = d * np.array([-1.0, -1.0, 1.0])
         return _turned(_tilted(d, theta_h), phi_h), _turned(_tilted(opposite, theta_h), phi_h)

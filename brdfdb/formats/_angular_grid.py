@@ -25,11 +25,12 @@ if TYPE_CHECKING:
 _AT_ONCE = 1 << 22  # values that are interpolated, or looked up, at a time
 _FIRST = 8  # intervals of each axis before any is halved
 _HALVINGS = 14
-_FEWEST = 60  # pairs in an interval that is halved: of fewer, the percentile says nothing
+_FEWEST = 40  # pairs in an interval that is halved: of fewer, the percentile says nothing
 # Smallest error of an interval, as a share of the target: of the first ones, and of those that were halved
 _LEAST, _LEAST_OF_HALVES = 1 / 64, 1 / 4
 _MOST = 0.97  # share of the pairs of an interval that its error stands for
 _BALANCES = 2
+_EVERY = 2  # of the pairs, one of so many chooses the nodes
 _DECIMALS = 5  # of nodes in degrees, so that text holds them
 _SEARCHES = 8
 _SAME = 1e-3  # largest p99 between a table and its image under a symmetry
@@ -115,15 +116,17 @@ class Plan:
     """
 
     def __init__(self, table: Table, comparison: Comparison, system: System, target: float) -> None:
-        above = comparison.wr[:, 2] > 0.0
+        above = np.flatnonzero(comparison.wr[:, 2] > 0.0)[::_EVERY]
         self.system = system
-        self._table, self._comparison = table, comparison
+        self._table, self._comparison, self._target = table, comparison, target
         self._truth = comparison.truth[above]
         self._angles = system.angles(comparison.wi[above], comparison.wr[above])
         scale = np.maximum(self._truth, comparison.floor)
         self._scale = np.where(scale > 0.0, scale, 1.0)
         self._shares = np.ones(len(system.ends))
         self._lines = [self._halved(axis, end, target) for axis, end in enumerate(system.ends)]
+        for _ in range(_BALANCES):
+            self._balance(self.nodes(target))
 
     def nodes(self, target: float) -> tuple[Floats, ...]:
         """Return nodes [rad] of each angle, between which linear interpolation is wrong by about `target`."""
@@ -148,7 +151,16 @@ class Plan:
             low, high = (low, middle) if self.count(middle) <= most else (middle, high)
         return high
 
-    def balance(self, nodes: Sequence[Floats]) -> None:
+    def steeper(self) -> Plan:
+        """Return the plan with directions of nodes that come closer to the horizon."""
+        return Plan(self._table, self._comparison, self.system.steeper(), self._target)
+
+    def grid(self, target: float, written: Callable[[AngularGrid], AngularGrid]) -> tuple[AngularGrid, FileError]:
+        """Return the grid of a target as a file holds it, and its error."""
+        grid = written(filled(self._table, self._comparison, self.system, self.nodes(target)))
+        return grid, self._comparison.error_of(grid.evaluate)
+
+    def _balance(self, nodes: Sequence[Floats]) -> None:
         """Shift nodes between the angles, so that each is wrong by the same: then their product is the smallest."""
         every = np.arange(len(self._angles))
         wrong = np.empty(len(nodes))
@@ -237,19 +249,25 @@ def chosen(
     written : callable
         Gives the grid as the file holds it, with its rounded numbers.
     """
-    target = tolerance / 2.0
-    plans = [Plan(table, comparison, system, target) for system in systems]
-    for plan in plans:
-        for _ in range(_BALANCES):
-            plan.balance(plan.nodes(target))
-    plan = min(plans, key=lambda some: some.count(target))
+    plans = [Plan(table, comparison, system, tolerance / 2.0) for system in systems]
+    plan = min(plans, key=lambda some: some.count(tolerance / 2.0))
+    grid, error = _smallest(plan, tolerance, most, written)
+    if error.p99 > tolerance:
+        other = _smallest(plan.steeper(), tolerance, most, written)
+        grid, error = min((grid, error), other, key=lambda some: _rank(some[0], some[1], tolerance))
+    return grid, error
+
+
+def _smallest(
+    plan: Plan, tolerance: float, most: int, written: Callable[[AngularGrid], AngularGrid]
+) -> tuple[AngularGrid, FileError]:
+    """Return the smallest grid of a plan within a tolerance, or that of the smallest error, and its error."""
     finest = plan.finest(most)
-    target = max(target, finest)
+    target = max(tolerance / 2.0, finest)
     best: tuple[AngularGrid, FileError] | None = None
     within, beyond = 0.0, math.inf  # targets whose grids are, and are not, within the tolerance
     for _ in range(_SEARCHES):
-        grid = written(filled(table, comparison, plan.system, plan.nodes(target)))
-        error = comparison.error_of(grid.evaluate)
+        grid, error = plan.grid(target, written)
         if best is None or _rank(grid, error, tolerance) < _rank(*best, tolerance):
             best = grid, error
         if error.p99 <= tolerance:
