@@ -12,8 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from brdfdb.geometry import HALF_PI, unit_vector
 from brdfdb.parameters import Floats
+
+HALF_PI = 0.5 * np.pi
 
 # Largest polar angles [rad] at which a table is looked up. At 90 degrees f_r of many models has a pole: a node there
 # with a finite value of the right size is better. Others have lobes that lie closer to the horizon.
@@ -108,6 +109,8 @@ class Spherical:
         return np.stack([_polar(wi), *([phi_i] if self.anisotropic else []), _polar(wr), phi_r], axis=1)
 
     def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        from brdfdb.geometry import unit_vector
+
         columns = list(angles.T)
         phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_i, theta_r, phi_r = columns
@@ -157,6 +160,8 @@ class Specular:
         return np.stack([theta_i, *([phi_i] if self.anisotropic else []), _polar(w), phi_s], axis=1)
 
     def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        from brdfdb.geometry import unit_vector
+
         columns = list(angles.T)
         phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_i, theta_s, phi_s = columns
@@ -216,6 +221,8 @@ class HalfDifference:
         return np.stack([theta_h, *([phi_h] if self.anisotropic else []), theta_d, phi_d], axis=1)
 
     def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        from brdfdb.geometry import unit_vector
+
         columns = list(angles.T)
         phi_h = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
         theta_h, theta_d, phi_d = columns

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable, Samples
 from brdfdb.formats._record import CONVENTION, record
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.formats._dense_grid import DenseTable
+    from brdfdb.formats._readings import FileTable, Samples
     from brdfdb.tables.table import Table
 
 OPTIONS = (
@@ -159,6 +159,8 @@ def file_table(
         raise FileFormatError(f"{path}: brdf holds values that are not finite")
     table = interpolated(grid, values.astype(np.float32), at)
     channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(
         name=str(known.get("name") or Path(path).stem),
         channels=channels,
@@ -207,6 +209,8 @@ def reading_of_rows(
     zero = np.zeros(len(values))
     turned = {name: np.deg2rad(column) for name, column in angles.items()}
     phi_i = turned.get("phi_i", zero)
+    from brdfdb.formats._readings import Samples
+
     return Samples(
         name=str(known.get("name") or path.stem),
         theta_i=turned["theta_i"],

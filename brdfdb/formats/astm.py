@@ -17,16 +17,17 @@ from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
 from brdfdb.formats._colours import specular_remark
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable, Samples
 from brdfdb.formats._record import lines, of_lines, record
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable, Samples
     from brdfdb.tables.table import Table
 
 suffix = ".astm"
 media_type = "text/plain"
-summary = "ASTM E1392 in Cornell's dialect: rows of angles and f_r at all wavelengths (libbsdf, ALTA)"
+summary = "ASTM E1392 in Cornell's dialect: rows of angles and f_r at all wavelengths"
+tools = "libbsdf, ALTA"
 kinds = ()
 options = (
     TOLERANCE,
@@ -121,6 +122,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     count = math.prod(axis.size for axis in nodes)
     if count != len(rows) or (nodes[1].size == 1 and nodes[1][0] != 0.0):
         theta_i, phi_i, theta_r, phi_r = rows[:, :4].T
+        from brdfdb.formats._readings import Samples
+
         return Samples(name, theta_i, phi_i, theta_r, phi_r, names, at, rows[:, 4:], document)
     order = np.lexsort(rows[:, 3::-1].T)
     values = rows[order, 4:].reshape(*(axis.size for axis in nodes), len(names)).astype(np.float32)
@@ -130,6 +133,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
     if one_side:
         nodes, values = (*nodes[:2], nodes[2][nodes[2] < 4.0]), values[:, :, nodes[2] < 4.0]
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(name, names, at, AngularGrid(Spherical(anisotropic, one_side), nodes, values).evaluate, document)
 
 

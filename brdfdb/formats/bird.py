@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 suffix = ".json"
 media_type = "application/json"
 summary = "universal BRDF JSON of the project BiRD"
+tools = "BiRD view and other programs of the universal BRDF format"
 kinds = ()
 options = (
     TOLERANCE,

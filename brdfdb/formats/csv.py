@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows, specular_remarks
-from brdfdb.formats._readings import Samples
 from brdfdb.formats._record import lines, of_lines
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
-    from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._readings import FileTable, Samples
     from brdfdb.tables.table import Table
 
 suffix = ".csv"
 media_type = "text/csv"
 summary = "f_r on a plain grid of angles as text"
+tools = "every spreadsheet, pandas, R, MATLAB"
 kinds = ()
 options = OPTIONS
 _DIGITS = 5
@@ -127,6 +127,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     angles = tuple(name for name in names if name in _ANGLES)
     if not angles or numbers.shape[1] != len(names) or names[: len(angles)] != angles or len(names) == len(angles):
         raise FileFormatError(f"{path}: the columns {', '.join(names)[:200]} are not angles, then values of f_r")
+    from brdfdb.formats._readings import Samples
+
     known = of_lines(comments)
     at = _wavelengths(names[len(angles) :])
     columns = {name: numbers[:, index] for index, name in enumerate(angles)}

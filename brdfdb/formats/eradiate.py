@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError, import_extra
 from brdfdb.formats._dense_files import record_of_attributes, specular_remarks
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -26,12 +25,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.formats._channels import Channels
+    from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import Comparison
     from brdfdb.tables.table import Table
 
 suffix = ".nc"
 media_type = "application/netcdf"
 summary = "netCDF tables of Eradiate's mqdiffuse, at one wavelength"
+tools = "Eradiate (`mqdiffuse`), xarray"
 kinds = ()
 options = (
     TOLERANCE,
@@ -138,6 +139,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     except Exception as error:  # SciPy raises what its parser comes to
         raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
     name = str(known.get("name") or Path(path).stem)
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(name, ("grey",), None, functools.partial(_evaluated, values), known)
 
 

@@ -18,16 +18,17 @@ from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
 from brdfdb.formats._interface import Option
 from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.table import Table
 
 suffix = ".xml"
 media_type = "application/xml"
-summary = "BSDF files of WINDOW, matrices over the patches of Klems"
+summary = "BSDF files of WINDOW: averages over the patches of Klems"
+tools = "WINDOW and pyWinCalc, EnergyPlus, Radiance"
 kinds = tuple(BASES)
 options = (Option("colour", False, "blocks of colour for Radiance; pyWinCalc refuses files that have them"),)
 
@@ -182,6 +183,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     lights, viewers = bases[visible.basis.lower()], bases[visible.row_basis.lower()]
     matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
     of_colour = ("X", "Y", "Z") if len(names) > 1 else ("grey",)
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(file.name, of_colour, None, functools.partial(evaluated, matrix, viewers, lights), file.record)
 
 

@@ -13,12 +13,12 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
+    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.table import Table
 
 suffix = ".mtlx"
@@ -152,6 +152,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     grey = all(len(set(color)) == 1 for color in (surface.base_color, surface.specular_color))
     if grey:
         surface = replace(surface, base_color=surface.base_color[:1], specular_color=surface.specular_color[:1])
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(str(name), ("grey",) if grey else RGB, None, surface.brdf, document)
 
 

@@ -11,23 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError
-from brdfdb.formats._angles import HalfDifference
+from brdfdb.formats._angles import HALF_PI, HalfDifference
 from brdfdb.formats._angular_grid import AngularGrid, reciprocal
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._colours import colours_of, specular_remark
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
-from brdfdb.geometry import HALF_PI
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.table import Table
 
 suffix = ".binary"
 media_type = "application/octet-stream"
-summary = "MERL: isotropic tables as RGB on a fixed grid of 90 x 90 x 180 (BRDF Explorer, Mitsuba plugins)"
+summary = "isotropic tables as RGB on the fixed MERL grid of 90 x 90 x 180"
+tools = "BRDF Explorer, plugins of Mitsuba and others, libbsdf"
 kinds = ()
 options = (
     TOLERANCE,
@@ -138,6 +138,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     known = record_beside(path)
     samples = "edges" if known.get("samples") == "edges" else "centres"
     name = str(known.get("name") or path.stem)
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(name, ("R", "G", "B"), None, _Reader(planes, samples), known)
 
 

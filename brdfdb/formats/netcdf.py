@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 suffix = ".nc"
 media_type = "application/netcdf"
 summary = "f_r on a plain grid of angles as netCDF"
+tools = "xarray, MATLAB, Panoply, every program with netCDF"
 kinds = ()
 options = OPTIONS
 _MAGIC = (b"CDF\x01", b"CDF\x02")

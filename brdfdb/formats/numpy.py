@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 suffix = ".npz"
 media_type = "application/x-npz"
 summary = "f_r on a plain grid of angles as NumPy arrays"
+tools = "NumPy"
 kinds = ()
 options = OPTIONS
 _MOST_BYTES = 1 << 30  # of an array that is read

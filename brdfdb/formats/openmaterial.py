@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 suffix = ".xompt"
 media_type = "application/json"
 summary = "BRDF lookup tables of ASAM OpenMATERIAL 3D"
+tools = "simulators of ASAM OpenMATERIAL 3D"
 kinds = ()
 options = (
     TOLERANCE,

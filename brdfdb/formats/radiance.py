@@ -15,7 +15,6 @@ from brdfdb.formats import _bsdf_xml
 from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._square_disk import ANISOTROPIC, ISOTROPIC
 from brdfdb.formats._tensor_colour import trees_of, xyz_of
 from brdfdb.formats._tensor_growth import Growth
@@ -25,12 +24,14 @@ from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
+    from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import Comparison, FileError
     from brdfdb.tables.table import Table
 
 suffix = ".xml"
 media_type = "application/xml"
 summary = "BSDF files of Radiance, tensor trees, and materials that include them"
+tools = "Radiance (`BSDF`, `plastic2`, `metal2`), pyradiance"
 kinds = ()
 options = (
     TOLERANCE,
@@ -191,4 +192,6 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         except ValueError as error:
             raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
     of_colour = ("X", "Y", "Z") if len(trees) > 1 else ("grey",)
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record)

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 suffix = ".bsdf"
 media_type = "application/octet-stream"
-summary = "tensor file of RGL for Mitsuba 3 (`measured`), pbrt-v4 and RGL's loader"
+summary = "tensor files of RGL"
+tools = "Mitsuba 3 (`measured`), pbrt-v4, RGL's loader"
 kinds = ("spectral", "rgb")
 options = (
     TOLERANCE,

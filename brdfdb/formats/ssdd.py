@@ -15,17 +15,18 @@ from brdfdb.formats import _ssdd_file
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
 from brdfdb.formats._angular_grid import AngularGrid, chosen, mirrored, reciprocal
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import lines, of_lines, record
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import Comparison
     from brdfdb.tables.table import Table
 
 suffix = ".ssdd"
 media_type = "application/octet-stream"
-summary = "SSDD 0.3: tables with all wavelengths and the specular part (libbsdf, BSDF Processor)"
+summary = "SSDD 0.3: tables with all wavelengths and the specular part"
+tools = "BSDF Processor, libbsdf"
 kinds = ()
 options = (
     TOLERANCE,
@@ -128,6 +129,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     at = block.wavelength_nm
     names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else tuple(f"{value:g}nm" for value in at)
     name = str(document.get("name") or block.entries.get("NAME") or path.stem)
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(name, names, at, grid.evaluate, document)
 
 

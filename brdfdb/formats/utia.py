@@ -15,17 +15,18 @@ from brdfdb.formats._angular_grid import AngularGrid, filled
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._colours import colours_of, specular_remark
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.table import Table
 
 suffix = ".bin"
 media_type = "application/octet-stream"
-summary = "UTIA: tables as RGB on a fixed grid of 15 degrees by 7.5 degrees, anisotropic ones too (ALTA, UTIA's reader)"
+summary = "RGB on the fixed UTIA grid of 15 by 7.5 degrees, anisotropic tables too"
+tools = "readers of UTIA, ALTA"
 kinds = ()
 options = (
     TOLERANCE,
@@ -132,6 +133,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     known = record_beside(path)
     numbers = np.pad(np.moveaxis(planes, 0, -1), [(0, 0), (0, 1), (0, 0), (0, 1), (0, 0)], mode="wrap")
     evaluate = _Reader(numbers, "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear")
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(str(known.get("name") or path.stem), ("R", "G", "B"), None, evaluate, known)
 
 

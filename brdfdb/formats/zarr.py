@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 suffix = ".zarr"
 media_type = "application/zip"  # of the directory over HTTP
 summary = "f_r on a plain grid of angles as zarr 3"
+tools = "xarray, zarr"
 kinds = ()
 options = OPTIONS
 

@@ -15,17 +15,18 @@ from brdfdb.formats._angles import Specular
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
 from brdfdb.formats._colours import colours_of, specular_remark
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import CONVENTION, lines, of_lines, record
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
+    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.table import Table
 
 suffix = ".bsdf"
 media_type = "text/plain"
-summary = "Zemax (Radiant) BSDF: angles about the specular direction, one value or CIE XYZ (OpticStudio, libbsdf)"
+summary = "Zemax and Radiant BSDF: angles about the specular direction, one value or CIE XYZ"
+tools = "OpticStudio, libbsdf"
 kinds = ()
 options = (
     TOLERANCE,
@@ -149,6 +150,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     document = of_lines(list(text.comments))
     document |= {"theta_i_deg": text.angles[1].tolist(), "tis": np.moveaxis(text.tis, 0, -1).tolist()}
     names = ("X", "Y", "Z") if text.content == "XYZ" else ("grey",)
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(str(document.get("name") or path.stem), names, None, grid.evaluate, document)
 
 

@@ -80,6 +80,8 @@ def test_modules_of_the_room_are_found() -> None:
     for exporter in EXPORTERS.values():
         assert exporter.suffix.startswith(".")
         assert "/" in exporter.media_type
+        assert exporter.summary
+        assert exporter.tools
 
 
 @pytest.mark.parametrize(
