@@ -45,14 +45,14 @@ MEASURED = "What Mitsuba makes of RGL's tensor files of our tables: f_r, the alb
 Array = NDArray[np.float64]
 
 
-def tables(root: str | None, quick: bool) -> Iterator[Table]:
-    """Tables of a store, or made here by the planner."""
+def tables(root: str | None, names: Sequence[str] | None) -> Iterator[Table]:
+    """Tables of a store, or made here by the planner: those that are named, or all."""
     if root is not None:
         store = brdfdb.open(root)
-        yield from (store[name] for name in (QUICK if quick else store))
+        yield from (store[name] for name in names or store)
         return
     for job in load().jobs():
-        if quick and job.material.name not in QUICK:
+        if names is not None and job.material.name not in names:
             continue
         layout = plan(job.material, job.wavelength_nm, 0.01)
         values = np.concatenate([tabulation.block(layout, rows) for rows in layout.blocks])
@@ -151,8 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         median = run.table("Spheres", Column(name="material", width=36), Column(name="median", unit="%"))
         for name in QUICK if options.quick else SPHERES:
             path = Path(folder) / f"{name}.bsdf"
-            table = next(t for t in tables(options.store, False) if t.name == name)
-            rgl.write(table, path, kind="rgb")
+            rgl.write(next(tables(options.store, [name])), path, kind="rgb")
             median.add(name, 100.0 * (off := sphere(name, path, 24 if options.quick else 128)))
             bad += [name] * (off > REQUIRED)
     run.say(f"Beyond what was stated or required: {', '.join(bad) or 'none'}.")
