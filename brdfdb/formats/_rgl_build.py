@@ -79,6 +79,7 @@ def build(surface: Surface, plan: Plan, wavelength_nm: Floats32 | None) -> Field
     if surface.reduction == 4:
         phi_i = np.append(phi_i, np.float32(phi_i[-1] + _BEYOND))
         vndf, luminance, spectra = (np.concatenate([part, part[:1]]) for part in (vndf, luminance, spectra))
+    # below the horizon values are 0: renderers reject samples below 0, which lines from there give beside it
     return Fields(
         theta_i=theta_i,
         phi_i=phi_i,
@@ -86,7 +87,7 @@ def build(surface: Surface, plan: Plan, wavelength_nm: Floats32 | None) -> Field
         sigma=sigma,
         vndf=vndf,
         luminance=luminance.astype(np.float32),
-        spectra=spectra.astype(np.float32),
+        spectra=np.maximum(spectra, 0.0).astype(np.float32),
         wavelength_nm=wavelength_nm,
     )
 

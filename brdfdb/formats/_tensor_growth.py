@@ -124,6 +124,21 @@ class Growth:
         self._measure = np.concatenate([self._measure, self._measured(mean, high - low, level)])
         self._open = np.concatenate([self._open, np.zeros(len(corner), dtype=bool)])
 
+    def deepen(self, level: int) -> int:
+        """Divide the cells in the first corner of the cube down to a level; return the number of the leaf there."""
+        node = 0
+        for _ in range(level):
+            if not self._open[node]:
+                if self._child[node] == _NONE:
+                    self._bear(np.array([node]))
+                self._open[node] = True
+                children = self._child[node] + np.arange(self._kin)
+                self._leaves = np.concatenate([self._leaves[self._leaves != node], children])
+            node = int(self._child[node])
+        while self._open[node]:
+            node = int(self._child[node])
+        return int(np.searchsorted(np.sort(self._leaves), node))
+
     def tree(self) -> tuple[Tree, Floats]:
         """Return the tree, with the numbers of its leaves as values, and their averages [1/sr], shape (leaves, C)."""
         inner, leaves = np.flatnonzero(self._open), np.sort(self._leaves)

@@ -53,6 +53,7 @@ _FIRST = 16.0  # cells of the first tree that is compared with the table
 _POWER, _LEAST, _MOST = 1.5, 1.15, 8.0
 # Share of the cells that is spent where all of them would not do: the error falls more slowly than the file grows
 _OUT_OF_REACH = 1.0 / 3.0
+_DARK_LEVEL = 6  # level of the cell without light in coloured trees: one of 262144
 _HOLDS = (
     "f_r [1/sr] without the cosine, as averages over cells of equal projected solid angle of the viewer; "
     "Visible is CIE Y under equal energy"
@@ -131,7 +132,7 @@ def _grown(
     target = min(_FIRST, most)
     while True:
         grows = growth.to(target)
-        trees = _trees(*growth.tree())
+        trees = _trees(growth)
         error = comparison.error_of(functools.partial(evaluated, trees))
         excess = error.p99 / tolerance
         within_reach = len(growth) * excess**growth.rank <= most
@@ -141,9 +142,22 @@ def _grown(
         target = min(limit, len(growth) * float(np.clip(excess**_POWER, _LEAST, _MOST)))
 
 
-def _trees(tree: Tree, mean: Floats) -> tuple[Tree, ...]:
-    """Return the trees of a file from one tree and the averages of its leaves."""
-    return trees_of(tree, mean) if mean.shape[1] > 1 else (replace(tree, values=rounded(mean[:, 0])),)
+def _trees(growth: Growth) -> tuple[Tree, ...]:
+    """Return the trees of a file: of f_r, or of luminance and chromaticities.
+
+    Radiance takes the least colour of a tree out as its diffuse part. In coloured trees of rank 3 it then loses the
+    chromaticities, because it has no cells in the half that is not used: the material turns red. A cell without light
+    keeps it from that. It is in the last degrees before the horizon, of light and viewer both.
+    """
+    tree, mean = growth.tree()
+    if mean.shape[1] == 1:
+        return (replace(tree, values=rounded(mean[:, 0])),)
+    if growth.rank == ISOTROPIC:
+        dark = growth.deepen(_DARK_LEVEL)
+        tree, mean = growth.tree()
+        mean = mean.copy()
+        mean[dark] = 0.0
+    return trees_of(tree, mean)
 
 
 def evaluated(trees: tuple[Tree, ...], wi: Floats, wr: Floats) -> Floats:

@@ -46,7 +46,7 @@ _SYSTEM = Spherical(anisotropic=True, mirrored=False)
 _NODES = tuple(np.deg2rad(step * np.arange(count + count // 48)) for step, count in zip(STEPS_DEG, SHAPE, strict=True))
 _LINEAR = "f_r [1/sr], the BRDF without the cosine, linear sRGB, no scale: as UTIA's own reader gives it back"
 _DJ = "140 * s, where s is the sRGB curve of f_r [1/sr] / 100: as dj_brdf decodes it"
-_LIKELY = 1e5  # no number of such a file is larger
+_LIKELY = (1e-25, 1e5)  # text, read as such numbers, has smaller and larger ones
 
 
 def write(
@@ -110,7 +110,7 @@ def recognises(head: bytes) -> bool:
         return False
     with np.errstate(invalid="ignore"):
         size = np.abs(numbers)
-        return bool(np.all((numbers == 0.0) | ((size > 1.0 / _LIKELY**2) & (size < _LIKELY))))
+        return bool(np.all((numbers == 0.0) | ((size > _LIKELY[0]) & (size < _LIKELY[1]))))
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:

@@ -22,6 +22,7 @@ SIGNED = {"difference"}  # columns whose numbers may be negative
 needs = {
     "against_cpp": pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed"),
     "mitsuba_microfacet": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
+    "rgl": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
 }
 
 

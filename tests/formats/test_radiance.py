@@ -1,0 +1,230 @@
+"""Tensor trees: the layout by hand, what Radiance sees of them, and refusals of damaged files."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from brdfdb.errors import FileFormatError, WriteError
+from brdfdb.formats import radiance
+from brdfdb.formats._channels import channels_of
+from brdfdb.formats._square_disk import disk, lights, positions, square, viewers
+from brdfdb.formats._tensor_tree import parsed
+from brdfdb.geometry import unit_vector
+from brdfdb.parameters import Floats
+from brdfdb.tables.table import Table
+from tests.formats.bsdf_judges import check_bsdf, made, queried, traced, tree_total
+
+SMOOTH = {"rho_d": 0.3, "rho_s": 0.1, "alpha_x": 0.3, "alpha_y": 0.3}
+BRUSHED = {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": 0.2, "alpha_y": 0.5}
+TABLES = {
+    "grey": ("ward", SMOOTH, None),
+    "anisotropic": ("ward", BRUSHED, None),
+    "diffuse": ("oren_nayar_qualitative", {"rho": 0.8, "sigma_deg": 20.0}, None),
+    "spectral": ("ggx_separable", {"alpha_x": 0.4, "alpha_y": 0.4}, np.arange(400.0, 701.0, 20.0)),
+}
+KINDS = pytest.mark.parametrize("kind", TABLES)
+
+# Radiance varies values of trees by up to 2e-4; worst measured 1.6e-4, and 6e-4 in colour
+AS_RADIANCE, AS_RADIANCE_COLOURED = 2.5e-4, 1e-3
+TOTAL = 5e-3  # checkBSDF against the albedo of the table, besides its last digit of 0.001; worst measured 1e-3
+PICTURE = 0.01  # whole light of a picture; worst measured 3e-3
+
+
+@functools.cache
+def table_of(kind: str) -> Table:
+    return made(*TABLES[kind])
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("trees")
+    paths = {kind: folder / f"{kind}.xml" for kind in TABLES}
+    for kind, path in paths.items():
+        radiance.write(table_of(kind), path, cells=60_000)
+    return paths
+
+
+def drawn(count: int) -> tuple[Floats, Floats]:
+    rng = np.random.default_rng(11)
+    theta, phi = np.arccos(rng.uniform(0.02, 1.0, (2, count))), rng.uniform(-np.pi, np.pi, (2, count))
+    return unit_vector(theta[0], phi[0]), unit_vector(theta[1], phi[1])
+
+
+def test_squares_become_circles() -> None:
+    corners = np.array([[0.5, 0.5], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5], [0.5, 0.0], [1.0, 1.0], [0.75, 0.5]])
+    s = np.sqrt(0.5)
+    expected = np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1], [s, s], [0.5, 0]])
+    assert disk(corners) == pytest.approx(expected, abs=1e-15)
+    points = np.random.default_rng(3).random((1000, 2))
+    assert square(disk(points)) == pytest.approx(points, abs=1e-14)
+
+
+@pytest.mark.parametrize("rank", [3, 4])
+def test_positions_and_directions_are_inverse(rank: int) -> None:
+    place = np.random.default_rng(4).random((1000, rank)) * ([0.5, 1.0, 1.0] if rank == 3 else 1.0)
+    assert positions(lights(place[:, :-2]), viewers(place[:, -2:]), rank) == pytest.approx(place, abs=1e-12)
+
+
+def test_the_mirror_direction_is_the_diagonal_of_rank_4() -> None:
+    wi, _ = drawn(100)
+    place = positions(wi, wi * [-1.0, -1.0, 1.0], 4)
+    assert place[:, :2] == pytest.approx(place[:, 2:], abs=1e-12)
+
+
+def test_children_count_the_first_dimension_by_the_lowest_bit_and_grids_by_the_slowest_index() -> None:
+    middles = (np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)]) + 0.5) / 2.0
+    children = "{" + "".join(f"{{{k}}}" for k in range(8)) + "}"
+    assert parsed(children, 3).at(middles).tolist() == [0, 4, 2, 6, 1, 5, 3, 7]
+    assert parsed("{0, 1 2,3 4 5 6 7}", 3).at(middles).tolist() == [0, 1, 2, 3, 4, 5, 6, 7]
+    assert parsed("{5}", 3).at(middles).tolist() == [5.0] * 8
+    assert parsed("{-5}", 4).at(np.full((1, 4), 0.5)).tolist() == [0.0]
+
+
+def test_text_and_tree_are_inverse() -> None:
+    rng = np.random.default_rng(5)
+
+    def branch(depth: int) -> str:
+        if depth and rng.random() < 0.6:
+            return "{" + "".join(branch(depth - 1) for _ in range(8)) + "}"
+        count = rng.choice([1, 8])
+        return "{" + " ".join(f"{value:.4g}" for value in rng.random(count)) + "}"
+
+    tree = parsed("{" + "".join(branch(3) for _ in range(8)) + "}", 3)
+    place = rng.random((2000, 3))
+    assert np.array_equal(parsed(tree.text(), 3).at(place), tree.at(place))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "it has 0 roots"),
+        ("{1}{2}", "it has 2 roots"),
+        ("{{1}{2}}", "a node has 2 children instead of 8"),
+        ("{1 2 3}", "a grid of 3 values is not of the same length along 3 axes"),
+        ("{", "a brace is not closed"),
+        ("{1}}", "'}' stands outside of the braces"),
+        ("1", "'1' stands outside of the braces"),
+        ("{nan}", "a value is not finite"),
+        ("{one}", "could not convert string to float"),
+        ("{" * 1000, "it has more than 24 levels"),
+    ],
+)
+def test_damaged_trees_are_refused_with_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "a.xml"
+    radiance.write(table_of("diffuse"), path, cells=8)
+    whole = path.read_text()
+    begin, end = whole.index("<ScatteringData>") + 16, whole.index("</ScatteringData>")
+    path.write_text(whole[:begin] + text + whole[end:])
+    with pytest.raises(FileFormatError, match=r"a\.xml: block Visible is no tensor tree: ") as refusal:
+        formats.read(path)
+    assert sentence in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("Reflection Back", "Reflection Front", "it has no Visible block of Reflection Back"),
+        ("LBNL/Shirley-Chiu", "LBNL/Klems Full", "the angle basis 'LBNL/Klems Full' of block Visible"),
+        ("<WindowElement ", "<!DOCTYPE a>\n<WindowElement ", "it declares a document type"),
+        ("</Layer>", "", "it is not XML"),
+        ("DataDefinition", "Definition", "it has no DataDefinition"),
+        ("TensorTree3", "TensorTree5", "its structure 'TensorTree5' is not"),
+    ],
+)
+def test_damaged_files_are_refused_with_a_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+    path = tmp_path / "a.xml"
+    radiance.write(table_of("diffuse"), path, cells=8)
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(FileFormatError, match=r"a\.xml: ") as refusal:
+        formats.read(path)
+    assert sentence in str(refusal.value)
+
+
+@KINDS
+def test_what_is_read_is_what_the_file_states(files: dict[str, Path], kind: str) -> None:
+    table, reading = table_of(kind), formats.read(files[kind])
+    assert reading.channels == (("X", "Y", "Z") if kind == "spectral" else ("grey",))
+    assert reading.record["title"] == "Made <up> & down"
+    stated = reading.record["error_of_file"]
+    wi, wr = drawn(5000)
+    truth = channels_of(table, "xyz" if kind == "spectral" else "").values(table, wi, wr)
+    values = reading.lookup_vectors(wi, wr).reshape(truth.shape)  # type: ignore[union-attr]
+    assert np.abs(values - truth).sum() / truth.sum() < 3.0 * stated["l1"]
+    assert stated["p99"] >= stated["l1"]
+    assert ("TensorTree4" in files[kind].read_text()) == (kind == "anisotropic")
+
+
+def test_the_smallest_tree_within_the_tolerance_is_written(tmp_path: Path) -> None:
+    table = table_of("diffuse")
+    sizes = []
+    for tolerance in (0.2, 0.05):
+        written = radiance.write(table, tmp_path / "a.xml", tolerance=tolerance)
+        assert written.error is not None
+        assert 0.5 * tolerance < written.error.p99 <= tolerance
+        sizes.append(written.nbytes)
+    assert sizes[0] < sizes[1]
+    few = radiance.write(table, tmp_path / "a.xml", tolerance=1e-3, cells=300)
+    assert not few.within
+    assert few.nbytes < sizes[1]
+
+
+def test_no_half_file_is_left(tmp_path: Path) -> None:
+    (tmp_path / "a.rad").mkdir()
+    with pytest.raises(WriteError, match=r"a\.rad: it is a directory"):
+        radiance.write(table_of("diffuse"), tmp_path / "a.xml", cells=8)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.rad"]
+
+
+@KINDS
+def test_radiance_sees_the_values_that_are_read(files: dict[str, Path], kind: str) -> None:
+    wi, wr = drawn(1000)
+    seen = queried(files[kind], wi, wr)
+    reading = formats.read(files[kind])
+    values = reading.lookup_vectors(wi, wr)  # type: ignore[union-attr]
+    if kind == "spectral":
+        assert np.max(np.abs(seen - values) / (values + 0.01 * values.max())) < AS_RADIANCE_COLOURED
+    else:
+        assert seen[:, 1] == pytest.approx(values, rel=AS_RADIANCE)
+
+
+@KINDS
+def test_the_total_of_check_bsdf_is_the_albedo(files: dict[str, Path], kind: str) -> None:
+    name, total = check_bsdf(files[kind])
+    assert name == ("Anisotropic_Tensor_Tree" if kind == "anisotropic" else "Isotropic_Tensor_Tree")
+    assert total == pytest.approx(tree_total(table_of(kind)), rel=TOTAL, abs=5e-4)
+
+
+def test_a_picture_is_that_of_radiances_own_bounded_ward(tmp_path: Path) -> None:
+    """Both materials of the file beside the tree stand in a scene, on a surface that is turned about its normal."""
+    table = made("ward_bounded", BRUSHED)
+    radiance.write(table, tmp_path / "a.xml", cells=300_000)
+    material = (tmp_path / "a.rad").read_text()
+    sun = "void light sun\n0\n0\n3 1e5 1e5 1e5\nsun source disk\n0\n0\n4 0.3 0.5 0.8 0.5\n"
+    theta, phi = np.meshgrid(np.radians(np.arange(5.0, 66.0, 5.0)), np.radians(np.arange(0.0, 360.0, 15.0)))
+    viewer = unit_vector(theta.reshape(-1), phi.reshape(-1))
+    rays = np.concatenate([5.0 * viewer, -viewer], axis=1)
+    means = []
+    for name in ("made-up", "made-up_plastic", "made-up_metal"):
+        floor = f"{name} polygon floor\n0\n0\n12 -1 -1 0 1 -1 0 1 1 0 -1 1 0\n"
+        means.append(traced(sun + material + floor, rays, tmp_path, "-ss", "64"))
+    of_file, plastic, metal = means
+    assert metal == pytest.approx(plastic, rel=1e-4)
+    assert of_file.sum() == pytest.approx(plastic.sum(), rel=PICTURE)
+    wi = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
+    expected = np.asarray(table.lookup_vectors(wi, viewer))
+    assert plastic / expected == pytest.approx(np.mean(plastic / expected), rel=0.02)
+
+
+def test_the_material_names_what_it_is_and_how_to_turn_it(files: dict[str, Path]) -> None:
+    text = files["anisotropic"].with_suffix(".rad").read_text()
+    assert "void BSDF made-up\n6 0 anisotropic.xml 0 1 0 .\n0\n0\n" in text
+    assert "void plastic2 made-up_plastic\n4 0 1 0 .\n0\n6 0.149254 0.149254 0.149254 0.33 0.5 0.2\n" in text
+    assert "void metal2 made-up_metal\n4 0 1 0 .\n0\n6 0.43 0.43 0.43 0.767442 0.5 0.2\n" in text
+    assert "higher by 1 / cos theta" in text
+    assert "void plastic made-up_plastic\n0\n0\n5 0.333333 " in files["grey"].with_suffix(".rad").read_text()
+    assert "plastic" not in files["diffuse"].with_suffix(".rad").read_text()
