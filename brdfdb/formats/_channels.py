@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb import spectra
-from brdfdb.errors import CannotHoldError
+from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
@@ -94,3 +94,21 @@ def channels_of(table: Table, colour: str = "") -> Channels:
     if colour == "grey":
         return Channels(names, wavelengths, weights[:, 1:2], "luminous: CIE Y under the equal-energy illuminant")
     return Channels(names, wavelengths, weights, "CIE XYZ, 2 degree observer, equal-energy illuminant")
+
+
+def at_wavelength(table: Table, wavelength_nm: float) -> Channels:
+    """Return the one channel of a format that holds a single wavelength: that of a grey table, or a wavelength.
+
+    Raises
+    ------
+    ParameterError
+        If the wavelength [nm] is outside those of the table; a table of one wavelength has that one.
+    """
+    at = table.wavelength_nm
+    if at is None or at.size == 1:
+        return channels_of(table)
+    if not at[0] <= wavelength_nm <= at[-1]:
+        raise ParameterError(
+            "wavelength", f"{wavelength_nm:g} nm is outside [{at[0]:g}, {at[-1]:g}] nm of {table.name}", wavelength_nm
+        )
+    return Channels((f"{wavelength_nm:g}nm",), np.array([wavelength_nm]), None, f"f_r at {wavelength_nm:g} nm alone")

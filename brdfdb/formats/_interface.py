@@ -74,6 +74,8 @@ TOLERANCE = Option(
     high=1.0,
 )
 
+WAVELENGTH = Option("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6)
+
 
 class Exporter(Protocol):
     """A format that tables are written to: a module of `brdfdb.formats`, or another object with these names.

@@ -14,7 +14,7 @@ from brdfdb.formats._channels import Channels, channels_of
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.parameters import Floats
-from brdfdb.tables.error_measurement import WIDTHS
+from brdfdb.tables.error_measurement import WIDTHS, rank_of_limit
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 PAIRS = 10000  # pairs of each of the two draws
 SEED = 2018
 FLOOR = 1e-3  # share of the Lambertian BRDF with the albedo of the table
-# Rank of p99 among the values of a draw, from the largest: with a confidence of 99.9 %, no more than a hundredth of all
-# values lie beyond the value of that rank (a binomial of 10000 and 0.01 is below 70 with a chance of 0.08 %)
-_RANK = 70
+_WITHIN, _CONFIDENCE = 0.99, 0.999  # share of the values within p99, and how sure that is
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ class Comparison:
 
     def _p99(self, relative: Floats, draw: slice) -> float:
         some = relative[draw][self._above[draw]]
-        rank = max(1, _RANK * len(some) // PAIRS)
+        rank = rank_of_limit(len(some), _WITHIN, _CONFIDENCE)
         return float(np.partition(some, len(some) - rank, axis=0)[len(some) - rank].max())
 
 

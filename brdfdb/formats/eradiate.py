@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError, import_extra
+from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._dense_files import record_of_attributes, specular_remarks
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
 from brdfdb.formats._record import record
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -36,7 +37,7 @@ tools = "Eradiate (`mqdiffuse`), xarray"
 kinds = ()
 options = (
     TOLERANCE,
-    Option("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6),
+    WAVELENGTH,
     Option("resolution", 0.0, "number of cosines of light and viewer; 0: as few as the tolerance takes", high=513.0),
 )
 _DIMS = ("cos_theta_o", "phi_d", "cos_theta_i")
@@ -96,7 +97,7 @@ def write(
     import_extra("scipy.io")
     if table.anisotropic:
         raise CannotHoldError(f"{table.name}: is anisotropic, and mqdiffuse holds isotropic tables only")
-    channels = _channels(table, wavelength)
+    channels = at_wavelength(table, wavelength)
     if resolution and (resolution < 3.0 or resolution != int(resolution)):
         raise ParameterError("resolution", f"{resolution:g} is not a whole number of at least 3", resolution)
     comparison = Comparison(table, channels)
@@ -106,7 +107,7 @@ def write(
     error = comparison.error_of(functools.partial(_evaluated, values))
     remarks = specular_remarks(table)
     if channels.wavelength_nm is not None:
-        remarks = (*remarks, f"of the wavelengths of the table the file holds {channels.names[0]}")
+        remarks = (*remarks, channels.meaning)
     wanted = None if resolution else tolerance
     known = record(table, error, verdict, holds=HOLDS, remarks=remarks, tolerance=wanted)
     known["wavelength_nm"] = None if channels.wavelength_nm is None else float(channels.wavelength_nm[0])
@@ -130,6 +131,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     import xarray as xr
 
+    from brdfdb.formats._readings import FileTable
+
     import_extra("scipy.io")
     try:
         with xr.open_dataset(path, engine="scipy") as opened:
@@ -138,24 +141,10 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         raise
     except Exception as error:  # SciPy raises what its parser comes to
         raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
-    name = str(known.get("name") or Path(path).stem)
-    from brdfdb.formats._readings import FileTable
-
-    return FileTable(name, ("grey",), None, functools.partial(_evaluated, values), known)
-
-
-def _channels(table: Table, wavelength: float) -> Channels:
-    """Return the one channel of a file: grey, or a wavelength of the table."""
-    from brdfdb.formats._channels import Channels, channels_of
-
-    at = table.wavelength_nm
-    if at is None or at.size == 1:
-        return channels_of(table)
-    if not at[0] <= wavelength <= at[-1]:
-        raise ParameterError(
-            "wavelength", f"{wavelength:g} nm is outside [{at[0]:g}, {at[-1]:g}] nm of {table.name}", wavelength
-        )
-    return Channels((f"{wavelength:g}nm",), np.array([wavelength]), None, "f_r at one wavelength")
+    name, nm = str(known.get("name") or Path(path).stem), known.get("wavelength_nm")
+    at = np.array([float(nm)]) if isinstance(nm, int | float) else None
+    channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
+    return FileTable(name, channels, at, functools.partial(_evaluated, values), known)
 
 
 def _smallest(table: Table, comparison: Comparison, tolerance: float) -> tuple[int, int, int]:

@@ -264,21 +264,21 @@ def _limit(error: Floats) -> Floats:
     """Return the limit that `_WITHIN` of all errors are within, with `_CONFIDENCE`, of a sample (N, columns)."""
     if len(error) == 0:
         return np.zeros(error.shape[1])
-    return np.asarray(np.sort(error, axis=0)[-_rank(len(error))])
+    return np.asarray(np.sort(error, axis=0)[-rank_of_limit(len(error), _WITHIN, _CONFIDENCE)])
 
 
 @functools.cache
-def _rank(count: int) -> int:
-    """Return which of so many values, from the largest, 1 or more, bounds the quantile `_WITHIN`.
+def rank_of_limit(count: int, within: float, confidence: float) -> int:
+    """Return which of so many values, from the largest, 1 or more, bounds the quantile `within` of all values.
 
     The number of values beyond the quantile is binomial. That fewer than the rank are is the chance of a limit that is
-    too low.
+    too low: at most 1 - `confidence`, unless the values are too few for that.
     """
     rank, chance = 0, 0.0  # the chance that no more than `rank` are beyond
     while True:
         ways = math.lgamma(count + 1) - math.lgamma(rank + 1) - math.lgamma(count - rank + 1)
-        chance += math.exp(ways + rank * math.log(1.0 - _WITHIN) + (count - rank) * math.log(_WITHIN))
-        if chance > 1.0 - _CONFIDENCE:
+        chance += math.exp(ways + rank * math.log(1.0 - within) + (count - rank) * math.log(within))
+        if chance > 1.0 - confidence:
             return max(rank, 1)
         rank += 1
 

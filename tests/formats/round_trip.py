@@ -10,7 +10,7 @@ import numpy as np
 
 from brdfdb import formats
 from brdfdb.formats import EXPORTERS, IMPORTERS
-from brdfdb.formats._channels import RGB, XYZ, Channels, channels_of
+from brdfdb.formats._channels import RGB, XYZ, Channels, at_wavelength, channels_of
 from brdfdb.formats._readings import FileTable, Samples
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import unit_vector
@@ -58,6 +58,8 @@ def round_trip(table: Table, folder: Path, file_format: str, **options: Any) -> 
 
 def channels(reading: FileTable | Samples, table: Table) -> Channels:
     """Return the channels of a table that those of a reading are compared with."""
+    if reading.wavelength_nm is not None and reading.wavelength_nm.size == 1:
+        return at_wavelength(table, float(reading.wavelength_nm[0]))
     return channels_of(table, _COLOURS.get(reading.channels, ""))
 
 
@@ -66,7 +68,7 @@ def error_of(reading: FileTable | Samples, table: Table) -> float:
     compared = channels(reading, table)
     if isinstance(reading, Samples):
         return _of_samples(reading, table, compared)
-    at = None if reading.wavelength_nm is None or table.wavelength_nm is None else table.wavelength_nm
+    at = None if reading.wavelength_nm is None else compared.wavelength_nm
 
     def evaluate(wi: Floats, wr: Floats) -> Floats:
         values = np.asarray(reading.lookup_vectors(wi, wr, at))

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 import functools
+import json
+import struct
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from brdfdb import presets
+from brdfdb import formats, presets
+from brdfdb.errors import FileFormatError, WriteError
+from brdfdb.formats import rgl
+from brdfdb.formats._readings import FileTable
+from brdfdb.formats._rgl_fields import fields_of
+from brdfdb.formats._rgl_tensor import read_tensors, write_tensors
+from brdfdb.formats._rgl_warp import Mixture, Warp
+from brdfdb.formats._stated_error import Comparison
+from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material
+from brdfdb.tables.albedo import directional_albedo
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.table import Table, table_from

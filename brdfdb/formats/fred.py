@@ -1,0 +1,213 @@
+"""FRED's tabulated scatter: f_r at angles of light and viewer as text.
+
+The layout is that of files that laboratories publish for FRED. Each direction of the light has a block. Its first line
+has two angles [degree], and the lines below it have two angles and f_r for each viewer. The azimuth of a viewer counts
+from the half plane of the mirror direction. FRED does not publish how it interpolates. This reader interpolates in
+straight lines over each angle.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import CannotHoldError, FileFormatError
+from brdfdb.formats._angles import Spherical
+from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
+from brdfdb.formats._beside import beside, record_beside
+from brdfdb.formats._channels import at_wavelength
+from brdfdb.formats._colours import specular_remark
+from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
+from brdfdb.formats._record import record
+from brdfdb.formats._written import Written, whole
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.tables.table import Table
+
+suffix = ".fred.txt"
+media_type = "text/plain"
+summary = "tabulated scatter of FRED at one wavelength, isotropic tables"
+tools = "FRED (Photon Engineering)"
+kinds = ()
+options = (
+    TOLERANCE,
+    WAVELENGTH,
+    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+)
+
+_TITLE = "type bsdf_data"
+_FORMAT = "format angles=deg bsdf=value scale=1"
+_CHARACTERS = 24  # of a line
+_MOST_BYTES = 1 << 30  # of a file that is read
+
+
+def write(
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float = 0.02,
+    wavelength: float = 550.0,
+    size: float = 16.0,
+    verdict: str | None = None,
+) -> Written:
+    """Write an isotropic table as tabulated scatter of FRED, and its record beside it: whole, or not at all.
+
+    Parameters
+    ----------
+    table : Table
+        Isotropic.
+    path : path
+        The file; one that is there is replaced.
+    tolerance : float [1]
+        Largest p99.
+    wavelength : float [nm]
+        The wavelength of a spectral table that is written.
+    size : float [MB]
+        Largest file.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Raises
+    ------
+    CannotHoldError
+        If the table is anisotropic: what the azimuth of the light counts from is not published.
+    ParameterError
+        If the wavelength is outside those of the table.
+    WriteError
+        If a file cannot be written.
+    """
+    from brdfdb.formats._stated_error import Comparison
+
+    if table.anisotropic:
+        raise CannotHoldError(f"{table.name}: is anisotropic, and this format is written for isotropic tables only")
+    comparison = Comparison(table, at_wavelength(table, wavelength))
+    grid, error = chosen(
+        table,
+        comparison,
+        [Spherical(anisotropic=False, mirrored=True)],
+        tolerance,
+        int(size * 1e6 / _CHARACTERS / 2),  # the file has both sides
+        lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
+    )
+    path = Path(path)
+    remarks = specular_remark(table)
+    if comparison.channels.wavelength_nm is not None:
+        remarks = (*remarks, comparison.channels.meaning)
+    document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
+    at = comparison.channels.wavelength_nm
+    document["wavelength_nm"] = None if at is None else float(at[0])
+    with whole(path, beside(path)) as (file, there):
+        with file.open("w", encoding="ascii", newline="\n") as stream:
+            _write_blocks(stream, grid)
+        there.write_text(json.dumps(document, indent=1), encoding="utf-8")
+    return Written((path, beside(path)), error, tolerance, remarks)
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of tabulated scatter of FRED."""
+    return head.lstrip().lower().startswith(_TITLE.encode())
+
+
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+    """Return f_r of tabulated scatter: linear over each angle if the viewers of all lights are one grid, else samples.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is not such a file, is damaged, or has other units than degrees and f_r.
+    OSError
+        If it cannot be read.
+    """
+    from brdfdb.formats._readings import FileTable, Samples
+
+    path = Path(path)
+    rows = _rows(path)
+    known = record_beside(path)
+    name, nm = str(known.get("name") or path.name.partition(".")[0]), known.get("wavelength_nm")
+    at = np.array([float(nm)]) if isinstance(nm, int | float) else None
+    channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
+    grid = _grid(rows)
+    if grid is not None:
+        return FileTable(name, channels, at, grid.evaluate, known)
+    theta_i, phi_i, theta_r, phi_r = np.deg2rad(rows[:, :4]).T
+    return Samples(
+        name, theta_i, phi_i, theta_r, (phi_i + np.pi - phi_r) % (2.0 * np.pi), channels, at, rows[:, 4:], known
+    )
+
+
+def _write_blocks(stream: TextIO, grid: AngularGrid) -> None:
+    """Write a block a polar angle of the light: both sides of the plane of incidence, the normal once."""
+    theta_i, theta_r, delta_phi = (np.rad2deg(axis) for axis in grid.nodes)
+    forward = 180.0 - delta_phi[::-1]
+    half = np.arange(forward.size)[::-1]
+    other = half[(forward > 0.0) & (forward < 180.0)][::-1]
+    azimuths = np.concatenate([forward, 360.0 - forward[(forward > 0.0) & (forward < 180.0)][::-1]])
+    columns = np.concatenate([half, other])
+    stream.write(f"{_TITLE}\n{_FORMAT}\n")
+    for number, angle in enumerate(theta_i):
+        stream.write(f"{angle:.9g}\t0\n")
+        for row, theta in enumerate(theta_r):
+            values = grid.values[number, row, :, 0]
+            some = [(0.0, columns[0])] if theta == 0.0 else zip(azimuths, columns, strict=True)
+            stream.writelines(f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in some)
+
+
+def _rows(path: Path) -> NDArray[np.float64]:
+    """Return rows of theta_i, phi_i, theta_r, phi_r [degree] and f_r [1/sr]."""
+    if path.stat().st_size > _MOST_BYTES:
+        raise FileFormatError(f"{path}: it is larger than {_MOST_BYTES >> 20} MiB")
+    with path.open(encoding="utf-8", errors="replace") as file:
+        first, second = file.readline().strip().lower(), file.readline().lower()
+        if first != _TITLE or "angles=deg" not in second or "bsdf=value" not in second:
+            raise FileFormatError(f"{path}: it does not begin with the lines {_TITLE!r} and {_FORMAT!r}")
+        try:
+            scale = float(second.partition("scale=")[2].split()[0])
+            lines = [[float(word) for word in line.split()] for line in file if line.strip()]
+        except (ValueError, IndexError) as error:
+            raise FileFormatError(f"{path}: it holds what is no number ({error})") from None
+    rows: list[list[float]] = []
+    light: list[float] | None = None
+    for line in lines:
+        if len(line) == 2:
+            light = line
+        elif len(line) == 3 and light is not None:
+            rows.append([*light, *line[:2], scale * line[2]])
+        else:
+            raise FileFormatError(
+                f"{path}: a line has {len(line)} numbers; a light has two, and a viewer below it three"
+            )
+    if not rows or not np.all(np.isfinite(rows)):
+        raise FileFormatError(f"{path}: it holds no values, or one that is not finite")
+    return np.array(rows)
+
+
+def _grid(rows: NDArray[np.float64]) -> AngularGrid | None:
+    """Return the grid of rows; None if they are none, or the azimuth of the light varies."""
+    one_side = rows[(rows[:, 2] == 0.0) | (rows[:, 3] <= 180.0)]
+    if np.any(rows[:, 1] != 0.0):
+        return None
+    above = one_side[one_side[:, 2] > 0.0]
+    theta_i, theta_r, forward = (np.unique(column) for column in above[:, [0, 2, 3]].T)
+    at_normal = one_side[one_side[:, 2] == 0.0]
+    count = math.prod(axis.size for axis in (theta_i, theta_r, forward))
+    if len(above) != count or (len(at_normal) and not np.array_equal(np.unique(at_normal[:, 0]), theta_i)):
+        return None
+    order = np.lexsort(above[:, [3, 2, 0]].T)
+    values = above[order, 4].reshape(theta_i.size, theta_r.size, forward.size)
+    if len(at_normal):
+        if len(at_normal) != theta_i.size:
+            return None
+        straight = at_normal[np.argsort(at_normal[:, 0]), 4]
+        values = np.concatenate([np.broadcast_to(straight[:, None, None], (theta_i.size, 1, forward.size)), values], 1)
+        theta_r = np.append(0.0, theta_r)
+    nodes = (theta_i, theta_r, 180.0 - forward[::-1])
+    system = Spherical(anisotropic=False, mirrored=True)
+    kept = values[..., ::-1, np.newaxis].astype(np.float32)
+    return AngularGrid(system, tuple(np.deg2rad(axis) for axis in nodes), kept)

@@ -1,0 +1,118 @@
+"""Tabulated scatter of FRED: the lines by hand, where the mirror direction is, round trips, damage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError
+from brdfdb.formats import fred
+from brdfdb.formats._readings import FileTable, Samples
+from tests.formats.kinds_of_tables import ISOTROPIC, table_of
+from tests.formats.round_trip import error_of
+
+SIZE = 0.5  # MB, so that tests are quick
+DIGITS = 1e-4  # of p99 of a file that is read again, whose numbers have five digits
+# Light at 10 and 50 degrees; bright towards the mirror direction, at azimuth 0
+BY_HAND = """\
+type bsdf_data
+format angles=deg bsdf=value scale=2
+10\t0
+0\t0\t1
+40\t0\t2
+40\t180\t1.5
+40\t270\t1.7
+40\t90\t1.7
+50\t0
+0\t0\t3
+40\t0\t8
+40\t90\t5
+40\t180\t4
+40\t270\t5
+"""
+
+
+@pytest.mark.parametrize("kind", ISOTROPIC)
+def test_a_file_holds_what_it_states(kind: str, tmp_path: Path) -> None:
+    table = table_of(kind)
+    written = fred.write(table, tmp_path / "a.fred.txt", size=SIZE, verdict="sound")
+    reading = formats.read(written.paths[0])
+    assert isinstance(reading, FileTable)
+    assert written.error is not None
+    assert error_of(reading, table) == pytest.approx(written.error.p99, rel=DIGITS)
+    assert written.nbytes < 1.2e6 * SIZE
+    assert reading.record["audit"] == "sound"
+    assert (reading.wavelength_nm is None) == (kind != "copper")
+
+
+def test_both_sides_are_written_and_the_normal_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.fred.txt"
+    table = table_of("ward")
+    fred.write(table, path, tolerance=0.2)
+    lines = path.read_text(encoding="ascii").splitlines()
+    assert lines[:3] == ["type bsdf_data", "format angles=deg bsdf=value scale=1", "0\t0"]
+    rows = [[float(word) for word in line.split("\t")] for line in lines[2:]]
+    lights = [number for number, row in enumerate(rows) if len(row) == 2]
+    block = rows[lights[1] + 1 : lights[2]]
+    assert sum(theta == 0.0 for theta, _, _ in block) == 1
+    values = {(theta, round(phi, 5)): value for theta, phi, value in block}
+    light = np.deg2rad(rows[lights[1]][0])
+    for (theta, phi), value in values.items():
+        if theta:
+            assert values[theta, round((360.0 - phi) % 360.0, 5)] == value
+        if theta < 89.0:
+            f_r = float(table.lookup(light, np.pi, np.deg2rad(theta), np.deg2rad(phi)))
+            assert value == pytest.approx(f_r, rel=6e-5)
+
+
+def test_azimuths_count_from_the_mirror_direction(tmp_path: Path) -> None:
+    path = tmp_path / "a.fred.txt"
+    path.write_text(BY_HAND, encoding="ascii")
+    reading = formats.read(path)
+    assert isinstance(reading, FileTable)
+    light, viewer = np.deg2rad([30.0, 20.0])
+    # at theta_i = 30 degrees, half way between both lights, and half way between the normal and 40 degrees; scale 2
+    assert reading.lookup(light, 0.0, viewer, np.pi) == pytest.approx((1 + 2 + 3 + 8) / 2, rel=1e-6)
+    assert reading.lookup(light, 0.0, viewer, 0.0) == pytest.approx((1 + 1.5 + 3 + 4) / 2, rel=1e-6)
+    assert reading.lookup(light, 0.4, viewer, 0.4 + np.pi / 2) == pytest.approx((1 + 1.7 + 3 + 5) / 2, rel=1e-6)
+
+
+def test_directions_that_are_no_grid_are_samples(tmp_path: Path) -> None:
+    path = tmp_path / "a.fred.txt"
+    path.write_text(BY_HAND.replace("40\t180\t4\n", ""), encoding="ascii")
+    samples = formats.read(path)
+    assert isinstance(samples, Samples)
+    assert samples.values.shape == (9, 1)
+    brightest = int(samples.values[:, 0].argmax())
+    delta_phi = np.rad2deg(samples.phi_r - samples.phi_i)[brightest]
+    assert (samples.values[brightest, 0], round(delta_phi)) == (16.0, 180)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sentence"),
+    [
+        ("angles=deg", "angles=rad", "it does not begin with the lines"),
+        ("scale=2", "scale=", "it holds what is no number"),
+        ("40\t0\t8", "40\tzero\t8", "it holds what is no number"),
+        ("40\t0\t8", "40\t0\t8\t9", "a line has 4 numbers"),
+        ("10\t0\n", "", "a line has 3 numbers"),
+        ("40\t0\t8", "40\t0\tnan", "one that is not finite"),
+    ],
+)
+def test_damage_is_named(before: str, after: str, sentence: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.fred.txt"
+    path.write_text(BY_HAND.replace(before, after, 1), encoding="ascii")
+    with pytest.raises(FileFormatError, match=sentence) as caught:
+        formats.read(path)
+    assert str(path) in str(caught.value)
+
+
+def test_what_it_cannot_hold_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CannotHoldError, match="anisotropic"):
+        fred.write(table_of("anisotropic ward"), tmp_path / "a.fred.txt")
+    with pytest.raises(ParameterError, match="wavelength: 900 nm is outside"):
+        fred.write(table_of("copper"), tmp_path / "a.fred.txt", wavelength=900.0)
+    assert list(tmp_path.iterdir()) == []
