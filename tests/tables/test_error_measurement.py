@@ -223,10 +223,12 @@ def test_an_error_of_before_is_read_and_refused_between_wavelengths() -> None:
 @pytest.mark.parametrize("count", [150, 200, 300, 500, 3000])
 def test_a_limit_is_too_low_once_in_fifty_times(count: int) -> None:
     # of samples whose quantile is known: the limit is above it as often as the binomial distribution says
-    rank = error_measurement._rank(count)
+    rank = error_measurement.rank_of_limit(count, 0.98, 0.98)
     below = sum(math.comb(count, k) * 0.02**k * 0.98 ** (count - k) for k in range(rank))
     more = below + math.comb(count, rank) * 0.02**rank * 0.98 ** (count - rank)
     assert (below <= 0.02 or rank == 1) and more > 0.02  # noqa: PT018  # one statement: the largest rank that will do
-    assert error_measurement._rank(1_000_000) == pytest.approx(20_000 - 2.05 * math.sqrt(1e6 * 0.02 * 0.98), abs=3)
+    assert error_measurement.rank_of_limit(1_000_000, 0.98, 0.98) == pytest.approx(
+        20_000 - 2.05 * math.sqrt(1e6 * 0.02 * 0.98), abs=3
+    )
     samples = np.random.default_rng(count).random((count, 4000))
     assert np.mean(error_measurement._limit(samples) < 0.98) == pytest.approx(below, abs=4.0 * math.sqrt(below / 4000))
