@@ -150,7 +150,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     bad = []
     with tempfile.TemporaryDirectory() as folder:
         bad += [
-            name for table in tables(options.store, options.quick) for name in _row(rows, table, folder, count, grid)
+            name
+            for table in tables(options.store, QUICK if options.quick else None)
+            for name in _row(rows, table, folder, count, grid)
         ]
         median = run.table("Spheres", Column(name="material", width=36), Column(name="median", unit="%"))
         for name in QUICK if options.quick else SPHERES:
