@@ -163,6 +163,7 @@ def _refined(evaluate: Evaluate, basis: Basis, viewer: Index, incident: Index, n
         weight = length**2 * basis.solid_angles[viewer[pair]][:, np.newaxis]
         divided = np.any((spread > _STEEP * mean) & (spread * weight > _NEGLIGIBLE), axis=-1)
         divided |= lit & (depth < _AT_LEAST)
+        divided |= (viewer[pair] == 0) & (depth < _AROUND)
         divided &= depth < _DEEPEST
         np.add.at(result, item[~divided], length**2 * mean[~divided])
         corner = (corner[divided][:, np.newaxis] + 0.5 * length * halves).reshape(-1, 2)

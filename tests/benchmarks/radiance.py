@@ -141,7 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 largest, normal = klems_total(table, BASES[kind])
                 _, total = check_bsdf(path)
                 wrong = off(total, largest)
-                shares = in_window(path, kind)
+                shares = in_window(path, kind, "PHOTOPIC", "SOLAR")
                 window = max(
                     (abs(share - normal) / max(normal, 1e-9) for share in shares if normal > 0.0), default=None
                 )

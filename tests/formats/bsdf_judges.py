@@ -42,7 +42,7 @@ if sys.argv[2] == "full":
     standard = pywincalc.load_standard(str(pywincalc.standard_path / "W5_NFRC_2003.std"))
     basis = pywincalc.BSDFHemisphere.create(pywincalc.BSDFBasisType.FULL)
     system = pywincalc.GlazingSystem(solid_layers=[product], optical_standard=standard, bsdf_hemisphere=basis)
-    for method in ("PHOTOPIC", "SOLAR"):
+    for method in sys.argv[3:]:
         sides = system.optical_method_results(method, 0.0, 0.0).system_results
         shares += [side.reflectance.direct_hemispherical for side in (sides.front, sides.back)]
 print(json.dumps(shares))
@@ -97,13 +97,16 @@ def check_bsdf(path: Path) -> tuple[str, float]:
     lines = _run(["checkBSDF", path.name], path.parent).splitlines()
     (kind,) = [line.removeprefix("Type: ") for line in lines if line.startswith("Type: ")]
     front = next(line for line in lines if line.startswith("Interior Refl"))
+    if kind == "Pure_Lambertian":  # of which checkBSDF prints a hundredth of the total
+        return kind, 0.01 * float(front.split()[3])
     return kind, 0.01 * float(front.split("%")[0].split()[-1])
 
 
-def in_window(path: Path, kind: str) -> list[float]:
-    """Return reflectances [1] for light along the normal: front and back, visible and solar; none but of "full"."""
+def in_window(path: Path, kind: str, *methods: str) -> list[float]:
+    """Return reflectances [1] for light along the normal, front and back, by methods; computed of "full" alone."""
     pytest.importorskip("pywincalc")
-    return [float(share) for share in json.loads(_run([sys.executable, "-c", _WINDOW, str(path), kind], path.parent))]
+    answer = _run([sys.executable, "-c", _WINDOW, str(path), kind, *methods], path.parent)
+    return [float(share) for share in json.loads(answer)]
 
 
 def traced(scene: str, rays: Floats, folder: Path, *options: str) -> Floats:

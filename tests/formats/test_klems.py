@@ -1,0 +1,181 @@
+"""Klems matrices: patches by hand, what Radiance and WINDOW's engine see of them, and refusals of damaged files."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from brdfdb.errors import FileFormatError
+from brdfdb.formats import klems
+from brdfdb.formats._bsdf_visible import visible_channels
+from brdfdb.formats._klems_basis import BASES, Basis, averages
+from brdfdb.geometry import unit_vector
+from brdfdb.parameters import Floats
+from brdfdb.tables.table import Table
+from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried
+
+TABLES = {
+    "grey": ("ward", {"rho_d": 0.3, "rho_s": 0.1, "alpha_x": 0.15, "alpha_y": 0.15}, None),
+    "anisotropic": ("ward", {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": 0.08, "alpha_y": 0.2}, None),
+    "spectral": ("ggx_separable", {"alpha_x": 0.4, "alpha_y": 0.4}, np.arange(400.0, 701.0, 20.0)),
+}
+WRITTEN = [("grey", "full"), ("grey", "half"), ("grey", "quarter"), ("anisotropic", "full"), ("spectral", "quarter")]
+FILES = pytest.mark.parametrize(("material", "kind"), WRITTEN)
+
+# Radiance varies values of pairs by up to 3e-4; worst measured 3.1e-4. It keeps 8 bits of each chromaticity,
+# and takes a diffuse part out: worst measured 0.047 of Y
+AS_RADIANCE, AS_RADIANCE_COLOURED = 4e-4, 0.06
+TOTAL = 5e-3  # sums of columns against the albedo of the table, besides the last digit printed; worst measured 2e-3
+
+
+@functools.cache
+def table_of(material: str) -> Table:
+    return made(*TABLES[material])
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], Path]:
+    folder = tmp_path_factory.mktemp("matrices")
+    paths = {(material, kind): folder / f"{material}_{kind}.xml" for material, kind in WRITTEN}
+    for (material, kind), path in paths.items():
+        klems.write(table_of(material), path, kind=kind)
+    return paths
+
+
+def drawn(count: int) -> tuple[Floats, Floats]:
+    rng = np.random.default_rng(11)
+    theta, phi = np.arccos(rng.uniform(0.02, 1.0, (2, count))), rng.uniform(-np.pi, np.pi, (2, count))
+    return unit_vector(theta[0], phi[0]), unit_vector(theta[1], phi[1])
+
+
+@pytest.mark.parametrize(("kind", "count"), [("full", 145), ("half", 77), ("quarter", 41)])
+def test_the_patches_fill_the_hemisphere(kind: str, count: int) -> None:
+    basis = BASES[kind]
+    assert len(basis) == count
+    assert basis.solid_angles.sum() == pytest.approx(np.pi)
+    patch = np.arange(count)
+    place = np.random.default_rng(2).random((20, count, 2))
+    for places in place:
+        assert np.array_equal(basis.patches(basis.vectors(patch, places)), patch)
+
+
+def test_the_first_patches_of_the_full_basis_lie_where_they_should() -> None:
+    degrees = np.array([[0, 0], [4.9, 77], [5.1, 0], [10, 22], [10, 23], [14, 338], [20, 0], [89, 359], [89, 345]])
+    patches = BASES["full"].patches(unit_vector(*np.radians(degrees.T)))
+    assert patches.tolist() == [0, 0, 1, 1, 2, 1, 9, 133, 133]
+
+
+def test_averages_are_those_of_the_patches_of_a_lopsided_function() -> None:
+    """f_r = 1 + x of the viewer + 2 y of the light, which has closed averages, in the order of files."""
+    basis = BASES["quarter"]
+
+    def lopsided(wi: Floats, wr: Floats) -> Floats:
+        wi, wr = np.broadcast_arrays(wi, wr)
+        return np.asarray(1.0 + wr[..., :1] + 2.0 * wi[..., 1:2])
+
+    matrix = averages(lopsided, basis, 1, isotropic=False)[..., 0]
+    ring = np.radians(np.array(basis.bounds_deg))
+    sine3, sine2 = np.diff(np.sin(ring) ** 3), np.diff(np.sin(ring) ** 2)
+    width = np.pi / np.array(basis.counts)
+    radius = (2.0 / 3.0 * sine3 / sine2 * np.sin(width) / width)[basis.rings]
+    middle = np.concatenate([2.0 * np.pi * np.arange(count) / count for count in basis.counts])
+    # The light of a column comes from the other side than the patch that it would mirror to
+    expected = 1.0 + (radius * np.cos(middle))[:, np.newaxis] - 2.0 * radius * np.sin(middle)
+    assert matrix == pytest.approx(expected, abs=3e-3)
+
+
+def test_isotropic_averages_are_those_of_all_pairs() -> None:
+    table, basis = table_of("grey"), BASES["quarter"]
+
+    def brdf(wi: Floats, wr: Floats) -> Floats:
+        return visible_channels(table).values(table, wi, wr)
+
+    alike, whole = (averages(brdf, basis, 1, isotropic=isotropic) for isotropic in (True, False))
+    assert alike == pytest.approx(whole, rel=1e-4)
+
+
+@FILES
+def test_what_is_read_is_what_the_file_states(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
+    reading = formats.read(files[material, kind])
+    assert reading.channels == ("grey",)
+    assert reading.record["error_of_file"]["p99"] > 0.0
+    assert any("both sides" in remark for remark in reading.record["remarks"])
+
+
+def test_rows_and_bases_of_others_are_read(tmp_path: Path, files: dict[tuple[str, str], Path]) -> None:
+    own = Basis("Two rings", (0.0, 45.0, 90.0), (1, 4))
+    numbers = np.arange(25.0).reshape(5, 5)
+    path = tmp_path / "a.xml"
+    text = files["grey", "quarter"].read_text()
+    definition = text[text.index("<AngleBasis>") : text.index("<Comments>")]
+    text = text.replace(definition, "\n".join(klems._definition(own))).replace("LBNL/Klems Quarter", own.name)
+    head, *blocks = text.split("<ScatteringData>")
+    text = head + "".join(
+        "<ScatteringData>" + "\t".join(map(str, numbers.ravel())) + block[block.index("</ScatteringData>") :]
+        for block in blocks
+    )
+    wi, wr = unit_vector(1.2, np.pi), unit_vector(1.2, 0.5 * np.pi)  # column 1 and row 2
+    for structure, expected in (("Columns", numbers[2, 1]), ("Rows", numbers[1, 2])):
+        path.write_text(text.replace("Columns", structure))
+        reading = klems.read(path)
+        assert reading.lookup_vectors(wi, wr) == expected
+    reflected = queried(path, wi[np.newaxis], wr[np.newaxis])
+    assert reflected[0, 1] == pytest.approx(numbers[1, 2], rel=AS_RADIANCE)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("Columns", "Diagonals", "its structure 'Diagonals' is not Columns or Rows"),
+        ("Reflection Back", "Reflection Front", "it has no Visible block of Reflection Back"),
+        ("<RowAngleBasis>LBNL", "<RowAngleBasis>CIE", "the angle basis 'CIE/Klems Quarter' is not defined"),
+        ("<ScatteringData>\n", "<ScatteringData>\n1,", "has 1682 numbers instead of 41 x 41"),
+        ("<ScatteringData>\n", "<ScatteringData>\none,", "could not convert string to float"),
+        ("<nPhis>12</nPhis>", "<nPhis>many</nPhis>", "invalid literal for int()"),
+        ("<nPhis>12</nPhis>", "<nPhis>1000000000000</nPhis>", "more than 100000"),
+        ("<UpperTheta>45", "<UpperTheta>5", "no rings of patches that rise to 90 degrees"),
+    ],
+)
+def test_damaged_files_are_refused_with_a_sentence(
+    tmp_path: Path, files: dict[tuple[str, str], Path], old: str, new: str, sentence: str
+) -> None:
+    path = tmp_path / "a.xml"
+    text = files["grey", "quarter"].read_text()
+    path.write_text(text.replace(old, new))
+    with pytest.raises(FileFormatError, match=r"a\.xml: ") as refusal:
+        formats.read(path)
+    assert sentence in str(refusal.value)
+
+
+@pytest.mark.parametrize("material", ["grey", "anisotropic"])
+def test_radiance_sees_the_values_that_are_read(files: dict[tuple[str, str], Path], material: str) -> None:
+    path = files[material, "full"]
+    wi, wr = drawn(1000)
+    assert queried(path, wi, wr)[:, 1] == pytest.approx(klems.read(path).lookup_vectors(wi, wr), rel=AS_RADIANCE)
+
+
+def test_radiance_sees_the_colour(tmp_path: Path) -> None:
+    path = tmp_path / "a.xml"
+    klems.write(table_of("spectral"), path, kind="quarter", colour=True)
+    reading = klems.read(path)
+    assert reading.channels == ("X", "Y", "Z")
+    wi, wr = drawn(1000)
+    values = reading.lookup_vectors(wi, wr)
+    assert np.max(np.abs(queried(path, wi, wr) - values) / values[:, 1:2]) < AS_RADIANCE_COLOURED
+
+
+@FILES
+def test_the_totals_are_the_albedo(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
+    largest, normal = klems_total(table_of(material), BASES[kind])
+    name, total = check_bsdf(files[material, kind])
+    assert name == {"full": "Klems_Full", "half": "Unknown_Matrix", "quarter": "Klems_Quarter"}[kind]
+    assert total == pytest.approx(largest, rel=TOTAL, abs=5e-4)
+    if kind == "full" and material == "anisotropic":
+        shares = in_window(files[material, kind], kind, "PHOTOPIC")
+        assert shares == pytest.approx([normal] * 2, rel=TOTAL)
+    elif kind != "full" and material == "grey":
+        assert in_window(files[material, kind], kind) == []
