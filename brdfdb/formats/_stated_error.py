@@ -23,14 +23,15 @@ PAIRS = 10000  # pairs of each of the two draws
 SEED = 2018
 FLOOR = 1e-3  # share of the Lambertian BRDF with the albedo of the table
 _WITHIN, _CONFIDENCE = 0.99, 0.999  # share of the values within p99, and how sure that is
+_ROUNDING = 1e-9  # of sums of weights
 
 
 @dataclass(frozen=True)
 class FileError:
     """Error of the values of a file against those of its table, abs(file - table) / max(table, floor).
 
-    Light and viewer are drawn cosine-weighted over the hemisphere. In a second draw the viewers are in the lobe. Each
-    number is that of the channel where it is largest.
+    Light and viewer are drawn cosine-weighted over the hemisphere. In a second draw the viewers are in the lobe, and
+    each pair is weighted by the cosine of its viewer. Each number is that of the channel where it is largest.
 
     Attributes
     ----------
@@ -81,6 +82,10 @@ class Comparison:
         self.channels = channels_of(table) if channels is None else channels
         self.wi, self.wr, self._weight, lobe = _drawn(table)
         self._above = self._weight > 0.0
+        # of a draw over the hemisphere all pairs count alike; one in the lobe is weighted by the cosine of the viewer
+        self._share = np.where(self._above, 1.0, 0.0)
+        if lobe:
+            self._share[PAIRS:] = np.maximum(self.wr[PAIRS:, 2], 0.0)
         self._draws = slice(0, PAIRS), slice(PAIRS, 2 * PAIRS) if lobe else slice(0, 2 * PAIRS)
         self.truth = self.channels.values(table, self.wi, self.wr)
 
@@ -107,9 +112,14 @@ class Comparison:
         )
 
     def _p99(self, relative: Floats, draw: slice) -> float:
-        some = relative[draw][self._above[draw]]
-        rank = rank_of_limit(len(some), _WITHIN, _CONFIDENCE)
-        return float(np.partition(some, len(some) - rank, axis=0)[len(some) - rank].max())
+        """Return the limit of 99 of 100 errors (N, C) of a draw, weighted by `_share`, of the worst channel."""
+        share = self._share[draw]
+        count = int(share.sum() ** 2 / (share**2).sum())  # as many pairs of equal weight are as sure
+        beyond = rank_of_limit(count, _WITHIN, _CONFIDENCE) / count * share.sum()
+        order = np.argsort(-relative[draw], axis=0)
+        rank = (np.cumsum(share[order], axis=0) < beyond * (1.0 - _ROUNDING)).sum(axis=0)
+        limits = relative[draw][order[rank, np.arange(relative.shape[1])], np.arange(relative.shape[1])]
+        return float(limits.max())
 
 
 def _drawn(table: Table) -> tuple[Floats, Floats, Floats, bool]:
