@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import ParameterError
+from brdfdb.errors import CannotHoldError
+from brdfdb.formats._channels import RGB
 from brdfdb.formats._rgl_build import Plan, build
 from brdfdb.formats._rgl_fields import Fields, Floats32
 from brdfdb.formats._rgl_surface import Surface
@@ -24,7 +25,19 @@ if TYPE_CHECKING:
 GREY_NM = 550.0  # the wavelength of grey tables; readers continue a single one to all
 _HORIZON = 0.94  # share of rows above the horizon, of warps that end there
 # Rungs from small to large: size, lights, and azimuths of a quarter
-_ISOTROPIC = ((10, 8), (14, 11), (20, 15), (28, 22), (36, 28), (44, 34), (52, 40), (64, 50), (80, 62), (96, 76))
+_ISOTROPIC = (
+    (10, 8),
+    (14, 11),
+    (20, 15),
+    (28, 22),
+    (36, 28),
+    (44, 34),
+    (52, 40),
+    (64, 50),
+    (80, 62),
+    (96, 76),
+    (116, 92),
+)
 _ANISOTROPIC = (
     (16, 8, 5),
     (24, 12, 7),
@@ -33,6 +46,8 @@ _ANISOTROPIC = (
     (48, 23, 13),
     (56, 26, 15),
     (64, 30, 17),
+    (74, 35, 19),
+    (84, 40, 22),
 )
 _FIRST = 5  # rung that is tried first
 _STEP = 1.4  # factor by which the error falls, about, from rung to rung
@@ -73,6 +88,22 @@ def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full:
     full : bool
         The file holds all azimuths of the light.
     """
+    if table.wavelength_nm is not None:
+        return _smallest(table, kind, tolerance, most_bytes, full)
+    fit = _smallest_grey(table, tolerance, most_bytes, full)
+    if kind == "spectral":
+        return fit
+    fields = replace(fit.fields, spectra=np.repeat(fit.fields.spectra, 3, axis=2), wavelength_nm=None)
+    return replace(fit, fields=fields, channels=RGB, remarks=(COLOURLESS, *fit.remarks))
+
+
+@functools.lru_cache(maxsize=2)
+def _smallest_grey(table: Table, tolerance: float, most_bytes: float, full: bool) -> Fit:
+    """Return the file of a grey table: those for both kinds of renderers have the same values."""
+    return _smallest(table, "spectral", tolerance, most_bytes, full)
+
+
+def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool) -> Fit:
     from brdfdb.formats._stated_error import Comparison
 
     channels, remarks = _channels(table, kind)
@@ -96,9 +127,6 @@ class _Search:
         self._kept = np.arange(len(channels.names)) if at is None else _thinned(comparison, at, tolerance)
         self.nodes = None if at is None else at[self._kept]
         self._mixing = None if at is None else _lines(at, at[self._kept])
-        self._copies = 1
-        if kind == "rgb" and channels.wavelength_nm is None:  # one channel is enough, three times
-            self._kept, self._mixing, self._copies = np.zeros(1, np.int64), np.ones((1, 3)), 3
         self._known: dict[Plan, float] = {}
         self._last: tuple[Plan, Fields] | None = None
         self._of_file: Floats32 | None = None
@@ -137,8 +165,6 @@ class _Search:
             error = self._comparison.error_of(functools.partial(self._evaluated, fields))
             if error.p99 <= self._tolerance:
                 break
-        if self._copies > 1:
-            fields = replace(fields, spectra=np.repeat(fields.spectra, self._copies, axis=2))
         return fields, error
 
     def _built(self, plan: Plan) -> Fields:
@@ -167,21 +193,21 @@ class _Search:
         return values if self._mixing is None else np.asarray(values @ self._mixing)
 
     def _nbytes(self, plan: Plan) -> int:
-        texels = (self._copies * self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
+        texels = (self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
         return 4 * plan.lights * plan.azimuths * texels
 
 
 def _channels(table: Table, kind: str) -> tuple[Channels, tuple[str, ...]]:
     """Return the channels of a kind of file, and remarks."""
-    from brdfdb.formats._channels import RGB, Channels, channels_of
+    from brdfdb.formats._channels import Channels, channels_of
 
     if kind == "spectral":
         return channels_of(table), ()
     at = table.wavelength_nm
+    assert at is not None
     try:
-        return channels_of(table, "rgb"), (COLOURLESS,) if at is None else ()
-    except ParameterError:
-        assert at is not None
+        return channels_of(table, "rgb"), ()
+    except CannotHoldError:
         return Channels(RGB, at, np.full((at.size, 3), 1.0 / at.size), "mean over the wavelengths"), (COLOURLESS,)
 
 

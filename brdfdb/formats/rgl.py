@@ -24,7 +24,7 @@ tools = "Mitsuba 3 (`measured`), pbrt-v4, RGL's loader"
 kinds = ("spectral", "rgb")
 options = (
     TOLERANCE,
-    Option("megabytes", 12.0, "largest size of a file that is tried for the tolerance [MB]", low=0.01, high=2000.0),
+    Option("megabytes", 48.0, "largest size of a file that is tried for the tolerance [MB]", low=0.01, high=2000.0),
     Option(
         "azimuth",
         "reduced",
@@ -46,7 +46,7 @@ def write(
     *,
     kind: str = "spectral",
     tolerance: float = 0.02,
-    megabytes: float = 12.0,
+    megabytes: float = 48.0,
     azimuth: str = "reduced",
     verdict: str | None = None,
 ) -> Written:
@@ -65,6 +65,7 @@ def write(
         Largest error against the table that 99 of 100 values may have: the smallest file within it is written.
     megabytes : float [1e6 byte]
         Largest size that is tried; where it is not enough, the file with the least error of that size is written.
+        Files of grey tables for "rgb" repeat their values three times, which does not count.
     azimuth : str
         "reduced" leaves out azimuths of the light that follow from the symmetry of an anisotropic table, as only
         Mitsuba 3 knows it. "full" is also for pbrt-v4 and RGL's loader; the file may be four times as large.

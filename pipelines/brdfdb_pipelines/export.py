@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,8 +12,9 @@ import brdfdb
 from brdfdb.errors import CannotHoldError, WriteError, counted
 from brdfdb.formats import EXPORTERS
 from brdfdb.formats._written import Written
-from brdfdb.store.reader import Store
-from brdfdb_pipelines import terminal
+from brdfdb_pipelines import terminal, workers
+
+_FEW = 3  # materials that are written before other processes would have started
 
 
 class _Export(NamedTuple):
@@ -27,13 +26,19 @@ class _Export(NamedTuple):
 
 
 def run(
-    root: Path, names: list[str], directory: Path, file_format: str, options: Mapping[str, Any], audit: Path
+    root: Path,
+    names: list[str],
+    directory: Path,
+    file_format: str,
+    options: Mapping[str, Any],
+    audit: Path,
+    jobs: int,
 ) -> bool:
     """Write the named materials of a store, or all of them, in a format of `EXPORTERS`, and print what was written.
 
     A format with several kinds of files writes one of each, NAME_KIND.SUFFIX, unless the options choose a kind. Of all
     materials, those that the format cannot hold are left out and named. `audit` is the report whose verdicts are
-    written.
+    written. A few materials are written by `jobs` threads, more by as many processes.
 
     Returns
     -------
@@ -55,14 +60,15 @@ def run(
         reason = "it is a file, not a directory" if isinstance(error, FileExistsError) else error.strerror
         raise WriteError(f"cannot write to {directory}: {reason}") from None
     verdicts = _verdicts(audit, revisions)
-    write = partial(_write, store, directory=directory, file_format=file_format, options=options, verdicts=verdicts)
+    write = partial(_write, root, directory, file_format, options, verdicts)
     exports: list[_Export] = []
-    with terminal.progress() as bar, ThreadPoolExecutor(os.cpu_count()) as threads:
+    pool = workers.threads(jobs) if len(revisions) <= _FEW else workers.processes(jobs, patient=False)
+    with terminal.progress() as bar, pool as some:
         try:
-            results = threads.map(write, revisions)
+            results = some.executor.map(write, revisions)
             exports += bar.track(results, total=len(revisions), description="exporting tables")
         except BaseException:
-            threads.shutdown(cancel_futures=True)
+            some.executor.shutdown(cancel_futures=True)
             raise
     refused = [export for export in exports if export.refusal is not None]
     if refused and (names or len(refused) == len(exports)):
@@ -72,16 +78,10 @@ def run(
 
 
 def _write(
-    store: Store,
-    name: str,
-    *,
-    directory: Path,
-    file_format: str,
-    options: Mapping[str, Any],
-    verdicts: Mapping[str, str],
+    root: Path, directory: Path, file_format: str, options: Mapping[str, Any], verdicts: Mapping[str, str], name: str
 ) -> _Export:
     """Write the files of one material."""
-    exporter, table, verdict = EXPORTERS[file_format], store[name], verdicts.get(name)
+    exporter, table, verdict = EXPORTERS[file_format], brdfdb.open(root)[name], verdicts.get(name)
     kinds = (options["kind"],) if "kind" in options else exporter.kinds
     paths = [(directory / f"{name}_{kind}{exporter.suffix}", {"kind": kind}) for kind in kinds]
     try:

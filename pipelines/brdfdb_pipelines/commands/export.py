@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import ParameterError
-from brdfdb_pipelines.commands._arguments import add_out, add_store
+from brdfdb_pipelines.commands._arguments import add_jobs, add_out, add_store
 from brdfdb_pipelines.exit_codes import VIOLATED
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="FILE",
             help="report of `brdfdb audit` whose verdicts go into the files (default: DIR/audit.json of the store)",
         )
+        add_jobs(command, "materials that are written at a time")
         command.add_argument(
             "--strict", action="store_true", help="exit with 1 if a file is not within the tolerance that was asked for"
         )
@@ -69,5 +70,5 @@ def run(options: argparse.Namespace) -> int:
     texts = {name: getattr(options, f"option_{name}") for name in options_of(exporter)}
     given = parsed_options(exporter, {name: text for name, text in texts.items() if text is not None})
     audit = options.audit or options.store / "audit.json"
-    within = export.run(options.store, options.names, options.out, options.file_format, given, audit)
+    within = export.run(options.store, options.names, options.out, options.file_format, given, audit, options.jobs)
     return VIOLATED if options.strict and not within else 0
