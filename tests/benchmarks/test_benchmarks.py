@@ -22,6 +22,9 @@ SIGNED = {"difference"}  # columns whose numbers may be negative
 needs = {
     "against_cpp": pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed"),
     "mitsuba_microfacet": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
+    "radiance": pytest.mark.skipif(
+        None in (find_spec("pyradiance"), find_spec("pywincalc")), reason="pyradiance or pywincalc is not installed"
+    ),
 }
 
 
