@@ -20,7 +20,7 @@ _DEEPEST = 6  # halvings of a patch of the viewer
 _AROUND = 2  # halvings of the patch that is a whole ring
 _AT_LEAST = 4  # halvings at the mirror direction
 _NEXT = 1.3  # radii of a cell from its middle to the mirror direction, at which its nodes may miss the lobe
-# A cell is divided if its nodes differ by more than this share of their average, and by more than this albedo [1]
+# A cell is divided if its nodes differ by more than a share of their average, and by more than a share of the albedo
 _STEEP, _NEGLIGIBLE = 0.15, 3e-4
 
 
@@ -128,18 +128,22 @@ def averages(evaluate: Evaluate, basis: Basis, channels: int, *, isotropic: bool
         values = evaluate(wi[:, np.newaxis], wr[:, :, np.newaxis]).reshape(len(some), -1, channels)
         mean[some[:, 0]], spread[some[:, 0]] = values.mean(axis=1), np.ptp(values, axis=1)
     weight = basis.solid_angles[viewer][:, np.newaxis]
-    steep = np.any((spread > _STEEP * mean) & (spread * weight > _NEGLIGIBLE), axis=-1)
+    columns = basis.solid_angles @ mean[whose].reshape(size, -1)
+    negligible = _NEGLIGIBLE * float(columns.max())
+    steep = np.any((spread > _STEEP * mean) & (spread * weight > negligible), axis=-1)
     # Two nodes around a whole ring are none
     steep |= _next_to_mirror(basis)[viewer, incident] | (viewer == 0) | (incident == 0)
     for ring in (True, False):  # the first patch is a whole ring
         some = np.flatnonzero(steep & ((incident == 0) == ring))
         nodes, weights = _rule(_LIGHTS[size], periodic=ring)
-        refined = _refined(evaluate, basis, viewer[some], incident[some], nodes, channels)
+        refined = _refined(evaluate, basis, viewer[some], incident[some], nodes, channels, negligible)
         mean[some] = np.einsum("pnc,n->pc", refined, weights)
     return mean[whose].reshape(size, size, channels)
 
 
-def _refined(evaluate: Evaluate, basis: Basis, viewer: Index, incident: Index, nodes: Floats, channels: int) -> Floats:
+def _refined(
+    evaluate: Evaluate, basis: Basis, viewer: Index, incident: Index, nodes: Floats, channels: int, negligible: float
+) -> Floats:
     """Return averages over the patches of the viewer, shape (pairs, nodes, C), for lights at nodes of their patches."""
     count = len(nodes)
     result = np.zeros((len(viewer) * count, channels))
@@ -161,7 +165,7 @@ def _refined(evaluate: Evaluate, basis: Basis, viewer: Index, incident: Index, n
             lit[some] = _at_mirror(wi, wr)
         pair = item // count
         weight = length**2 * basis.solid_angles[viewer[pair]][:, np.newaxis]
-        divided = np.any((spread > _STEEP * mean) & (spread * weight > _NEGLIGIBLE), axis=-1)
+        divided = np.any((spread > _STEEP * mean) & (spread * weight > negligible), axis=-1)
         divided |= lit & (depth < _AT_LEAST)
         divided |= (viewer[pair] == 0) & (depth < _AROUND)
         divided &= depth < _DEEPEST

@@ -54,6 +54,8 @@ _POWER, _LEAST, _MOST = 1.5, 1.15, 8.0
 # Share of the cells that is spent where all of them would not do: the error falls more slowly than the file grows
 _OUT_OF_REACH = 1.0 / 3.0
 _DARK_LEVEL = 6  # level of the cell without light in coloured trees: one of 262144
+_BLACK = 1e-3  # albedo
+_TAKEN_AS_BLACK = "Radiance takes surfaces that reflect less than 0.1 % as black"
 _HOLDS = (
     "f_r [1/sr] without the cosine, as averages over cells of equal projected solid angle of the viewer; "
     "Visible is CIE Y under equal energy"
@@ -98,13 +100,14 @@ def write(
     """
     from brdfdb.formats._radiance_material import material_text
     from brdfdb.formats._record import record
-    from brdfdb.formats._stated_error import Comparison
+    from brdfdb.formats._stated_error import FLOOR, Comparison
 
     path = Path(path)
     channels = visible_channels(table)
     comparison = Comparison(table, channels)
     trees, error = _grown(table, channels, comparison, tolerance, cells)
-    remarks = remarks_of(table)
+    dark = comparison.floor.max() * np.pi < FLOOR * _BLACK
+    remarks = (*remarks_of(table), *([_TAKEN_AS_BLACK] if dark else []))
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
     blocks = (
         Block(wavelength, FRONT_OF_RADIANCE, _BASIS, "", tree.text(), "BRDF")

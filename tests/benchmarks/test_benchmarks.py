@@ -23,6 +23,9 @@ needs = {
     "against_cpp": pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed"),
     "mitsuba_microfacet": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
     "rgl": pytest.mark.skipif(find_spec("mitsuba") is None, reason="mitsuba is not installed"),
+    "radiance": pytest.mark.skipif(
+        None in (find_spec("pyradiance"), find_spec("pywincalc")), reason="pyradiance or pywincalc is not installed"
+    ),
 }
 
 
