@@ -167,20 +167,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             f"All {len(rows)} {title} took {sum(float(row[column] or 0.0) for row in rows):.0f} s of one processor."
         )
     run.say(f"Totals are off by {worst:.2%} at most, beyond rounding; at most {REQUIRED:.1%} is required.")
-<<<<<<< HEAD
-    held = len(trees.rows) - len(beyond)
-    run.say(f"f_r is within the stated error for {held} of {len(trees.rows)} trees. {' '.join(beyond)}")
-    run.say(
-        f"A picture of a ball of bounded Ward differs from plastic2 by {whole:.2%} in all, by {median:.2%} in the "
-        f"median pixel; from the table the file differs by {file_off:.2%}, plastic2 by {plastic_off:.2%} in the median."
-    )
-=======
     count = len(trees.rows)
     run.say(f"f_r is within the stated error for {count - len(beyond)} of {count} trees. {' '.join(beyond)}".strip())
     of_picture = f"{whole:.2%} in all and by {median:.2%} in the median pixel"
     run.say(f"A picture of a ball of bounded Ward, in a tree, differs from plastic2 by {of_picture}.")
     run.say(f"From the table the tree differs by {file_off:.2%}, plastic2 by {plastic_off:.2%} in the median pixel.")
->>>>>>> w-radiance
     run.end()
     return 0 if worst <= REQUIRED and not beyond and abs(whole) <= 0.01 else 1
 
