@@ -1,13 +1,15 @@
 """RGL's tensor files in Mitsuba: ``python tests/benchmarks/rgl.py``.
 
 Each table is written for spectral variants, loaded by Mitsuba's `measured`, and compared with the table: f_r at random
-pairs of directions, and the mean weight of Mitsuba's samples with the directional albedo. Spheres that Mitsuba renders
-from files for RGB are compared with `brdfdb render`. Exits with 1 if Mitsuba sees more than the stated error, or a
+pairs of directions, and the mean weight of Mitsuba's samples with the directional albedo. Where $DRJIT_LIBLLVM_PATH
+names LLVM 19, Mitsuba's chi-square test judges the density of its samples. Spheres that Mitsuba renders from files for
+RGB are compared with `brdfdb render`. Exits with 1 if Mitsuba sees more than the stated error, a test rejects, or a
 furnace or a sphere is off by more than 0.5 %.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import time
@@ -40,6 +42,9 @@ QUICK, SPHERES = ("white-ceramic-tile",), ("rolled-brass", "scene-copper-sphere"
 LIGHTS_DEG = np.array([0.0, 30.0, 60.0, 80.0])
 OFF_PLANE = 0.3  # azimuth of these lights [rad]
 REQUIRED = 0.005  # of furnaces and spheres
+CHI2_DEG = np.array([45.0, 75.0, 10.0])  # lights of chi-square tests
+# Level at which all tests together reject one file by chance; number of the tests
+SIGNIFICANCE, FAMILY = 0.01, 59 * CHI2_DEG.size
 MEASURED = "What Mitsuba makes of RGL's tensor files of our tables: f_r, the albedo by its samples, and spheres."
 
 Array = NDArray[np.float64]
@@ -100,6 +105,27 @@ def furnace(surface: Any, table: Table, count: int) -> tuple[float, float]:
     return worst, noise
 
 
+def rejected(path: Path, lights: int, samples: int) -> int | None:
+    """Return how many lights Mitsuba's chi-square test rejects; None without the LLVM that its arrays need.
+
+    The density is integrated over cells of 3.5 degrees with 32 points along each side: with Mitsuba's default of 4 the
+    lobe of brass falls between the points.
+    """
+    if "DRJIT_LIBLLVM_PATH" not in os.environ:
+        return None
+    import mitsuba
+
+    mitsuba.set_variant("llvm_ad_spectral")
+    from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
+
+    surface, wrong = {"type": "measured", "filename": str(path)}, 0
+    for light in unit_vector(radians(CHI2_DEG[:lights]), np.full(lights, OFF_PLANE)).tolist():
+        sample, density = BSDFAdapter("measured", surface, wi=mitsuba.Vector3f(*light))
+        test = ChiSquareTest(SphericalDomain(), sample, density, 3, sample_count=samples, res=51, ires=32)
+        wrong += not test.run(SIGNIFICANCE, FAMILY, quiet=True)
+    return wrong
+
+
 def sphere(table: Table, path: Path, width: int) -> float:
     """Return the median difference [1] of the pixels of a sphere by Mitsuba from our renderer's, in luminance.
 
@@ -146,19 +172,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = run.parse(parser, arguments)
     count, grid = (500, 16) if options.quick else (10_000, 40)
     columns = [Column(name="kB", digits=4), Column(name="seconds"), *(Column(name=n, unit="%") for n in _SHARES)]
-    rows = run.table("Files for spectral renderers", Column(name="material", width=36), "nodes", *columns)
+    rows = run.table("Files for spectral renderers", Column(name="material", width=36), "nodes", *columns, _LIGHTS)
     bad = []
     with tempfile.TemporaryDirectory() as folder:
         bad += [
             name
             for table in tables(options.store, QUICK if options.quick else None)
-            for name in _row(rows, table, folder, count, grid)
+            for name in _row(rows, table, folder, count, grid, options.quick)
         ]
         median = run.table("Spheres", Column(name="material", width=36), Column(name="median", unit="%"))
         for name in QUICK if options.quick else SPHERES:
             path = Path(folder) / f"{name}.bsdf"
             table = next(tables(options.store, [name]))
-            rgl.write(table, path, kind="rgb", megabytes=24.0)
+            rgl.write(table, path, kind="rgb")
             median.add(name, 100.0 * (off := sphere(table, path, 24 if options.quick else 128)))
             bad += [name] * (off > REQUIRED)
     run.say(f"Beyond what was stated or required: {', '.join(bad) or 'none'}.")
@@ -166,10 +192,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(bool(bad))
 
 
+_LIGHTS = "lights rejected by chi2"
 _SHARES = ("stated p99", "p99 over the hemisphere", "l1", "p99 by Mitsuba", "furnace", "noise of a sample")
 
 
-def _row(rows: Any, table: Table, folder: str, count: int, grid: int) -> list[str]:
+def _row(rows: Any, table: Table, folder: str, count: int, grid: int, quick: bool) -> list[str]:
     """Add the row of a table; return its name if something is beyond what was stated or required."""
     import mitsuba
 
@@ -179,12 +206,13 @@ def _row(rows: Any, table: Table, folder: str, count: int, grid: int) -> list[st
     mitsuba.set_variant("scalar_spectral")
     surface = mitsuba.load_dict({"type": "measured", "filename": str(path)})
     seen, (off, noise) = difference(surface, table, count), furnace(surface, table, grid)
+    wrong = rejected(path, *((1, 20_000) if quick else (CHI2_DEG.size, 200_000)))
     error = files.error
     assert error is not None
     nodes = " x ".join(str(n) for n in read_tensors(path)["spectra"].shape)
     shares = (error.p99, error.p99_hemisphere, error.l1, seen, off, noise)
-    rows.add(table.name, nodes, files.nbytes / 1e3, seconds, *(100.0 * share for share in shares))
-    return [table.name] * (seen > error.p99 or off > REQUIRED)
+    rows.add(table.name, nodes, files.nbytes / 1e3, seconds, *(100.0 * share for share in shares), wrong)
+    return [table.name] * (seen > error.p99 or off > REQUIRED or bool(wrong))
 
 
 if __name__ == "__main__":
