@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from brdfdb import formats
 from brdfdb.formats._exr_file import write_slice
 from brdfdb.geometry import directions_from_half_difference
 from brdfdb.spectra import srgb_weights
@@ -186,6 +189,39 @@ def pixels(content: bytes, folder: Path) -> dict[str, Any]:
 @pytest.mark.parametrize("query", ["kind=map", "theta_i=-1", "half=perhaps", "wavelength_nm=500"])
 def test_a_bad_slice_names_the_parameter(client: Client, query: str) -> None:
     assert client.problem("GET", f"{FOIL}/export/exr?{query}", 422)["parameter"] == query.partition("=")[0]
+
+
+# Files of other formats
+
+
+def test_a_file_and_its_record_are_one_archive(client: Client, tmp_path: Path) -> None:
+    answer = client.get(f"{FELT}/export/fred?tolerance=0.1")
+    assert answer.headers["content-type"] == "application/zip"
+    assert answer.headers["content-disposition"] == 'attachment; filename="grey-felt.fred.txt.zip"'
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert archive.namelist() == ["grey-felt.fred.txt", "grey-felt.fred.txt.json"]
+        archive.extractall(tmp_path)
+    reading = formats.read(tmp_path / "grey-felt.fred.txt")
+    assert reading.record["name"] == "grey-felt"
+    assert reading.record["error_of_file"]["p99"] <= 0.1
+
+
+def test_a_table_that_a_format_cannot_hold_is_refused(client: Client) -> None:
+    detail = client.problem("GET", f"{METAL}/export/fred", 422)["detail"]
+    assert detail == "brushed-metal: is anisotropic, and this format is written for isotropic tables only"
+    assert client.problem("GET", f"{FOIL}/export/fred?wavelength=900", 422)["parameter"] == "wavelength"
+
+
+def test_the_tag_of_a_file_changes_with_the_verdict(own: Path) -> None:
+    client, address = client_of(own), f"{TILE}/export/csv"
+    before = client.get(address)
+    assert "# audit: not audited" in before.text
+    held = {"if-none-match": before.headers["etag"]}
+    assert client.get(address, headers=held).status_code == 304
+    report(own)
+    after = client.get(address, headers=held)
+    assert after.status_code == 200
+    assert "# audit: passes" in after.text
 
 
 # Verdicts

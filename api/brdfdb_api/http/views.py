@@ -214,8 +214,8 @@ def export(
         path = FilePath(folder) / f"{name}{kind}{exporter.suffix}"
         try:
             written = exporter.write(table, path, verdict=verdict, **options)
-        except CannotHoldError as error:
-            raise RequestError(422, str(error)) from None
+        except (CannotHoldError, ParameterError) as error:
+            raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
         if len(written.paths) == 1 and path.is_file():
             return Response(path.read_bytes(), media_type=exporter.media_type, headers=headers)
         headers["Content-Disposition"] = f'attachment; filename="{name}{kind}{exporter.suffix}.zip"'
