@@ -24,7 +24,7 @@ tools = "Mitsuba 3 (`measured`), pbrt-v4, RGL's loader"
 kinds = ("spectral", "rgb")
 options = (
     TOLERANCE,
-    Option("megabytes", 48.0, "largest size of a file that is tried for the tolerance [MB]", low=0.01, high=2000.0),
+    Option("megabytes", 64.0, "largest size of a file that is tried for the tolerance [MB]", low=0.01, high=2000.0),
     Option(
         "azimuth",
         "reduced",
@@ -46,7 +46,7 @@ def write(
     *,
     kind: str = "spectral",
     tolerance: float = 0.02,
-    megabytes: float = 48.0,
+    megabytes: float = 64.0,
     azimuth: str = "reduced",
     verdict: str | None = None,
 ) -> Written:
