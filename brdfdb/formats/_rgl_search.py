@@ -26,17 +26,8 @@ GREY_NM = 550.0  # the wavelength of grey tables; readers continue a single one 
 _HORIZON = 0.94  # share of rows above the horizon, of warps that end there
 # Rungs from small to large: size, lights, and azimuths of a quarter
 _ISOTROPIC = (
-    (10, 8),
-    (14, 11),
-    (20, 15),
-    (28, 22),
-    (36, 28),
-    (44, 34),
-    (52, 40),
-    (64, 50),
-    (80, 62),
-    (96, 76),
-    (116, 92),
+    *((10, 8), (14, 11), (20, 15), (28, 22), (36, 28), (44, 34), (52, 40), (58, 45)),
+    *((64, 50), (72, 56), (80, 62), (88, 69), (96, 76), (106, 84), (116, 92)),
 )
 _ANISOTROPIC = (
     (16, 8, 5),
