@@ -310,7 +310,7 @@ def test_a_bad_wavelength_is_named(wavelength: str, built: Path, capsys: Capture
         (("build", "--processes", "--scheduler", "tcp://x"), "argument --scheduler: not allowed with argument --proc"),
         (("gc", "--keep", "0"), "argument --keep: 0 is not at least 1"),
         (("serve", "--port", "http"), "argument --port: invalid int value: 'http'"),
-        (("export", "png", "foam"), "argument FORMAT: invalid choice: 'png'"),
+        (("export", "gif", "foam"), "argument FORMAT: invalid choice: 'gif'"),
         (("shine",), "argument COMMAND: invalid choice: 'shine'"),
         ((), "the following arguments are required: COMMAND"),
     ],

@@ -74,7 +74,8 @@ def test_a_format_that_does_not_exist_points_to_what_there_is(capsys: pytest.Cap
     with pytest.raises(SystemExit):
         cli.main(["export", "mitsuba"])
     err = capsys.readouterr().err
-    assert "invalid choice: 'mitsuba'; choose from exr; other programs read tables through xarray" in err
+    assert "invalid choice: 'mitsuba'; choose from astm, bird, " in err
+    assert "; rgl is for Mitsuba 3 and pbrt, netcdf, csv and numpy for everybody" in err
 
 
 def test_a_material_that_is_misspelt_in_a_recipe_brings_the_closest(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     # a command a format: argparse takes no NAME after an option that follows another positional argument
     formats = parser.add_subparsers(required=True, metavar="FORMAT", dest="file_format")
     formats.hint = (  # type: ignore[attr-defined]  # read by the parser
-        "; other programs read tables through xarray, `brdfdb.open(DIR).dataset(NAME)`, zarr, or `brdfdb serve`"
+        "; rgl is for Mitsuba 3 and pbrt, netcdf, csv and numpy for everybody"
     )
     for name, exporter in EXPORTERS.items():
         sentence = f"Write {exporter.summary}."
