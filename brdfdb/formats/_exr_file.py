@@ -21,7 +21,7 @@ from brdfdb.tables.table import Table
 QUANTITY = "f_r"
 UNIT = "1/sr"
 HALF_MAX = 65504.0
-SPHERE = 512  # pixels across the picture of a sphere
+SPHERE = 256  # pixels across the picture of a sphere
 LIT = "radiance of a lit sphere, linear sRGB under D65; a white Lambertian one has 0.8 where it is brightest"
 
 

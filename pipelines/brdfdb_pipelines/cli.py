@@ -31,7 +31,7 @@ _MODELS = "files of models"  # begins the names under which parsers keep --model
 _EPILOG = f"""\
 exit codes:
   0    done
-  {VIOLATED}    brdfdb audit found a violation that is neither known nor allowed; a file of export --strict is too far off
+  {VIOLATED}    brdfdb audit found a violation that is neither known nor allowed, or export --strict wrote a far file
   {REFUSED}    refused or impossible, for the reason on stderr: bad input, a damaged store, a full disk, a missing extra
   {BUG}   a bug of brdfdb; stderr names the file with the traceback
   {INTERRUPTED}  interrupted by Ctrl-C
