@@ -45,6 +45,7 @@ _STEP = 1.4  # factor by which the error falls, about, from rung to rung
 _COARSE = 30  # size below which densities have half of the nodes
 _FEW = 3  # channels that rungs are compared by
 _OF_SPECTRUM = 0.5  # share of the tolerance that straight lines between wavelengths may take
+_REMEMBERED = 3  # files: the search returns to the one before the last
 _PAIRS = 4001  # pairs of directions that they are tested with
 COLOURLESS = "the colour was not measured: R, G and B are equal"
 REDUCED = (
@@ -119,7 +120,7 @@ class _Search:
         self.nodes = None if at is None else at[self._kept]
         self._mixing = None if at is None else _lines(at, at[self._kept])
         self._known: dict[Plan, float] = {}
-        self._last: tuple[Plan, Fields] | None = None
+        self._files: dict[Plan, Fields] = {}
         self._of_file: Floats32 | None = None
         if kind == "spectral":
             self._of_file = np.array([GREY_NM] if self.nodes is None else self.nodes, np.float32)
@@ -159,10 +160,12 @@ class _Search:
         return fields, error
 
     def _built(self, plan: Plan) -> Fields:
-        """Return the fields of a plan with all channels; those of the last one are kept."""
-        if self._last is None or self._last[0] != plan:
-            self._last = plan, build(self.surface, plan, self._of_file)
-        return self._last[1]
+        """Return the fields of a plan with all channels; those of the last few plans are kept."""
+        if plan not in self._files:
+            if len(self._files) >= _REMEMBERED:
+                del self._files[next(iter(self._files))]
+            self._files[plan] = build(self.surface, plan, self._of_file)
+        return self._files[plan]
 
     def p99(self, plan: Plan) -> float:
         """Return p99 of a plan over a few channels."""
