@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import CONVENTION, record
+from brdfdb.formats._record import CONVENTION, record, specular_remark
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,17 +54,10 @@ def dense_record(
     table: Table, dense: DenseTable, verdict: str | None, tolerance: float | None, *, specular: bool
 ) -> dict[str, Any]:
     """Return the record of a file with a dense table; `specular` says that the file holds the specular part, too."""
-    remarks = () if specular else specular_remarks(table)
+    remarks = () if specular else specular_remark(table)
     document = record(table, dense.error, verdict, holds=CONVENTION, remarks=remarks, tolerance=tolerance)
     continued = [_CONTINUED] if dense.grid.half_difference else []
     return {**document, "interpolation": "; ".join([INTERPOLATION, *continued]), "symmetries": dense.grid.symmetries}
-
-
-def specular_remarks(table: Table) -> tuple[str, ...]:
-    """Return a sentence on the specular part of a table; none if it has none."""
-    if table.specular is None or not table.specular.any():
-        return ()
-    return (f"not in the file: up to {table.specular.max():.3g} of the light leaves in the exact mirror direction",)
 
 
 def dataset(table: Table, dense: DenseTable, verdict: str | None, tolerance: float | None) -> xr.Dataset:
@@ -84,7 +77,7 @@ def dataset(table: Table, dense: DenseTable, verdict: str | None, tolerance: flo
     values = dense.values if spectral else dense.values[..., 0]
     quantity = {"long_name": "bidirectional reflectance distribution function", "units": "sr-1"}
     variables: dict[str, Any] = {"brdf": ((*dense.grid.names, *spectral), values, quantity)}
-    if specular_remarks(table) and table.specular is not None:
+    if specular_remark(table) and table.specular is not None:
         nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
         coordinates["specular_theta_i"] = ("specular_theta_i", nodes, {"units": "degree", "long_name": "theta_i"})
         share = {"long_name": "reflectance of the specular part, in the exact mirror direction", "units": "1"}

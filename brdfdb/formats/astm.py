@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
-from brdfdb.formats._colours import specular_remark
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import lines, of_lines, record
+from brdfdb.formats._record import lines, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows, specular_remarks
+from brdfdb.formats._dense_files import dense_record, reading_of_rows
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, column, degrees_of, parsed, title_of
+from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def write(
     document = {"metadata": _metadata(table, known), "data": data}
     with whole(path) as (half,):
         half.write_text(json.dumps(document, ensure_ascii=False, separators=(",", ":")), encoding="utf-8")
-    return Written((Path(path),), dense.error, wanted, specular_remarks(table))
+    return Written((Path(path),), dense.error, wanted, specular_remark(table))
 
 
 def recognises(head: bytes) -> bool:

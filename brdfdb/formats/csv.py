@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows, specular_remarks
-from brdfdb.formats._record import lines, of_lines
+from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
+from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def write(
             file.writelines(
                 f"{start},{last},{','.join(map(repr, row))}\n" for last, row in zip(columns[-1], numbers, strict=True)
             )
-    return Written((Path(path),), dense.error, wanted, specular_remarks(table))
+    return Written((Path(path),), dense.error, wanted, specular_remark(table))
 
 
 def recognises(head: bytes) -> bool:

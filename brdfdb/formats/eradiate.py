@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError, import_extra
 from brdfdb.formats._channels import at_wavelength
-from brdfdb.formats._dense_files import record_of_attributes, specular_remarks
+from brdfdb.formats._dense_files import record_of_attributes
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
-from brdfdb.formats._record import record
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -105,9 +105,7 @@ def write(
     shape = (count, count | 1, count) if count else _smallest(table, comparison, tolerance)
     values = _values(table, channels, shape)
     error = comparison.error_of(functools.partial(_evaluated, values))
-    remarks = specular_remarks(table)
-    if channels.wavelength_nm is not None:
-        remarks = (*remarks, channels.meaning)
+    remarks = (*specular_remark(table), *channels.remarks)
     wanted = None if resolution else tolerance
     known = record(table, error, verdict, holds=HOLDS, remarks=remarks, tolerance=wanted)
     known["wavelength_nm"] = None if channels.wavelength_nm is None else float(channels.wavelength_nm[0])

@@ -22,9 +22,8 @@ from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import at_wavelength
-from brdfdb.formats._colours import specular_remark
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
-from brdfdb.formats._record import record
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -97,9 +96,7 @@ def write(
         lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
     )
     path = Path(path)
-    remarks = specular_remark(table)
-    if comparison.channels.wavelength_nm is not None:
-        remarks = (*remarks, comparison.channels.meaning)
+    remarks = (*specular_remark(table), *comparison.channels.remarks)
     document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
     at = comparison.channels.wavelength_nm
     document["wavelength_nm"] = None if at is None else float(at[0])

@@ -14,8 +14,8 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _bsdf_xml
-from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
+from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import Option
 from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
 from brdfdb.formats._written import Written, whole
@@ -71,8 +71,8 @@ def write(
 
     Raises
     ------
-    ParameterError
-        If the wavelengths of the table do not reach over the visible ones.
+    CannotHoldError
+        If the table has several wavelengths that do not reach over the visible ones.
     WriteError
         If the file cannot be written.
 
@@ -80,10 +80,10 @@ def write(
     -----
     WINDOW's front is outdoors and Radiance's indoors: the block Reflection Back is Radiance's front.
     """
-    from brdfdb.formats._record import record
+    from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._stated_error import Comparison
 
-    basis, channels = BASES[kind], visible_channels(table, colour=colour)
+    basis, channels = BASES[kind], channels_of(table, "auto" if colour else "grey")
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return np.maximum(channels.values(table, wi, wr), 0.0)
@@ -92,7 +92,7 @@ def write(
     texts = [_text(matrix[..., channel]) for channel in range(matrix.shape[-1])]
     read_back = np.stack([_numbers(text) for text in texts], axis=-1).reshape(matrix.shape)
     error = Comparison(table, channels).error_of(functools.partial(evaluated, read_back, basis, basis))
-    remarks = (*remarks_of(table), _ONE_SHEET, _SOLAR)
+    remarks = (*channels.remarks, *specular_remark(table), _ONE_SHEET, _SOLAR)
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks)
     definition = ["<IncidentDataStructure>Columns</IncidentDataStructure>", *_definition(basis)]
     with whole(path) as (half,), half.open("w", encoding="utf-8") as file:
@@ -182,7 +182,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
             raise FileFormatError(f"{path}: the angle basis {name!r} is not defined")
     lights, viewers = bases[visible.basis.lower()], bases[visible.row_basis.lower()]
     matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
-    of_colour = ("X", "Y", "Z") if len(names) > 1 else ("grey",)
+    of_colour = XYZ if len(names) > 1 else LUMINOUS
     from brdfdb.formats._readings import FileTable
 
     return FileTable(file.name, of_colour, None, functools.partial(evaluated, matrix, viewers, lights), file.record)

@@ -14,9 +14,9 @@ from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats._angles import HALF_PI, HalfDifference
 from brdfdb.formats._angular_grid import AngularGrid, reciprocal
 from brdfdb.formats._beside import beside, record_beside
-from brdfdb.formats._colours import colours_of, specular_remark
+from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import record
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -90,7 +90,7 @@ def write(
 
     if table.anisotropic:
         raise CannotHoldError(f"{table.name}: MERL files are isotropic, and the table is anisotropic")
-    channels, remarks = colours_of(table, "rgb")
+    channels = channels_of(table, "rgb")
     valid, angles = _nodes(samples)
     comparison = Comparison(table, channels)
     planes = np.full((3, *SHAPE), INVALID)
@@ -102,7 +102,7 @@ def write(
         first = 0 if samples == "centres" else 1
         planes[..., SHAPE[2] // 2 :] = planes[..., first : first + SHAPE[2] // 2][..., ::-1]
     error = comparison.error_of(_Reader(planes, samples))
-    remarks = (*remarks, *specular_remark(table))
+    remarks = (*channels.remarks, *specular_remark(table))
     holds = _HOLDS + ("centres of bins" if samples == "centres" else "lower edges of bins")
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
     paths = Path(path), beside(Path(path))
@@ -140,7 +140,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     name = str(known.get("name") or path.stem)
     from brdfdb.formats._readings import FileTable
 
-    return FileTable(name, ("R", "G", "B"), None, _Reader(planes, samples), known)
+    return FileTable(name, RGB, None, _Reader(planes, samples), known)
 
 
 def _nodes(samples: str) -> tuple[NDArray[np.bool_], Floats]:

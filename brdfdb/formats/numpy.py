@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table, specular_remarks
+from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table
+from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def write(
         arrays["wavelength"] = at
     known = dense_record(table, dense, verdict, wanted, specular=True)
     arrays |= {"axes": np.array(list(arrays)), "record": np.array(json.dumps(known, ensure_ascii=False))}
-    if specular_remarks(table) and table.specular is not None:
+    if specular_remark(table) and table.specular is not None:
         nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
         arrays |= {"specular_theta_i": nodes, "specular_reflectance": table.specular}
     arrays["brdf"] = dense.values[..., 0] if at is None else dense.values

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows, specular_remarks
+from brdfdb.formats._dense_files import dense_record, reading_of_rows
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, degrees_of, parsed, title_of
+from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def write(
     dense = dense_table(table, tolerance, axes="light_viewer", resolution=resolution, most_values=most, digits=_DIGITS)
     wanted = None if resolution else tolerance
     at = dense.channels.wavelength_nm
-    remarks = specular_remarks(table)
+    remarks = specular_remark(table)
     if at is None:
         remarks = (*remarks, f"grey: the same at all wavelengths, written at {GREY_NM:g} nm")
     known = dense_record(table, dense, verdict, wanted, specular=False) | {"remarks": list(remarks)}

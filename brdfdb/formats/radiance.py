@@ -12,8 +12,8 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _bsdf_xml
-from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block
+from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._square_disk import ANISOTROPIC, ISOTROPIC
 from brdfdb.formats._tensor_colour import trees_of, xyz_of
@@ -88,8 +88,8 @@ def write(
 
     Raises
     ------
-    ParameterError
-        If the wavelengths of the table do not reach over the visible ones.
+    CannotHoldError
+        If the table has several wavelengths that do not reach over the visible ones.
     WriteError
         If a file cannot be written.
 
@@ -99,15 +99,15 @@ def write(
     what Radiance reads in trees. A table of one wavelength is written as the Visible block.
     """
     from brdfdb.formats._radiance_material import material_text
-    from brdfdb.formats._record import record
+    from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._stated_error import FLOOR, Comparison
 
     path = Path(path)
-    channels = visible_channels(table)
+    channels = channels_of(table, "auto")
     comparison = Comparison(table, channels)
     trees, error = _grown(table, channels, comparison, tolerance, cells)
     dark = comparison.floor.max() * np.pi < FLOOR * _BLACK
-    remarks = (*remarks_of(table), *([_TAKEN_AS_BLACK] if dark else []))
+    remarks = (*channels.remarks, *specular_remark(table), *([_TAKEN_AS_BLACK] if dark else []))
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
     blocks = (
         Block(wavelength, FRONT_OF_RADIANCE, _BASIS, "", tree.text(), "BRDF")
@@ -208,7 +208,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
             trees.append(parsed(block.numbers, rank))
         except ValueError as error:
             raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
-    of_colour = ("X", "Y", "Z") if len(trees) > 1 else ("grey",)
+    of_colour = XYZ if len(trees) > 1 else LUMINOUS
     from brdfdb.formats._readings import FileTable
 
     return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record)

@@ -37,7 +37,6 @@ HOLDS = (
     "spectra * ndf(half vector) / (4 sigma(light)) is f_r cos(theta_r) [1/sr], the cosine included; "
     "half vectors are warped by vndf"
 )
-SPECULAR = "the specular part is left out: the format has no place for light in the exact mirror direction alone"
 
 
 def write(
@@ -74,19 +73,19 @@ def write(
 
     Raises
     ------
+    CannotHoldError
+        If the kind is "rgb", and the table has several wavelengths that do not reach over the visible ones.
     WriteError
         If the file cannot be written.
     """
-    from brdfdb.formats._record import record
+    from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._rgl_search import smallest
     from brdfdb.formats._rgl_tensor import write_tensors
     from brdfdb.formats._written import Written, whole
 
     path = Path(path)
     fit = smallest(table, kind, tolerance, 1e6 * megabytes, azimuth == "full")
-    remarks = fit.remarks
-    if table.specular is not None and table.specular.max() > 0.0:
-        remarks += (SPECULAR,)
+    remarks = (*fit.remarks, *specular_remark(table))
     document = record(table, fit.error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
     document["channels"] = list(fit.channels)
     fields = replace(fit.fields, description=json.dumps(document))

@@ -13,9 +13,9 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, filled
 from brdfdb.formats._beside import beside, record_beside
-from brdfdb.formats._colours import colours_of, specular_remark
+from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import record
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -88,12 +88,12 @@ def write(
     """
     from brdfdb.formats._stated_error import Comparison
 
-    channels, remarks = colours_of(table, "rgb")
+    channels = channels_of(table, "rgb")
     comparison = Comparison(table, channels)
     grid = filled(table, comparison, _SYSTEM, _NODES)
     numbers = _encoded(np.maximum(grid.values.astype(np.float64), 0.0), encoding)
     error = comparison.error_of(_Reader(numbers, encoding))
-    remarks = (*remarks, *specular_remark(table))
+    remarks = (*channels.remarks, *specular_remark(table))
     holds = _LINEAR if encoding == "linear" else _DJ
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
     paths = Path(path), beside(Path(path))
@@ -135,7 +135,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     evaluate = _Reader(numbers, "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear")
     from brdfdb.formats._readings import FileTable
 
-    return FileTable(str(known.get("name") or path.stem), ("R", "G", "B"), None, evaluate, known)
+    return FileTable(str(known.get("name") or path.stem), RGB, None, evaluate, known)
 
 
 def _encoded(f_r: Floats, encoding: str) -> Floats:

@@ -13,9 +13,9 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats import _zemax_file
 from brdfdb.formats._angles import Specular
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
-from brdfdb.formats._colours import colours_of, specular_remark
+from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import CONVENTION, lines, of_lines, record
+from brdfdb.formats._record import CONVENTION, lines, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -81,8 +81,7 @@ def write(
     """
     from brdfdb.formats._stated_error import Comparison
 
-    spectral = table.wavelength_nm is not None and table.wavelength_nm.size > 1
-    channels, remarks = colours_of(table, ("xyz" if spectral else "grey") if colour == "auto" else colour)
+    channels = channels_of(table, colour)
     count = len(channels.names)
     system = Specular(table.anisotropic, mirrored=not table.anisotropic)
     grid, error = chosen(
@@ -93,8 +92,9 @@ def write(
         int(size * 1e6 / count / _CHARACTERS),
         lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
     )
-    remarks = (*remarks, *specular_remark(table))
+    remarks = (*channels.remarks, *specular_remark(table))
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
+    document["channels"] = list(channels.names)
     angles = [np.rad2deg(axis) for axis in grid.nodes]
     values = grid.values
     if not table.anisotropic:
@@ -149,7 +149,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     grid = AngularGrid(Specular(anisotropic, both_sides), nodes, values if anisotropic else values[:, 0])
     document = of_lines(list(text.comments))
     document |= {"theta_i_deg": text.angles[1].tolist(), "tis": np.moveaxis(text.tis, 0, -1).tolist()}
-    names = ("X", "Y", "Z") if text.content == "XYZ" else ("grey",)
+    luminous = document.get("channels") == list(LUMINOUS)
+    names = XYZ if text.content == "XYZ" else LUMINOUS if luminous else ("grey",)
     from brdfdb.formats._readings import FileTable
 
     return FileTable(str(document.get("name") or path.stem), names, None, grid.evaluate, document)
