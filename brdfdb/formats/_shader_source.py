@@ -39,8 +39,26 @@ class Language:
     after: str = ""
 
 
-def write_source(table: Table, path: str | os.PathLike[str], language: Language, verdict: str | None) -> Written:
+def write_source(
+    language: Language, table: Table, path: str | os.PathLike[str], *, verdict: str | None = None
+) -> Written:
     """Write the function ``brdf(wi, wr)`` of a table's model: whole, or not at all.
+
+    Parameters
+    ----------
+    language : Language
+        The shading language.
+    table : Table
+        Table in memory, of a model with a closed form.
+    path : path
+        The file; one that is there is replaced. The record is in its first lines, as comments.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Returns
+    -------
+    Written
+        The file, with the error of the model against the table.
 
     Raises
     ------

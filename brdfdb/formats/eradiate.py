@@ -1,4 +1,11 @@
-"""Eradiate: tables of its BSDF ``mqdiffuse``, measured and almost diffuse, as netCDF."""
+"""Eradiate: tables of its BSDF ``mqdiffuse``, measured and almost diffuse, as netCDF.
+
+f_r in 1/sr is on a regular grid: the cosines of light and viewer, and the azimuth between them. Eradiate's kernel
+interpolates in straight lines along all three. Narrow lobes need more nodes than a grid can have.
+
+The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
+part is left out.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,12 @@
 """FRED's tabulated scatter: f_r at angles of light and viewer as text.
 
 The layout is that of files that laboratories publish for FRED. Each direction of the light has a block. Its first line
-has two angles [degree], and the lines below it have two angles and f_r for each viewer. The azimuth of a viewer counts
-from the half plane of the mirror direction. FRED does not publish how it interpolates. This reader interpolates in
-straight lines over each angle.
+has two angles in degrees, and the lines below it have two angles and f_r in 1/sr for each viewer. The azimuth of a
+viewer counts from the half plane of the mirror direction. FRED does not publish how it interpolates. This reader
+interpolates in straight lines over each angle.
+
+The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
+part is left out.
 """
 
 from __future__ import annotations

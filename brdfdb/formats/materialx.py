@@ -1,4 +1,12 @@
-"""MaterialX: the OpenPBR or Standard Surface that comes closest to a table, as a document that states its error."""
+"""MaterialX: the OpenPBR or Standard Surface that comes closest to a table, as a document that states its error.
+
+The file holds the parameters of a surface, which are fitted to the table. Renderers evaluate the surface, so nothing is
+interpolated. Its shapes are those of GGX and Oren-Nayar. Other lobes come out different, and the stated error says how
+much.
+
+Anisotropic highlights fit. Spectral tables become linear sRGB. The specular part is left out, unless the surface is
+smooth.
+"""
 
 from __future__ import annotations
 
@@ -127,6 +135,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     OSError
         If the file cannot be read.
     """
+    from brdfdb.formats._readings import FileTable
+
     path = Path(path)
     with path.open("rb") as file:
         text = file.read(_LARGEST + 1)
@@ -147,8 +157,6 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     grey = all(len(set(color)) == 1 for color in (surface.base_color, surface.specular_color))
     if grey:
         surface = replace(surface, base_color=surface.base_color[:1], specular_color=surface.specular_color[:1])
-    from brdfdb.formats._readings import FileTable
-
     return FileTable(str(name), ("grey",) if grey else RGB, None, surface.brdf, document)
 
 

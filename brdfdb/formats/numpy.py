@@ -1,4 +1,10 @@
-"""NumPy: f_r on a plain grid of angles as an .npz archive of arrays."""
+"""NumPy: f_r on a plain grid of angles as an .npz archive of arrays.
+
+The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
+f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+
+Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own.
+"""
 
 from __future__ import annotations
 
@@ -68,12 +74,11 @@ def write(
     from brdfdb.formats._dense_grid import dense_table
 
     dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
-    wanted = None if resolution else tolerance
     at = dense.channels.wavelength_nm
     arrays: dict[str, NDArray[Any]] = dict(dense.grid.axes)
     if at is not None:
         arrays["wavelength"] = at
-    known = dense_record(table, dense, verdict, wanted, specular=True)
+    known = dense_record(table, dense, verdict, specular=True)
     arrays |= {"axes": np.array(list(arrays)), "record": np.array(json.dumps(known, ensure_ascii=False))}
     if specular_remark(table) and table.specular is not None:
         nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
@@ -81,7 +86,7 @@ def write(
     arrays["brdf"] = dense.values[..., 0] if at is None else dense.values
     with whole(path) as (half,), half.open("wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
-    return Written((Path(path),), dense.error, wanted)
+    return Written((Path(path),), dense.error, dense.tolerance)
 
 
 def recognises(head: bytes) -> bool:

@@ -1,4 +1,12 @@
-"""Radiance: tensor trees of variable resolution, and the material that scenes include."""
+"""Radiance: tensor trees of variable resolution, and the material that scenes include.
+
+A tree cuts the directions of light and viewer into cells, small where f_r varies. A cell holds the average of f_r in
+1/sr. Radiance does not interpolate between cells, so that narrow lobes take many. The file beside the tree is the
+material that scenes include.
+
+Anisotropic tables fit. Spectral tables become CIE Y and the chromaticities u' and v'. The specular part is left out: a
+scene can add a mirror for it.
+"""
 
 from __future__ import annotations
 
@@ -193,6 +201,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     -----
     Radiance varies the values by up to 2e-4 from cell to cell, so that it can tell cells apart; this is left out.
     """
+    from brdfdb.formats._readings import FileTable
+
     file = _bsdf_xml.read(path)
     rank = _STRUCTURES.get(file.structure.lower())
     if rank is None:
@@ -209,6 +219,4 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         except ValueError as error:
             raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
     of_colour = XYZ if len(trees) > 1 else LUMINOUS
-    from brdfdb.formats._readings import FileTable
-
     return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record)

@@ -1,4 +1,12 @@
-"""Zemax (Radiant) BSDF files: f_r about the specular direction as text, one value or CIE XYZ."""
+"""Zemax (Radiant) BSDF files: f_r about the specular direction as text, one value or CIE XYZ.
+
+For each direction of the light, f_r in 1/sr is listed over the angle from the specular direction and the azimuth about
+it. libbsdf interpolates in straight lines over each angle. The file also holds the total integrated scatter, which is
+the albedo.
+
+Anisotropic tables fit, but OpticStudio and libbsdf read isotropic ones only. Spectral tables become CIE XYZ, or its Y
+alone (``--colour``). The specular part is left out.
+"""
 
 from __future__ import annotations
 
@@ -135,6 +143,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     OSError
         If it cannot be read.
     """
+    from brdfdb.formats._readings import FileTable
+
     path = Path(path)
     text = _zemax_file.parsed(path)
     if text.scatter != "BRDF":
@@ -151,8 +161,6 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     document |= {"theta_i_deg": text.angles[1].tolist(), "tis": np.moveaxis(text.tis, 0, -1).tolist()}
     luminous = document.get("channels") == list(LUMINOUS)
     names = XYZ if text.content == "XYZ" else LUMINOUS if luminous else ("grey",)
-    from brdfdb.formats._readings import FileTable
-
     return FileTable(str(document.get("name") or path.stem), names, None, grid.evaluate, document)
 
 
