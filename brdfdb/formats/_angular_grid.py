@@ -2,6 +2,10 @@
 
 Formats of measurement programs list the nodes of each angle and a value at each combination of them. Their readers
 interpolate linearly over each angle. Nodes need not be uniform: `chosen` places them where f_r curves.
+
+`_dense_grid` chooses nodes for the axes of tables by second derivatives. Here intervals are halved instead, because
+angles about the specular direction have lobes that are narrower than a second derivative tells, and edges at the
+horizon; and because readers of these formats continue lines beyond the last node.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from brdfdb.parameters import Floats
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
-RGB, XYZ = ("R", "G", "B"), ("X", "Y", "Z")
+RGB, XYZ, LUMINOUS = ("R", "G", "B"), ("X", "Y", "Z"), ("Y",)
 _AT_ONCE = 1 << 22  # values of a table that are looked up at a time
 
 
@@ -26,19 +26,22 @@ class Channels:
     Attributes
     ----------
     names : tuple of str
-        ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or a wavelength each, such as "550nm".
+        ("R", "G", "B"), ("X", "Y", "Z"), ("Y",), ("grey",), or a wavelength each, such as "550nm".
     wavelength_nm : array (L,) [nm] or None
         Wavelengths at which the table is looked up; None of a grey one.
     weights : array (L, C) or None
         Weights that take the wavelengths to the channels; None where they are the channels.
     meaning : str
         The channels in words.
+    remarks : tuple of str
+        A sentence for the record if the channels are others than those of the table.
     """
 
     names: tuple[str, ...]
     wavelength_nm: NDArray[np.float64] | None
     weights: NDArray[np.float64] | None
     meaning: str
+    remarks: tuple[str, ...] = ()
 
     def values(self, table: Table, wi: Floats, wr: Floats) -> Floats:
         """Return f_r [1/sr] of a table in the channels, shape (..., C), at unit vectors (..., 3)."""
@@ -58,6 +61,11 @@ class Channels:
         return brdf if self.weights is None else np.asarray(brdf @ self.weights)
 
 
+def has_spectrum(table: Table) -> bool:
+    """Return True if a table has several wavelengths, so that it can have a colour."""
+    return table.wavelength_nm is not None and table.wavelength_nm.size > 1
+
+
 def channels_of(table: Table, colour: str = "") -> Channels:
     """Return the channels of a table: its wavelengths, or colours of it.
 
@@ -67,19 +75,27 @@ def channels_of(table: Table, colour: str = "") -> Channels:
         Grey or spectral.
     colour : str
         "" keeps the wavelengths. "rgb" is linear sRGB under D65. "xyz" is CIE XYZ of the 2 degree observer under the
-        equal-energy illuminant, with Y = 1 of a white surface. "grey" is Y of it.
+        equal-energy illuminant, with Y = 1 of a white surface. "grey" is Y of it. "auto" is "xyz" for a table of
+        several wavelengths, and "grey" for others. The channels of a grey table are all the same, and so are those of a
+        table of one wavelength: f_r there.
 
     Raises
     ------
     CannotHoldError
-        If a colour is asked for and the wavelengths of the table do not reach from 420 to 680 nm.
+        If a colour is asked for and the table has several wavelengths that do not reach from 420 to 680 nm.
     """
     at = table.wavelength_nm
-    names = {"": ("grey",), "rgb": RGB, "xyz": XYZ, "grey": ("Y",)}[colour]
+    if colour == "auto":
+        colour = "xyz" if has_spectrum(table) else "grey"
+    names = {"": ("grey",), "rgb": RGB, "xyz": XYZ, "grey": LUMINOUS}[colour]
+    same = "all channels are the same: the table is grey"
     if at is None:
-        return Channels(names, None, None, "grey: the same at all wavelengths")
+        return Channels(names, None, None, "grey: the same at all wavelengths", (same,) if len(names) > 1 else ())
     if not colour:
         return Channels(tuple(f"{value:g}nm" for value in at), at, None, "f_r at each wavelength")
+    if not has_spectrum(table):
+        meaning = f"{'all channels are ' if len(names) > 1 else ''}f_r at {at[0]:g} nm"
+        return Channels(names, at, np.ones((1, len(names))), meaning, (meaning,))
     wavelengths = at if spectra.covers_visible(at) else spectra.picture_wavelengths(at)
     if wavelengths is None:
         raise CannotHoldError(
@@ -88,12 +104,13 @@ def channels_of(table: Table, colour: str = "") -> Channels:
         )
     key = tuple(wavelengths.tolist())
     if colour == "rgb":
-        return Channels(names, wavelengths, spectra.srgb_weights(key), "linear sRGB under D65")
-    weights = spectra.xyz_weights(key, "E")
-    weights = weights / weights.sum(axis=0)
+        weights, meaning = spectra.srgb_weights(key), "linear sRGB under D65"
+    else:
+        weights, meaning = spectra.xyz_weights(key, "E"), "CIE XYZ, 2 degree observer, equal-energy illuminant"
+        weights = weights / weights.sum(axis=0)
     if colour == "grey":
-        return Channels(names, wavelengths, weights[:, 1:2], "luminous: CIE Y under the equal-energy illuminant")
-    return Channels(names, wavelengths, weights, "CIE XYZ, 2 degree observer, equal-energy illuminant")
+        weights, meaning = weights[:, 1:2], "luminous: CIE Y under the equal-energy illuminant"
+    return Channels(names, wavelengths, weights, meaning, (f"of the spectrum: {meaning}",))
 
 
 def at_wavelength(table: Table, wavelength_nm: float) -> Channels:
@@ -111,4 +128,5 @@ def at_wavelength(table: Table, wavelength_nm: float) -> Channels:
         raise ParameterError(
             "wavelength", f"{wavelength_nm:g} nm is outside [{at[0]:g}, {at[-1]:g}] nm of {table.name}", wavelength_nm
         )
-    return Channels((f"{wavelength_nm:g}nm",), np.array([wavelength_nm]), None, f"f_r at {wavelength_nm:g} nm alone")
+    meaning = f"f_r at {wavelength_nm:g} nm alone"
+    return Channels((f"{wavelength_nm:g}nm",), np.array([wavelength_nm]), None, meaning, (meaning,))

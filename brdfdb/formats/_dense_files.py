@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import CONVENTION, record
+from brdfdb.formats._record import CONVENTION, record, specular_remark
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,24 +50,15 @@ _TURNED = {
 _MOST_VALUES = 1 << 28  # of a file that is read
 
 
-def dense_record(
-    table: Table, dense: DenseTable, verdict: str | None, tolerance: float | None, *, specular: bool
-) -> dict[str, Any]:
+def dense_record(table: Table, dense: DenseTable, verdict: str | None, *, specular: bool) -> dict[str, Any]:
     """Return the record of a file with a dense table; `specular` says that the file holds the specular part, too."""
-    remarks = () if specular else specular_remarks(table)
-    document = record(table, dense.error, verdict, holds=CONVENTION, remarks=remarks, tolerance=tolerance)
+    remarks = () if specular else specular_remark(table)
+    document = record(table, dense.error, verdict, holds=CONVENTION, remarks=remarks, tolerance=dense.tolerance)
     continued = [_CONTINUED] if dense.grid.half_difference else []
     return {**document, "interpolation": "; ".join([INTERPOLATION, *continued]), "symmetries": dense.grid.symmetries}
 
 
-def specular_remarks(table: Table) -> tuple[str, ...]:
-    """Return a sentence on the specular part of a table; none if it has none."""
-    if table.specular is None or not table.specular.any():
-        return ()
-    return (f"not in the file: up to {table.specular.max():.3g} of the light leaves in the exact mirror direction",)
-
-
-def dataset(table: Table, dense: DenseTable, verdict: str | None, tolerance: float | None) -> xr.Dataset:
+def dataset(table: Table, dense: DenseTable, verdict: str | None) -> xr.Dataset:
     """Return a dense table as a Dataset: ``brdf``, the specular part, units and the record as attributes."""
     import xarray as xr
 
@@ -84,12 +75,12 @@ def dataset(table: Table, dense: DenseTable, verdict: str | None, tolerance: flo
     values = dense.values if spectral else dense.values[..., 0]
     quantity = {"long_name": "bidirectional reflectance distribution function", "units": "sr-1"}
     variables: dict[str, Any] = {"brdf": ((*dense.grid.names, *spectral), values, quantity)}
-    if specular_remarks(table) and table.specular is not None:
+    if specular_remark(table) and table.specular is not None:
         nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
         coordinates["specular_theta_i"] = ("specular_theta_i", nodes, {"units": "degree", "long_name": "theta_i"})
         share = {"long_name": "reflectance of the specular part, in the exact mirror direction", "units": "1"}
         variables["specular_reflectance"] = (("specular_theta_i", *spectral), table.specular, share)
-    known = dense_record(table, dense, verdict, tolerance, specular=True)
+    known = dense_record(table, dense, verdict, specular=True)
     return xr.Dataset(variables, coordinates, plain_attributes(known))
 
 
@@ -145,6 +136,7 @@ def file_table(
         If the axes, the wavelengths or the shape are not those of a table, or a value is not a finite number.
     """
     from brdfdb.formats._dense_grid import interpolated
+    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.grids import Grid, check_wavelengths
 
     try:
@@ -159,8 +151,6 @@ def file_table(
         raise FileFormatError(f"{path}: brdf holds values that are not finite")
     table = interpolated(grid, values.astype(np.float32), at)
     channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
-    from brdfdb.formats._readings import FileTable
-
     return FileTable(
         name=str(known.get("name") or Path(path).stem),
         channels=channels,
@@ -197,6 +187,8 @@ def reading_of_rows(
     FileFormatError
         If the rows are over half and difference vectors and no grid, or there are more values than wavelengths.
     """
+    from brdfdb.formats._readings import Samples
+
     if values.shape[1] != (1 if wavelength_nm is None else wavelength_nm.size):
         raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")
     nodes = {name: np.unique(column) for name, column in angles.items()}
@@ -209,8 +201,6 @@ def reading_of_rows(
     zero = np.zeros(len(values))
     turned = {name: np.deg2rad(column) for name, column in angles.items()}
     phi_i = turned.get("phi_i", zero)
-    from brdfdb.formats._readings import Samples
-
     return Samples(
         name=str(known.get("name") or path.stem),
         theta_i=turned["theta_i"],

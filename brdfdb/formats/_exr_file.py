@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError, WriteError
 from brdfdb.formats._pictures import rgb_of
-from brdfdb.formats._record import record
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.tables.slices import Slice
 from brdfdb.tables.table import Table
@@ -23,11 +23,6 @@ UNIT = "1/sr"
 HALF_MAX = 65504.0
 SPHERE = 256  # pixels across the picture of a sphere
 LIT = "radiance of a lit sphere, linear sRGB under D65; a white Lambertian one has 0.8 where it is brightest"
-
-
-def _dirac(specular: NDArray[np.float32]) -> str:
-    """Return a sentence on what an image leaves out of a table with a specular part."""
-    return f"not in this image: up to {specular.max():.4g} of the light leaves in the exact mirror direction"
 
 
 def write_slice(
@@ -106,7 +101,7 @@ def _attributes(image: Slice, table: Table) -> dict[str, Any]:
         "brdf:title": table.metadata.title or "",
         "brdf:quantity": QUANTITY,
         "brdf:unit": UNIT,
-        "brdf:dirac": "none" if table.specular is None else _dirac(table.specular),
+        "brdf:dirac": " ".join(specular_remark(table)) or "none",
         "brdf:error_p99": "not measured" if table.error is None else repr(table.error.overall.p99),
         "brdf:slice": image.kind,
         "brdf:description": image.description,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from brdfdb.errors import ParameterError
@@ -72,6 +72,11 @@ TOLERANCE = Option(
     "largest error against the table that 99 of 100 values may have: the smallest file within it is written",
     low=1e-4,
     high=1.0,
+)
+
+FIXED = replace(
+    TOLERANCE,
+    help="largest error against the table that 99 of 100 values may have: a larger one is reported, the grid is fixed",
 )
 
 WAVELENGTH = Option("wavelength", 550.0, "wavelength of a spectral table that is written [nm]", low=1.0, high=1e6)

@@ -65,6 +65,14 @@ def record(
     }
 
 
+def specular_remark(table: Table) -> tuple[str, ...]:
+    """Return a sentence on the specular part of a table for a file that has no place for it; none if it has none."""
+    if table.specular is None or not table.specular.any():
+        return ()
+    share = f"up to {table.specular.max():.4g} of the light"
+    return (f"not in the file: the specular part, {share} in the exact mirror direction",)
+
+
 def lines(document: dict[str, Any]) -> list[str]:
     """Return a record as lines of text, "key: value", for headers that hold text; values are JSON but for strings."""
     pairs = ((key, value if isinstance(value, str) else json.dumps(value)) for key, value in document.items())

@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import CannotHoldError
-from brdfdb.formats._channels import RGB
+from brdfdb.formats._channels import RGB, Channels, channels_of
 from brdfdb.formats._rgl_build import Plan, build
 from brdfdb.formats._rgl_fields import Fields, Floats32
 from brdfdb.formats._rgl_surface import Surface
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
-    from brdfdb.formats._channels import Channels
     from brdfdb.formats._stated_error import Comparison, FileError
     from brdfdb.tables.table import Table
 
@@ -47,7 +45,6 @@ _FEW = 3  # channels that rungs are compared by
 _OF_SPECTRUM = 0.5  # share of the tolerance that straight lines between wavelengths may take
 _REMEMBERED = 3  # files: the search returns to the one before the last
 _PAIRS = 4001  # pairs of directions that they are tested with
-COLOURLESS = "the colour was not measured: R, G and B are equal"
 REDUCED = (
     "the file holds a quarter or half of the azimuths of the light, which Mitsuba 3 mirrors; "
     "pbrt-v4 and RGL's loader take files with azimuth full"
@@ -86,7 +83,7 @@ def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full:
     if kind == "spectral":
         return fit
     fields = replace(fit.fields, spectra=np.repeat(fit.fields.spectra, 3, axis=2), wavelength_nm=None)
-    return replace(fit, fields=fields, channels=RGB, remarks=(COLOURLESS, *fit.remarks))
+    return replace(fit, fields=fields, channels=RGB, remarks=(*channels_of(table, "rgb").remarks, *fit.remarks))
 
 
 @functools.lru_cache(maxsize=2)
@@ -98,7 +95,8 @@ def _smallest_grey(table: Table, tolerance: float, most_bytes: float, full: bool
 def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool) -> Fit:
     from brdfdb.formats._stated_error import Comparison
 
-    channels, remarks = _channels(table, kind)
+    channels = channels_of(table, "" if kind == "spectral" else "rgb")
+    remarks = channels.remarks
     search = _Search(table, Comparison(table, channels), kind, tolerance, full)
     if search.surface.reduction > 1:
         remarks += (REDUCED,)
@@ -191,24 +189,8 @@ class _Search:
         return 4 * plan.lights * plan.azimuths * texels
 
 
-def _channels(table: Table, kind: str) -> tuple[Channels, tuple[str, ...]]:
-    """Return the channels of a kind of file, and remarks."""
-    from brdfdb.formats._channels import Channels, channels_of
-
-    if kind == "spectral":
-        return channels_of(table), ()
-    at = table.wavelength_nm
-    assert at is not None
-    try:
-        return channels_of(table, "rgb"), ()
-    except CannotHoldError:
-        return Channels(RGB, at, np.full((at.size, 3), 1.0 / at.size), "mean over the wavelengths"), (COLOURLESS,)
-
-
 def _some(channels: Channels, kept: NDArray[np.int64]) -> Channels:
     """Return some of the channels."""
-    from brdfdb.formats._channels import Channels
-
     names = tuple(channels.names[index] for index in kept)
     if channels.wavelength_nm is None:
         return Channels(names, None, None, channels.meaning)

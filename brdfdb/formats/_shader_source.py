@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from brdfdb.errors import CannotHoldError
-from brdfdb.formats._channels import RGB, channels_of
-from brdfdb.formats._record import CONVENTION, lines, record
+from brdfdb.formats._channels import RGB, channels_of, has_spectrum
+from brdfdb.formats._record import CONVENTION, lines, record, specular_remark
 from brdfdb.formats._shader_models import FUNCTIONS
 from brdfdb.formats._shader_models import MODELS as SHADERS
 from brdfdb.formats._written import Written, whole
@@ -39,8 +39,26 @@ class Language:
     after: str = ""
 
 
-def write_source(table: Table, path: str | os.PathLike[str], language: Language, verdict: str | None) -> Written:
+def write_source(
+    language: Language, table: Table, path: str | os.PathLike[str], *, verdict: str | None = None
+) -> Written:
     """Write the function ``brdf(wi, wr)`` of a table's model: whole, or not at all.
+
+    Parameters
+    ----------
+    language : Language
+        The shading language.
+    table : Table
+        Table in memory, of a model with a closed form.
+    path : path
+        The file; one that is there is replaced. The record is in its first lines, as comments.
+    verdict : str, optional
+        Verdict of the audit of this revision.
+
+    Returns
+    -------
+    Written
+        The file, with the error of the model against the table.
 
     Raises
     ------
@@ -67,8 +85,7 @@ def write_source(table: Table, path: str | os.PathLike[str], language: Language,
         return np.stack(values, axis=-1)
 
     error = Comparison(table, channels).error_of(evaluate)
-    if table.specular is not None:
-        remarks = (*remarks, f"without the specular part, up to {table.specular.max():.4g} of the light")
+    remarks = (*remarks, *channels.remarks, *specular_remark(table))
     document = record(table, error, verdict, holds=CONVENTION, remarks=remarks)
     comments = [*lines(document), f"f_r [1/sr] of the model {model}, {channels.meaning}", _FRAME]
     text = "".join(f"// {_plain(line)}\n" for line in comments) + "\n" + source(model, parameters, language, table.name)
@@ -131,8 +148,7 @@ def _closed_form(table: Table) -> tuple[str, dict[str, Any], Channels, tuple[str
     material = table.source
     if not isinstance(material, Material):
         raise CannotHoldError(f"{table.name}: the table does not say of which model it is, so there is no source of it")
-    at = table.wavelength_nm
-    several = at is not None and at.size > 1
+    several = has_spectrum(table)
     model, changes = _FITS.get(material.model, (material.model, {}))
     indexed = MODELS[model].spectral
     if model not in SHADERS or (several and indexed):

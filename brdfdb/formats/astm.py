@@ -1,4 +1,10 @@
-"""ASTM E1392: f_r at pairs of directions as rows of text, in the dialect of Cornell's measurements."""
+"""ASTM E1392: f_r at pairs of directions as rows of text, in the dialect of Cornell's measurements.
+
+A row holds the polar angles and azimuths of light and viewer, in radians, and f_r in 1/sr at each wavelength. The rows
+form a grid whose nodes are chosen for the tolerance. libbsdf interpolates in straight lines over each angle.
+
+Anisotropic tables and all wavelengths fit. The specular part does not.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +21,8 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
-from brdfdb.formats._colours import specular_remark
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import lines, of_lines, record
+from brdfdb.formats._record import lines, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -111,6 +116,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     OSError
         If it cannot be read.
     """
+    from brdfdb.formats._readings import FileTable
+
     path = Path(path)
     comments, names, rows = _parsed(path)
     document = of_lines(comments)
@@ -133,8 +140,6 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
     if one_side:
         nodes, values = (*nodes[:2], nodes[2][nodes[2] < 4.0]), values[:, :, nodes[2] < 4.0]
-    from brdfdb.formats._readings import FileTable
-
     return FileTable(name, names, at, AngularGrid(Spherical(anisotropic, one_side), nodes, values).evaluate, document)
 
 

@@ -1,4 +1,11 @@
-"""BiRD: the universal BRDF format 1.0 of the project BiRD, JSON with one entry a direction and wavelength."""
+"""BiRD: the universal BRDF format 1.0 of the project BiRD, JSON with one entry a direction and wavelength.
+
+The lists hold the polar angles and azimuths of light and viewer, in degrees, f_r in 1/sr and the wavelengths in nm. The
+directions form a grid. The format does not say how to interpolate. The stated error is that of straight lines along all
+angles at once.
+
+Anisotropic tables and all wavelengths fit. The specular part does not.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows, specular_remarks
+from brdfdb.formats._dense_files import dense_record, reading_of_rows
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, column, degrees_of, parsed, title_of
+from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -83,8 +91,7 @@ def write(
         digits=_DIGITS,
         last_deg=_LAST_DEG,
     )
-    wanted = None if resolution else tolerance
-    known = dense_record(table, dense, verdict, wanted, specular=False)
+    known = dense_record(table, dense, verdict, specular=False)
     nodes, values = list(dense.grid.axes.values()), dense.values
     for axis, name in enumerate(dense.grid.names):  # 360 degrees are 0 again, and not allowed
         if nodes[axis][-1] == 360.0 and name.startswith("phi"):
@@ -101,7 +108,7 @@ def write(
     document = {"metadata": _metadata(table, known), "data": data}
     with whole(path) as (half,):
         half.write_text(json.dumps(document, ensure_ascii=False, separators=(",", ":")), encoding="utf-8")
-    return Written((Path(path),), dense.error, wanted, specular_remarks(table))
+    return Written((Path(path),), dense.error, dense.tolerance, specular_remark(table))
 
 
 def recognises(head: bytes) -> bool:

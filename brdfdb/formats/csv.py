@@ -1,4 +1,11 @@
-"""CSV: f_r on a plain grid of angles, a row a pair of directions and a column a wavelength."""
+"""CSV: f_r on a plain grid of angles, a row a pair of directions and a column a wavelength.
+
+The columns are the angles in degrees, then f_r in 1/sr, with five significant digits. Lines that begin with # hold the
+record. The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors
+(``--axes``). The cosine is not included. Readers interpolate in straight lines along all axes at once.
+
+Anisotropic tables and all wavelengths fit. The specular part does not.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows, specular_remarks
-from brdfdb.formats._record import lines, of_lines
+from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
+from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -72,8 +79,7 @@ def write(
     row_bytes = _ANGLE_BYTES * (4 if table.anisotropic else 3) + _VALUE_BYTES * count
     most = _MOST_BYTES // row_bytes * count
     dense = dense_table(table, tolerance, axes=axes, resolution=resolution, most_values=most, digits=_DIGITS)
-    wanted = None if resolution else tolerance
-    known = dense_record(table, dense, verdict, wanted, specular=False)
+    known = dense_record(table, dense, verdict, specular=False)
     names = dense.channels.names if dense.channels.wavelength_nm is not None else ("brdf",)
     header = [*(f"# {line}" for line in (*lines(known), _COLUMNS)), ",".join((*dense.grid.names, *names))]
     columns = [[repr(float(node)) for node in nodes] for nodes in dense.grid.axes.values()]
@@ -87,7 +93,7 @@ def write(
             file.writelines(
                 f"{start},{last},{','.join(map(repr, row))}\n" for last, row in zip(columns[-1], numbers, strict=True)
             )
-    return Written((Path(path),), dense.error, wanted, specular_remarks(table))
+    return Written((Path(path),), dense.error, dense.tolerance, specular_remark(table))
 
 
 def recognises(head: bytes) -> bool:
@@ -108,6 +114,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     FileFormatError
         If the columns are not angles [degree] and values, a number cannot be read, or the file has more than 1 GiB.
     """
+    from brdfdb.formats._readings import Samples
+
     path = Path(path)
     if path.stat().st_size > _MOST_READ:
         raise FileFormatError(f"{path}: it has more than {_MOST_READ} bytes")
@@ -127,8 +135,6 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     angles = tuple(name for name in names if name in _ANGLES)
     if not angles or numbers.shape[1] != len(names) or names[: len(angles)] != angles or len(names) == len(angles):
         raise FileFormatError(f"{path}: the columns {', '.join(names)[:200]} are not angles, then values of f_r")
-    from brdfdb.formats._readings import Samples
-
     known = of_lines(comments)
     at = _wavelengths(names[len(angles) :])
     columns = {name: numbers[:, index] for index, name in enumerate(angles)}

@@ -1,4 +1,11 @@
-"""Eradiate: tables of its BSDF ``mqdiffuse``, measured and almost diffuse, as netCDF."""
+"""Eradiate: tables of its BSDF ``mqdiffuse``, measured and almost diffuse, as netCDF.
+
+f_r in 1/sr is on a regular grid: the cosines of light and viewer, and the azimuth between them. Eradiate's kernel
+interpolates in straight lines along all three. Narrow lobes need more nodes than a grid can have.
+
+The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
+part is left out.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +23,9 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError, import_extra
 from brdfdb.formats._channels import at_wavelength
-from brdfdb.formats._dense_files import record_of_attributes, specular_remarks
+from brdfdb.formats._dense_files import record_of_attributes
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
-from brdfdb.formats._record import record
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -105,9 +112,7 @@ def write(
     shape = (count, count | 1, count) if count else _smallest(table, comparison, tolerance)
     values = _values(table, channels, shape)
     error = comparison.error_of(functools.partial(_evaluated, values))
-    remarks = specular_remarks(table)
-    if channels.wavelength_nm is not None:
-        remarks = (*remarks, channels.meaning)
+    remarks = (*specular_remark(table), *channels.remarks)
     wanted = None if resolution else tolerance
     known = record(table, error, verdict, holds=HOLDS, remarks=remarks, tolerance=wanted)
     known["wavelength_nm"] = None if channels.wavelength_nm is None else float(channels.wavelength_nm[0])

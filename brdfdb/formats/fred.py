@@ -1,9 +1,12 @@
 """FRED's tabulated scatter: f_r at angles of light and viewer as text.
 
 The layout is that of files that laboratories publish for FRED. Each direction of the light has a block. Its first line
-has two angles [degree], and the lines below it have two angles and f_r for each viewer. The azimuth of a viewer counts
-from the half plane of the mirror direction. FRED does not publish how it interpolates. This reader interpolates in
-straight lines over each angle.
+has two angles in degrees, and the lines below it have two angles and f_r in 1/sr for each viewer. The azimuth of a
+viewer counts from the half plane of the mirror direction. FRED does not publish how it interpolates. This reader
+interpolates in straight lines over each angle.
+
+The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
+part is left out.
 """
 
 from __future__ import annotations
@@ -22,9 +25,8 @@ from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import at_wavelength
-from brdfdb.formats._colours import specular_remark
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
-from brdfdb.formats._record import record
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -97,9 +99,7 @@ def write(
         lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
     )
     path = Path(path)
-    remarks = specular_remark(table)
-    if comparison.channels.wavelength_nm is not None:
-        remarks = (*remarks, comparison.channels.meaning)
+    remarks = (*specular_remark(table), *comparison.channels.remarks)
     document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
     at = comparison.channels.wavelength_nm
     document["wavelength_nm"] = None if at is None else float(at[0])

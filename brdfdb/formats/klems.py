@@ -1,4 +1,11 @@
-"""Klems matrices: averages over patches of the hemisphere, for WINDOW, EnergyPlus and Radiance."""
+"""Klems matrices: averages over patches of the hemisphere, for WINDOW, EnergyPlus and Radiance.
+
+The hemisphere is cut into 145, 77 or 41 patches. A number is the average of f_r in 1/sr over a patch of the light and a
+patch of the viewer. Readers do not interpolate. The patches are fixed, and lobes narrower than a patch become wide.
+
+Anisotropic tables fit. The file has one value, CIE Y. With ``--colour`` it has CIE X and Z as well, which Radiance
+reads. The specular part is left out.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +21,9 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _bsdf_xml
-from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
-from brdfdb.formats._interface import Option
+from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
+from brdfdb.formats._interface import FIXED, Option
 from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -30,7 +37,10 @@ media_type = "application/xml"
 summary = "BSDF files of WINDOW: averages over the patches of Klems"
 tools = "WINDOW and pyWinCalc, EnergyPlus, Radiance"
 kinds = tuple(BASES)
-options = (Option("colour", False, "blocks of colour for Radiance; pyWinCalc refuses files that have them"),)
+options = (
+    FIXED,
+    Option("colour", False, "blocks of colour for Radiance; pyWinCalc refuses files that have them"),
+)
 
 SOLAR, CIE_X, CIE_Z = "Solar", "CIE-X", "CIE-Z"
 _ONE_SHEET = "both sides reflect alike and nothing is transmitted; thickness and thermal properties are placeholders"
@@ -52,7 +62,13 @@ _MOST_RINGS, _MOST_PATCHES = 46, 100_000  # of a basis that a file defines; Radi
 
 
 def write(
-    table: Table, path: str | os.PathLike[str], *, kind: str = "full", colour: bool = False, verdict: str | None = None
+    table: Table,
+    path: str | os.PathLike[str],
+    *,
+    kind: str = "full",
+    tolerance: float = 0.02,
+    colour: bool = False,
+    verdict: str | None = None,
 ) -> Written:
     """Write a table as a Klems matrix: whole, or not at all.
 
@@ -64,6 +80,8 @@ def write(
         The file; one that is there is replaced.
     kind : str
         "full" with 145 patches, "half" with 77, or "quarter" with 41.
+    tolerance : float [1]
+        Largest p99. The patches are fixed: a larger error is stated.
     colour : bool
         Add the blocks CIE-X and CIE-Z of a spectral table, which Radiance reads. WINDOW's engine refuses such files.
     verdict : str, optional
@@ -71,8 +89,8 @@ def write(
 
     Raises
     ------
-    ParameterError
-        If the wavelengths of the table do not reach over the visible ones.
+    CannotHoldError
+        If the table has several wavelengths that do not reach over the visible ones.
     WriteError
         If the file cannot be written.
 
@@ -80,10 +98,10 @@ def write(
     -----
     WINDOW's front is outdoors and Radiance's indoors: the block Reflection Back is Radiance's front.
     """
-    from brdfdb.formats._record import record
+    from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._stated_error import Comparison
 
-    basis, channels = BASES[kind], visible_channels(table, colour=colour)
+    basis, channels = BASES[kind], channels_of(table, "auto" if colour else "grey")
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return np.maximum(channels.values(table, wi, wr), 0.0)
@@ -92,13 +110,13 @@ def write(
     texts = [_text(matrix[..., channel]) for channel in range(matrix.shape[-1])]
     read_back = np.stack([_numbers(text) for text in texts], axis=-1).reshape(matrix.shape)
     error = Comparison(table, channels).error_of(functools.partial(evaluated, read_back, basis, basis))
-    remarks = (*remarks_of(table), _ONE_SHEET, _SOLAR)
-    document = record(table, error, verdict, holds=_HOLDS, remarks=remarks)
+    remarks = (*channels.remarks, *specular_remark(table), _ONE_SHEET, _SOLAR)
+    document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
     definition = ["<IncidentDataStructure>Columns</IncidentDataStructure>", *_definition(basis)]
     with whole(path) as (half,), half.open("w", encoding="utf-8") as file:
         title = table.metadata.title or ""
         file.writelines(_bsdf_xml.text_of(table.name, title, _MATERIAL, definition, _blocks(basis, texts), document))
-    return Written((Path(path),), error, None, remarks)
+    return Written((Path(path),), error, tolerance, remarks)
 
 
 def _blocks(basis: Basis, texts: list[str]) -> Iterator[Block]:
@@ -168,6 +186,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     -----
     Radiance varies the values by up to 3e-4 from pair to pair, and keeps 8 bits of each chromaticity; both is left out.
     """
+    from brdfdb.formats._readings import FileTable
+
     file = _bsdf_xml.read(path)
     if file.structure.lower() not in ("columns", "rows"):
         raise FileFormatError(f"{path}: its structure {file.structure!r} is not Columns or Rows")
@@ -182,9 +202,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
             raise FileFormatError(f"{path}: the angle basis {name!r} is not defined")
     lights, viewers = bases[visible.basis.lower()], bases[visible.row_basis.lower()]
     matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
-    of_colour = ("X", "Y", "Z") if len(names) > 1 else ("grey",)
-    from brdfdb.formats._readings import FileTable
-
+    of_colour = XYZ if len(names) > 1 else LUMINOUS
     return FileTable(file.name, of_colour, None, functools.partial(evaluated, matrix, viewers, lights), file.record)
 
 

@@ -1,4 +1,12 @@
-"""MaterialX: the OpenPBR or Standard Surface that comes closest to a table, as a document that states its error."""
+"""MaterialX: the OpenPBR or Standard Surface that comes closest to a table, as a document that states its error.
+
+The file holds the parameters of a surface, which are fitted to the table. Renderers evaluate the surface, so nothing is
+interpolated. Its shapes are those of GGX and Oren-Nayar. Other lobes come out different, and the stated error says how
+much.
+
+Anisotropic highlights fit. Spectral tables become linear sRGB. The specular part is left out, unless the surface is
+smooth.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +18,13 @@ from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._channels import RGB, channels_of
+from brdfdb.formats._channels import RGB, channels_of, has_spectrum
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface
-from brdfdb.formats._record import record
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
-    from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
     from brdfdb.tables.table import Table
 
@@ -101,14 +108,10 @@ def write(
     from brdfdb.formats._materialx_fit import fitted
     from brdfdb.formats._stated_error import Comparison
 
-    channels, remarks = _channels(table)
+    channels = channels_of(table, "rgb" if has_spectrum(table) else "grey")
     surface = _rounded(fitted(kind, table, channels))
     error = Comparison(table, channels).error_of(surface.brdf)
-    remarks = (_FITTED, *remarks)
-    if surface.smooth:
-        remarks = (*remarks, _SMOOTH)
-    elif table.specular is not None:
-        remarks = (*remarks, f"without the specular part, up to {table.specular.max():.4g} of the light")
+    remarks = (_FITTED, *channels.remarks, *((_SMOOTH,) if surface.smooth else specular_remark(table)))
     document = record(table, error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
     text = _document(table.name, surface, json.dumps(document))
     with whole(path) as (temporary,):
@@ -132,6 +135,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     OSError
         If the file cannot be read.
     """
+    from brdfdb.formats._readings import FileTable
+
     path = Path(path)
     with path.open("rb") as file:
         text = file.read(_LARGEST + 1)
@@ -152,19 +157,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     grey = all(len(set(color)) == 1 for color in (surface.base_color, surface.specular_color))
     if grey:
         surface = replace(surface, base_color=surface.base_color[:1], specular_color=surface.specular_color[:1])
-    from brdfdb.formats._readings import FileTable
-
     return FileTable(str(name), ("grey",) if grey else RGB, None, surface.brdf, document)
-
-
-def _channels(table: Table) -> tuple[Channels, tuple[str, ...]]:
-    """Return the channels in which a table is fitted, and a remark on one that has no colour."""
-    at = table.wavelength_nm
-    if at is None:
-        return channels_of(table), ()
-    if at.size == 1:
-        return channels_of(table), (f"grey: the table has one wavelength, {at[0]:g} nm",)
-    return channels_of(table, "rgb"), ()
 
 
 def _rounded(surface: Surface) -> Surface:

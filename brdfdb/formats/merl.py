@@ -1,4 +1,11 @@
-"""MERL: isotropic tables in three colours on the fixed grid of half and difference vectors of Matusik et al. (2003)."""
+"""MERL: isotropic tables in three colours on the fixed grid of half and difference vectors of Matusik et al. (2003).
+
+The grid has 90 x 90 x 180 bins over the half and difference vectors, finer next to the normal. A number is f_r in 1/sr
+times a scale. Some readers look one bin up, and others interpolate in straight lines (``--samples``). The grid is
+fixed. Lobes narrower than a bin come out coarse.
+
+The file holds linear sRGB. Anisotropic tables are refused, and the specular part is left out.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +21,9 @@ from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats._angles import HALF_PI, HalfDifference
 from brdfdb.formats._angular_grid import AngularGrid, reciprocal
 from brdfdb.formats._beside import beside, record_beside
-from brdfdb.formats._colours import colours_of, specular_remark
-from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import record
+from brdfdb.formats._channels import RGB, channels_of
+from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -30,7 +37,7 @@ summary = "isotropic tables as RGB on the fixed MERL grid of 90 x 90 x 180"
 tools = "BRDF Explorer, plugins of Mitsuba and others, libbsdf"
 kinds = ()
 options = (
-    TOLERANCE,
+    FIXED,
     Option(
         "samples",
         "centres",
@@ -90,7 +97,7 @@ def write(
 
     if table.anisotropic:
         raise CannotHoldError(f"{table.name}: MERL files are isotropic, and the table is anisotropic")
-    channels, remarks = colours_of(table, "rgb")
+    channels = channels_of(table, "rgb")
     valid, angles = _nodes(samples)
     comparison = Comparison(table, channels)
     planes = np.full((3, *SHAPE), INVALID)
@@ -102,7 +109,7 @@ def write(
         first = 0 if samples == "centres" else 1
         planes[..., SHAPE[2] // 2 :] = planes[..., first : first + SHAPE[2] // 2][..., ::-1]
     error = comparison.error_of(_Reader(planes, samples))
-    remarks = (*remarks, *specular_remark(table))
+    remarks = (*channels.remarks, *specular_remark(table))
     holds = _HOLDS + ("centres of bins" if samples == "centres" else "lower edges of bins")
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
     paths = Path(path), beside(Path(path))
@@ -127,6 +134,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     OSError
         If it cannot be read.
     """
+    from brdfdb.formats._readings import FileTable
+
     path = Path(path)
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
@@ -138,9 +147,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     known = record_beside(path)
     samples = "edges" if known.get("samples") == "edges" else "centres"
     name = str(known.get("name") or path.stem)
-    from brdfdb.formats._readings import FileTable
-
-    return FileTable(name, ("R", "G", "B"), None, _Reader(planes, samples), known)
+    return FileTable(name, RGB, None, _Reader(planes, samples), known)
 
 
 def _nodes(samples: str) -> tuple[NDArray[np.bool_], Floats]:

@@ -1,4 +1,10 @@
-"""netCDF: f_r on a plain grid of angles, which xarray and every other reader of netCDF opens."""
+"""netCDF: f_r on a plain grid of angles, which xarray and every other reader of netCDF opens.
+
+The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
+f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+
+Anisotropic tables, all wavelengths and the specular part fit. The specular part has a variable of its own.
+"""
 
 from __future__ import annotations
 
@@ -63,10 +69,9 @@ def write(
 
     import_extra("scipy.io")
     dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
-    wanted = None if resolution else tolerance
     with whole(path) as (half,):
-        dataset(table, dense, verdict, wanted).to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")
-    return Written((Path(path),), dense.error, wanted)
+        dataset(table, dense, verdict).to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")
+    return Written((Path(path),), dense.error, dense.tolerance)
 
 
 def recognises(head: bytes) -> bool:

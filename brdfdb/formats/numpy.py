@@ -1,4 +1,10 @@
-"""NumPy: f_r on a plain grid of angles as an .npz archive of arrays."""
+"""NumPy: f_r on a plain grid of angles as an .npz archive of arrays.
+
+The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
+f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+
+Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table, specular_remarks
+from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table
+from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -67,20 +74,19 @@ def write(
     from brdfdb.formats._dense_grid import dense_table
 
     dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
-    wanted = None if resolution else tolerance
     at = dense.channels.wavelength_nm
     arrays: dict[str, NDArray[Any]] = dict(dense.grid.axes)
     if at is not None:
         arrays["wavelength"] = at
-    known = dense_record(table, dense, verdict, wanted, specular=True)
+    known = dense_record(table, dense, verdict, specular=True)
     arrays |= {"axes": np.array(list(arrays)), "record": np.array(json.dumps(known, ensure_ascii=False))}
-    if specular_remarks(table) and table.specular is not None:
+    if specular_remark(table) and table.specular is not None:
         nodes = table.axes_deg["theta_i"] if table.specular_theta_deg is None else table.specular_theta_deg
         arrays |= {"specular_theta_i": nodes, "specular_reflectance": table.specular}
     arrays["brdf"] = dense.values[..., 0] if at is None else dense.values
     with whole(path) as (half,), half.open("wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
-    return Written((Path(path),), dense.error, wanted)
+    return Written((Path(path),), dense.error, dense.tolerance)
 
 
 def recognises(head: bytes) -> bool:

@@ -1,4 +1,11 @@
-"""ASAM OpenMATERIAL 3D: lookup tables of the BRDF of isotropic materials (.xompt)."""
+"""ASAM OpenMATERIAL 3D: lookup tables of the BRDF of isotropic materials (.xompt).
+
+A row holds a wavelength in metres, three angles in radians, and f_r in 1/sr. The directions form a grid of light and
+viewer. The format does not say how to interpolate. The stated error is that of straight lines along all angles at once.
+
+All wavelengths fit. Grey tables are written at 550 nm. Anisotropic tables are refused, and the specular part is left
+out.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows, specular_remarks
+from brdfdb.formats._dense_files import dense_record, reading_of_rows
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, degrees_of, parsed, title_of
+from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -83,12 +91,11 @@ def write(
         raise CannotHoldError(f"{table.name}: is anisotropic, and OpenMATERIAL 3D holds isotropic tables only")
     most = MOST_BYTES // (2 * _ROW_BYTES)
     dense = dense_table(table, tolerance, axes="light_viewer", resolution=resolution, most_values=most, digits=_DIGITS)
-    wanted = None if resolution else tolerance
     at = dense.channels.wavelength_nm
-    remarks = specular_remarks(table)
+    remarks = specular_remark(table)
     if at is None:
         remarks = (*remarks, f"grey: the same at all wavelengths, written at {GREY_NM:g} nm")
-    known = dense_record(table, dense, verdict, wanted, specular=False) | {"remarks": list(remarks)}
+    known = dense_record(table, dense, verdict, specular=False) | {"remarks": list(remarks)}
     half_turn = dense.grid.axes["delta_phi"]
     full_turn = np.append(half_turn, 360.0 - half_turn[-2::-1])
     values = np.concatenate([dense.values, dense.values[:, :, -2::-1]], axis=2)
@@ -108,7 +115,7 @@ def write(
                     file.write(separator + ",\n".join(f"{start}{a}{f!r}]" for a, f in zip(azimuths, row, strict=True)))
                     separator = ",\n"
         file.write("]}}\n")
-    return Written((Path(path),), dense.error, wanted, remarks)
+    return Written((Path(path),), dense.error, dense.tolerance, remarks)
 
 
 def recognises(head: bytes) -> bool:

@@ -1,15 +1,18 @@
-"""OSL: the closed form of a table's model as a function."""
+"""OSL: the closed form of a table's model as a function.
+
+The function gives f_r in 1/sr, without the cosine. It computes the model itself with the parameters of the material, so
+nothing is interpolated. The stated error is that of the model against the table. A shader that calls the function
+stands below it.
+
+Anisotropic models fit, and colours in linear sRGB. Models with integrals or spectra of refractive indices have no
+closed form, and are refused. The specular part is left out.
+"""
 
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING
+import functools
 
 from brdfdb.formats._shader_source import Language, write_source
-
-if TYPE_CHECKING:
-    from brdfdb.formats._written import Written
-    from brdfdb.tables.table import Table
 
 suffix = ".osl"
 media_type = "text/plain"
@@ -26,30 +29,4 @@ shader $name(vector wi = vector(0.0, 0.0, 1.0), vector wr = vector(0.0, 0.0, 1.0
 }
 """
 LANGUAGE = Language("vector", "color", _SHADER)
-
-
-def write(table: Table, path: str | os.PathLike[str], *, verdict: str | None = None) -> Written:
-    """Write the function `color brdf(vector wi, vector wr)` of the model of a table: whole, or not at all.
-
-    Parameters
-    ----------
-    table : Table
-        Table in memory, of a model with a closed form.
-    path : path
-        The file; one that is there is replaced. The record is in its first lines, as comments.
-    verdict : str, optional
-        Verdict of the audit of this revision.
-
-    Returns
-    -------
-    Written
-        The file, with the error of the model against the table.
-
-    Raises
-    ------
-    CannotHoldError
-        If the table does not say which model it holds, or the model has no closed form in a shader.
-    WriteError
-        If the file cannot be written.
-    """
-    return write_source(table, path, LANGUAGE, verdict)
+write = functools.partial(write_source, LANGUAGE)

@@ -1,4 +1,12 @@
-"""Radiance: tensor trees of variable resolution, and the material that scenes include."""
+"""Radiance: tensor trees of variable resolution, and the material that scenes include.
+
+A tree cuts the directions of light and viewer into cells, small where f_r varies. A cell holds the average of f_r in
+1/sr. Radiance does not interpolate between cells, so that narrow lobes take many. The file beside the tree is the
+material that scenes include.
+
+Anisotropic tables fit. Spectral tables become CIE Y and the chromaticities u' and v'. The specular part is left out: a
+scene can add a mirror for it.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +20,8 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _bsdf_xml
-from brdfdb.formats._bsdf_visible import remarks_of, visible_channels
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block
+from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._square_disk import ANISOTROPIC, ISOTROPIC
 from brdfdb.formats._tensor_colour import trees_of, xyz_of
@@ -88,8 +96,8 @@ def write(
 
     Raises
     ------
-    ParameterError
-        If the wavelengths of the table do not reach over the visible ones.
+    CannotHoldError
+        If the table has several wavelengths that do not reach over the visible ones.
     WriteError
         If a file cannot be written.
 
@@ -99,15 +107,15 @@ def write(
     what Radiance reads in trees. A table of one wavelength is written as the Visible block.
     """
     from brdfdb.formats._radiance_material import material_text
-    from brdfdb.formats._record import record
+    from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._stated_error import FLOOR, Comparison
 
     path = Path(path)
-    channels = visible_channels(table)
+    channels = channels_of(table, "auto")
     comparison = Comparison(table, channels)
     trees, error = _grown(table, channels, comparison, tolerance, cells)
     dark = comparison.floor.max() * np.pi < FLOOR * _BLACK
-    remarks = (*remarks_of(table), *([_TAKEN_AS_BLACK] if dark else []))
+    remarks = (*channels.remarks, *specular_remark(table), *([_TAKEN_AS_BLACK] if dark else []))
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
     blocks = (
         Block(wavelength, FRONT_OF_RADIANCE, _BASIS, "", tree.text(), "BRDF")
@@ -193,6 +201,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     -----
     Radiance varies the values by up to 2e-4 from cell to cell, so that it can tell cells apart; this is left out.
     """
+    from brdfdb.formats._readings import FileTable
+
     file = _bsdf_xml.read(path)
     rank = _STRUCTURES.get(file.structure.lower())
     if rank is None:
@@ -208,7 +218,5 @@ def read(path: str | os.PathLike[str]) -> FileTable:
             trees.append(parsed(block.numbers, rank))
         except ValueError as error:
             raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
-    of_colour = ("X", "Y", "Z") if len(trees) > 1 else ("grey",)
-    from brdfdb.formats._readings import FileTable
-
+    of_colour = XYZ if len(trees) > 1 else LUMINOUS
     return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record)

@@ -1,4 +1,12 @@
-"""RGL's tensor files: measured materials of Mitsuba 3, pbrt-v4 and RGL's own loader."""
+"""RGL's tensor files: measured materials of Mitsuba 3, pbrt-v4 and RGL's own loader.
+
+The file holds f_r times the cosine, divided by a density of half vectors, on squares that the density warps. Readers
+interpolate in straight lines along both sides of a square, the angles of the light, and the wavelengths. They also draw
+directions with the density.
+
+Anisotropic tables and all wavelengths fit. A file of the kind ``rgb`` holds linear sRGB instead. The specular part is
+left out.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +45,6 @@ HOLDS = (
     "spectra * ndf(half vector) / (4 sigma(light)) is f_r cos(theta_r) [1/sr], the cosine included; "
     "half vectors are warped by vndf"
 )
-SPECULAR = "the specular part is left out: the format has no place for light in the exact mirror direction alone"
 
 
 def write(
@@ -74,19 +81,19 @@ def write(
 
     Raises
     ------
+    CannotHoldError
+        If the kind is "rgb", and the table has several wavelengths that do not reach over the visible ones.
     WriteError
         If the file cannot be written.
     """
-    from brdfdb.formats._record import record
+    from brdfdb.formats._record import record, specular_remark
     from brdfdb.formats._rgl_search import smallest
     from brdfdb.formats._rgl_tensor import write_tensors
     from brdfdb.formats._written import Written, whole
 
     path = Path(path)
     fit = smallest(table, kind, tolerance, 1e6 * megabytes, azimuth == "full")
-    remarks = fit.remarks
-    if table.specular is not None and table.specular.max() > 0.0:
-        remarks += (SPECULAR,)
+    remarks = (*fit.remarks, *specular_remark(table))
     document = record(table, fit.error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
     document["channels"] = list(fit.channels)
     fields = replace(fit.fields, description=json.dumps(document))

@@ -1,4 +1,11 @@
-"""SSDD: any table on a grid that is chosen for it, with the specular part in a block of its own (libbsdf)."""
+"""SSDD: any table on a grid that is chosen for it, with the specular part in a block of its own (libbsdf).
+
+The lists of angles are those of half and difference vectors, of the viewer about the specular direction, or of light
+and viewer. The ones that need the fewest nodes are taken. libbsdf interpolates f_r, in 1/sr, in straight lines over
+each angle.
+
+Anisotropic tables, all wavelengths and the specular part fit.
+"""
 
 from __future__ import annotations
 
@@ -114,6 +121,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     OSError
         If it cannot be read.
     """
+    from brdfdb.formats._readings import FileTable
+
     path = Path(path)
     comments, blocks = _ssdd_file.parsed(path)
     by_type = {block.entries["DATA_TYPE"]: block for block in blocks}
@@ -129,8 +138,6 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     at = block.wavelength_nm
     names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else tuple(f"{value:g}nm" for value in at)
     name = str(document.get("name") or block.entries.get("NAME") or path.stem)
-    from brdfdb.formats._readings import FileTable
-
     return FileTable(name, names, at, grid.evaluate, document)
 
 

@@ -1,4 +1,11 @@
-"""UTIA: tables in three colours on the fixed anisotropic grid of the UTIA BRDF database (Filip and Vavra 2014)."""
+"""UTIA: tables in three colours on the fixed anisotropic grid of the UTIA BRDF database (Filip and Vavra 2014).
+
+The grid has steps of 15 degrees in the polar angles of light and viewer, and of 7.5 degrees in their azimuths. A number
+is f_r in 1/sr, or a code of it (``--encoding``). Readers interpolate in straight lines over the four angles. The grid
+is fixed. It is too coarse for glossy surfaces, and the stated error says so.
+
+Anisotropic tables fit. Spectral tables become linear sRGB. The specular part is left out.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +20,9 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, filled
 from brdfdb.formats._beside import beside, record_beside
-from brdfdb.formats._colours import colours_of, specular_remark
-from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import record
+from brdfdb.formats._channels import RGB, channels_of
+from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -29,7 +36,7 @@ summary = "RGB on the fixed UTIA grid of 15 by 7.5 degrees, anisotropic tables t
 tools = "readers of UTIA, ALTA"
 kinds = ()
 options = (
-    TOLERANCE,
+    FIXED,
     Option(
         "encoding",
         "linear",
@@ -88,12 +95,12 @@ def write(
     """
     from brdfdb.formats._stated_error import Comparison
 
-    channels, remarks = colours_of(table, "rgb")
+    channels = channels_of(table, "rgb")
     comparison = Comparison(table, channels)
     grid = filled(table, comparison, _SYSTEM, _NODES)
     numbers = _encoded(np.maximum(grid.values.astype(np.float64), 0.0), encoding)
     error = comparison.error_of(_Reader(numbers, encoding))
-    remarks = (*remarks, *specular_remark(table))
+    remarks = (*channels.remarks, *specular_remark(table))
     holds = _LINEAR if encoding == "linear" else _DJ
     document = record(table, error, verdict, holds=holds, remarks=remarks, tolerance=tolerance)
     paths = Path(path), beside(Path(path))
@@ -123,6 +130,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     OSError
         If it cannot be read.
     """
+    from brdfdb.formats._readings import FileTable
+
     path = Path(path)
     size = path.stat().st_size
     if size != _BYTES:
@@ -133,9 +142,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     known = record_beside(path)
     numbers = np.pad(np.moveaxis(planes, 0, -1), [(0, 0), (0, 1), (0, 0), (0, 1), (0, 0)], mode="wrap")
     evaluate = _Reader(numbers, "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear")
-    from brdfdb.formats._readings import FileTable
-
-    return FileTable(str(known.get("name") or path.stem), ("R", "G", "B"), None, evaluate, known)
+    return FileTable(str(known.get("name") or path.stem), RGB, None, evaluate, known)
 
 
 def _encoded(f_r: Floats, encoding: str) -> Floats:

@@ -1,4 +1,10 @@
-"""zarr 3: f_r on a plain grid of angles, a directory that xarray and zarr open."""
+"""zarr 3: f_r on a plain grid of angles, a directory that xarray and zarr open.
+
+The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
+f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
+
+Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own.
+"""
 
 from __future__ import annotations
 
@@ -58,10 +64,9 @@ def write(
     from brdfdb.formats._dense_grid import dense_table
 
     dense = dense_table(table, tolerance, axes=axes, resolution=resolution)
-    wanted = None if resolution else tolerance
     with whole(path) as (half,):
-        dataset(table, dense, verdict, wanted).to_zarr(half, mode="w", zarr_format=3, consolidated=False)
-    return Written((Path(path),), dense.error, wanted)
+        dataset(table, dense, verdict).to_zarr(half, mode="w", zarr_format=3, consolidated=False)
+    return Written((Path(path),), dense.error, dense.tolerance)
 
 
 def recognises(head: bytes) -> bool:

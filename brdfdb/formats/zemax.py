@@ -1,4 +1,12 @@
-"""Zemax (Radiant) BSDF files: f_r about the specular direction as text, one value or CIE XYZ."""
+"""Zemax (Radiant) BSDF files: f_r about the specular direction as text, one value or CIE XYZ.
+
+For each direction of the light, f_r in 1/sr is listed over the angle from the specular direction and the azimuth about
+it. libbsdf interpolates in straight lines over each angle. The file also holds the total integrated scatter, which is
+the albedo.
+
+Anisotropic tables fit, but OpticStudio and libbsdf read isotropic ones only. Spectral tables become CIE XYZ, or its Y
+alone (``--colour``). The specular part is left out.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +21,9 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats import _zemax_file
 from brdfdb.formats._angles import Specular
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
-from brdfdb.formats._colours import colours_of, specular_remark
+from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import CONVENTION, lines, of_lines, record
+from brdfdb.formats._record import CONVENTION, lines, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -81,8 +89,7 @@ def write(
     """
     from brdfdb.formats._stated_error import Comparison
 
-    spectral = table.wavelength_nm is not None and table.wavelength_nm.size > 1
-    channels, remarks = colours_of(table, ("xyz" if spectral else "grey") if colour == "auto" else colour)
+    channels = channels_of(table, colour)
     count = len(channels.names)
     system = Specular(table.anisotropic, mirrored=not table.anisotropic)
     grid, error = chosen(
@@ -93,8 +100,9 @@ def write(
         int(size * 1e6 / count / _CHARACTERS),
         lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
     )
-    remarks = (*remarks, *specular_remark(table))
+    remarks = (*channels.remarks, *specular_remark(table))
     document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
+    document["channels"] = list(channels.names)
     angles = [np.rad2deg(axis) for axis in grid.nodes]
     values = grid.values
     if not table.anisotropic:
@@ -135,6 +143,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     OSError
         If it cannot be read.
     """
+    from brdfdb.formats._readings import FileTable
+
     path = Path(path)
     text = _zemax_file.parsed(path)
     if text.scatter != "BRDF":
@@ -149,9 +159,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     grid = AngularGrid(Specular(anisotropic, both_sides), nodes, values if anisotropic else values[:, 0])
     document = of_lines(list(text.comments))
     document |= {"theta_i_deg": text.angles[1].tolist(), "tis": np.moveaxis(text.tis, 0, -1).tolist()}
-    names = ("X", "Y", "Z") if text.content == "XYZ" else ("grey",)
-    from brdfdb.formats._readings import FileTable
-
+    luminous = document.get("channels") == list(LUMINOUS)
+    names = XYZ if text.content == "XYZ" else LUMINOUS if luminous else ("grey",)
     return FileTable(str(document.get("name") or path.stem), names, None, grid.evaluate, document)
 
 

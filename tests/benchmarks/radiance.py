@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import brdfdb
 from brdfdb.formats import klems, radiance
-from brdfdb.formats._bsdf_visible import visible_channels
+from brdfdb.formats._channels import channels_of
 from brdfdb.formats._klems_basis import BASES
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.formats._written import Written
@@ -56,7 +56,7 @@ def at_random(table: Table, path: Path) -> float:
     rng = np.random.default_rng(7)
     theta, phi = np.arcsin(np.sqrt(rng.random((2, PAIRS)))), rng.uniform(0.0, 2.0 * np.pi, (2, PAIRS))
     wi, wr = unit_vector(theta[0], phi[0]), unit_vector(theta[1], phi[1])
-    channels = visible_channels(table)
+    channels = channels_of(table, "auto")
     truth = channels.values(table, wi, wr)
     values = queried(path, wi, wr)
     values = values if truth.shape[1] > 1 else values[:, 1:2]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.formats._bsdf_visible import visible_channels
+from brdfdb.formats._channels import channels_of
 from brdfdb.formats._klems_basis import Basis
 from brdfdb.materials import Material
 from brdfdb.parameters import Floats
@@ -123,7 +123,7 @@ def traced(scene: str, rays: Floats, folder: Path, *options: str) -> Floats:
 
 def _luminous(table: Table, theta_i: Floats) -> tuple[Floats, Floats]:
     """Return azimuths [degree] and luminous albedos [1], shape (theta_i, azimuths), at polar angles [rad]."""
-    channels = visible_channels(table)
+    channels = channels_of(table, "auto")
     of_table = directional_albedo(table, np.degrees(theta_i), _ALBEDO_TOLERANCE)
     albedo = of_table.albedo[..., 0] if table.wavelength_nm is None else channels.of_spectra(of_table.albedo)
     return of_table.phi_i_deg, albedo if albedo.ndim == 2 else albedo[..., len(channels.names) // 2]

@@ -282,7 +282,8 @@ def test_an_image_says_what_it_leaves_out_of_a_table_with_a_dirac_part(tmp_path:
     cast(Any, source).specular = np.array([0.25, 0.5], dtype=np.float32)
     _exr_file.write_slice(tmp_path / "lobe.exr", slices.lobe_map(source), source)
     header, _ = read(tmp_path / "lobe.exr")
-    assert header["brdf:dirac"] == "not in this image: up to 0.5 of the light leaves in the exact mirror direction"
+    sentence = "not in the file: the specular part, up to 0.5 of the light in the exact mirror direction"
+    assert header["brdf:dirac"] == sentence
 
 
 def test_an_image_says_the_error_that_its_table_states(tmp_path: Path) -> None:

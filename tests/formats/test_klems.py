@@ -11,7 +11,7 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import klems
-from brdfdb.formats._bsdf_visible import visible_channels
+from brdfdb.formats._channels import channels_of
 from brdfdb.formats._klems_basis import BASES, Basis, averages
 from brdfdb.geometry import unit_vector
 from brdfdb.parameters import Floats
@@ -92,7 +92,7 @@ def test_isotropic_averages_are_those_of_all_pairs() -> None:
     table, basis = table_of("grey"), BASES["quarter"]
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
-        return visible_channels(table).values(table, wi, wr)
+        return channels_of(table, "auto").values(table, wi, wr)
 
     alike, whole = (averages(brdf, basis, 1, isotropic=isotropic) for isotropic in (True, False))
     assert alike == pytest.approx(whole, rel=1e-4)
@@ -101,7 +101,7 @@ def test_isotropic_averages_are_those_of_all_pairs() -> None:
 @FILES
 def test_what_is_read_is_what_the_file_states(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
     reading = formats.read(files[material, kind])
-    assert reading.channels == ("grey",)
+    assert reading.channels == ("Y",)
     assert reading.record["error_of_file"]["p99"] > 0.0
     assert any("both sides" in remark for remark in reading.record["remarks"])
 

@@ -13,7 +13,7 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats import merl
-from brdfdb.formats._colours import colours_of
+from brdfdb.formats._channels import channels_of
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.formats._written import Written
@@ -61,13 +61,13 @@ def test_a_file_is_read_as_brdf_explorer_reads_it(exported: tuple[str, Written])
         expected = looked_up(numbers, light, viewer)
         assert min(expected) >= 0.0  # a direction above the horizon is not invalid
         np.testing.assert_allclose(reading.lookup(*light, *viewer), expected, rtol=1e-12)
-    channels, _ = colours_of(table_of(kind), "rgb")
+    channels = channels_of(table_of(kind), "rgb")
     assert Comparison(table_of(kind), channels).error_of(reading.evaluate) == written.error
 
 
 def test_bins_have_the_value_at_their_centre_and_none_below_the_horizon(exported: tuple[str, Written]) -> None:
     kind, written = exported
-    channels, _ = colours_of(table_of(kind), "rgb")
+    channels = channels_of(table_of(kind), "rgb")
     numbers = np.fromfile(written.paths[0], "<f8", offset=HEADER).reshape(3, 90, 90, 180)
     # theta_h = 90 (30.5 / 90)^2, theta_d = 20.5, phi_d = 90.5: by hand, the light at 90 + 0.5 about the half vector
     theta_h, theta_d, phi_d = np.deg2rad([90.0 * (30.5 / 90.0) ** 2, 20.5, 90.5])

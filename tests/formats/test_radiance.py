@@ -148,7 +148,7 @@ def test_damaged_files_are_refused_with_a_sentence(tmp_path: Path, old: str, new
 @KINDS
 def test_what_is_read_is_what_the_file_states(files: dict[str, Path], kind: str) -> None:
     table, reading = table_of(kind), formats.read(files[kind])
-    assert reading.channels == (("X", "Y", "Z") if kind == "spectral" else ("grey",))
+    assert reading.channels == (("X", "Y", "Z") if kind == "spectral" else ("Y",))
     assert reading.record["title"] == "Made <up> & down"
     stated = reading.record["error_of_file"]
     wi, wr = drawn(5000)

@@ -12,7 +12,7 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import utia
-from brdfdb.formats._colours import colours_of
+from brdfdb.formats._channels import channels_of
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import unit_vector
@@ -47,7 +47,7 @@ def test_a_file_is_read_as_its_own_reader_reads_it(tmp_path: Path, kind: str) ->
     for angles in rng.uniform(0.0, [1.57, 6.28, 1.57, 6.28], (40, 4)):
         expected = interpolated(numbers, angles)
         np.testing.assert_allclose(reading.lookup(*angles), expected, rtol=0.0, atol=SUM_ATOL * numbers.max())
-    channels, _ = colours_of(table_of(kind), "rgb")
+    channels = channels_of(table_of(kind), "rgb")
     again = Comparison(table_of(kind), channels).error_of(reading.evaluate)
     assert written.error is not None
     assert again.p99 == pytest.approx(written.error.p99, rel=1e-9)

@@ -10,7 +10,7 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import zemax
-from brdfdb.formats._colours import colours_of
+from brdfdb.formats._channels import channels_of
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.formats._written import Written
@@ -55,8 +55,8 @@ def test_a_file_holds_what_it_states(exported: tuple[str, Written]) -> None:
     reading = formats.read(written.paths[0])
     assert isinstance(reading, FileTable)
     spectral = kind == "copper"
-    assert reading.channels == (("X", "Y", "Z") if spectral else ("grey",))
-    channels, _ = colours_of(table, "xyz" if spectral else "grey")
+    assert reading.channels == (("X", "Y", "Z") if spectral else ("Y",))
+    channels = channels_of(table, "xyz" if spectral else "grey")
     again = Comparison(table, channels).error_of(reading.evaluate)
     assert written.error is not None
     assert again.p99 == pytest.approx(written.error.p99, rel=ERROR_RTOL)
