@@ -232,11 +232,11 @@ def _compensated_diffuse(at: _Geometry, color: Floats, roughness: float) -> Floa
     single = color * level * (1.0 + roughness * share)
     mean = level * (1.0 + _FUJII_2 * roughness)
     multiple = color**2 * mean / (1.0 - color * max(0.0, 1.0 - mean))
-    lost_i, lost_r = (np.maximum(_LEAST, 1.0 - _fujii_albedo(cos, roughness, level)) for cos in (at.cos_i, at.cos_r))
+    lost_i, lost_r = (np.maximum(_LEAST, 1.0 - _diffuse_albedo(cos, roughness, level)) for cos in (at.cos_i, at.cos_r))
     return np.asarray((single + multiple * lost_i * lost_r / max(_LEAST, 1.0 - mean)) / np.pi)
 
 
-def _fujii_albedo(cos: Floats, roughness: float, level: float) -> Floats:
+def _diffuse_albedo(cos: Floats, roughness: float, level: float) -> Floats:
     sin = np.sqrt(np.maximum(0.0, 1.0 - cos * cos))
     g = sin * (np.arccos(cos) - sin * cos) + 2.0 / 3.0 * (sin / cos * (1.0 - sin**3) - sin)
     return np.asarray(level + roughness * level * g / np.pi)

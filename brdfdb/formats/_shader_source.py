@@ -14,8 +14,6 @@ import numpy as np
 from brdfdb.errors import CannotHoldError
 from brdfdb.formats._channels import RGB, channels_of, has_spectrum
 from brdfdb.formats._record import CONVENTION, lines, record, specular_remark
-from brdfdb.formats._shader_models import FUNCTIONS
-from brdfdb.formats._shader_models import MODELS as SHADERS
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
@@ -23,8 +21,6 @@ if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.tables.table import Table
 
-# The paper's own fit, which is a closed form, in place of integrals over facets
-_FITS = {"oren_nayar_gaussian": ("oren_nayar", {"interreflection": True})}
 _FIT = "the functional fit of the paper, eqs 27 to 29, in place of the integrals over facets that the table holds"
 _INDEX = "n", "k"  # of models with a refractive index
 _FRAME = "wi and wr are unit vectors towards light and viewer in the frame of the surface: x, y, and z its normal"
@@ -100,7 +96,7 @@ def source(model: str, parameters: Mapping[str, Any], language: Language, name: 
     Parameters
     ----------
     model : str
-        One of `brdfdb.formats._shader_models.MODELS`.
+        One of `brdfdb.models.shaders.SHADERS`.
     parameters : mapping
         The arguments of the model; reflectances may have three numbers.
     language : Language
@@ -109,6 +105,7 @@ def source(model: str, parameters: Mapping[str, Any], language: Language, name: 
         Name of the material.
     """
     from brdfdb.models import MODELS
+    from brdfdb.models.shaders import FUNCTIONS, SHADERS
 
     shader = SHADERS[model]
     colors = {parameter.name for parameter in MODELS[model].parameters if parameter.reflectance}
@@ -144,12 +141,13 @@ def _closed_form(table: Table) -> tuple[str, dict[str, Any], Channels, tuple[str
     """Return the model, its arguments in the channels, the channels, and remarks."""
     from brdfdb.materials import Material
     from brdfdb.models import MODELS
+    from brdfdb.models.shaders import FITS, SHADERS
 
     material = table.source
     if not isinstance(material, Material):
         raise CannotHoldError(f"{table.name}: the table does not say of which model it is, so there is no source of it")
     several = has_spectrum(table)
-    model, changes = _FITS.get(material.model, (material.model, {}))
+    model, changes = FITS.get(material.model, (material.model, {}))
     indexed = MODELS[model].spectral
     if model not in SHADERS or (several and indexed):
         reason = "a spectrum of refractive indices" if model in SHADERS else "no closed form"

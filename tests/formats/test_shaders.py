@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError
 from brdfdb.formats import glsl, osl, slang
-from brdfdb.formats._shader_models import MODELS as SHADERS
 from brdfdb.formats._shader_source import source
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.models import MODELS
+from brdfdb.models.shaders import SHADERS
 from tests.formats import opengl, slang_compiler
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, small_table
 from tests.formats.test_materialx import pairs

@@ -18,6 +18,9 @@ class ShaderModel(NamedTuple):
     statements: str
 
 
+# Models without a closed form, and a closed form of the same paper with parameters that it is given
+FITS: dict[str, tuple[str, dict[str, bool]]] = {"oren_nayar_gaussian": ("oren_nayar", {"interreflection": True})}
+
 # Abramowitz and Stegun 1964, 4.4.46 and 7.1.26: within 2e-8 and 1.5e-7
 FUNCTIONS = {
     "brdf_angle": """\
@@ -201,7 +204,7 @@ def _facets(smith: str, reflectance: str) -> ShaderModel:
     return ShaderModel(functions, _FACETS + _SMITH[smith] + _SLOPES[slopes] + _LOBE + reflectance)
 
 
-MODELS = {
+SHADERS = {
     "lambert": ShaderModel((), "return P_RHO / BRDF_PI;\n"),
     "minnaert": ShaderModel((), "return P_RHO * ((P_K + 1.0) / (2.0 * BRDF_PI) * pow(cos_i * cos_r, P_K - 1.0));\n"),
     "oren_nayar": ShaderModel(
