@@ -12,7 +12,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats import _ssdd_file, ssdd
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
-from tests.formats.kinds_of_tables import KINDS, table_of
+from tests.formats.small_tables import KINDS, SPECTRAL, small_table
 
 SIZE = 0.5  # MB, so that tests are quick
 ERROR_RTOL = 1e-6  # of p99 of a file that is read again: worst measured 1.2e-7, of the seven digits in ASCII
@@ -50,9 +50,9 @@ def entries_of(path: Path) -> list[str]:
     return [line.split(" ")[0] for line in lines if line and not line.startswith("#")]
 
 
-@pytest.mark.parametrize(("kind", "data"), [*((kind, "binary") for kind in KINDS), ("copper", "ascii")])
+@pytest.mark.parametrize(("kind", "data"), [*((kind, "binary") for kind in KINDS), (SPECTRAL, "ascii")])
 def test_a_file_holds_what_it_states(tmp_path: Path, kind: str, data: str) -> None:
-    table = table_of(kind)
+    table = small_table(kind)
     written = ssdd.write(table, tmp_path / "a.ssdd", size=SIZE, data=data, verdict="sound")
     assert written.nbytes < 1.2e6 * SIZE
     reading = formats.read(tmp_path / "a.ssdd")
@@ -71,7 +71,7 @@ def test_a_file_holds_what_it_states(tmp_path: Path, kind: str, data: str) -> No
 
 
 def test_the_specular_part_has_a_block_of_its_own(tmp_path: Path) -> None:
-    table = table_of("copper")
+    table = small_table(SPECTRAL)
     ssdd.write(table, tmp_path / "a.ssdd", size=SIZE)
     record = ssdd.read(tmp_path / "a.ssdd").record
     assert table.specular is not None
