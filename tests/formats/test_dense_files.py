@@ -47,7 +47,7 @@ AT_NODES = {
 @pytest.mark.parametrize(("kind", "name"), TRIPS)
 def test_files_read_back_are_within_the_error_that_they_state(kind: str, name: str, tmp_path: Path) -> None:
     table, path = small_table(kind), tmp_path / f"table{EXPORTERS[name].suffix}"
-    written = EXPORTERS[name].write(table, path, tolerance=0.3, verdict="passes")
+    written = EXPORTERS[name].write(table, path, tolerance=0.5, verdict="passes")
     back = formats.read(path)
     assert isinstance(back, FileTable)
     assert written.error is not None
@@ -56,7 +56,7 @@ def test_files_read_back_are_within_the_error_that_they_state(kind: str, name: s
     again = Comparison(table).error_of(lambda wi, wr: np.reshape(back.lookup_vectors(wi, wr), (len(wi), count)))
     assert again == written.error
     assert again.p99 <= back.record["error_of_file"]["p99"] <= 1.02 * again.p99
-    assert (back.record["name"], back.record["audit"], back.record["tolerance"]) == (table.name, "passes", 0.3)
+    assert (back.record["name"], back.record["audit"], back.record["tolerance"]) == (table.name, "passes", 0.5)
     assert back.record["parameters"] == table.metadata.model_dump(mode="json")["parameters"]
     assert (back.wavelength_nm is None) == (table.wavelength_nm is None)
     said = " ".join((*written.remarks, *back.record.get("remarks", [])))
