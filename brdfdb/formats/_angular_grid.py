@@ -3,9 +3,9 @@
 Formats of measurement programs list the nodes of each angle and a value at each combination of them. Their readers
 interpolate linearly over each angle. Nodes need not be uniform: `chosen` places them where f_r curves.
 
-`_dense_grid` chooses nodes for the axes of tables by second derivatives. Here intervals are halved instead, because
-angles about the specular direction have lobes that are narrower than a second derivative tells, and edges at the
-horizon; and because readers of these formats continue lines beyond the last node.
+`_dense_grid` chooses the nodes of tables by second derivatives. It takes fewer values for spectra on half and difference
+vectors, and for light and viewer. It knows no angles about the specular direction, which are the best ones of some
+formats here, and no lines that continue beyond the last node. Halving intervals works for all of them.
 """
 
 from __future__ import annotations

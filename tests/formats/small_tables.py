@@ -29,28 +29,30 @@ _MODELS: dict[str, tuple[str, dict[str, Any], str | None]] = {
     GREY: ("ward", {"rho_d": 0.2, "rho_s": 0.1, "alpha_x": 0.2, "alpha_y": 0.2}, None),
     ANISOTROPIC: ("ward", {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": ALPHA_X, "alpha_y": ALPHA_Y}, None),
     DIFFUSE: ("oren_nayar_qualitative", {"rho": 0.7, "sigma_deg": 30.0}, None),
-    SPECTRAL: ("he_torrance", {"sigma_0_um": 0.1, "tau_um": 1.5, "a": 0.0}, "main/Cu/Johnson"),
+    SPECTRAL: ("he_torrance", {"sigma_0_um": 0.13, "tau_um": 1.2, "a": 0.0}, "main/Cu/Johnson"),
     SMOOTH: ("he_torrance", {"sigma_0_um": 0.0, "tau_um": 1.0, "a": 0.15}, "other/ZeonexE48R/Sultanova"),
 }
 _AXES: dict[str, dict[str, Any]] = {
     GREY: {"theta_h": _HALF, "theta_d": [0, 45, 90], "phi_d": [0, 90]},
-    ANISOTROPIC: {"theta_h": _HALF, "phi_h": [0, 15, 30, 45, 60, 75, 90], "theta_d": [0, 90], "phi_d": [0, 180]},
+    ANISOTROPIC: {"theta_h": _HALF, "phi_h": range(0, 91, 15), "theta_d": [0, 90], "phi_d": range(0, 181, 60)},
     DIFFUSE: _LIGHT_VIEWER,
     SPECTRAL: {"theta_i": _GLOSSY, "theta_r": _GLOSSY, "delta_phi": [0, 60, 120, 150, 165, 172, 180]},
     SMOOTH: _LIGHT_VIEWER,
 }
 _WAVELENGTHS_NM = {SPECTRAL: np.array(WAVELENGTHS_NM), SMOOTH: np.array([460.0])}
+_FINE_NM = np.arange(420.0, 681.0, 20.0)
 
 
 @functools.cache
-def small_table(kind: str) -> Table:
-    """Return the table of one of `KINDS`, which is its name, too."""
+def small_table(kind: str, *, fine_spectrum: bool = False) -> Table:
+    """Return the table of one of `KINDS`, which is its name, too; in fine steps of wavelengths for pictures."""
+    at = _FINE_NM if fine_spectrum else _WAVELENGTHS_NM.get(kind)
     model, parameters, metal = _MODELS[kind]
     index = {"refractive_index": metal} if metal else {}
     entries = {"title": kind, "model": model, "source": "no paper", "parameters": parameters, **index}
     power = 0.5 if model == "ward" else 0.0
     interpolation = Interpolation("cubic", True, 1e-4, power)
-    layout = Layout(Material.from_table(kind, entries), Grid(_AXES[kind]), _WAVELENGTHS_NM.get(kind), interpolation)
+    layout = Layout(Material.from_table(kind, entries), Grid(_AXES[kind]), at, interpolation)
     dataset = tabulate(layout)
     arrays = {str(name): np.asarray(variable.values) for name, variable in dataset.variables.items()}
     return table_from(kind, "r000001", arrays, dataset.attrs)

@@ -11,7 +11,7 @@ from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
 from brdfdb.formats._angular_grid import AngularGrid, chosen, mirrored, reciprocal, rounded
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import unit_vector
-from tests.formats.kinds_of_tables import KINDS, table_of
+from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, small_table
 
 ANGLE_ATOL = 1e-13  # of angles and back [rad]; worst measured 8.4e-15
 SYSTEMS: list[System] = [
@@ -84,22 +84,22 @@ def test_lines_between_nodes_and_beyond_them() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_symmetries_are_those_of_the_table(kind: str) -> None:
-    comparison = Comparison(table_of(kind))
-    assert reciprocal(table_of(kind), comparison)
-    assert mirrored(table_of(kind), comparison)
+    comparison = Comparison(small_table(kind))
+    assert reciprocal(small_table(kind), comparison)
+    assert mirrored(small_table(kind), comparison)
 
 
 def test_a_table_without_mirror_images_is_noticed() -> None:
-    table = table_of("anisotropic ward")
+    table = small_table(ANISOTROPIC)
     skewed = replace(table, values=table.values * np.array([1.0, 1.3, 1.0, 1.0], np.float32))  # over phi_d
     assert not mirrored(skewed, Comparison(skewed))
-    one_way = table_of("oren-nayar")
-    one_way = replace(one_way, values=one_way.values * np.linspace(1.0, 2.0, 8, dtype=np.float32)[:, None, None])
+    one_way = small_table(DIFFUSE)
+    one_way = replace(one_way, values=one_way.values * np.linspace(1.0, 2.0, 7, dtype=np.float32)[:, None, None])
     assert not reciprocal(one_way, Comparison(one_way))
 
 
 def test_a_smaller_tolerance_takes_more_nodes_and_a_limit_is_kept() -> None:
-    table = table_of("ward")
+    table = small_table(GREY)
     comparison = Comparison(table)
     loose, fine = (chosen(table, comparison, [HalfDifference(False)], tolerance, 10**6) for tolerance in (0.1, 0.03))
     assert loose[1].p99 <= 0.1
@@ -111,7 +111,7 @@ def test_a_smaller_tolerance_takes_more_nodes_and_a_limit_is_kept() -> None:
 
 
 def test_the_system_with_the_fewest_nodes_is_taken() -> None:
-    table = table_of("oren-nayar")
+    table = small_table(DIFFUSE)
     grid, _ = chosen(table, Comparison(table), [Specular(False, True), Spherical(False, True)], 0.05, 10**6)
     assert isinstance(grid.system, Spherical)
 

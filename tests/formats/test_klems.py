@@ -17,13 +17,9 @@ from brdfdb.geometry import unit_vector
 from brdfdb.parameters import Floats
 from brdfdb.tables.table import Table
 from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried
+from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, small_table
 
-TABLES = {
-    "grey": ("ward", {"rho_d": 0.3, "rho_s": 0.1, "alpha_x": 0.15, "alpha_y": 0.15}, None),
-    "anisotropic": ("ward", {"rho_d": 0.1, "rho_s": 0.33, "alpha_x": 0.08, "alpha_y": 0.2}, None),
-    "spectral": ("ggx_separable", {"alpha_x": 0.4, "alpha_y": 0.4}, np.arange(400.0, 701.0, 20.0)),
-}
-WRITTEN = [("grey", "full"), ("grey", "half"), ("grey", "quarter"), ("anisotropic", "full"), ("spectral", "quarter")]
+WRITTEN = [(GREY, "full"), (GREY, "half"), (GREY, "quarter"), (ANISOTROPIC, "half"), ("spectral", "quarter")]
 FILES = pytest.mark.parametrize(("material", "kind"), WRITTEN)
 
 # Radiance varies values of pairs by up to 3e-4; worst measured 3.1e-4. It keeps 8 bits of each chromaticity,
@@ -34,7 +30,9 @@ TOTAL = 5e-3  # sums of columns against the albedo of the table, besides the las
 
 @functools.cache
 def table_of(material: str) -> Table:
-    return made(*TABLES[material])
+    if material == "spectral":
+        return made("ggx_separable", {"alpha_x": 0.4, "alpha_y": 0.4}, np.arange(400.0, 701.0, 20.0))
+    return small_table(material)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +87,7 @@ def test_averages_are_those_of_the_patches_of_a_lopsided_function() -> None:
 
 
 def test_isotropic_averages_are_those_of_all_pairs() -> None:
-    table, basis = table_of("grey"), BASES["quarter"]
+    table, basis = table_of(GREY), BASES["quarter"]
 
     def brdf(wi: Floats, wr: Floats) -> Floats:
         return channels_of(table, "auto").values(table, wi, wr)
@@ -106,11 +104,20 @@ def test_what_is_read_is_what_the_file_states(files: dict[tuple[str, str], Path]
     assert any("both sides" in remark for remark in reading.record["remarks"])
 
 
+def test_fixed_patches_report_a_tolerance_that_is_out_of_reach(tmp_path: Path) -> None:
+    for tolerance in (0.02, 1.0):
+        written = klems.write(table_of(DIFFUSE), tmp_path / "a.xml", kind="quarter", tolerance=tolerance)
+        assert written.error is not None
+        assert 0.02 < written.error.p99 < 1.0
+        assert written.within == (tolerance == 1.0)
+        assert klems.read(tmp_path / "a.xml").record["tolerance"] == tolerance
+
+
 def test_rows_and_bases_of_others_are_read(tmp_path: Path, files: dict[tuple[str, str], Path]) -> None:
     own = Basis("Two rings", (0.0, 45.0, 90.0), (1, 4))
     numbers = np.arange(25.0).reshape(5, 5)
     path = tmp_path / "a.xml"
-    text = files["grey", "quarter"].read_text()
+    text = files[GREY, "quarter"].read_text()
     definition = text[text.index("<AngleBasis>") : text.index("<Comments>")]
     text = text.replace(definition, "\n".join(klems._definition(own))).replace("LBNL/Klems Quarter", own.name)
     head, *blocks = text.split("<ScatteringData>")
@@ -144,16 +151,16 @@ def test_damaged_files_are_refused_with_a_sentence(
     tmp_path: Path, files: dict[tuple[str, str], Path], old: str, new: str, sentence: str
 ) -> None:
     path = tmp_path / "a.xml"
-    text = files["grey", "quarter"].read_text()
+    text = files[GREY, "quarter"].read_text()
     path.write_text(text.replace(old, new))
     with pytest.raises(FileFormatError, match=r"a\.xml: ") as refusal:
         formats.read(path)
     assert sentence in str(refusal.value)
 
 
-@pytest.mark.parametrize("material", ["grey", "anisotropic"])
-def test_radiance_sees_the_values_that_are_read(files: dict[tuple[str, str], Path], material: str) -> None:
-    path = files[material, "full"]
+@pytest.mark.parametrize(("material", "kind"), [(GREY, "full"), (ANISOTROPIC, "half")])
+def test_radiance_sees_the_values_that_are_read(files: dict[tuple[str, str], Path], material: str, kind: str) -> None:
+    path = files[material, kind]
     wi, wr = drawn(1000)
     assert queried(path, wi, wr)[:, 1] == pytest.approx(klems.read(path).lookup_vectors(wi, wr), rel=AS_RADIANCE)
 
@@ -174,8 +181,8 @@ def test_the_totals_are_the_albedo(files: dict[tuple[str, str], Path], material:
     name, total = check_bsdf(files[material, kind])
     assert name == {"full": "Klems_Full", "half": "Unknown_Matrix", "quarter": "Klems_Quarter"}[kind]
     assert total == pytest.approx(largest, rel=TOTAL, abs=5e-4)
-    if kind == "full" and material == "anisotropic":
+    if kind == "full":
         shares = in_window(files[material, kind], kind, "PHOTOPIC")
         assert shares == pytest.approx([normal] * 2, rel=TOTAL)
-    elif kind != "full" and material == "grey":
+    elif material == GREY:
         assert in_window(files[material, kind], kind) == []

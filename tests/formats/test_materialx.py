@@ -25,9 +25,8 @@ from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SMOOTH
 
 # f_r of the shader, in single precision, against the reader, relative to f_r: worst seen 6e-5
 SHADER_RTOL = 2e-4
-# l1 of the closest surface, the larger of the two kinds: 0.065, 0.56 (a table too coarse for the lobe; 0.33 of a fine
-# one), 0.083, 0.50 and 0.068
-MOST_L1 = {GREY: 0.08, ANISOTROPIC: 0.6, DIFFUSE: 0.09, SPECTRAL: 0.55, SMOOTH: 0.08}
+# l1 of the closest surface, the larger of the two kinds: 0.087, 0.26, 0.043, 0.50 and 0.070
+MOST_L1 = {GREY: 0.1, ANISOTROPIC: 0.3, DIFFUSE: 0.05, SPECTRAL: 0.55, SMOOTH: 0.08}
 
 SURFACES = {
     "painted": Surface(OPEN_PBR, (0.6, 0.3, 0.1), (1.0, 0.8, 0.9), 0.9, 0.7, 0.0, 0.8, 0.5, 1.7, 0.3),
@@ -173,15 +172,15 @@ def test_widths_of_slopes_become_roughness_anisotropy_and_a_turn(kind: str) -> N
     }
 
 
-def test_brass_is_brightest_across_its_grain(tmp_path: Path) -> None:
-    """Ward's alphas of brass are 0.05 along x and 0.16 along y: the highlight is wider towards y."""
+def test_a_highlight_is_wider_across_the_grain(tmp_path: Path) -> None:
+    """Ward's alphas are 0.15 along x and 0.3 along y: the highlight is wider towards y."""
     materialx.write(small_table(ANISOTROPIC), tmp_path / "a.mtlx")
     reading = formats.read(tmp_path / "a.mtlx")
-    slope = radians(10.0)
+    slope = radians(20.0)
     towards_x, towards_y = (
         float(reading.lookup_vectors(unit_vector(slope, phi), unit_vector(slope, phi))) for phi in (0.0, np.pi / 2)
     )
-    assert towards_y > 3.0 * towards_x
+    assert towards_y > 2.0 * towards_x
 
 
 @pytest.mark.parametrize(

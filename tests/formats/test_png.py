@@ -37,7 +37,7 @@ def test_a_sphere_is_that_of_the_library(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", [ANISOTROPIC, SPECTRAL])
 def test_slices_have_the_tones_that_the_file_states(name: str, tmp_path: Path) -> None:
     """f_r = 1/pi is half of the brightest light, 0.7354 of the screen's range; pixels grow with f_r."""
-    table = small_table(name)
+    table = small_table(name, fine_spectrum=name == SPECTRAL)
     png.write(table, tmp_path / "a.png", kind="lobe", theta_i=30.0)
     image = imread(tmp_path / "a.png")
     values = slices.lobe_map(table, theta_i_deg=30.0).values
@@ -66,7 +66,7 @@ def test_a_size_out_of_range_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("half", [False, True])
 def test_the_sphere_in_exr_is_linear_and_not_clipped(half: bool, tmp_path: Path) -> None:
-    table = small_table(ANISOTROPIC)
+    table = small_table(SPECTRAL)
     exr.write(table, tmp_path / "a.exr", kind="sphere", half=half, verdict="ok")
     with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
         channels = {name: channel.pixels.copy() for name, channel in file.channels().items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import os
 import struct
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brdfdb import formats, presets
+from brdfdb import formats
 from brdfdb.errors import FileFormatError, WriteError
 from brdfdb.formats import rgl
 from brdfdb.formats._readings import FileTable
@@ -23,12 +22,8 @@ from brdfdb.formats._rgl_tensor import read_tensors, write_tensors
 from brdfdb.formats._rgl_warp import Mixture, Warp
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import unit_vector
-from brdfdb.materials import Material
 from brdfdb.tables.albedo import directional_albedo
-from brdfdb.tables.grids import Grid
-from brdfdb.tables.layout import Layout
-from brdfdb.tables.table import Table, table_from
-from brdfdb.tables.tabulation import tabulate
+from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, WAVELENGTHS_NM, small_table
 
 # Mitsuba computes in float32; the largest relative difference of f_r measured is 9e-5, where rows of a warp are dark
 FLOAT32 = 3e-4
@@ -41,31 +36,7 @@ LOOSE, MEGABYTES = 0.03, 4.0  # tolerance and size of the files of these tests
 
 Array = NDArray[Any]
 
-ANGLES = [*range(0, 90, 5), 89]
-HALF, DIFFERENCE = [0, 2, 4, 7, 11, 16, 25, 40, 60, 85], [0, 30, 60, 75, 85]
-WARD = {"rho_d": 0.2, "rho_s": 0.1}
-KINDS = ("grey-ward", "anisotropic-ward", "oren-nayar", "he-torrance")
-
-
-@functools.cache
-def table_of(kind: str) -> Table:
-    """A small table: of a model, on a grid that is coarse on purpose."""
-    document: dict[str, Any] = {"title": kind, "source": "no paper"}
-    wavelengths = None
-    if kind == "grey-ward":
-        document |= {"model": "ward", "parameters": WARD | {"alpha_x": 0.15, "alpha_y": 0.15}}
-        grid = Grid({"theta_h": HALF, "theta_d": DIFFERENCE, "phi_d": [0, 45, 90]})
-    elif kind == "anisotropic-ward":
-        document |= {"model": "ward", "parameters": WARD | {"alpha_x": 0.3, "alpha_y": 0.2}}
-        grid = Grid({"theta_h": HALF, "phi_h": [0, 30, 60, 90], "theta_d": DIFFERENCE, "phi_d": [0, 90, 180]})
-    else:
-        document |= {"model": "oren_nayar", "parameters": {"rho": 0.6, "sigma_deg": 30}}
-        grid = Grid({"theta_i": ANGLES, "theta_r": ANGLES, "delta_phi": [0, 45, 90, *range(120, 185, 5)]})
-        wavelengths = np.array([450.0, 550.0, 650.0]) if kind == "he-torrance" else None
-    source = presets()["scene-copper-sphere"] if kind == "he-torrance" else Material.from_table(kind, document)
-    dataset = tabulate(Layout(source, grid, wavelengths))
-    arrays = {str(name): array.to_numpy() for name, array in dataset.variables.items()}
-    return table_from(kind, "r000001", arrays, dataset.attrs)
+KINDS = (GREY, ANISOTROPIC, DIFFUSE, SPECTRAL)
 
 
 def directions(count: int) -> tuple[Array, Array]:
@@ -89,7 +60,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("rgl")
     paths = {kind: folder / f"{kind}.bsdf" for kind in KINDS}
     for kind, path in paths.items():
-        rgl.write(table_of(kind), path, tolerance=LOOSE, megabytes=MEGABYTES, verdict="passed")
+        rgl.write(small_table(kind), path, tolerance=LOOSE, megabytes=MEGABYTES, verdict="passed")
     return paths
 
 
@@ -120,7 +91,7 @@ def test_values_are_those_of_mitsuba(written: dict[str, Path], kind: str) -> Non
 
 
 def test_rgb_files_are_those_of_mitsuba(tmp_path: Path) -> None:
-    table, path = table_of("he-torrance"), tmp_path / "rgb.bsdf"
+    table, path = small_table(SPECTRAL), tmp_path / "rgb.bsdf"
     files = rgl.write(table, path, kind="rgb", tolerance=LOOSE, megabytes=MEGABYTES)
     assert "of the spectrum: linear sRGB under D65" in files.remarks
     ours = formats.read(path)
@@ -130,7 +101,7 @@ def test_rgb_files_are_those_of_mitsuba(tmp_path: Path) -> None:
     theirs = seen_by_mitsuba(path, "scalar_rgb", wi, wr, None)
     np.testing.assert_allclose(theirs, ours.evaluate(wi, wr), rtol=FLOAT32, atol=1e-6)
     grey = tmp_path / "grey.bsdf"
-    rgl.write(table_of("oren-nayar"), grey, kind="rgb", tolerance=LOOSE)
+    rgl.write(small_table(DIFFUSE), grey, kind="rgb", tolerance=LOOSE)
     spectra = read_tensors(grey)["rgb"]
     assert spectra.shape[2] == 3
     np.testing.assert_array_equal(spectra[:, :, 0], spectra[:, :, 2])
@@ -139,11 +110,12 @@ def test_rgb_files_are_those_of_mitsuba(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_samples_of_mitsuba_reflect_the_albedo(written: dict[str, Path], kind: str) -> None:
     mitsuba = mitsuba_of("scalar_spectral")
-    table = table_of(kind)
-    albedo = directional_albedo(table, LIGHTS_DEG).albedo[:, 0, 0]
+    table = small_table(kind)
+    albedo = directional_albedo(table, LIGHTS_DEG).albedo[:, 0]
+    albedo = albedo[:, albedo.shape[1] // 2]
     surface = mitsuba.load_dict({"type": "measured", "filename": str(written[kind])})
     context, interaction = mitsuba.BSDFContext(), mitsuba.SurfaceInteraction3f()
-    interaction.wavelengths = [450.0] * 4
+    interaction.wavelengths = [550.0] * 4
     lights = unit_vector(np.deg2rad(LIGHTS_DEG), np.zeros(LIGHTS_DEG.size))
     centres = ((np.arange(24) + 0.5) / 24).tolist()
     for light, expected in zip(lights.tolist(), albedo.tolist(), strict=True):
@@ -154,7 +126,7 @@ def test_samples_of_mitsuba_reflect_the_albedo(written: dict[str, Path], kind: s
         assert np.std(weights) <= NOISE * np.mean(weights)
 
 
-@pytest.mark.parametrize("kind", ["anisotropic-ward", "he-torrance"])
+@pytest.mark.parametrize("kind", [ANISOTROPIC, SPECTRAL])
 def test_densities_of_samples_pass_mitsubas_chi2(written: dict[str, Path], kind: str) -> None:
     if "DRJIT_LIBLLVM_PATH" not in os.environ:  # Mitsuba 3.9 ends the process with the LLVM 14 to 16 that it may find
         pytest.skip("DRJIT_LIBLLVM_PATH names no LLVM 19 for mitsuba's llvm variants")
@@ -171,14 +143,14 @@ def test_a_light_in_the_plane_of_symmetry_is_read_right(written: dict[str, Path]
     _, wr = directions(50)
     inside = np.tile(unit_vector(np.array([1.0]), np.array([-1e-6])), (50, 1))
     exact = inside * (1.0, 0.0, 1.0)
-    values = seen_by_mitsuba(written["anisotropic-ward"], "scalar_spectral", exact, wr, np.full(4, 550.0))
-    ours = formats.read(written["anisotropic-ward"])
+    values = seen_by_mitsuba(written[ANISOTROPIC], "scalar_spectral", exact, wr, np.full(4, 550.0))
+    ours = formats.read(written[ANISOTROPIC])
     assert isinstance(ours, FileTable)
     np.testing.assert_allclose(values[:, :1], ours.evaluate(inside, wr), rtol=1e-3, atol=1e-5)
 
 
 def test_files_with_all_azimuths_are_for_other_readers(tmp_path: Path) -> None:
-    table, path = table_of("anisotropic-ward"), tmp_path / "full.bsdf"
+    table, path = small_table(ANISOTROPIC), tmp_path / "full.bsdf"
     files = rgl.write(table, path, azimuth="full", tolerance=0.5, megabytes=MEGABYTES)
     phi_i = read_tensors(path)["phi_i"]
     assert (phi_i[0], phi_i[-1]) == (np.float32(-np.pi), np.float32(np.pi))  # what pbrt-v4 and RGL's loader ask for
@@ -194,16 +166,16 @@ def test_a_file_states_its_error_and_its_record(written: dict[str, Path], kind: 
     read_back = formats.read(written[kind])
     assert isinstance(read_back, FileTable)
     assert read_back.name == kind
-    error = Comparison(table_of(kind)).error_of(read_back.evaluate)
+    error = Comparison(small_table(kind)).error_of(read_back.evaluate)
     stated = read_back.record["error_of_file"]
     assert {name: stated[name] for name in error.document()} == error.document()
     assert read_back.record["audit"] == "passed"
     assert read_back.record["tolerance"] == LOOSE
-    assert read_back.channels == (("grey",) if kind != "he-torrance" else ("450nm", "550nm", "650nm"))
+    assert read_back.channels == (("grey",) if kind != SPECTRAL else ("400nm", "550nm", "700nm"))
 
 
 def test_a_smaller_tolerance_is_a_larger_file(tmp_path: Path) -> None:
-    table = table_of("grey-ward")
+    table = small_table(GREY)
     files = [rgl.write(table, tmp_path / f"{t}.bsdf", tolerance=t) for t in (0.5, 0.05)]
     assert [f.within for f in files] == [True, True]
     assert files[0].nbytes < files[1].nbytes
@@ -226,7 +198,7 @@ def test_the_bytes_of_a_tensor_file(tmp_path: Path) -> None:
 
 
 def test_damaged_files_are_named_in_a_sentence(written: dict[str, Path], tmp_path: Path) -> None:
-    whole = written["oren-nayar"].read_bytes()
+    whole = written[DIFFUSE].read_bytes()
     path = tmp_path / "damaged.bsdf"
     for length in (0, 5, 12, 17, 30, 200, 400, len(whole) - 1):
         path.write_bytes(whole[:length])
@@ -253,7 +225,7 @@ def test_damaged_files_are_named_in_a_sentence(written: dict[str, Path], tmp_pat
     ],
 )
 def test_fields_that_no_reader_takes_are_named(written: dict[str, Path], name: str, change: Any) -> None:
-    arrays = read_tensors(written["oren-nayar"])
+    arrays = read_tensors(written[DIFFUSE])
     with pytest.raises(FileFormatError, match=name):
         fields_of("file", arrays | {name: change(arrays[name])})
     with pytest.raises(FileFormatError, match=name):
@@ -261,23 +233,23 @@ def test_fields_that_no_reader_takes_are_named(written: dict[str, Path], name: s
 
 
 def test_files_of_other_programs_have_no_record(written: dict[str, Path], tmp_path: Path) -> None:
-    fields = fields_of("file", read_tensors(written["he-torrance"]))
-    assert json.loads(fields.description)["name"] == "he-torrance"
+    fields = fields_of("file", read_tensors(written[SPECTRAL]))
+    assert json.loads(fields.description)["name"] == SPECTRAL
     path = tmp_path / "lab_spec.bsdf"
     write_tensors(path, replace(fields, description="measured in a laboratory").tensors())
     read_back = formats.read(path)
     assert isinstance(read_back, FileTable)
     assert (read_back.name, dict(read_back.record)) == ("lab_spec", {})
     assert read_back.wavelength_nm is not None
-    assert read_back.wavelength_nm.tolist() == [450.0, 550.0, 650.0]
+    assert read_back.wavelength_nm.tolist() == WAVELENGTHS_NM
 
 
 def test_nothing_is_left_of_a_file_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(WriteError, match="nowhere"):
-        rgl.write(table_of("oren-nayar"), tmp_path / "nowhere" / "file.bsdf", tolerance=1.0)
+        rgl.write(small_table(DIFFUSE), tmp_path / "nowhere" / "file.bsdf", tolerance=1.0)
     (tmp_path / "folder.bsdf").mkdir()
     with pytest.raises(WriteError, match="it is a directory"):
-        rgl.write(table_of("oren-nayar"), tmp_path / "folder.bsdf", tolerance=1.0)
+        rgl.write(small_table(DIFFUSE), tmp_path / "folder.bsdf", tolerance=1.0)
     assert [path.name for path in tmp_path.iterdir()] == ["folder.bsdf"]
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from brdfdb.errors import CannotHoldError
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._record import lines, of_lines, record
+from brdfdb.formats._record import lines, of_lines, record, specular_remark
 from brdfdb.formats._stated_error import PAIRS, Comparison
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import presets
@@ -15,6 +18,7 @@ from brdfdb.tables.layout import Layout
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import block
+from tests.formats.small_tables import DIFFUSE, SMOOTH, SPECTRAL, small_table
 
 BRASS = "rolled-brass"
 
@@ -88,3 +92,25 @@ def test_a_record_survives_as_lines(brass: Table) -> None:
     assert document["audit"] == "passes"
     assert of_lines(lines(document)) == document
     assert all("\n" not in line for line in lines(document))
+
+
+def test_channels_of_a_table_of_one_wavelength_are_alike() -> None:
+    table = small_table(SMOOTH)
+    wi, wr = unit_vector(0.3, 0.0), unit_vector(0.6, 2.0)
+    for colour, names in (("rgb", ("R", "G", "B")), ("xyz", ("X", "Y", "Z")), ("grey", ("Y",)), ("auto", ("Y",))):
+        channels = channels_of(table, colour)
+        assert channels.names == names
+        np.testing.assert_array_equal(channels.values(table, wi, wr), [table.lookup_vectors(wi, wr)[0]] * len(names))
+        assert channels.remarks == (f"{'all channels are ' if len(names) > 1 else ''}f_r at 460 nm",)
+
+
+def test_channels_name_what_is_lost_of_a_spectrum() -> None:
+    table = small_table(SPECTRAL)
+    assert channels_of(table).remarks == ()
+    assert channels_of(table, "auto").names == ("X", "Y", "Z")
+    assert channels_of(table, "rgb").remarks == ("of the spectrum: linear sRGB under D65",)
+    assert specular_remark(table)[0].startswith("not in the file: the specular part, up to 0.")
+    assert specular_remark(small_table(DIFFUSE)) == ()
+    infrared = replace(table, wavelength_nm=np.array([1000.0, 1500.0, 2000.0]))
+    with pytest.raises(CannotHoldError, match="copper: wavelengths of 1000 to 2000 nm give no colour"):
+        channels_of(infrared, "grey")

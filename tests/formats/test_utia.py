@@ -16,7 +16,7 @@ from brdfdb.formats._channels import channels_of
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import unit_vector
-from tests.formats.kinds_of_tables import KINDS, table_of
+from tests.formats.small_tables import ANISOTROPIC, KINDS, SPECTRAL, small_table
 
 PLANE = 288 * 288
 SUM_ATOL = 5e-15  # of the largest number: sums of sixteen products; worst measured 5e-16
@@ -38,7 +38,7 @@ def interpolated(numbers: np.ndarray, angles: np.ndarray) -> list[float]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_file_is_read_as_its_own_reader_reads_it(tmp_path: Path, kind: str) -> None:
-    written = utia.write(table_of(kind), tmp_path / "a.bin")
+    written = utia.write(small_table(kind), tmp_path / "a.bin")
     numbers = np.fromfile(tmp_path / "a.bin", "<f8")
     assert numbers.size == 3 * PLANE
     reading = formats.read(tmp_path / "a.bin")
@@ -47,14 +47,14 @@ def test_a_file_is_read_as_its_own_reader_reads_it(tmp_path: Path, kind: str) ->
     for angles in rng.uniform(0.0, [1.57, 6.28, 1.57, 6.28], (40, 4)):
         expected = interpolated(numbers, angles)
         np.testing.assert_allclose(reading.lookup(*angles), expected, rtol=0.0, atol=SUM_ATOL * numbers.max())
-    channels = channels_of(table_of(kind), "rgb")
-    again = Comparison(table_of(kind), channels).error_of(reading.evaluate)
+    channels = channels_of(small_table(kind), "rgb")
+    again = Comparison(small_table(kind), channels).error_of(reading.evaluate)
     assert written.error is not None
     assert again.p99 == pytest.approx(written.error.p99, rel=1e-9)
 
 
 def test_places_by_hand(tmp_path: Path) -> None:
-    table = table_of("anisotropic ward")
+    table = small_table(ANISOTROPIC)
     utia.write(table, tmp_path / "a.bin")
     numbers = np.fromfile(tmp_path / "a.bin", "<f8")
     wi, wr = unit_vector(*np.deg2rad([45.0, 15.0])), unit_vector(*np.deg2rad([30.0, 202.5]))  # numbers 3, 2, 2 and 27
@@ -64,7 +64,7 @@ def test_places_by_hand(tmp_path: Path) -> None:
 
 
 def test_dj_brdf_decodes_its_encoding(tmp_path: Path) -> None:
-    table = table_of("copper")
+    table = small_table(SPECTRAL)
     utia.write(table, tmp_path / "linear.bin")
     utia.write(table, tmp_path / "dj.bin", encoding="dj_brdf")
     linear, encoded = (np.fromfile(tmp_path / name, "<f8") for name in ("linear.bin", "dj.bin"))
