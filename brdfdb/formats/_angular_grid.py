@@ -3,8 +3,8 @@
 Formats of measurement programs list the nodes of each angle and a value at each combination of them. Their readers
 interpolate linearly over each angle. Nodes need not be uniform: `chosen` places them where f_r curves.
 
-`_dense_grid` chooses the nodes of tables by second derivatives. It takes fewer values for spectra on half and difference
-vectors, and for light and viewer. It knows no angles about the specular direction, which are the best ones of some
+`_dense_grid` chooses the nodes of tables by second derivatives. It takes fewer values for spectra on half and
+difference vectors, and for light and viewer. It knows no angles about the specular direction, which are the best ones of some
 formats here, and no lines that continue beyond the last node. Halving intervals works for all of them.
 """
 
