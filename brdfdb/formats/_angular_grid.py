@@ -4,8 +4,8 @@ Formats of measurement programs list the nodes of each angle and a value at each
 interpolate linearly over each angle. Nodes need not be uniform: `chosen` places them where f_r curves.
 
 `_dense_grid` chooses the nodes of tables by second derivatives. It takes fewer values for spectra on half and
-difference vectors, and for light and viewer. It knows no angles about the specular direction, which are the best ones of some
-formats here, and no lines that continue beyond the last node. Halving intervals works for all of them.
+difference vectors, and for light and viewer. It knows no angles about the specular direction, which are the best ones
+of some formats here, and no lines that continue beyond the last node. Halving intervals works for all of them.
 """
 
 from __future__ import annotations

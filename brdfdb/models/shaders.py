@@ -1,4 +1,4 @@
-"""Closed-form models as shader source: statements that GLSL, Slang and OSL have in common.
+"""Closed-form models as shader source: statements that GLSL, Slang and OSL have in common; Radiance's own Ward.
 
 `$color` stands for the type of a colour. Parameters are macros, named as in the models, in capitals after `P_`.
 Reflectances are colours. Directions are arrays of three numbers. The statements are those of a function of `wi` and
@@ -269,4 +269,25 @@ return P_RHO / BRDF_PI * (single + multiple * (1.0 - lost) * P_RHO / (1.0 - lost
     "beckmann": _facets("beckmann", _EXACT),
     "beckmann_separable": _facets("beckmann_separable", _EXACT),
     "beckmann_schlick": _facets("beckmann", _SCHLICK),
+}
+
+# How the lobes of Ward's models differ from `ward_bounded`, which is what Radiance evaluates as plastic2 and metal2
+OF_RADIANCE = {
+    "ward": (
+        "Ward 1992, eq. (5a), has 1 / (4 sqrt(cos theta_i cos theta_r)) where Radiance has |h|^2 / (h.n)^4 with h the",
+        "sum of the unit vectors of light and viewer. The exponent is the same. In the mirror direction Radiance is",
+        "higher by 1 / cos theta: equal at normal incidence, 1.15 times at 30 degrees, 2 times at 60 degrees.",
+        "The lobe of Ward loses about 1 - cos theta of rho_s towards grazing; that of Radiance keeps it.",
+    ),
+    "ward_half_vector": (
+        "Ward 1992, eq. (5b), differs from Radiance in the factor 1 / (4 sqrt(cos theta_i cos theta_r)), which is",
+        "|h|^2 / (h.n)^4 there, and in the exponent: it falls off with sin(delta / 2), Radiance with tan(delta).",
+        "In the mirror direction Radiance is higher by 1 / cos theta.",
+    ),
+    "ward_duer": (
+        "Duer 2006 has 1 / (4 cos theta_i cos theta_r) where Radiance has |h|^2 / (h.n)^4 with h the sum of the unit",
+        "vectors of light and viewer. The exponent is the same. They are equal in the mirror direction. Duer's albedo",
+        "exceeds 1 near grazing, that of Radiance does not.",
+    ),
+    "ward_bounded": ("This model is what Radiance evaluates; they are equal but for a widening by flat sources.",),
 }
