@@ -95,9 +95,9 @@ def test_the_check_runs_the_readmes_two_commands() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (command,) = [line for line in text.splitlines() if "-m pytest" in line]
     assert command.startswith("python3 -m venv .venv && .venv/bin/pip install -e '.[test]'")
-    assert "grep '^python3 -m venv' README.md | while read -r command" in (ROOT / ".ci" / "run").read_text(
-        encoding="utf-8"
-    )
+    check = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert "mapfile -t commands < <(grep '^python3 -m venv' README.md)" in check
+    assert 'eval "$command"' in check
 
 
 def test_every_reference_key_is_in_the_bibliography() -> None:
