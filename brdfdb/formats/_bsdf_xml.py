@@ -57,7 +57,7 @@ class Block:
 
 @dataclass(frozen=True)
 class BsdfFile:
-    """What a file says.
+    """Content of a BSDF file.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What readers of files give: f_r as the tools of a format see it, or the samples that the file lists."""
+"""Results of reading a file: f_r as the tools of a format see it, or the samples that the file lists."""
 
 from __future__ import annotations
 
@@ -53,10 +53,9 @@ class FileTable(Lookups):
         return values if wavelength_nm is None else self._between(values, wavelength_nm)
 
     def _at_angles(self, angles: FourAngles, wavelength_nm: ArrayLike | None) -> Floats:
-        directions = checked_angles(*angles)
+        checked_angles(*angles)
         shape = np.broadcast_shapes(*(np.shape(angle) for angle in angles))
         theta_i, phi_i, theta_r, phi_r = (np.broadcast_to(np.asarray(angle, np.float64), shape) for angle in angles)
-        del directions
         return self.lookup_vectors(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r), wavelength_nm)
 
     def _between(self, values: Floats, wavelength_nm: ArrayLike) -> Floats:

@@ -21,7 +21,7 @@ _PARTS = {"Monochrome": ("Monochrome",), "XYZ": ("TristimulusX", "TristimulusY",
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """What a file says.
+    """Content of a Zemax file.
 
     Attributes
     ----------

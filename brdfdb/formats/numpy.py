@@ -110,7 +110,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
             axes = {name: _array(archive, name) for name in names if name != "wavelength"}
             known = json.loads(str(_array(archive, "record"))) if "record.npy" in archive.namelist() else {}
             values = _array(archive, "brdf")
-    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, EOFError, NotImplementedError) as error:
+    # zipfile calls a compression that it does not know not implemented, which is a RuntimeError
+    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, EOFError, RuntimeError) as error:
         raise FileFormatError(f"{path}: it is no archive of NumPy arrays, or is damaged ({error})") from error
     return file_table(path, axes, values, at, known if isinstance(known, dict) else {})
 
