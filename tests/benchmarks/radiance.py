@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,12 @@ MEASURED = "Totals and f_r as Radiance and pyWinCalc see the files, against the 
 BOUNDED = {"rho_d": 0.2, "rho_s": 0.3, "alpha_x": 0.3, "alpha_y": 0.45}
 SUN = (0.4, 0.2, 0.9)  # direction of the sun in the picture
 WIDTH = 64  # pixels along the picture
+# Columns of the pictures: sums of all pixels and the median pixel
+OF_PICTURE = tuple(
+    f"{pair}, {part}"
+    for pair in ("file to plastic2", "file to table", "plastic2 to table")
+    for part in ("sum", "median")
+)
 
 
 def off(total: float, expected: float) -> float:
@@ -65,13 +72,24 @@ def at_random(table: Table, path: Path) -> float:
     return float(np.quantile(wrong / scale, 0.99, axis=0).max())
 
 
-def picture(folder: Path) -> tuple[float, float, float, float]:
-    """Return the differences of a picture of a lit ball, the file against plastic2, and both against the table.
+class Picture(NamedTuple):
+    """Relative differences of pictures of a lit ball: of the sum of all pixels, and of the median pixel."""
 
-    They are the relative difference of the whole light, the median of all pixels, and the same median of both pictures
-    against the table.
-    """
-    table = made("ward_bounded", BOUNDED)
+    whole: float  # file against plastic2
+    median: float
+    file_whole: float  # file against table
+    file_median: float
+    plastic_whole: float  # plastic2 against table
+    plastic_median: float
+
+
+def differences(seen: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
+    """Return the relative differences of two pictures in the sum of all pixels and in the median pixel."""
+    return float(seen.sum() / expected.sum() - 1.0), float(np.median(np.abs(seen / expected - 1.0)))
+
+
+def picture(folder: Path, table: Table) -> Picture:
+    """Return how pictures of a lit ball differ: the file against Radiance's own Ward, and both against the table."""
     radiance.write(table, folder / "ball.xml")
     grid = (np.arange(WIDTH) + 0.5) / WIDTH * 2.0 - 1.0
     x, y = (axis.reshape(-1) for axis in np.meshgrid(grid, grid))
@@ -84,7 +102,7 @@ def picture(folder: Path) -> tuple[float, float, float, float]:
     light = f"void light sun\n0\n0\n3 1e5 1e5 1e5\nsun source disk\n0\n0\n4 {sun[0]} {sun[1]} {sun[2]} 0.5\n"
     pictures = [
         traced(f"{light}{text}\n{name} sphere ball\n0\n0\n4 0 0 0 1\n", rays, folder, *options)
-        for name, options in (("made-up", ("-ss", "64")), ("made-up_plastic", ()))
+        for name, options in ((table.name, ("-ss", "64")), (f"{table.name}_plastic", ()))
     ]
     # The frame of the table at each point: its y axis is the up vector, less what is along the normal
     y_axis = np.array([0.0, 1.0, 0.0]) - normal[:, 1:2] * normal
@@ -94,12 +112,7 @@ def picture(folder: Path) -> tuple[float, float, float, float]:
     wi, wr = frame @ sun, frame @ np.array([0.0, 0.0, 1.0])
     expected = np.asarray(table.lookup_vectors(wi, wr)) * wi[:, 2] * 1e5 * solid_angle
     of_file, plastic = pictures
-    return (
-        float(of_file.sum() / plastic.sum() - 1.0),
-        float(np.median(np.abs(of_file / plastic - 1.0))),
-        float(np.median(np.abs(of_file / expected - 1.0))),
-        float(np.median(np.abs(plastic / expected - 1.0))),
-    )
+    return Picture(*differences(of_file, plastic), *differences(of_file, expected), *differences(plastic, expected))
 
 
 def timed(write: object, *arguments: object, **options: object) -> tuple[Written, float]:
@@ -129,6 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     matrices = run.table(
         "Klems matrices", Column(name="material", width=34), "kind", *numbers[:3], *numbers[5:], "WINDOW off"
     )
+    balls = run.table("Pictures of a lit ball", Column(name="material", width=34), *OF_PICTURE)
     worst, beyond = 0.0, []
     with tempfile.TemporaryDirectory() as home:
         folder = Path(home)
@@ -160,7 +174,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 )
                 worst = max(worst, abs(wrong), window or 0.0)
                 matrices.add(name, kind, written.nbytes / 1e6, seconds, error.p99, error.l1, total, wrong, window)
-        whole, median, file_off, plastic_off = picture(folder)
+            if table.metadata.model == "ward":
+                balls.add(name, *picture(folder, table))
+        bounded = picture(folder, made("ward_bounded", BOUNDED))
+        balls.add("bounded Ward", *bounded)
     for title, rows in (("trees", trees.rows), ("matrices", matrices.rows)):
         column = 2 if title == "trees" else 3
         run.say(
@@ -169,11 +186,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run.say(f"Totals are off by {worst:.2%} at most, beyond rounding; at most {REQUIRED:.1%} is required.")
     count = len(trees.rows)
     run.say(f"f_r is within the stated error for {count - len(beyond)} of {count} trees. {' '.join(beyond)}".strip())
-    of_picture = f"{whole:.2%} in all and by {median:.2%} in the median pixel"
-    run.say(f"A picture of a ball of bounded Ward, in a tree, differs from plastic2 by {of_picture}.")
-    run.say(f"From the table the tree differs by {file_off:.2%}, plastic2 by {plastic_off:.2%} in the median pixel.")
+    far = max(abs(float(row[2] or 0.0)) for row in balls.rows)
+    run.say(f"{len(balls.rows)} pictures of a file differ from plastic2 by {far:.2%} at most in the median pixel.")
+    run.say(f"Where both have one formula, bounded Ward, all light together differs by {bounded.whole:.2%}.")
     run.end()
-    return 0 if worst <= REQUIRED and not beyond and abs(whole) <= 0.01 else 1
+    return 0 if worst <= REQUIRED and not beyond and max(far, abs(bounded.whole)) <= 0.01 else 1
 
 
 if __name__ == "__main__":
