@@ -16,8 +16,9 @@ from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options
 
 if TYPE_CHECKING:
-    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._readings import FileTable
     from brdfdb.formats._written import Written
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 __all__ = ["EXPORTERS", "IMPORTERS", "Exporter", "Importer", "Option", "options_of", "parsed_options", "read", "write"]

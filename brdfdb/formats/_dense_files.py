@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.formats._dense_grid import DenseTable
-    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 OPTIONS = (
@@ -187,7 +188,7 @@ def reading_of_rows(
     FileFormatError
         If the rows are over half and difference vectors and no grid, or there are more values than wavelengths.
     """
-    from brdfdb.formats._readings import Samples
+    from brdfdb.measurements.samples import Samples
 
     if values.shape[1] != (1 if wavelength_nm is None else wavelength_nm.size):
         raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 from brdfdb.errors import ParameterError
 
 if TYPE_CHECKING:
-    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._readings import FileTable
     from brdfdb.formats._written import Written
+    from brdfdb.measurements.samples import Samples
 
 
 @dataclass(frozen=True)

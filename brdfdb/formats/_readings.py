@@ -1,4 +1,4 @@
-"""Results of reading a file: f_r as the tools of a format see it, or the samples that the file lists."""
+"""The result of reading a file whose tools know f_r between its values."""
 
 from __future__ import annotations
 
@@ -71,34 +71,3 @@ class FileTable(Lookups):
         width = np.where(above > below, stored[above] - stored[below], 1.0)
         share = (wanted - stored[below]) / width
         return np.asarray(values[..., below] * (1.0 - share) + values[..., above] * share)
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Values that a file lists at directions, without a rule for what lies between.
-
-    Attributes
-    ----------
-    name : str
-        Name of the material, or of the file.
-    theta_i, phi_i, theta_r, phi_r : array (N,) [rad]
-        Directions of light and viewer.
-    channels : tuple of str
-        As of `FileTable`.
-    wavelength_nm : array (L,) [nm] or None
-        Wavelengths of the channels; None of colours and of grey files.
-    values : array (N, C) [1/sr]
-        f_r.
-    record : mapping
-        The record in the file or beside it; empty of files of other programs.
-    """
-
-    name: str
-    theta_i: Floats = field(repr=False)
-    phi_i: Floats = field(repr=False)
-    theta_r: Floats = field(repr=False)
-    phi_r: Floats = field(repr=False)
-    channels: tuple[str, ...]
-    wavelength_nm: NDArray[np.float64] | None
-    values: Floats = field(repr=False)
-    record: Mapping[str, Any] = field(default_factory=dict, repr=False)

@@ -26,7 +26,8 @@ from brdfdb.formats._record import lines, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
-    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".astm"
@@ -129,9 +130,9 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     count = math.prod(axis.size for axis in nodes)
     if count != len(rows) or (nodes[1].size == 1 and nodes[1][0] != 0.0):
         theta_i, phi_i, theta_r, phi_r = rows[:, :4].T
-        from brdfdb.formats._readings import Samples
+        from brdfdb.measurements.samples import Samples
 
-        return Samples(name, theta_i, phi_i, theta_r, phi_r, names, at, rows[:, 4:], document)
+        return Samples(name, theta_i, phi_i, theta_r, phi_r, names, at, rows[:, 4:], record=document)
     order = np.lexsort(rows[:, 3::-1].T)
     values = rows[order, 4:].reshape(*(axis.size for axis in nodes), len(names)).astype(np.float32)
     anisotropic = nodes[1].size > 1

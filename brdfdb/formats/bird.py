@@ -27,7 +27,8 @@ from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
-    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".json"

@@ -23,7 +23,8 @@ from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
-    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".csv"
@@ -114,7 +115,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     FileFormatError
         If the columns are not angles [degree] and values, a number cannot be read, or the file has more than 1 GiB.
     """
-    from brdfdb.formats._readings import Samples
+    from brdfdb.measurements.samples import Samples
 
     path = Path(path)
     if path.stat().st_size > _MOST_READ:

@@ -30,7 +30,8 @@ from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
-    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".fred.txt"
@@ -125,7 +126,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     OSError
         If it cannot be read.
     """
-    from brdfdb.formats._readings import FileTable, Samples
+    from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
 
     path = Path(path)
     rows = _rows(path)
@@ -138,7 +140,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         return FileTable(name, channels, at, grid.evaluate, known)
     theta_i, phi_i, theta_r, phi_r = np.deg2rad(rows[:, :4]).T
     return Samples(
-        name, theta_i, phi_i, theta_r, (phi_i + np.pi - phi_r) % (2.0 * np.pi), channels, at, rows[:, 4:], known
+        name, theta_i, phi_i, theta_r, (phi_i + np.pi - phi_r) % (2.0 * np.pi), channels, at, rows[:, 4:], record=known
     )
 
 

@@ -11,9 +11,10 @@ import numpy as np
 from brdfdb import formats
 from brdfdb.formats import EXPORTERS, IMPORTERS
 from brdfdb.formats._channels import RGB, XYZ, Channels, at_wavelength, channels_of
-from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import unit_vector
+from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
 from brdfdb.tables.table import Table
 

@@ -10,9 +10,10 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import EXPORTERS, IMPORTERS, astm
-from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.formats._written import Written
+from brdfdb.measurements.samples import Samples
 from tests.formats.small_tables import DIFFUSE, KINDS, small_table
 
 SIZE, LOOSE = 0.3, 0.2  # MB, and tolerance, so that tests are quick

@@ -15,9 +15,10 @@ from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError, WriteError
 from brdfdb.formats import EXPORTERS, IMPORTERS
 from brdfdb.formats._dense_grid import dense_table, rounded
-from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import radians
+from brdfdb.measurements.samples import Samples
 from brdfdb.tables.grids import (
     ANISOTROPIC_AXES,
     ANISOTROPIC_HALF_DIFFERENCE_AXES,

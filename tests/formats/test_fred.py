@@ -10,7 +10,8 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError
 from brdfdb.formats import fred
-from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._readings import FileTable
+from brdfdb.measurements.samples import Samples
 from tests.formats.round_trip import error_of
 from tests.formats.small_tables import ANISOTROPIC, GREY, ISOTROPIC, SPECTRAL, small_table
 

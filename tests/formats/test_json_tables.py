@@ -13,9 +13,10 @@ import pytest
 from brdfdb import formats
 from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats import EXPORTERS, IMPORTERS
-from brdfdb.formats._readings import FileTable, Samples
+from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import radians
+from brdfdb.measurements.samples import Samples
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SPECTRAL, SPECULAR, small_table
 
 TEXT = {"type": "string", "minLength": 1}

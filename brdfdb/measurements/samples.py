@@ -1,0 +1,249 @@
+"""Samples of a measurement: directions, wavelengths, f_r, its standard uncertainty, and the instrument."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import check_phi, check_theta, degrees, radians, unit_vector
+from brdfdb.parameters import Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
+_HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
+_SAME_LIGHT_DEG = 1e-4  # lights closer than this are one incidence
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """The instrument of a measurement. What is not known is None, or an empty text.
+
+    Attributes
+    ----------
+    name : str
+        What people call it.
+    source_solid_angle_sr, receiver_solid_angle_sr : float [sr] or None
+        Solid angles of the light and of the receiver, as the sample sees them.
+    spot_mm : float [mm] or None
+        Diameter of the spot that is measured.
+    polarisation : str
+        Polarisation of light and receiver, in words.
+    """
+
+    name: str = ""
+    source_solid_angle_sr: float | None = None
+    receiver_solid_angle_sr: float | None = None
+    spot_mm: float | None = None
+    polarisation: str = ""
+
+    def __post_init__(self) -> None:
+        for quantity in ("source_solid_angle_sr", "receiver_solid_angle_sr", "spot_mm"):
+            value = getattr(self, quantity)
+            if value is not None and not 0.0 < value < np.inf:
+                raise ParameterError(quantity, f"{value:g} is not a positive number", value, (0.0, np.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """f_r at some directions, as an instrument measured it or as a file lists it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the material, or of the file.
+    theta_i, phi_i, theta_r, phi_r : array (N,) [rad]
+        Directions of light and viewer. Polar angles are in [0, pi/2].
+    channels : tuple of str
+        Names of the columns of `values`: ("R", "G", "B"), ("X", "Y", "Z"), ("grey",), or wavelengths as "550nm".
+    wavelength_nm : array (C,) [nm] or None
+        Wavelengths of the channels; None of colours and of grey samples.
+    values : array (N, C) [1/sr]
+        f_r without the cosine. A hole is nan. Noise may make values negative.
+    uncertainty : array (N, C) [1/sr] or None
+        Standard uncertainty of each value; None if it is not known.
+    bandwidth_nm : array (C,) [nm] or None
+        Full width of each band at half of its height; None if it is not known.
+    instrument : Instrument
+        The instrument.
+    provenance : str
+        Where the samples come from, in words.
+    record : mapping
+        What the file says beside its values: its header, or the record of an export.
+
+    Raises
+    ------
+    ParameterError
+        If shapes do not fit, an angle is outside its range, a value is infinite, or an uncertainty is negative.
+    """
+
+    name: str
+    theta_i: Floats = field(repr=False)
+    phi_i: Floats = field(repr=False)
+    theta_r: Floats = field(repr=False)
+    phi_r: Floats = field(repr=False)
+    channels: tuple[str, ...]
+    wavelength_nm: NDArray[np.float64] | None
+    values: Floats = field(repr=False)
+    uncertainty: Floats | None = field(default=None, repr=False)
+    bandwidth_nm: NDArray[np.float64] | None = None
+    instrument: Instrument = Instrument()
+    provenance: str = ""
+    record: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in (*ANGLES, "values", "uncertainty", "wavelength_nm", "bandwidth_nm"):
+            array = getattr(self, name)
+            if array is not None:
+                object.__setattr__(self, name, np.asarray(array, dtype=np.float64))
+        count = len(self.theta_i)
+        expected = {**dict.fromkeys(ANGLES, (count,)), "values": (count, len(self.channels))}
+        expected |= {"uncertainty": expected["values"], "wavelength_nm": (len(self.channels),)}
+        expected |= {"bandwidth_nm": expected["wavelength_nm"]}
+        for name, shape in expected.items():
+            array = getattr(self, name)
+            if array is not None and array.shape != shape:
+                raise ParameterError(name, f"shape {array.shape} is not {shape}", array.shape, shape)
+        for name in ANGLES:
+            angle = getattr(self, name)
+            (check_theta if name.startswith("theta") else check_phi)(name, angle)
+            if not np.all(np.isfinite(angle)):
+                raise ParameterError(name, "nan is not an angle", np.nan)
+            if name.startswith("theta") and np.any(angle > _HORIZON):
+                raise ParameterError(
+                    name,
+                    f"{degrees(angle.max()):.6g} degrees is below the horizon",
+                    float(angle.max()),
+                    (0.0, _HORIZON),
+                )
+        if np.any(np.isinf(self.values)):
+            raise ParameterError("values", "a value is infinite; a hole is nan", np.inf)
+        if self.uncertainty is not None and np.any(self.uncertainty < 0.0):
+            raise ParameterError("uncertainty", f"{np.nanmin(self.uncertainty):g} is below 0", None, (0.0, np.inf))
+
+    def __len__(self) -> int:
+        return len(self.theta_i)
+
+    @cached_property
+    def known(self) -> NDArray[np.bool_]:
+        """True where there is a value, shape (N, C): False in holes."""
+        return np.isfinite(self.values)
+
+    @cached_property
+    def w_i(self) -> Floats:
+        """Unit vectors of the light, shape (N, 3)."""
+        return unit_vector(self.theta_i, self.phi_i)
+
+    @cached_property
+    def w_r(self) -> Floats:
+        """Unit vectors of the viewer, shape (N, 3)."""
+        return unit_vector(self.theta_r, self.phi_r)
+
+    @cached_property
+    def incidence(self) -> NDArray[np.int64]:
+        """Number of the incidence of each sample, shape (N,): the same number, the same direction of the light."""
+        theta, phi = degrees(self.theta_i), degrees(self.phi_i) % 360.0
+        rows = np.stack([np.round(theta / _SAME_LIGHT_DEG), np.round(phi / _SAME_LIGHT_DEG)], axis=1)
+        rows[rows[:, 0] == 0.0, 1] = 0.0  # at the normal every azimuth is the same direction
+        return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+    @cached_property
+    def turned(self) -> bool:
+        """True if the light comes from more than one azimuth, so that anisotropy can be seen."""
+        tilted = self.theta_i > 0.0
+        azimuths = np.round(degrees(self.phi_i[tilted]) % 360.0 / _SAME_LIGHT_DEG)
+        return np.unique(azimuths).size > 1
+
+    def selected(self, rows: NDArray[Any]) -> Samples:
+        """Return some of the samples: those of a mask (N,), or of indices."""
+        parts = {name: getattr(self, name)[rows] for name in (*ANGLES, "values")}
+        uncertainty = None if self.uncertainty is None else self.uncertainty[rows]
+        return replace(self, **parts, uncertainty=uncertainty)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the samples as a Dataset over ``sample`` and ``channel``, with angles in degrees.
+
+        Its variables are brdf and uncertainty [1/sr]. All else stands in its attributes, the record as JSON.
+        """
+        import xarray as xr
+
+        angles = {name: ("sample", degrees(getattr(self, name)), {"units": "degree"}) for name in ANGLES}
+        of_channels: dict[str, Any] = {"channel": ("channel", list(self.channels))}
+        for name, of in (("wavelength", self.wavelength_nm), ("bandwidth", self.bandwidth_nm)):
+            if of is not None:
+                of_channels[name] = ("channel", of, {"units": "nm"})
+        values = {"brdf": self.values, "uncertainty": self.uncertainty}
+        known = {name: (("sample", "channel"), v, {"units": "sr-1"}) for name, v in values.items() if v is not None}
+        instrument = {
+            f"instrument_{part.name}": getattr(self.instrument, part.name)
+            for part in fields(Instrument)
+            if getattr(self.instrument, part.name) not in (None, "")
+        }
+        attributes = {"name": self.name, "provenance": self.provenance, **instrument}
+        attributes["record"] = json.dumps(dict(self.record), ensure_ascii=False, default=str)
+        return xr.Dataset(known, coords=angles | of_channels, attrs=attributes)
+
+    @classmethod
+    def from_xarray(cls, dataset: xr.Dataset) -> Samples:
+        """Return the samples of a Dataset as `to_xarray` gives it.
+
+        Only the angles theta_i, theta_r and phi_r in degrees or radians (attribute ``units``) and brdf are required.
+
+        Raises
+        ------
+        ParameterError
+            If a variable is missing or has other units, or the samples are not allowed.
+        """
+        brdf = dataset.get("brdf")
+        if brdf is None or not {"theta_i", "theta_r", "phi_r"} <= set(dataset.variables):
+            missing = [name for name in ("brdf", "theta_i", "theta_r", "phi_r") if name not in dataset.variables]
+            raise ParameterError("dataset", f"it has no {', '.join(missing)}", missing)
+        count = dataset["theta_i"].size
+        values = np.asarray(brdf.transpose("sample", ...), dtype=np.float64).reshape(count, -1)
+        wavelength = np.asarray(dataset["wavelength"]).reshape(-1) if "wavelength" in dataset.variables else None
+        if "channel" in dataset.variables:
+            channels = tuple(str(name) for name in np.atleast_1d(dataset["channel"].values))
+        else:
+            channels = ("grey",) if wavelength is None else tuple(f"{at:g}nm" for at in wavelength)
+        uncertainty = None
+        if "uncertainty" in dataset.variables:
+            uncertainty = np.asarray(dataset["uncertainty"].transpose("sample", ...)).reshape(values.shape)
+        attributes = dataset.attrs
+        instrument = {
+            part.name: attributes[f"instrument_{part.name}"]
+            for part in fields(Instrument)
+            if f"instrument_{part.name}" in attributes
+        }
+        return cls(
+            name=str(attributes.get("name", "samples")),
+            **{name: _angle(dataset, name, count) for name in ANGLES},
+            channels=channels,
+            wavelength_nm=wavelength,
+            values=values,
+            uncertainty=uncertainty,
+            bandwidth_nm=np.asarray(dataset["bandwidth"]).reshape(-1) if "bandwidth" in dataset.variables else None,
+            instrument=Instrument(**instrument),
+            provenance=str(attributes.get("provenance", "")),
+            record=json.loads(attributes.get("record", "{}")),
+        )
+
+
+def _angle(dataset: xr.Dataset, name: str, count: int) -> Floats:
+    """Return an angle [rad] of a Dataset; an azimuth of the light that is missing is 0."""
+    if name not in dataset.variables:
+        return np.zeros(count)
+    units = str(dataset[name].attrs.get("units", "missing"))
+    angle = np.asarray(dataset[name].values, dtype=np.float64)
+    if units.startswith("deg"):
+        return radians(angle)
+    if units.startswith("rad"):
+        return angle
+    raise ParameterError(name, f"its units are {units!r}; degree and radian are allowed", units, ("degree", "radian"))

@@ -1,0 +1,106 @@
+"""Samples: what they refuse, what they know of themselves, and the way through xarray."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from brdfdb.errors import ParameterError
+from brdfdb.measurements import Instrument, Samples
+
+
+def samples(**changes: Any) -> Samples:
+    """Four samples of two incidences, with a hole."""
+    given: dict[str, Any] = {
+        "name": "sheet",
+        "theta_i": np.radians([10.0, 10.0, 40.0, 40.0]),
+        "phi_i": np.zeros(4),
+        "theta_r": np.radians([0.0, 20.0, 0.0, 20.0]),
+        "phi_r": np.radians([0.0, 180.0, 0.0, 180.0]),
+        "channels": ("450nm", "650nm"),
+        "wavelength_nm": np.array([450.0, 650.0]),
+        "values": np.array([[0.1, 0.2], [0.3, np.nan], [0.5, 0.6], [0.7, 0.8]]),
+        "uncertainty": np.full((4, 2), 0.01),
+        "bandwidth_nm": np.array([10.0, 12.0]),
+        "instrument": Instrument("bench", 1e-4, 2e-4, 5.0, "unpolarised"),
+        "provenance": "our bench",
+        "record": {"operator": "A", "lamps": [1, 2]},
+    }
+    return Samples(**given | changes)
+
+
+def test_a_hole_is_known_and_incidences_are_numbered() -> None:
+    some = samples()
+    assert some.known.tolist() == [[True, True], [True, False], [True, True], [True, True]]
+    assert some.incidence.tolist() == [0, 0, 1, 1]
+    assert not some.turned
+    assert samples(phi_i=np.array([0.0, 0.0, 1.0, 1.0])).turned
+
+
+def test_all_azimuths_at_the_normal_are_one_incidence() -> None:
+    some = samples(theta_i=np.zeros(4), phi_i=np.array([0.0, 1.0, 2.0, 3.0]))
+    assert some.incidence.tolist() == [0, 0, 0, 0]
+    assert not some.turned
+
+
+def test_a_selection_keeps_rows_together() -> None:
+    some = samples().selected(np.array([False, True, False, True]))
+    assert len(some) == 2
+    assert some.values[1].tolist() == [0.7, 0.8]
+    assert some.uncertainty is not None
+    assert some.uncertainty.shape == (2, 2)
+
+
+def test_nothing_is_lost_through_xarray_and_netcdf(tmp_path: Path) -> None:
+    some = samples()
+    some.to_xarray().to_netcdf(tmp_path / "samples.nc")
+    with xr.open_dataset(tmp_path / "samples.nc") as dataset:
+        again = Samples.from_xarray(dataset)
+    for name in ("theta_i", "phi_i", "theta_r", "phi_r"):
+        np.testing.assert_allclose(getattr(again, name), getattr(some, name), rtol=1e-14)
+    for name in ("values", "uncertainty", "wavelength_nm", "bandwidth_nm"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(some, name))
+    for name in ("name", "channels", "instrument", "provenance", "record"):
+        assert getattr(again, name) == getattr(some, name)
+
+
+def test_a_plain_dataset_of_radians_is_enough() -> None:
+    at = {"units": "rad"}
+    angles = {name: ("sample", [0.1, 0.2], at) for name in ("theta_i", "theta_r", "phi_r")}
+    some = Samples.from_xarray(xr.Dataset({"brdf": ("sample", [1.0, 2.0]), **angles}))
+    assert some.channels == ("grey",)
+    assert some.theta_i.tolist() == [0.1, 0.2]
+    assert some.phi_i.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"theta_r": np.radians([0.0, 20.0, 0.0, 95.0])}, "theta_r: 95 degrees is below the horizon"),
+        ({"phi_r": np.array([0.0, np.nan, 0.0, 0.0])}, "phi_r: nan is not an angle"),
+        ({"values": np.ones((4, 3))}, "values: shape"),
+        ({"values": np.full((4, 2), np.inf)}, "values: a value is infinite"),
+        ({"uncertainty": -np.ones((4, 2))}, "uncertainty: -1 is below 0"),
+        ({"theta_i": np.zeros(5)}, "phi_i: shape"),
+    ],
+)
+def test_samples_that_cannot_be_are_refused(changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ParameterError, match=sentence):
+        samples(**changes)
+
+
+def test_a_solid_angle_is_positive() -> None:
+    with pytest.raises(ParameterError, match="source_solid_angle_sr: -1 is not a positive number"):
+        Instrument(source_solid_angle_sr=-1.0)
+
+
+def test_a_dataset_without_units_is_refused() -> None:
+    bare = {name: ("sample", [0.1]) for name in ("theta_i", "theta_r", "phi_r")}
+    with pytest.raises(ParameterError, match="theta_i: its units are 'missing'"):
+        Samples.from_xarray(xr.Dataset({"brdf": ("sample", [1.0]), **bare}))
+    with pytest.raises(ParameterError, match="dataset: it has no brdf"):
+        Samples.from_xarray(xr.Dataset(bare))
