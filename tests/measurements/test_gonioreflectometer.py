@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from brdfdb import formats, models, presets
+from brdfdb import formats, presets
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats.gonioreflectometer import read_picture, write_picture
-from brdfdb.measurements import Samples, joined
 from brdfdb.measurements.aperture import averaged
 from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture, eq_3, photograph, reduced, traced
 
@@ -31,23 +29,6 @@ def brdf_of(name: str) -> Any:
 
 def taken(name: str, settings: Gonioreflectometer = SMALL, theta_i: float = 30.0, phi_i: float = 40.0) -> Picture:
     return photograph(brdf_of(name), settings, np.radians(theta_i), np.radians(phi_i), 7, name)
-
-
-def fitted(samples: Samples) -> tuple[Array, Array]:
-    """Return Ward's four parameters, and their standard errors: least squares with rho_d + rho_s at most 1."""
-    assert samples.uncertainty is not None
-    measured, noise = samples.values[:, 0], samples.uncertainty[:, 0]
-
-    def left(x: Array) -> Array:
-        given = dict(zip(PARAMETERS, x, strict=True))
-        predicted = averaged(lambda wi, wr: models.ward_vectors(wi, wr, **given)[:, np.newaxis], samples.instrument)
-        return (predicted(samples.w_i, samples.w_r)[:, 0] - measured) / noise
-
-    found = least_squares(
-        left, [0.3, 0.1, 0.1, 0.1], bounds=([0.0, 0.0, 0.01, 0.01], [1.0, 1.0, 0.6, 0.6]), x_scale=0.1
-    )
-    assert found.x[0] + found.x[1] <= 1.0
-    return found.x, np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
 
 
 @pytest.mark.parametrize("name", ["rolled-brass", "wall-plaster"])
@@ -81,23 +62,6 @@ def test_eq_3_alone_would_be_off_where_traced_rays_are_not() -> None:
     apart = np.degrees(np.arccos(np.sum(eq_3(theta, phi, 0.1) * traced(theta, phi, 0.1), axis=-1)))
     assert np.all(apart < 1.0)
     assert np.all(apart > 0.01)
-
-
-@pytest.mark.parametrize("name", ["rolled-brass", "glossy-grey-paper"])
-def test_a_fit_to_pictures_finds_the_parameters_again(name: str, tmp_path: Path) -> None:
-    parts = []
-    for number, (theta_i, phi_i) in enumerate(LIGHTS):
-        write_picture(
-            photograph(brdf_of(name), Gonioreflectometer(), np.radians(theta_i), np.radians(phi_i), number, name),
-            tmp_path / "a.exr",
-        )
-        some = formats.read(tmp_path / "a.exr")
-        assert isinstance(some, Samples)
-        parts.append(some)
-    found, error = fitted(joined(parts))
-    true = np.array([float(presets()[name].parameters[key]) for key in PARAMETERS])
-    assert np.all(np.abs(found - true) < 3.5 * error)
-    assert np.all(error < 0.05 * true)
 
 
 def test_a_picture_through_a_file_is_the_same(tmp_path: Path) -> None:
