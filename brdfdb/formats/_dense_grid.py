@@ -268,7 +268,7 @@ class _Plan:
     def _count(self, axis: int, need: Floats, level: float) -> int:
         """Return the number of nodes of an axis whose cells leave an error of a level."""
         bin_width = radians(self.coarsest.axes[self.names[axis]][-1]) / _BINS
-        return 1 + max(1, math.ceil(need.sum() * bin_width / math.sqrt(8.0 * level)))
+        return 1 + max(1, math.ceil(float(need.sum()) * bin_width / math.sqrt(8.0 * level)))
 
     def _need(self, axis: int) -> Floats:
         """Return the root of the second derivative of f_r, relative to f_r, in the bins of an axis [1/rad]."""

@@ -19,7 +19,7 @@ ISOTROPIC_ALONE = ("eradiate", "fred", "merl", "openmaterial")
 REGULAR = {"resolution": 30.0}  # of formats that would search for nodes
 OPTIONS: dict[str, dict[str, Any]] = {
     **dict.fromkeys(("bird", "csv", "netcdf", "numpy", "openmaterial", "zarr"), REGULAR),
-    "eradiate": {"resolution": 9.0},
+    "eradiate": {"nodes": 9},
     "klems": {"kind": "quarter"},
 }
 
