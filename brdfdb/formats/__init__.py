@@ -51,7 +51,7 @@ def write(
     file_format : str
         One of `EXPORTERS`.
     verdict : str, optional
-        Verdict of the audit of this revision, for the record in the file.
+        Verdict of the audit of this revision, for the record in the file, which says "not stated" without one.
     **options
         Options of the format, as `brdfdb export FORMAT --help` lists them, with underscores.
 

@@ -116,8 +116,8 @@ class Exporter(Protocol):
         All other keyword arguments.
     write : callable
         ``write(table, path, verdict=None, **options)`` writes the file, and those that stand beside it: whole, or not
-        at all. `verdict` is that of the audit of this revision. It raises CannotHoldError for a table that the format
-        has no place for.
+        at all. `verdict` is that of the audit of this revision, or None where the caller knows none. It raises
+        CannotHoldError for a table that the format has no place for.
     """
 
     suffix: str

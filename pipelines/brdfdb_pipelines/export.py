@@ -12,6 +12,7 @@ import brdfdb
 from brdfdb.errors import CannotHoldError, WriteError, counted
 from brdfdb.formats import EXPORTERS
 from brdfdb.formats._written import Written
+from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb_pipelines import terminal, workers
 
 _FEW = 3  # materials that are written before other processes would have started
@@ -81,7 +82,7 @@ def _write(
     root: Path, directory: Path, file_format: str, options: Mapping[str, Any], verdicts: Mapping[str, str], name: str
 ) -> _Export:
     """Write the files of one material."""
-    exporter, table, verdict = EXPORTERS[file_format], brdfdb.open(root)[name], verdicts.get(name)
+    exporter, table, verdict = EXPORTERS[file_format], brdfdb.open(root)[name], verdicts.get(name, NOT_AUDITED)
     kinds = (options["kind"],) if "kind" in options else exporter.kinds
     paths = [(directory / f"{name}_{kind}{exporter.suffix}", {"kind": kind}) for kind in kinds]
     try:

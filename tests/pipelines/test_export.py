@@ -78,10 +78,10 @@ def test_the_verdict_of_this_revision_is_written(store: Path, tmp_path: Path) ->
     (store / "audit.json").write_text(json.dumps(report))
     assert run("export", "list", "grey", "dark", "--store", store, "--out", tmp_path) == 0
     assert (tmp_path / "grey.list").read_text() == "passes"
-    assert (tmp_path / "dark.list").read_text() == "None"
+    assert (tmp_path / "dark.list").read_text() == "not audited"
     (store / "audit.json").write_text("[")
     assert run("export", "list", "grey", "--store", store, "--out", tmp_path) == 0
-    assert (tmp_path / "grey.list").read_text() == "None"
+    assert (tmp_path / "grey.list").read_text() == "not audited"
 
 
 def test_an_output_that_is_a_file_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:
