@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import brdfdb
-from brdfdb.errors import CannotHoldError, WriteError, counted
+from brdfdb.errors import CannotHoldError, ParameterError, WriteError, counted
 from brdfdb.formats import EXPORTERS
 from brdfdb.formats._written import Written
 from brdfdb.store.summary_words import NOT_AUDITED
@@ -32,14 +32,14 @@ def run(
     directory: Path,
     file_format: str,
     options: Mapping[str, Any],
-    audit: Path,
+    audit: Path | None,
     jobs: int,
 ) -> bool:
     """Write the named materials of a store, or all of them, in a format of `EXPORTERS`, and print what was written.
 
     A format with several kinds of files writes one of each, NAME_KIND.SUFFIX, unless the options choose a kind. Of all
     materials, those that the format cannot hold are left out and named. `audit` is the report whose verdicts are
-    written. A few materials are written by `jobs` threads, more by as many processes.
+    written; None: that of the store, if it has one. A few materials are written by `jobs` threads, more by as many processes.
 
     Returns
     -------
@@ -48,6 +48,8 @@ def run(
 
     Raises
     ------
+    ParameterError
+        If `audit` is no report.
     CannotHoldError
         If the format cannot hold a material that is named, or any of all.
     WriteError
@@ -55,12 +57,12 @@ def run(
     """
     store = brdfdb.open(root)
     revisions = {name: store.head(name) for name in names or store}
+    verdicts = _verdicts(root, audit, revisions)
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = "it is a file, not a directory" if isinstance(error, FileExistsError) else error.strerror
         raise WriteError(f"cannot write to {directory}: {reason}") from None
-    verdicts = _verdicts(audit, revisions)
     write = partial(_write, root, directory, file_format, options, verdicts)
     exports: list[_Export] = []
     pool = workers.threads(jobs) if len(revisions) <= _FEW else workers.processes(jobs, patient=False)
@@ -97,13 +99,17 @@ def _write(
         return _Export(name, [], error)
 
 
-def _verdicts(audit: Path, revisions: Mapping[str, str]) -> dict[str, str]:
-    """Return the verdicts of an audit report on these revisions by name; none if there is no report."""
+def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> dict[str, str]:
+    """Return the verdicts of an audit report on these revisions by name; none if the store has no report."""
+    path = root / "audit.json" if audit is None else audit
     try:
-        materials = json.loads(audit.read_bytes())["materials"]
+        materials = json.loads(path.read_bytes())["materials"]
         given = {entry["material"]: (entry["revision"], entry["verdict"]) for entry in materials}
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        if audit is None:
+            return {}
+        reason = error.strerror if isinstance(error, OSError) else "it is no report of `brdfdb audit`"
+        raise ParameterError("audit", f"{audit} cannot be read: {reason}", str(audit)) from None
     return {
         name: given[name][1] for name, revision in revisions.items() if name in given and given[name][0] == revision
     }

@@ -84,6 +84,23 @@ def test_the_verdict_of_this_revision_is_written(store: Path, tmp_path: Path) ->
     assert (tmp_path / "grey.list").read_text() == "not audited"
 
 
+@pytest.mark.parametrize("text", ["[", "[]", '{"materials": [1]}', None])
+def test_a_report_that_is_named_must_be_one(store: Path, tmp_path: Path, capsys: Captured, text: str | None) -> None:
+    report, reason = tmp_path / "report.json", "No such file or directory"
+    if text is not None:
+        report.write_text(text)
+        reason = "it is no report of `brdfdb audit`"
+    out = tmp_path / "out"
+    assert run("export", "list", "grey", "--audit", report, "--store", store, "--out", out) == 2
+    assert capsys.readouterr().err == f"brdfdb: audit: {report} cannot be read: {reason}\n"
+    assert not out.exists()
+
+
+def test_names_and_all_exclude_each_other(store: Path, tmp_path: Path, capsys: Captured) -> None:
+    assert run("export", "list", "grey", "--all", "--store", store, "--out", tmp_path / "out") == 2
+    assert capsys.readouterr().err == "brdfdb: export: name materials or give --all, not both\n"
+
+
 def test_an_output_that_is_a_file_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "out").write_text("a file")
     assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == 2

@@ -64,11 +64,14 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb.formats import EXPORTERS, options_of, parsed_options
     from brdfdb_pipelines import export
 
-    if bool(options.names) == options.all:
+    if options.names and options.all:
+        raise ParameterError("export", "name materials or give --all, not both")
+    if not options.names and not options.all:
         raise ParameterError("export", "name materials, or give --all")
     exporter = EXPORTERS[options.file_format]
     texts = {name: getattr(options, f"option_{name}") for name in options_of(exporter)}
     given = parsed_options(exporter, {name: text for name, text in texts.items() if text is not None})
-    audit = options.audit or options.store / "audit.json"
-    within = export.run(options.store, options.names, options.out, options.file_format, given, audit, options.jobs)
+    within = export.run(
+        options.store, options.names, options.out, options.file_format, given, options.audit, options.jobs
+    )
     return VIOLATED if options.strict and not within else 0
