@@ -51,7 +51,7 @@ def write(
     file_format : str
         One of `EXPORTERS`.
     verdict : str, optional
-        Verdict of the audit of this revision, for the record in the file.
+        Verdict of the audit of this revision, for the record in the file, which says "not stated" without one.
     **options
         Options of the format, as `brdfdb export FORMAT --help` lists them, with underscores.
 
@@ -82,8 +82,8 @@ def write(
             "file_format", f"{file_format!r} is not one of {', '.join(EXPORTERS)}", file_format, tuple(EXPORTERS)
         )
     exporter = EXPORTERS[file_format]
-    parsed_options(exporter, {name: _text(value) for name, value in options.items()})
-    return exporter.write(table, Path(path), verdict=verdict, **options)
+    parsed = parsed_options(exporter, {name: _text(value) for name, value in options.items()})
+    return exporter.write(table, Path(path), verdict=verdict, **parsed)
 
 
 def _text(value: Any) -> str:

@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import brdfdb
+from brdfdb import formats
 from brdfdb.errors import ParameterError
 from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options
+from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
@@ -73,6 +76,16 @@ def test_a_format_of_fifteen_lines_is_an_address(store: Path) -> None:
     assert client.problem("GET", "/v1/materials/grey/export/list?digits=x", 422)["parameter"] == "digits"
     assert client.problem("GET", "/v1/materials/grey/export/list?kind=lobe", 422)["parameter"] == "kind"
     assert ", exr, " in client.problem("GET", "/v1/materials/grey/export/paper", 404)["detail"]
+
+
+def test_a_verdict_that_is_not_given_is_not_stated(store: Path, tmp_path: Path) -> None:
+    table = brdfdb.open(store)["grey"]
+    for verdict, stated in ((None, "not stated"), ("passes", "passes")):
+        formats.write(table, tmp_path / "grey.csv", "csv", resolution=45.0, verdict=verdict)
+        reading = formats.read(tmp_path / "grey.csv")
+        assert isinstance(reading, FileTable)
+        assert reading.record["audit"] == stated
+    assert b"audit: not audited" in client_of(store).get("/v1/materials/grey/export/csv?resolution=45").content
 
 
 def test_modules_of_the_room_are_found() -> None:
