@@ -80,9 +80,10 @@ def test_a_directory_that_cannot_be_replaced_stays(tmp_path: Path, monkeypatch: 
         replace(source, target)
 
     monkeypatch.setattr(os, "replace", full)
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new" / "zarr.json").write_text("new")
     with pytest.raises(WriteError, match="No space left"), whole(path) as (half,):
-        half.mkdir()
-        (half / "zarr.json").write_text("new")
+        (tmp_path / "new").rename(half)
     assert list(tmp_path.iterdir()) == [path]
     assert (path / "zarr.json").read_text() == "old"
 
