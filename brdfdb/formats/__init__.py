@@ -12,7 +12,10 @@ import pkgutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.formats._input import check_file
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options
 
 if TYPE_CHECKING:
@@ -106,7 +109,7 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     ParameterError
         If there is no such format.
     FileFormatError
-        If no format recognises the file, or it is damaged.
+        If no format recognises the file, it is damaged, or it is no regular file of at most 2 GiB.
     OSError
         If the file cannot be read.
 
@@ -118,16 +121,31 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
     path = Path(path)
+    check_file(path)
+    importer = _importer(path, file_format)
+    try:
+        reading = importer.read(path)
+    except ParameterError as error:  # of samples that are none
+        raise FileFormatError(f"{path}: {error}") from error
+    at = reading.wavelength_nm
+    if at is not None and not np.all((at > 0.0) & (at < np.inf)):
+        wrong = at[~((at > 0.0) & (at < np.inf))][0]
+        raise FileFormatError(f"{path}: a wavelength is {wrong:g} nm; allowed are positive numbers")
+    return reading
+
+
+def _importer(path: Path, file_format: str) -> Importer:
+    """Return the importer of a format by its name, or the one that recognises a file."""
     if file_format:
         if file_format not in IMPORTERS:
             raise ParameterError(
                 "file_format", f"{file_format!r} is not one of {', '.join(IMPORTERS)}", file_format, tuple(IMPORTERS)
             )
-        return IMPORTERS[file_format].read(path)
+        return IMPORTERS[file_format]
     with (path / "zarr.json" if path.is_dir() else path).open("rb") as file:  # a zarr group is a directory
         head = file.read(_HEAD)
     by_suffix = sorted(IMPORTERS.values(), key=lambda importer: not path.name.endswith(importer.suffix))
     for importer in by_suffix:
         if importer.recognises(head):
-            return importer.read(path)
+            return importer
     raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}")

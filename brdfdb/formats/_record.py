@@ -79,6 +79,15 @@ def lines(document: dict[str, Any]) -> list[str]:
     return [f"{key}: {' '.join(value.split())}" for key, value in pairs]
 
 
+def document_of(text: str | bytes) -> dict[str, Any]:
+    """Return the record that stands in a text as JSON; empty if there is none, or it is damaged."""
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
 def of_lines(texts: list[str]) -> dict[str, Any]:
     """Return the record that `lines` wrote; other lines are left out."""
     document: dict[str, Any] = {}
@@ -87,6 +96,6 @@ def of_lines(texts: list[str]) -> dict[str, Any]:
         if colon:
             try:
                 document[key] = json.loads(value)
-            except ValueError:
+            except (ValueError, RecursionError):
                 document[key] = value
     return document

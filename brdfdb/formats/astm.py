@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._record import lines, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
@@ -170,21 +171,23 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
     """Return comments, the names of the channels, and the rows."""
     comments: list[str] = []
     columns: tuple[str, ...] = ()
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in itertools.islice(file, _LONGEST_HEADER):
-            word, _, rest = line.strip().partition(" ")
-            if word == "VARS":
-                columns = tuple(text.strip() for text in rest.split(","))
-                break
-            comments.append(rest)
-        if columns[:4] != _ANGLES or len(columns) < 5:
-            raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} with channels behind it")
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")  # an empty file
-                rows = np.loadtxt(file, delimiter=",", ndmin=2)
-        except (ValueError, UserWarning):
-            raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none") from None
+    texts = lines_of(path)
+    for line in itertools.islice(texts, _LONGEST_HEADER):
+        word, _, rest = line.strip().partition(" ")
+        if word == "VARS":
+            columns = tuple(text.strip() for text in rest.split(","))
+            break
+        comments.append(rest)
+    if columns[:4] != _ANGLES or len(columns) < 5:
+        raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} with channels behind it")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an empty file
+            rows = np.loadtxt(texts, delimiter=",", ndmin=2)
+    except FileFormatError:
+        raise
+    except (ValueError, UserWarning):
+        raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none") from None
     if rows.shape[1] != len(columns) or not np.all(np.isfinite(rows)):
         raise FileFormatError(f"{path}: a row has no {len(columns)} finite numbers")
     rows[:, :4] = np.where(rows[:, :4] < 0.0, rows[:, :4] + 2.0 * np.pi, rows[:, :4])

@@ -133,15 +133,12 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._channels import RGB
     from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._record import document_of
     from brdfdb.formats._rgl_fields import fields_of
     from brdfdb.formats._rgl_tensor import read_tensors
 
     fields = fields_of(path, read_tensors(path))
-    try:
-        document = json.loads(fields.description)
-    except ValueError:
-        document = {}
-    document = document if isinstance(document, dict) else {}
+    document = document_of(fields.description)
     name = str(document.get("name") or Path(path).stem)
     if fields.wavelength_nm is None:
         return FileTable(name, RGB, None, fields.evaluate, document)
