@@ -104,9 +104,9 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     Raises
     ------
     ParameterError
-        If there is no such format.
+        If there is no such format, or its files are only written.
     FileFormatError
-        If no format recognises the file, or it is damaged.
+        If no format recognises the file, its format is only written, or it is damaged.
     OSError
         If the file cannot be read.
 
@@ -118,7 +118,10 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
     path = Path(path)
+    only_written = {name: exporter for name, exporter in EXPORTERS.items() if name not in IMPORTERS}
     if file_format:
+        if file_format in only_written:
+            raise ParameterError("file_format", f"files of {file_format} are only written, not read", file_format)
         if file_format not in IMPORTERS:
             raise ParameterError(
                 "file_format", f"{file_format!r} is not one of {', '.join(IMPORTERS)}", file_format, tuple(IMPORTERS)
@@ -130,4 +133,7 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     for importer in by_suffix:
         if importer.recognises(head):
             return importer.read(path)
+    for name, exporter in only_written.items():
+        if path.name.endswith(exporter.suffix):
+            raise FileFormatError(f"{path}: files of {name} are only written, not read")
     raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}")
