@@ -11,7 +11,7 @@ import pytest
 
 import brdfdb
 from brdfdb import formats
-from brdfdb.errors import ParameterError
+from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written
@@ -20,6 +20,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
+from brdfdb_api.http.openapi_notes import EXPORT_OPTIONS
 from tests.api.a_store import client_of
 from tests.pipelines.command import Captured, run
 
@@ -86,6 +87,30 @@ def test_a_verdict_that_is_not_given_is_not_stated(store: Path, tmp_path: Path) 
         assert isinstance(reading, FileTable)
         assert reading.record["audit"] == stated
     assert b"audit: not audited" in client_of(store).get("/v1/materials/grey/export/csv?resolution=45").content
+
+
+@pytest.mark.parametrize("suffix", ["exr", "png", "glsl", "slang", "osl"])
+def test_files_that_are_only_written_are_named(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"grey.{suffix}"
+    path.write_bytes(b"something")
+    sentence = f"files of {suffix} are only written, not read"
+    with pytest.raises(FileFormatError, match=sentence):
+        formats.read(path)
+    with pytest.raises(ParameterError, match=f"file_format: {sentence}"):
+        formats.read(path, suffix)
+
+
+def test_an_option_over_http_allows_what_any_format_allows() -> None:
+    schemas = {parameter["name"]: parameter["schema"] for parameter in EXPORT_OPTIONS}
+    for exporter in EXPORTERS.values():
+        for name, option in options_of(exporter).items():
+            schema = schemas[name]
+            if isinstance(option.default, bool | str):
+                assert {*option.choices} <= {*schema.get("enum", option.choices)}
+            else:
+                assert schema["minimum"] <= min(option.low, option.default)
+                assert schema["maximum"] >= max(option.high, option.default)
+    assert "enum" not in schemas["colour"]  # a switch of one format, and a choice of another
 
 
 def test_modules_of_the_room_are_found() -> None:
