@@ -21,8 +21,20 @@ if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
-__all__ = ["EXPORTERS", "IMPORTERS", "Exporter", "Importer", "Option", "options_of", "parsed_options", "read", "write"]
+__all__ = [
+    "EXPORTERS",
+    "IMPORTERS",
+    "Exporter",
+    "Importer",
+    "Option",
+    "options_of",
+    "parsed_options",
+    "read",
+    "samples",
+    "write",
+]
 
+_TEXT = "text"
 _HEAD = 4096  # bytes of a file that tell its format
 
 
@@ -118,16 +130,75 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
     path = Path(path)
+    return _importer(path, file_format).read(path)
+
+
+def samples(path: str | os.PathLike[str], file_format: str = "", **columns: Any) -> Samples:
+    """Return the samples that a file lists, or the values of a grid at its own directions above the horizon.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    file_format : str
+        As of `read`.
+    **columns
+        The columns of a text, its quantity and its angles, as of `brdfdb.formats.text.read`. A file is read as text
+        then.
+
+    Returns
+    -------
+    Samples
+        Values as the file has them: negative ones stay, and holes are nan. Of grids the rows below the horizon are left
+        out and counted in the record, and a value that stands at all azimuths of the normal is given once. Klems
+        matrices and tensor trees give their averages at the middles of patches and cells. A network, which is a
+        formula, gives values on a grid that its record names.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format or column.
+    FileFormatError
+        If no format recognises the file, it is damaged, or it holds a formula and no values.
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from brdfdb import formats
+    >>> _ = Path("sheet.csv").write_text("sza,vza,raa,550nm\\n10,20,180,0.3\\n", encoding="utf-8")
+    >>> formats.samples("sheet.csv").values
+    array([[0.3]])
+    """
+    from brdfdb.measurements.samples import Samples
+
+    path = Path(path)
+    if columns:
+        if file_format not in ("", _TEXT):
+            raise ParameterError("file_format", f"{file_format!r} has no columns; {_TEXT!r} has", file_format, (_TEXT,))
+        reading: FileTable | Samples = _MODULES[_TEXT].read(path, **columns)
+    else:
+        reading = _importer(path, file_format).read(path)
+    if isinstance(reading, Samples):
+        return reading
+    if reading.nodes is None:
+        raise FileFormatError(f"{path}: it holds a formula, and no values at directions")
+    return reading.nodes()
+
+
+def _importer(path: Path, file_format: str) -> Importer:
+    """Return the importer of a format by its name, or the one that recognises a file."""
     if file_format:
         if file_format not in IMPORTERS:
             raise ParameterError(
                 "file_format", f"{file_format!r} is not one of {', '.join(IMPORTERS)}", file_format, tuple(IMPORTERS)
             )
-        return IMPORTERS[file_format].read(path)
+        return IMPORTERS[file_format]
     with (path / "zarr.json" if path.is_dir() else path).open("rb") as file:  # a zarr group is a directory
         head = file.read(_HEAD)
     by_suffix = sorted(IMPORTERS.values(), key=lambda importer: not path.name.endswith(importer.suffix))
     for importer in by_suffix:
         if importer.recognises(head):
-            return importer.read(path)
+            return importer
     raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}")

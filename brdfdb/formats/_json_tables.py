@@ -30,13 +30,13 @@ def parsed(path: Path) -> dict[str, Any]:
     return document
 
 
-def column(path: Path, name: str, values: Any) -> NDArray[np.float64]:
-    """Return a list of numbers; FileFormatError if it holds anything else."""
+def column(path: Path, name: str, values: Any, *, holes: bool = False) -> NDArray[np.float64]:
+    """Return a list of numbers, with nan for null if it may have holes; FileFormatError if it holds anything else."""
     try:
         numbers = np.array(values, dtype=np.float64)
     except (ValueError, TypeError, OverflowError):
         numbers = np.empty((0, 0))
-    if numbers.ndim != 1 or not numbers.size or not np.all(np.isfinite(numbers)):
+    if numbers.ndim != 1 or not numbers.size or np.any(np.isinf(numbers) | (np.isnan(numbers) & ~holes)):
         raise FileFormatError(f"{path}: {name} is not a list of numbers")
     return numbers
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.parameters import Floats
 
 LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
 TITLE = "BSDF Data Interchange file"
@@ -33,7 +34,7 @@ class Text:
         The four lists: rotations of the sample, angles of incidence, azimuths and radial angles.
     tis : array (C, rotations, incidences)
         Total integrated scatter.
-    values : float32 array (C, rotations, incidences, azimuths, radials) [1/sr]
+    values : array (C, rotations, incidences, azimuths, radials) [1/sr]
         f_r.
     """
 
@@ -43,7 +44,7 @@ class Text:
     scatter: str
     angles: tuple[NDArray[np.float64], ...]
     tis: NDArray[np.float64]
-    values: NDArray[np.float32]
+    values: Floats
 
 
 def write(stream: BinaryIO, text: Text) -> None:
@@ -102,7 +103,7 @@ def parsed(path: Path) -> Text:
             if word == "TIS":
                 break
         tis[number] = _numbers(path, words, 1, "TIS")[0]
-        rows.append(_numbers(path, words, lists[2].size * lists[3].size, "TIS").astype(np.float32))
+        rows.append(_numbers(path, words, lists[2].size * lists[3].size, "TIS"))
     shape = (parts, *(nodes.size for nodes in lists))
     values = np.concatenate(rows).reshape(shape)
     return Text(

@@ -11,6 +11,7 @@ part is left out.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
@@ -26,6 +27,7 @@ from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
+from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 
@@ -127,7 +129,6 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
 
     path = Path(path)
     rows = _rows(path)
@@ -136,12 +137,10 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
     grid = _grid(rows)
-    if grid is not None:
-        return FileTable(name, channels, at, grid.evaluate, known)
-    theta_i, phi_i, theta_r, phi_r = np.deg2rad(rows[:, :4]).T
-    return Samples(
-        name, theta_i, phi_i, theta_r, (phi_i + np.pi - phi_r) % (2.0 * np.pi), channels, at, rows[:, 4:], record=known
-    )
+    angles = np.deg2rad(rows[:, :4])
+    angles[:, 3] = np.deg2rad((rows[:, 1] + 180.0 - rows[:, 3]) % 360.0)
+    nodes = functools.partial(samples_at_angles, angles, rows[:, 4:], name, channels, at, known)
+    return nodes() if grid is None else FileTable(name, channels, at, grid.evaluate, known, nodes)
 
 
 def _write_blocks(stream: TextIO, grid: AngularGrid) -> None:

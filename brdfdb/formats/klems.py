@@ -25,11 +25,13 @@ from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import FIXED, Option
 from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
+from brdfdb.formats._nodes import samples_at_vectors
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".xml"
@@ -142,7 +144,7 @@ def _text(matrix: Floats) -> str:
 
 
 def _numbers(text: str) -> Floats:
-    return np.maximum(np.array(text.replace(",", " ").split(), dtype=np.float64), 0.0)
+    return np.array(text.replace(",", " ").split(), dtype=np.float64)
 
 
 def _definition(basis: Basis) -> Iterator[str]:
@@ -203,7 +205,30 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     lights, viewers = bases[visible.basis.lower()], bases[visible.row_basis.lower()]
     matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
     of_colour = XYZ if len(names) > 1 else LUMINOUS
-    return FileTable(file.name, of_colour, None, functools.partial(evaluated, matrix, viewers, lights), file.record)
+    evaluate = functools.partial(evaluated, np.maximum(matrix, 0.0), viewers, lights)
+    nodes = functools.partial(_samples, path, file, viewers, lights)
+    return FileTable(file.name, of_colour, None, evaluate, file.record, nodes)
+
+
+def _samples(path: str | os.PathLike[str], file: BsdfFile, viewers: Basis, lights: Basis) -> Samples:
+    """Return all blocks of the front in these bases at the middles of patches; a channel is a block."""
+    names = [
+        block.wavelength
+        for block in file.blocks.values()
+        if (block.basis.lower(), block.row_basis.lower()) == (lights.name.lower(), viewers.name.lower())
+    ]
+    matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
+    viewer, light = np.divmod(np.arange(len(viewers) * len(lights)), len(lights))
+    channels = [LUMINOUS[0] if name == VISIBLE else name for name in names]
+    return samples_at_vectors(
+        lights.middles[light] * FLIPPED,
+        viewers.middles[viewer],
+        matrix.reshape(len(viewer), -1),
+        file.name,
+        channels,
+        None,
+        {**file.record, "side": FRONT_OF_RADIANCE, "patches": f"{viewers.name}, f_r is their average"},
+    )
 
 
 def _matrix(path: str | os.PathLike[str], file: BsdfFile, name: str, viewers: Basis, lights: Basis) -> Floats:

@@ -18,6 +18,7 @@ from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".nc"
@@ -75,12 +76,12 @@ def write(
 
 
 def recognises(head: bytes) -> bool:
-    """Return True for the first bytes of a netCDF 3 file with a variable ``brdf`` over the axes of a grid."""
-    return head.startswith(_MAGIC) and any(name in head for name in (b"theta_r", b"theta_h"))
+    """Return True for the first bytes of a netCDF 3 file with a dimension of a grid, or one of samples."""
+    return head.startswith(_MAGIC) and any(name in head for name in (b"theta_r", b"theta_h", b"\0\0\0\x06sample"))
 
 
-def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly.
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly; or samples.
 
     Raises
     ------
