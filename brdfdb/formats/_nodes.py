@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import System
 from brdfdb.geometry import spherical_angles
 from brdfdb.measurements.samples import Instrument, Samples
@@ -52,9 +53,16 @@ def samples_at_angles(
     Samples
         In the order of the rows. Its record counts the rows ``below_the_horizon`` and those ``repeated``: with the same
         directions and the same values, as at all azimuths of the normal.
+
+    Raises
+    ------
+    FileFormatError
+        If no row is above the horizon.
     """
     above = np.flatnonzero((angles[:, 0] <= _HORIZON) & (angles[:, 2] <= _HORIZON))
     kept = above[_first_of_each(angles[above], values[above])]
+    if not len(kept):
+        raise FileFormatError(f"{name}: none of its {len(angles)} values is above the horizon")
     counts = {"below_the_horizon": len(angles) - len(above), "repeated": len(above) - len(kept)}
     theta_i, phi_i, theta_r, phi_r = np.minimum(angles[kept], [_HORIZON, np.inf, _HORIZON, np.inf]).T
     return Samples(

@@ -96,7 +96,7 @@ def read(
     roles = _roles(path, layout, columns)
     rows = _rows(path, layout, first)
     record: dict[str, Any] = {"titles": list(layout.titles)} if layout.titles else {}
-    turned = _angles(rows, roles, layout, angles, record)
+    turned = _angles(path, rows, roles, layout, angles, record)
     names = [layout.names[column] for column in roles["values"]]
     scale = _scale(quantity_of(names), layout, quantity, turned[:, 2], record)
     values: Array = rows[:, roles["values"]] * scale
@@ -188,12 +188,15 @@ def _rows(path: Path, layout: Layout, first: int) -> Array:
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, count)
 
 
-def _angles(rows: Array, roles: Mapping[str, list[int]], layout: Layout, unit: str, record: dict[str, Any]) -> Array:
+def _angles(
+    path: Path, rows: Array, roles: Mapping[str, list[int]], layout: Layout, unit: str, record: dict[str, Any]
+) -> Array:
     """Return theta_i, phi_i, theta_r, phi_r [rad] of rows, shape (N, 4)."""
     given = {name: rows[:, roles[name][0]] for name in ANGLES if name in roles}
     for name, column in given.items():
         if np.any(np.isnan(column)):
-            raise FileFormatError(f"field {layout.names[roles[name][0]]}: an angle is missing")
+            line = f"line {layout.line}, field {layout.names[roles[name][0]]}"
+            raise FileFormatError(f"{path}: {line}: an angle is missing")
     unit = layout.units or unit if unit == "auto" else unit
     largest = max(float(np.abs(column).max()) for column in given.values())
     if unit == "auto":
@@ -208,6 +211,9 @@ def _angles(rows: Array, roles: Mapping[str, list[int]], layout: Layout, unit: s
         if side == "i" and "delta_phi" in given:  # the viewer turns with the light
             given["delta_phi"] = np.where(theta < 0.0, given["delta_phi"] - np.pi, given["delta_phi"])
         given[f"theta_{side}"] = np.abs(theta)
+        if np.any(np.abs(theta) > np.pi * (1.0 + 1e-9)):
+            shown = np.rad2deg(np.abs(theta).max())
+            raise FileFormatError(f"{path}: line {layout.line}: theta_{side} of {shown:g} degrees is no polar angle")
     phi_r = given["phi_r"] if "phi_r" in given else given["phi_i"] + given["delta_phi"]
     return np.stack([given["theta_i"], given["phi_i"], given["theta_r"], phi_r], axis=1)
 
