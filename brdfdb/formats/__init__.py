@@ -133,7 +133,7 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     return _importer(path, file_format).read(path)
 
 
-def samples(path: str | os.PathLike[str], file_format: str = "", **columns: Any) -> Samples:
+def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -> Samples:
     """Return the samples that a file lists, or the values of a grid at its own directions above the horizon.
 
     Parameters
@@ -142,9 +142,9 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **columns: Any)
         The file.
     file_format : str
         As of `read`.
-    **columns
-        The columns of a text, its quantity and its angles, as of `brdfdb.formats.text.read`. A file is read as text
-        then.
+    **keywords
+        Of a text its columns, quantity and angles, as of `brdfdb.formats.text.read`: with one of them any file is read
+        as text. Of an archive the `member`, as of `brdfdb.formats.neural.read`.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **columns: Any)
     Raises
     ------
     ParameterError
-        If there is no such format or column.
+        If there is no such format, keyword or column.
     FileFormatError
         If no format recognises the file, it is damaged, or it holds a formula and no values.
     OSError
@@ -174,12 +174,14 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **columns: Any)
     from brdfdb.measurements.samples import Samples
 
     path = Path(path)
-    if columns:
-        if file_format not in ("", _TEXT):
-            raise ParameterError("file_format", f"{file_format!r} has no columns; {_TEXT!r} has", file_format, (_TEXT,))
-        reading: FileTable | Samples = _MODULES[_TEXT].read(path, **columns)
-    else:
-        reading = _importer(path, file_format).read(path)
+    text = bool(keywords) and set(keywords) <= set(_MODULES[_TEXT].keywords)
+    importer = _importer(path, file_format or (_TEXT if text else ""))
+    allowed = getattr(importer, "keywords", ())
+    for name, value in keywords.items():
+        if name not in allowed:
+            takes = f"takes {', '.join(allowed)}" if allowed else "takes no keywords"
+            raise ParameterError(name, f"the format of {path} {takes}", value, allowed)
+    reading: FileTable | Samples = importer.read(path, **keywords)
     if isinstance(reading, Samples):
         return reading
     if reading.nodes is None:

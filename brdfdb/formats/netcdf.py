@@ -98,3 +98,18 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         raise
     except Exception as error:  # SciPy raises what its parser comes to
         raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
+
+
+def write_samples(samples: Samples, path: str | os.PathLike[str]) -> None:
+    """Write samples as netCDF, which `read` gives back: whole, or not at all.
+
+    Raises
+    ------
+    MissingExtraError
+        If SciPy, which writes netCDF, is not installed.
+    WriteError
+        If the file cannot be written.
+    """
+    import_extra("scipy.io")
+    with whole(path) as (half,):
+        samples.to_xarray().to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")

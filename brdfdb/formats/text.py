@@ -41,6 +41,7 @@ Array = NDArray[np.float64]
 suffix = ".txt"
 _LONGEST_TITLE = 1000  # lines before the first row
 _ROLES = (*ANGLES, "values", "uncertainty", "wavelength")
+keywords = (*_ROLES, "quantity", "angles")
 _UNITS = ("auto", "deg", "rad")
 _SHOWN = 200  # characters of names that a sentence repeats
 _UPRIGHT = np.radians(90.0 + 1e-6)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from brdfdb.errors import import_extra
@@ -23,27 +25,53 @@ def averaged(points: Floats, values: Floats) -> tuple[Floats, Floats]:
     return points[first], np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
 
 
-def integrals(points: Floats, values: Floats) -> tuple[float, Floats, Floats]:
-    """Return the covered share of the unit disk, and integrals (C,) of values over it and over the whole disk."""
+@dataclass(frozen=True)
+class DiskIntegrals:
+    """Integrals of values over the unit disk.
+
+    Attributes
+    ----------
+    covered : float [1]
+        Share of the disk that the points surround.
+    inside, whole : array (C,)
+        Integrals over what is covered, and over the disk.
+    peak : float [1]
+        Largest share of one point in the integrals over the disk: of many points it is small, unless the values have a
+        peak that is narrower than the distance of the points.
+    """
+
+    covered: float
+    inside: Floats
+    whole: Floats
+    peak: float
+
+
+def integrals(points: Floats, values: Floats) -> DiskIntegrals | None:
+    """Return the integrals of values (N, C) at points (N, 2) of the unit disk; None if less than half is covered.
+
+    Values are linear on the Delaunay triangles of the points. Beyond them the value of each azimuth is that of the point
+    closest to the rim there. What covers half of the disk has its middle inside, so that every azimuth has an end.
+    """
     spatial = import_extra("scipy.spatial")
-    dark = np.zeros(values.shape[1])
     if len(points) < 3 or np.linalg.matrix_rank(points - points[0], tol=1e-6) < 2:
-        return 0.0, dark, dark
-    area, inside = _over_triangles(points, values)
-    azimuth = np.arange(_RIM) * (2.0 * np.pi / _RIM)
-    rim = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
-    distance, nearest = spatial.cKDTree(points).query(rim)
-    apart = distance > 1e-6
-    whole_area, whole = _over_triangles(
-        np.concatenate([points, rim[apart]]), np.concatenate([values, values[nearest[apart]]])
-    )
-    return area / np.pi, inside, whole * (np.pi / whole_area)
-
-
-def _over_triangles(points: Floats, values: Floats) -> tuple[float, Floats]:
-    """Return the area of the Delaunay triangles of points, and the integrals (C,) of values that are linear on them."""
-    spatial = import_extra("scipy.spatial")
+        return None
+    hull = spatial.ConvexHull(points)
+    if hull.volume < 0.5 * np.pi:
+        return None
     corners = spatial.Delaunay(points).simplices
     a, b, c = (points[corners[:, number]] for number in range(3))
     areas = 0.5 * np.abs((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
-    return float(areas.sum()), np.einsum("t,tc->c", areas, values[corners].mean(axis=1))
+    inner = np.bincount(corners.reshape(-1), np.repeat(areas / 3.0, 3), len(points))
+    azimuth = np.arange(_RIM) * (2.0 * np.pi / _RIM)
+    rim = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
+    toward = rim @ hull.equations[:, :2].T  # of each azimuth and edge of the hull
+    reach = np.min(
+        -hull.equations[:, 2] / np.where(toward > 0.0, toward, np.nan), axis=1, initial=1.0, where=toward > 0.0
+    )
+    beyond = 1.0 - reach**2
+    beyond *= (np.pi - hull.volume) / max(beyond.sum(), np.finfo(float).tiny)
+    outer = np.bincount(spatial.cKDTree(points).query(rim)[1], beyond, len(points))
+    parts = (inner + outer)[:, np.newaxis] * values
+    whole = parts.sum(axis=0)
+    shares = np.abs(parts).max(axis=0) / np.maximum(np.abs(whole), np.finfo(float).tiny)
+    return DiskIntegrals(float(hull.volume / np.pi), inner @ values, whole, float(shares.max()))

@@ -17,13 +17,13 @@ from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
 
 _FEWEST_VIEWERS = 12  # of an incidence that is integrated
-_LEAST_COVERED = 0.5  # share of the disk below which an incidence is not integrated
 _MOST_INCIDENCES = 400  # that are integrated, evenly among all
 _BANDS_DEG = (10.0, 30.0, 50.0, 70.0)  # incidences of scattered directions, each with those within _BAND_DEG
 _BAND_DEG = 1.0
 _MOST_IN_BAND = 20_000
 _SAME_DEG = 0.01  # directions of the light closer than this are one
 _ALL_COVERED = 0.999  # share of the disk from which on the rest is not spoken of
+_PEAK = 0.1  # share of one viewer in an albedo from which on it is not known
 _CLAIM = 0.05  # relative difference of a header from its own values that is stated
 _EXCESS = 1.02  # albedo above which the unit is doubted
 _BLACK = 2e-4  # albedo below which the unit is doubted: the blackest coatings reflect more
@@ -46,6 +46,9 @@ class Incidence:
         Integral of f_r cos(theta_r) over what is covered, of each channel.
     albedo : tuple of float [1]
         The same over the hemisphere; beyond the viewers f_r is that of the nearest one.
+    peak : float [1]
+        Largest share of one viewer in the albedo of a channel. Above a tenth the lobe is narrower than the steps
+        between viewers, and the albedo is not known.
     """
 
     theta_i_deg: float
@@ -54,6 +57,7 @@ class Incidence:
     covered: float
     measured: tuple[float, ...]
     albedo: tuple[float, ...]
+    peak: float
 
 
 @dataclass(frozen=True)
@@ -157,7 +161,8 @@ class Statement:
 
     def document(self) -> dict[str, Any]:
         """Return the statement as JSON."""
-        return {**asdict(self), "sentences": list(self.sentences)}
+        largest = self.largest if np.isfinite(self.largest) else None
+        return {**asdict(self), "largest": largest, "sentences": list(self.sentences)}
 
 
 def statement(samples: Samples, progress: Callable[[float], None] | None = None) -> Statement:
@@ -179,8 +184,8 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     Notes
     -----
     The viewers of a direction of the light are points of the unit disk, whose areas are projected solid angles. On the
-    Delaunay triangles of the points f_r is linear. The rim of the disk has the value of the nearest point. Zeros are
-    taken for holes where less than half of the values are 0.
+    Delaunay triangles of the points f_r is linear. Between them and the rim of the disk it is that of the point closest
+    to the rim. Zeros are taken for holes where less than half of the values are 0.
     """
     theta_i, theta_r = degrees(samples.theta_i), degrees(samples.theta_r)
     delta = degrees(samples.phi_r - samples.phi_i) % 360.0
@@ -247,15 +252,15 @@ def _incidence(
         points = np.concatenate([points, points * np.array([1.0, -1.0])])
         values = np.concatenate([values, values])
     points, values = averaged(points, values)
-    covered, measured, albedo = 1.0, np.zeros(len(samples.channels)), np.zeros(len(samples.channels))
+    covered, peak, (measured, albedo) = 1.0, 0.0, np.zeros((2, len(samples.channels)))
     patterns, of_pattern = np.unique(np.isfinite(values), axis=1, return_inverse=True)
     for number, known in enumerate(patterns.T):
         channels = np.flatnonzero(of_pattern.reshape(-1) == number)
-        share, inside, whole = integrals(points[known], values[np.ix_(known, channels)])
-        covered = min(covered, share)
-        measured[channels], albedo[channels] = inside, whole
-    if covered < _LEAST_COVERED:
-        return None
+        part = integrals(points[known], values[np.ix_(known, channels)])
+        if part is None:
+            return None
+        covered, peak = min(covered, part.covered), max(peak, part.peak)
+        measured[channels], albedo[channels] = part.inside, part.whole
     theta_i, phi_i = degrees(samples.theta_i[rows]), degrees(samples.phi_i[rows]) % 360.0
     return Incidence(
         round(float(np.mean(theta_i)), 4),
@@ -264,6 +269,7 @@ def _incidence(
         covered,
         tuple(measured.tolist()),
         tuple(albedo.tolist()),
+        peak,
     )
 
 
@@ -282,7 +288,7 @@ def _claims(samples: Samples, incidences: Sequence[Incidence]) -> tuple[Claim, .
             claims += [
                 Claim(incidence.theta_i_deg, channel, float(claimed), albedo)
                 for channel, claimed, albedo in zip(samples.channels, tis[0, nearest], incidence.albedo, strict=True)
-                if albedo > 0.0
+                if albedo > 0.0 and incidence.peak <= _PEAK
             ]
     return tuple(claims)
 
@@ -291,8 +297,9 @@ def _hints(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]
     """Return what looks wrong with the unit of the values, in sentences."""
     if not samples.known.any():
         return ("There is no value at all.",)
-    if incidences:
-        albedo, how = float(np.median([max(some.albedo) for some in incidences])), "the values integrate to"
+    sound = [max(some.albedo) for some in incidences if some.peak <= _PEAK]
+    if sound:
+        albedo, how = float(np.median(sound)), "the values integrate to"
     else:
         albedo, how = float(np.pi * np.nanmedian(samples.values)), "pi times the median of f_r is"
     if albedo > _EXCESS:
@@ -359,6 +366,8 @@ def _on_albedo(known: Statement) -> list[str]:
         if some.covered < _ALL_COVERED:
             inside = _shown(known.channels, some.measured)
             text += f"; viewers surround {100.0 * some.covered:.3g} % of the hemisphere, with {inside}"
+        if some.peak > _PEAK:
+            text += f"; unknown: one viewer makes {100.0 * some.peak:.2g} % of it, the lobe is narrower than the steps"
         lines.append(f"{text}.")
     if known.in_bands:
         lines.append(
