@@ -203,4 +203,5 @@ def _importer(path: Path, file_format: str) -> Importer:
     for importer in by_suffix:
         if importer.recognises(head):
             return importer
-    raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}")
+    hint = "" if b"\0" in head else "; a text is read with the names of its columns, such as theta_i=NAME"
+    raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}{hint}")

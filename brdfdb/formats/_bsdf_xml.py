@@ -12,10 +12,13 @@ from xml.sax.saxutils import escape
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._record import lines, of_lines
+from brdfdb.formats._text_file import check_size
 
 # Names of the sides in these files are those of WINDOW, whose front is outdoors. Radiance's front is the back
 FRONT_OF_RADIANCE = "Reflection Back"
 VISIBLE = "Visible"
+_MOST_BYTES = 1 << 28  # of a file that is read: its numbers take ten times as much memory as text
+_HEAD_BYTES = 4096  # in which the first element stands
 _NAMESPACE = "http://windows.lbl.gov"
 _HEAD = f"""<?xml version="1.0" encoding="UTF-8"?>
 <WindowElement xmlns="{_NAMESPACE}" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">
@@ -157,7 +160,13 @@ def read(path: str | os.PathLike[str]) -> BsdfFile:
     OSError
         If it cannot be read.
     """
-    data = Path(path).read_bytes()
+    path = Path(path)
+    check_size(path, _MOST_BYTES)
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+        if not is_window_element(head):
+            raise FileFormatError(f"{path}: line 1: it does not begin with a WindowElement")
+        data = head + file.read()
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities may grow without limit
         raise FileFormatError(f"{path}: it declares a document type, which these files do not have")
     try:

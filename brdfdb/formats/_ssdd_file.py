@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._text_file import check_size
 from brdfdb.parameters import Floats
 
 VERSION = "0.3"
 LISTS = ("PARAM0_LIST", "PARAM1_LIST", "PARAM2_LIST", "PARAM3_LIST")
 _TYPES = ("brdf", "btdf", "specular_reflectance", "specular_transmittance")
 _CHANNELS = {"monochrome": 1, "rgb": 3, "xyz": 3}
+_LONGEST = 1 << 24  # bytes of a line of a header: a list of angles or wavelengths
 _SPACES = b" \t\n\v\f\r"
 
 
@@ -79,6 +81,7 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     OSError
         If it cannot be read.
     """
+    check_size(path)
     data = path.read_bytes()
     comments: list[str] = []
     blocks: list[Block] = []
@@ -87,6 +90,8 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     while at < len(data):
         end = data.find(b"\n", at)
         end = len(data) if end < 0 else end
+        if end - at > _LONGEST:
+            raise FileFormatError(f"{path}: byte {at}: a line of its header has more than {_LONGEST} bytes")
         line = data[at:end].decode("utf-8", "replace").strip()
         at = end + 1
         if line.startswith("#"):

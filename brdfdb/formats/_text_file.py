@@ -7,10 +7,17 @@ from pathlib import Path
 
 from brdfdb.errors import FileFormatError
 
-MOST_BYTES = 1 << 28  # of a file that is read
+MOST_BYTES = 1 << 30  # of a file that is read
 _LONGEST = 1 << 16  # characters of a line
 _HEAD = 4096
 _MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+
+
+def check_size(path: Path, most: int = MOST_BYTES) -> None:
+    """Refuse a file of more than `most` bytes with a FileFormatError."""
+    size = path.stat().st_size
+    if size > most:
+        raise FileFormatError(f"{path}: it has {size} bytes, more than the {most} that are read")
 
 
 def check_text(path: Path, most: int = MOST_BYTES) -> str:
@@ -21,9 +28,7 @@ def check_text(path: Path, most: int = MOST_BYTES) -> str:
     FileFormatError
         If the file has more than `most` bytes, or begins with bytes that no text has.
     """
-    size = path.stat().st_size
-    if size > most:
-        raise FileFormatError(f"{path}: it has {size} bytes, more than the {most} that are read")
+    check_size(path, most)
     with path.open("rb") as file:
         head = file.read(_HEAD)
     encoding = next((name for mark, name in _MARKS.items() if head.startswith(mark)), "utf-8")

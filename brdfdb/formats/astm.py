@@ -25,6 +25,7 @@ from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import lines, of_lines, record, specular_remark
+from brdfdb.formats._text_file import check_text
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -169,6 +170,7 @@ def _write_rows(stream: BinaryIO, grid: AngularGrid, names: tuple[str, ...]) -> 
 
 def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]]:
     """Return comments, the names of the channels, and the rows."""
+    check_text(path)
     comments: list[str] = []
     columns: tuple[str, ...] = ()
     with path.open(encoding="utf-8", errors="replace") as file:
@@ -184,8 +186,8 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
             with warnings.catch_warnings():
                 warnings.simplefilter("error")  # an empty file
                 rows = np.loadtxt(file, delimiter=",", ndmin=2)
-        except (ValueError, UserWarning):
-            raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none") from None
+        except (ValueError, UserWarning) as error:
+            raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none ({error})") from None
     if rows.shape[1] != len(columns) or not np.all(np.isfinite(rows)):
         raise FileFormatError(f"{path}: a row has no {len(columns)} finite numbers")
     rows[:, :4] = np.where(rows[:, :4] < 0.0, rows[:, :4] + 2.0 * np.pi, rows[:, :4])

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
 from brdfdb.formats._record import lines, of_lines, specular_remark
+from brdfdb.formats._text_file import check_text
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ kinds = ()
 options = OPTIONS
 _DIGITS = 5
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
-_MOST_READ = 1 << 30  # of a file that is read
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
 _COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
 
@@ -118,8 +118,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     from brdfdb.measurements.samples import Samples
 
     path = Path(path)
-    if path.stat().st_size > _MOST_READ:
-        raise FileFormatError(f"{path}: it has more than {_MOST_READ} bytes")
+    check_text(path)
     comments: list[str] = []
     try:
         with path.open(encoding="utf-8") as file:

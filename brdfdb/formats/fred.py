@@ -15,13 +15,14 @@ import functools
 import json
 import math
 import os
+from array import array
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import CannotHoldError, FileFormatError
+from brdfdb.errors import CannotHoldError, FileFormatError, counted
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
 from brdfdb.formats._beside import beside, record_beside
@@ -29,6 +30,7 @@ from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -50,7 +52,6 @@ options = (
 _TITLE = "type bsdf_data"
 _FORMAT = "format angles=deg bsdf=value scale=1"
 _CHARACTERS = 24  # of a line
-_MOST_BYTES = 1 << 30  # of a file that is read
 
 
 def write(
@@ -162,31 +163,33 @@ def _write_blocks(stream: TextIO, grid: AngularGrid) -> None:
 
 def _rows(path: Path) -> NDArray[np.float64]:
     """Return rows of theta_i, phi_i, theta_r, phi_r [degree] and f_r [1/sr]."""
-    if path.stat().st_size > _MOST_BYTES:
-        raise FileFormatError(f"{path}: it is larger than {_MOST_BYTES >> 20} MiB")
-    with path.open(encoding="utf-8", errors="replace") as file:
-        first, second = file.readline().strip().lower(), file.readline().lower()
-        if first != _TITLE or "angles=deg" not in second or "bsdf=value" not in second:
-            raise FileFormatError(f"{path}: it does not begin with the lines {_TITLE!r} and {_FORMAT!r}")
-        try:
-            scale = float(second.partition("scale=")[2].split()[0])
-            lines = [[float(word) for word in line.split()] for line in file if line.strip()]
-        except (ValueError, IndexError) as error:
-            raise FileFormatError(f"{path}: it holds what is no number ({error})") from None
-    rows: list[list[float]] = []
+    lines = lines_of(path)
+    first, second = (next(lines, (0, ""))[1].strip().lower() for _ in range(2))
+    if first != _TITLE or "angles=deg" not in second or "bsdf=value" not in second:
+        raise FileFormatError(f"{path}: line 1: it does not begin with the lines {_TITLE!r} and {_FORMAT!r}")
+    numbers = array("d")
     light: list[float] | None = None
-    for line in lines:
+    try:
+        scale = float(second.partition("scale=")[2].split()[0])
+    except (ValueError, IndexError):
+        raise FileFormatError(f"{path}: line 2, field scale: it is no number") from None
+    for number, text in lines:
+        try:
+            line = [float(word) for word in text.split()]
+        except ValueError as error:
+            raise FileFormatError(f"{path}: line {number} holds what is no number ({error})") from None
+        if not np.all(np.isfinite(line)):
+            raise FileFormatError(f"{path}: line {number} holds a number that is not finite")
         if len(line) == 2:
             light = line
         elif len(line) == 3 and light is not None:
-            rows.append([*light, *line[:2], scale * line[2]])
-        else:
-            raise FileFormatError(
-                f"{path}: a line has {len(line)} numbers; a light has two, and a viewer below it three"
-            )
-    if not rows or not np.all(np.isfinite(rows)):
-        raise FileFormatError(f"{path}: it holds no values, or one that is not finite")
-    return np.array(rows)
+            numbers.extend([*light, *line[:2], scale * line[2]])
+        elif line:
+            count = counted(len(line), "number")
+            raise FileFormatError(f"{path}: line {number} has {count}; a light has two, and a viewer below it three")
+    if not numbers:
+        raise FileFormatError(f"{path}: it holds no values")
+    return np.frombuffer(numbers, dtype=np.float64).reshape(-1, 5)
 
 
 def _grid(rows: NDArray[np.float64]) -> AngularGrid | None:

@@ -34,7 +34,7 @@ summary = "f_r on a plain grid of angles as NumPy arrays"
 tools = "NumPy"
 kinds = ()
 options = OPTIONS
-_MOST_BYTES = 1 << 30  # of an array that is read
+_MOST_BYTES = 1 << 28  # of an array that is read
 
 
 def write(
@@ -103,7 +103,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     Raises
     ------
     FileFormatError
-        If the file is damaged, lacks an array, or holds one of more than 1 GiB.
+        If the file is damaged, lacks an array, or holds one of more than 256 MiB.
     """
     path = Path(path)
     try:

@@ -31,7 +31,7 @@ from brdfdb.formats._columns import (
 )
 from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import of_comments
-from brdfdb.formats._text_file import lines_of
+from brdfdb.formats._text_file import check_text, lines_of
 
 if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 suffix = ".txt"
+_MOST_BYTES = 1 << 28  # of a file that is read
 _LONGEST_TITLE = 1000  # lines before the first row
 _ROLES = (*ANGLES, "values", "uncertainty", "wavelength")
 keywords = (*_ROLES, "quantity", "angles")
@@ -90,6 +91,7 @@ def read(
         If the file is no text of numbers, or a column is missing; with the line and the field.
     """
     path = Path(path)
+    check_text(path, _MOST_BYTES)
     for name, value, allowed in (("quantity", quantity, ("auto", *QUANTITIES)), ("angles", angles, _UNITS)):
         if value not in allowed:
             raise ParameterError(name, f"{value!r} is not one of {', '.join(allowed)}", value, allowed)

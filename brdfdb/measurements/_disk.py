@@ -49,8 +49,8 @@ class DiskIntegrals:
 def integrals(points: Floats, values: Floats) -> DiskIntegrals | None:
     """Return the integrals of values (N, C) at points (N, 2) of the unit disk; None if less than half is covered.
 
-    Values are linear on the Delaunay triangles of the points. Beyond them the value of each azimuth is that of the point
-    closest to the rim there. What covers half of the disk has its middle inside, so that every azimuth has an end.
+    Values are linear on the Delaunay triangles of the points. Beyond them the value of each azimuth is that of the
+    point closest to the rim there. What covers half of the disk surrounds its middle: every azimuth has an end.
     """
     spatial = import_extra("scipy.spatial")
     if len(points) < 3 or np.linalg.matrix_rank(points - points[0], tol=1e-6) < 2:
