@@ -91,8 +91,7 @@ class Layout:
 
 def fields_of(line: str, delimiter: str | None) -> list[str]:
     """Return the fields of a line."""
-    fields = [field.strip().strip('"') for field in line.strip("\r\n").split(delimiter)]
-    return fields[:-1] if delimiter is not None and fields and not fields[-1] else fields
+    return [field.strip().strip('"') for field in line.strip("\r\n").split(delimiter)]
 
 
 def number_of(text: str, delimiter: str | None) -> float | None:
@@ -126,15 +125,25 @@ def layout_of(lines: Iterable[tuple[int, str]]) -> tuple[Layout, int] | None:
         if len(fields) < 4 or None in numbers or all(value != value for value in numbers):
             before.append((number, _COMMENT.sub("", line.rstrip("\r\n"))))
             continue
-        for at, text in reversed(before):
-            for sign in dict.fromkeys((delimiter, None, ",", "\t")):
-                names = fields_of(text, sign)
-                if len(names) == len(fields) and any(role_of(name) for name in names):
+        count = len(fields)
+        for known in (True, False):  # without a known name, the line before the first row may have names
+            for at, text in list(reversed(before))[: None if known else 1]:
+                names = _names(text, delimiter, count)
+                if names and (not known or any(role_of(name) for name in names)):
                     titles = tuple(line for other, line in before if other != at and line.strip())
-                    return Layout(delimiter, at, tuple(names), titles), number
+                    return Layout(delimiter, at, names, titles), number
         titles = tuple(line for _, line in before if line.strip())
         return Layout(delimiter, 0, tuple(str(1 + column) for column in range(len(fields))), titles), number
     return None
+
+
+def _names(text: str, delimiter: str | None, count: int) -> tuple[str, ...]:
+    """Return the names in a line if it has as many as there are columns, with the delimiter of rows or another one."""
+    for sign in dict.fromkeys((delimiter, None, ",", "\t")):
+        names = fields_of(text, sign)
+        if len(names) == count and all(names):
+            return tuple(names)
+    return ()
 
 
 def role_of(name: str) -> str:

@@ -15,7 +15,7 @@ from brdfdb.measurements.samples import Instrument, Samples
 from brdfdb.parameters import Floats
 
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
-_SAME = 1e-9  # difference of coordinates within which directions are the same
+_SAME = 1e-6  # difference of coordinates within which directions are the same: angles of files may have 32 bits
 _MIXED = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)  # odd: a hash of rows
 
 

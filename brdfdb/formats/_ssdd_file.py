@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._text_file import check_size
 from brdfdb.parameters import Floats
 
 VERSION = "0.3"
@@ -81,14 +81,16 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     OSError
         If it cannot be read.
     """
-    check_size(path)
-    data = path.read_bytes()
+    with path.open("rb") as file:
+        if not file.read(1):
+            return [], []
+        data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     comments: list[str] = []
     blocks: list[Block] = []
     entries: dict[str, str] = {}
     at = 0
     while at < len(data):
-        end = data.find(b"\n", at)
+        end = data.find(b"\n", at, at + _LONGEST)
         end = len(data) if end < 0 else end
         if end - at > _LONGEST:
             raise FileFormatError(f"{path}: byte {at}: a line of its header has more than {_LONGEST} bytes")
@@ -108,7 +110,7 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     return comments, blocks
 
 
-def _values(path: Path, data: bytes, at: int, entries: Mapping[str, str]) -> tuple[Block, int]:
+def _values(path: Path, data: mmap.mmap, at: int, entries: Mapping[str, str]) -> tuple[Block, int]:
     """Return the block whose values begin at a byte, and the byte behind it."""
     if entries.get("DATA_TYPE") not in _TYPES or "PARAM0_LIST" not in entries:
         raise FileFormatError(f"{path}: a block of data has no DATA_TYPE of {', '.join(_TYPES)}, or no PARAM0_LIST")

@@ -147,7 +147,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     except (FileFormatError, FileNotFoundError):
         raise
     except Exception as error:  # SciPy raises what its parser comes to
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
+        first = str(error).partition("\n")[0]
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
     name, nm = str(known.get("name") or Path(path).stem), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = ("grey",) if at is None else (f"{at[0]:g}nm",)

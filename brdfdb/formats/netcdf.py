@@ -97,7 +97,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     except (FileFormatError, FileNotFoundError):
         raise
     except Exception as error:  # SciPy raises what its parser comes to
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
+        first = str(error).partition("\n")[0]
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
 
 
 def write_samples(samples: Samples, path: str | os.PathLike[str]) -> None:

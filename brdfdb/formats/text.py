@@ -181,6 +181,7 @@ def _rows(path: Path, layout: Layout, first: int) -> Array:
         if line_number < first or not line.strip() or line.lstrip().startswith(("#", "%")):
             continue
         fields = fields_of(line, layout.delimiter)
+        fields = fields[:count] if len(fields) == count + 1 and not fields[-1] else fields
         if len(fields) != count:
             raise FileFormatError(f"{path}: line {line_number} has {len(fields)} fields, and the first row {count}")
         for field, name in zip(fields, layout.names, strict=True):

@@ -27,6 +27,7 @@ _PEAK = 0.1  # share of one viewer in an albedo from which on it is not known
 _CLAIM = 0.05  # relative difference of a header from its own values that is stated
 _EXCESS = 1.02  # albedo above which the unit is doubted
 _BLACK = 2e-4  # albedo below which the unit is doubted: the blackest coatings reflect more
+_QUANTITIES = {"reflectance_factor": "reflectance factors", "f_r_cos": "values with the cosine of the viewer"}
 _SHOWN = 6  # incidences in sentences
 
 
@@ -319,8 +320,8 @@ def _hints(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]
 def _notes(record: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what a reader noted in a record, in sentences."""
     notes = []
-    if record.get("quantity", "f_r") != "f_r":
-        notes.append(f"The file holds {str(record['quantity']).replace('_', ' ')}: f_r was made of it.")
+    if text := _QUANTITIES.get(record.get("quantity", "")):
+        notes.append(f"The file holds {text}: f_r was made of them.")
     if "exchanged" in record:
         notes.append(f"Letters exchanged: {record['exchanged']}.")
     if count := record.get("below_the_horizon"):
