@@ -174,13 +174,16 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
     from brdfdb.measurements.samples import Samples
 
     path = Path(path)
+    every = {key for some in IMPORTERS.values() for key in getattr(some, "keywords", ())}
+    for name, value in keywords.items():
+        if name not in every:
+            allowed = ", ".join(sorted(every))
+            raise ParameterError(name, f"no format takes it; there are {allowed}", value, tuple(sorted(every)))
     text = bool(keywords) and set(keywords) <= set(_MODULES[_TEXT].keywords)
     importer = _importer(path, file_format or (_TEXT if text else ""))
-    allowed = getattr(importer, "keywords", ())
     for name, value in keywords.items():
-        if name not in allowed:
-            takes = f"takes {', '.join(allowed)}" if allowed else "takes no keywords"
-            raise ParameterError(name, f"the format of {path} {takes}", value, allowed)
+        if name not in getattr(importer, "keywords", ()):
+            raise ParameterError(name, f"the format of {path} does not take it", value)
     reading: FileTable | Samples = importer.read(path, **keywords)
     if isinstance(reading, Samples):
         return reading

@@ -16,6 +16,7 @@ from brdfdb.formats._text_file import check_size
 
 # Names of the sides in these files are those of WINDOW, whose front is outdoors. Radiance's front is the back
 FRONT_OF_RADIANCE = "Reflection Back"
+SIDES = {"back": FRONT_OF_RADIANCE, "front": "Reflection Front"}
 VISIBLE = "Visible"
 _MOST_BYTES = 1 << 28  # of a file that is read: its numbers take ten times as much memory as text
 _HEAD_BYTES = 4096  # in which the first element stands
@@ -73,7 +74,7 @@ class BsdfFile:
     record : mapping
         Our record; empty of files of other programs.
     blocks : mapping
-        Blocks of the front of Radiance, by wavelength.
+        Blocks of the side, by wavelength.
     """
 
     name: str
@@ -150,8 +151,8 @@ def is_window_element(head: bytes) -> bool:
     return b"<WindowElement" in head
 
 
-def read(path: str | os.PathLike[str]) -> BsdfFile:
-    """Return what a file says of the side that is Radiance's front.
+def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFile:
+    """Return what a file says of a side: by default of the one that is Radiance's front.
 
     Raises
     ------
@@ -179,15 +180,14 @@ def read(path: str | os.PathLike[str]) -> BsdfFile:
     blocks: dict[str, Block] = {}
     for entry in layer.findall("{*}WavelengthData"):
         for part in entry.findall("{*}WavelengthDataBlock"):
-            if _text(part, "WavelengthDataDirection").lower() == FRONT_OF_RADIANCE.lower():
+            if _text(part, "WavelengthDataDirection").lower() == side.lower():
                 wavelength = _text(entry, "Wavelength")
                 basis = _text(part, "AngleBasis") or _text(part, "ColumnAngleBasis")
                 numbers = _text(part, "ScatteringData")
-                blocks[wavelength.lower()] = Block(
-                    wavelength, FRONT_OF_RADIANCE, basis, _text(part, "RowAngleBasis"), numbers
-                )
+                blocks[wavelength.lower()] = Block(wavelength, side, basis, _text(part, "RowAngleBasis"), numbers)
     if VISIBLE.lower() not in blocks:
-        raise FileFormatError(f"{path}: it has no {VISIBLE} block of {FRONT_OF_RADIANCE}, which is Radiance's front")
+        of_radiance = ", which is Radiance's front" if side == FRONT_OF_RADIANCE else ""
+        raise FileFormatError(f"{path}: it has no {VISIBLE} block of {side}{of_radiance}")
     return BsdfFile(
         _text(layer, "Material/{*}Name") or Path(path).stem,
         _text(definition, "IncidentDataStructure"),

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -98,13 +99,16 @@ def write(
 
 
 def recognises(head: bytes) -> bool:
-    """Return True for the first bytes of a text whose columns begin with angles, or that says so."""
+    """Return True for the first bytes of a text whose columns are angles, then f_r or wavelengths, or that says so."""
     try:
         text = head.decode("utf-8", "ignore")
     except ValueError:
         return False
     first = [line for line in text.splitlines() if not line.startswith("#")][:1]
-    return f"# {_COLUMNS}" in text or bool(first and first[0].partition(",")[0].strip() in _ANGLES)
+    names = [name.strip() for name in first[0].split(",")] if first else []
+    of_values = tuple(itertools.dropwhile(_ANGLES.__contains__, names))
+    alone = len(of_values) == 1 or (bool(of_values) and _wavelengths(of_values) is not None)
+    return f"# {_COLUMNS}" in text or (alone and len(of_values) < len(names))
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
@@ -129,8 +133,10 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
             else:
                 line = ""
             names = tuple(name.strip() for name in line.split(","))
-            numbers = np.loadtxt(file, delimiter=",", ndmin=2, dtype=np.float64)
-    except ValueError as error:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")  # an empty file
+                numbers = np.loadtxt(file, delimiter=",", ndmin=2, dtype=np.float64)
+    except (ValueError, UserWarning) as error:
         raise FileFormatError(f"{path}: it is no table of numbers ({error})") from error
     angles = tuple(name for name in names if name in _ANGLES)
     if not angles or numbers.shape[1] != len(names) or names[: len(angles)] != angles or len(names) == len(angles):

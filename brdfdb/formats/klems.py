@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brdfdb.errors import FileFormatError
+from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import _bsdf_xml
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
 suffix = ".xml"
+keywords = ("side",)
 media_type = "application/xml"
 summary = "BSDF files of WINDOW: averages over the patches of Klems"
 tools = "WINDOW and pyWinCalc, EnergyPlus, Radiance"
@@ -169,16 +170,20 @@ def recognises(head: bytes) -> bool:
     return _bsdf_xml.is_window_element(head) and b"TensorTree" not in head
 
 
-def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of the side that is Radiance's front, evaluated as Radiance does: the value of the pair of patches.
+def read(path: str | os.PathLike[str], side: str = "back") -> FileTable:
+    """Return f_r of one side, evaluated as Radiance does: the value of the pair of patches.
 
     Parameters
     ----------
     path : path
         File of this package, or of others: in bases of Klems or in one that it defines itself.
+    side : {"back", "front"}
+        Side of reflection as the file names it. The back is Radiance's front.
 
     Raises
     ------
+    ParameterError
+        If there is no such side.
     FileFormatError
         If the file is damaged or holds no matrix.
     OSError
@@ -190,7 +195,9 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._readings import FileTable
 
-    file = _bsdf_xml.read(path)
+    if side not in _bsdf_xml.SIDES:
+        raise ParameterError("side", f"{side!r} is not one of {', '.join(_bsdf_xml.SIDES)}", side, (*_bsdf_xml.SIDES,))
+    file = _bsdf_xml.read(path, _bsdf_xml.SIDES[side])
     if file.structure.lower() not in ("columns", "rows"):
         raise FileFormatError(f"{path}: its structure {file.structure!r} is not Columns or Rows")
     bases = {basis.name.lower(): basis for basis in BASES.values()}
@@ -227,7 +234,7 @@ def _samples(path: str | os.PathLike[str], file: BsdfFile, viewers: Basis, light
         file.name,
         channels,
         None,
-        {**file.record, "side": FRONT_OF_RADIANCE, "patches": f"{viewers.name}, f_r is their average"},
+        {**file.record, "side": file.blocks[VISIBLE.lower()].side, "patches": f"{viewers.name}, f_r is their average"},
     )
 
 

@@ -328,6 +328,8 @@ def _notes(record: Mapping[str, Any]) -> tuple[str, ...]:
         notes.append(f"{counted(count, 'row')} below the horizon {'was' if count == 1 else 'were'} left out.")
     if left := record.get("columns_left_out"):
         notes.append(f"Columns left out: {', '.join(left)}.")
+    if side := record.get("side"):
+        notes.append(f"Side: {side}, as the file names it.")
     if network := record.get("network"):
         notes.append(f"{network}.")
     return tuple(notes)

@@ -23,8 +23,7 @@ def run(
     *,
     file_format: str = "",
     columns: Sequence[str] = (),
-    text: Mapping[str, str | None] | None = None,
-    member: str | None = None,
+    more: Mapping[str, str | None] | None = None,
     json: bool = False,
     out: Path | None = None,
 ) -> list[Statement]:
@@ -38,10 +37,8 @@ def run(
         One of `brdfdb.formats.IMPORTERS`; by default recognised by content.
     columns : sequence of str
         Columns of a text, ``NAME=HEADER``. A name may stand more than once.
-    text : mapping, optional
-        Quantity and angles of a text; None of what is recognised.
-    member : str, optional
-        Member of an archive.
+    more : mapping, optional
+        Other keywords of `brdfdb.formats.samples`; None of what is not given.
     json : bool
         Print a list of JSON objects.
     out : Path, optional
@@ -56,9 +53,7 @@ def run(
         raise ParameterError("--out", f"it takes the samples of one file, and there are {len(files)}", len(files), 1)
     if out is not None and out.suffix != ".nc":
         raise ParameterError("--out", f"{str(out)!r} does not end in .nc", str(out), "FILE.nc")
-    keywords: dict[str, Any] = {**_columns(columns), **{key: value for key, value in (text or {}).items() if value}}
-    if member is not None:
-        keywords["member"] = member
+    keywords: dict[str, Any] = {**_columns(columns), **{key: value for key, value in (more or {}).items() if value}}
     statements: list[Statement] = []
     for file in files:
         samples, known = _read(file, file_format, keywords)

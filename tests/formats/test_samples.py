@@ -248,9 +248,9 @@ def test_the_cosine_of_a_pab_opto_file_is_divided_out_and_its_back_turned(tmp_pa
 def test_keywords_that_a_format_does_not_have_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "shade.dat"
     path.write_text(PABOPTO + "120 30 0.05\n", encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"member: the format of .* takes no keywords"):
+    with pytest.raises(ParameterError, match=r"member: the format of .* does not take it"):
         formats.samples(path, member="x")
-    with pytest.raises(ParameterError, match=r"theta_q: the format of .* takes theta_i, phi_i"):
+    with pytest.raises(ParameterError, match="theta_q: no format takes it; there are angles, delta_phi"):
         formats.samples(path, "text", theta_q="x")
     with pytest.raises(ParameterError, match="file_format: 'paper' is not one of"):
         formats.samples(path, "paper")

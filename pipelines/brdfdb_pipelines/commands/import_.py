@@ -29,6 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--angles", choices=("deg", "rad"), help="unit of the angles of a text (default: by its names)")
     parser.add_argument("--member", metavar="NAME", help="the file of an archive (.zip) that is read")
+    parser.add_argument(
+        "--side", choices=("back", "front"), help="side of a Klems matrix, as the file names it (default: back)"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--out", type=Path, metavar="FILE.nc", help="write the samples of one file as netCDF")
 
@@ -41,8 +44,7 @@ def run(options: argparse.Namespace) -> int:
         options.files,
         file_format=options.format,
         columns=options.column,
-        text={"quantity": options.quantity, "angles": options.angles},
-        member=options.member,
+        more={name: getattr(options, name) for name in ("quantity", "angles", "member", "side")},
         json=options.json,
         out=options.out,
     )
