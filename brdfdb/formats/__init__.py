@@ -165,11 +165,8 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> from brdfdb import formats
-    >>> _ = Path("sheet.csv").write_text("sza,vza,raa,550nm\\n10,20,180,0.3\\n", encoding="utf-8")
-    >>> formats.samples("sheet.csv").values
-    array([[0.3]])
+    >>> tile = formats.samples("tile.csv", quantity="reflectance_factor")  # doctest: +SKIP
     """
     from brdfdb.measurements.samples import Samples
 
