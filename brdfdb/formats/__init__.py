@@ -24,8 +24,20 @@ if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
-__all__ = ["EXPORTERS", "IMPORTERS", "Exporter", "Importer", "Option", "options_of", "parsed_options", "read", "write"]
+__all__ = [
+    "EXPORTERS",
+    "IMPORTERS",
+    "Exporter",
+    "Importer",
+    "Option",
+    "options_of",
+    "parsed_options",
+    "read",
+    "samples",
+    "write",
+]
 
+_TEXT = "text"
 _HEAD = 4096  # bytes of a file that tell its format
 
 
@@ -123,16 +135,80 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     """
     path = Path(path)
     check_file(path)
-    importer = _importer(path, file_format)
+    return _read(path, _importer(path, file_format))
+
+
+def _read(path: Path, importer: Importer, **keywords: Any) -> FileTable | Samples:
+    """Return what an importer reads; FileFormatError if directions or wavelengths cannot be."""
     try:
-        reading = importer.read(path)
+        reading: FileTable | Samples = importer.read(path, **keywords)
+    except FileFormatError:
+        raise
     except ParameterError as error:  # of samples that are none
+        if error.parameter in keywords:
+            raise
         raise FileFormatError(f"{path}: {error}") from error
     at = reading.wavelength_nm
     if at is not None and not np.all((at > 0.0) & (at < np.inf)):
         wrong = at[~((at > 0.0) & (at < np.inf))][0]
         raise FileFormatError(f"{path}: a wavelength is {wrong:g} nm; allowed are positive numbers")
     return reading
+
+
+def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -> Samples:
+    """Return the samples that a file lists, or the values of a grid at its own directions above the horizon.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    file_format : str
+        As of `read`.
+    **keywords
+        Of a text its columns, quantity and angles, as of `brdfdb.formats.text.read`: with one of them any file is read
+        as text. Of an archive the `member`, as of `brdfdb.formats.neural.read`.
+
+    Returns
+    -------
+    Samples
+        Values as the file has them: negative ones stay, and holes are nan. Of grids the rows below the horizon are left
+        out and counted in the record, and a value that stands at all azimuths of the normal is given once. Klems
+        matrices and tensor trees give their averages at the middles of patches and cells. A network, which is a
+        formula, gives values on a grid that its record names.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format, keyword or column.
+    FileFormatError
+        If no format recognises the file, it is damaged, or it holds a formula and no values.
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> from brdfdb import formats
+    >>> tile = formats.samples("tile.csv", quantity="reflectance_factor")  # doctest: +SKIP
+    """
+    from brdfdb.measurements.samples import Samples
+
+    path = Path(path)
+    every = {key for some in IMPORTERS.values() for key in getattr(some, "keywords", ())}
+    for name, value in keywords.items():
+        if name not in every:
+            allowed = ", ".join(sorted(every))
+            raise ParameterError(name, f"no format takes it; there are {allowed}", value, tuple(sorted(every)))
+    text = bool(keywords) and set(keywords) <= set(_MODULES[_TEXT].keywords)
+    importer = _importer(path, file_format or (_TEXT if text else ""))
+    for name, value in keywords.items():
+        if name not in getattr(importer, "keywords", ()):
+            raise ParameterError(name, f"the format of {path} does not take it", value)
+    reading = _read(path, importer, **keywords)
+    if isinstance(reading, Samples):
+        return reading
+    if reading.nodes is None:
+        raise FileFormatError(f"{path}: it holds a formula, and no values at directions")
+    return reading.nodes()
 
 
 def _importer(path: Path, file_format: str) -> Importer:
@@ -155,4 +231,5 @@ def _importer(path: Path, file_format: str) -> Importer:
     for name, exporter in only_written.items():
         if path.name.endswith(exporter.suffix):
             raise FileFormatError(f"{path}: files of {name} are only written, not read")
-    raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}")
+    hint = "" if b"\0" in head else "; a text is read with the names of its columns, such as theta_i=NAME"
+    raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}{hint}")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +17,14 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import degrees_of
+from brdfdb.formats._nodes import samples_at_angles
+from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import CONVENTION, record, specular_remark
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.formats._dense_grid import DenseTable
-    from brdfdb.formats._readings import FileTable
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
@@ -104,8 +107,9 @@ def record_of_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     return document
 
 
-def read_dataset(path: Path, opened: xr.Dataset) -> FileTable:
-    """Return f_r of a dataset that a file holds; FileFormatError if it is no dense table."""
+def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
+    """Return f_r of a dataset that a file holds, or its samples; FileFormatError if it is neither."""
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.grids import axes_among
 
     if "brdf" not in opened.data_vars:
@@ -113,6 +117,11 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable:
             f"{path}: it has no variable brdf, only {', '.join(map(str, opened.data_vars)) or 'none'}"
         )
     brdf = opened["brdf"]
+    if "sample" in brdf.dims:
+        try:
+            return Samples.from_xarray(opened)
+        except (ValueError, TypeError) as error:
+            raise FileFormatError(f"{path}: {error}") from None
     try:
         names = axes_among(brdf.dims)
     except ParameterError as error:
@@ -164,16 +173,15 @@ def file_table(
     values: NDArray[Any],
     wavelength_nm: NDArray[Any] | None,
     known: Mapping[str, Any],
-) -> FileTable:
-    """Return f_r that is interpolated linearly on the grid of a file.
+) -> FileTable | Samples:
+    """Return f_r that is interpolated linearly on the grid of a file; its samples where the grid has holes, nan.
 
     Raises
     ------
     FileFormatError
-        If the axes, the wavelengths or the shape are not those of a table, or a value is not a finite number.
+        If the axes, the wavelengths or the shape are not those of a table, or a value is infinite.
     """
     from brdfdb.formats._dense_grid import interpolated
-    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.grids import Grid, check_wavelengths
 
     try:
@@ -186,16 +194,28 @@ def file_table(
         raise FileFormatError(f"{path}: brdf is {values.dtype} of shape {values.shape}, not numbers of shape {shape}")
     with np.errstate(over="ignore"):
         stored = values.astype(np.float32)
-    if not np.all(np.isfinite(stored)):
-        raise FileFormatError(f"{path}: brdf holds values that are not finite, or above those of 32 bits")
-    table = interpolated(grid, stored, at)
+    if np.any(np.isinf(stored)) or np.all(np.isnan(stored)):
+        raise FileFormatError(
+            f"{path}: brdf holds holes alone, or values that are not finite, or above those of 32 bits"
+        )
     channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
+    name = str(known.get("name") or Path(path).stem)
+
+    def nodes() -> Samples:
+        angles = np.stack(np.broadcast_arrays(*grid.directions()), axis=-1).reshape(-1, 4)
+        flat = values.reshape(-1, len(channels)).astype(np.float64)
+        return samples_at_angles(angles, flat, name, channels, at, known)
+
+    if np.any(np.isnan(values)):
+        return nodes()
+    table = interpolated(grid, stored, at)
     return FileTable(
-        name=str(known.get("name") or Path(path).stem),
+        name=name,
         channels=channels,
         wavelength_nm=at,
         evaluate=lambda wi, wr: np.asarray(table.lookup_vectors(wi, wr)).reshape(len(wi), len(channels)),
         record=known,
+        nodes=nodes,
     )
 
 
@@ -205,6 +225,7 @@ def reading_of_rows(
     values: NDArray[np.float64],
     wavelength_nm: NDArray[np.float64] | None,
     known: Mapping[str, Any],
+    nodes: Callable[[], Samples] | None = None,
 ) -> FileTable | Samples:
     """Return f_r of rows of angles [degree]: interpolated linearly if the rows are those of a grid, else as samples.
 
@@ -220,36 +241,54 @@ def reading_of_rows(
         Wavelengths of the columns.
     known : mapping
         The record of the file.
+    nodes : callable, optional
+        Gives the samples of the file (default: `samples_of_rows`).
 
     Raises
     ------
     FileFormatError
         If the rows are over half and difference vectors and no grid, or there are more values than wavelengths.
     """
-    from brdfdb.measurements.samples import Samples
-
     if values.shape[1] != (1 if wavelength_nm is None else wavelength_nm.size):
         raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")
-    nodes = {name: np.unique(column) for name, column in angles.items()}
-    shape = tuple(column.size for column in nodes.values())
-    if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, nodes):
+    of_axes = {name: np.unique(column) for name, column in angles.items()}
+    shape = tuple(column.size for column in of_axes.values())
+    of_vectors = {"theta_i", "theta_r"} <= set(angles)
+    if of_vectors and nodes is None:
+        nodes = functools.partial(samples_of_rows, path, angles, values, wavelength_nm, known)
+    if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, of_axes):
         ordered = values.reshape(*shape, -1)
-        return file_table(path, nodes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
-    if not {"theta_i", "theta_r"} <= set(angles):
+        table = file_table(path, of_axes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
+        return replace(table, nodes=nodes) if isinstance(table, FileTable) and nodes is not None else table
+    if nodes is None:
         raise FileFormatError(f"{path}: rows over {', '.join(angles)} are not those of a grid")
+    return nodes()
+
+
+def samples_of_rows(
+    path: Path,
+    angles: Mapping[str, NDArray[np.float64]],
+    values: NDArray[np.float64],
+    wavelength_nm: NDArray[np.float64] | None,
+    known: Mapping[str, Any],
+    **keywords: Any,
+) -> Samples:
+    """Return the samples of rows of theta_i, theta_r and their azimuths, or delta_phi [degree].
+
+    Parameters
+    ----------
+    path, angles, values, wavelength_nm, known
+        As of `reading_of_rows`.
+    **keywords
+        Those of `samples_at_angles`.
+    """
     zero = np.zeros(len(values))
-    turned = {name: np.deg2rad(column) for name, column in angles.items()}
-    phi_i = turned.get("phi_i", zero)
-    return Samples(
-        name=str(known.get("name") or path.stem),
-        theta_i=turned["theta_i"],
-        phi_i=phi_i,
-        theta_r=turned["theta_r"],
-        phi_r=phi_i + turned["delta_phi"] if "delta_phi" in turned else turned.get("phi_r", zero),
-        channels=("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm),
-        wavelength_nm=wavelength_nm,
-        values=values,
-        record=known,
+    phi_i = angles.get("phi_i", zero)
+    phi_r = phi_i + angles["delta_phi"] if "delta_phi" in angles else angles.get("phi_r", zero)
+    rows = np.deg2rad(np.stack([angles["theta_i"], phi_i, angles["theta_r"], phi_r], axis=1))
+    channels = ("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm)
+    return samples_at_angles(
+        rows, values, str(known.get("name") or path.stem), channels, wavelength_nm, known, **keywords
     )
 
 

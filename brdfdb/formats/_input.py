@@ -1,9 +1,8 @@
-"""Files that are read: regular ones of a bounded size, and lines of text without zero bytes."""
+"""Files that are read: regular ones of a bounded size."""
 
 from __future__ import annotations
 
 import stat
-from collections.abc import Iterator
 from pathlib import Path
 
 from brdfdb.errors import FileFormatError
@@ -11,7 +10,6 @@ from brdfdb.errors import FileFormatError
 MOST_BYTES = 1 << 31  # size of a file, or of a directory: that of the largest file that an exporter writes
 MOST_TEXT = 1 << 30  # size of a file of text [byte]
 _MOST_METADATA = 1 << 24  # size of a zarr.json [byte]
-_LONGEST = 1 << 24  # characters of a line of text
 
 
 def check_file(path: Path) -> None:
@@ -43,19 +41,3 @@ def check_size(path: Path, most: int) -> None:
     """Raise FileFormatError if a file has more than `most` bytes."""
     if path.stat().st_size > most:
         raise FileFormatError(f"{path}: it has more than {most} bytes")
-
-
-def lines_of(path: Path) -> Iterator[str]:
-    """Yield the lines of a file of text, in UTF-8; bytes that are none are replaced.
-
-    Raises
-    ------
-    FileFormatError
-        If the file has more than 1 GiB, a line more than 16 million characters, or there is a zero byte.
-    """
-    check_size(path, MOST_TEXT)
-    with path.open(encoding="utf-8", errors="replace") as file:
-        while line := file.readline(_LONGEST):
-            if "\0" in line or (len(line) == _LONGEST and not line.endswith("\n")):
-                raise FileFormatError(f"{path}: it is no text: it has a zero byte, or a line of {_LONGEST} characters")
-            yield line

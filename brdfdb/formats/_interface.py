@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -139,12 +138,13 @@ class Importer(Protocol):
     recognises : callable
         ``recognises(head)`` is true if the first bytes of a file, 4096 of them or all, are those of this format.
     read : callable
-        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists.
+        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists. A module whose
+        `read` takes more has a tuple ``keywords`` with their names.
     """
 
     suffix: str
     recognises: Callable[[bytes], bool]
-    read: Callable[[str | os.PathLike[str]], FileTable | Samples]
+    read: Callable[..., FileTable | Samples]
 
 
 def options_of(exporter: Exporter) -> dict[str, Option]:

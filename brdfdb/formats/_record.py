@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
+
+from brdfdb.measurements.samples import Instrument
 
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import FileError
@@ -99,3 +103,22 @@ def of_lines(texts: list[str]) -> dict[str, Any]:
             except (ValueError, RecursionError):
                 document[key] = value
     return document
+
+
+_NM, _SPOT = re.compile(r"\b(\d+(?:\.\d+)?) ?nm\b"), re.compile(r"(\d+(?:\.\d+)?) ?mm spot")
+_INSTRUMENTS = ("Instrument", "Scatterometer", "Gonioreflectometer", "Goniophotometer")
+
+
+def of_comments(document: Mapping[str, Any]) -> tuple[Instrument, float | None]:
+    """Return the instrument that comments of a file name, and its wavelength [nm] if they name one and no other.
+
+    Parameters
+    ----------
+    document : mapping
+        Comments by the words before their colons, as `of_lines` gives them.
+    """
+    text = "\n".join(value for value in document.values() if isinstance(value, str))
+    lengths, spots = set(_NM.findall(text)), set(_SPOT.findall(text))
+    name = next((str(document[key]) for key in _INSTRUMENTS if key in document), "")
+    spot = float(spots.pop()) if len(spots) == 1 else None
+    return Instrument(name, spot_mm=spot or None), float(lengths.pop()) if len(lengths) == 1 else None

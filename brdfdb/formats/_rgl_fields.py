@@ -118,6 +118,26 @@ class Fields:
             values *= (bilinear(self.ndf, *places.u_m) / (4.0 * bilinear(self.sigma, *places.u_i)))[:, np.newaxis]
         return np.asarray(values / places.cosine[:, np.newaxis])
 
+    def at_nodes(self) -> tuple[Array, Array, Array]:
+        """Return light and viewer (M, 3) of all values, and f_r (M, W) [1/sr]; viewers may be below the horizon."""
+        phi_i, theta_i = np.meshgrid(self.phi_i.astype(np.float64), self.theta_i.astype(np.float64), indexing="ij")
+        wi = np.stack([np.sin(theta_i) * np.cos(phi_i), np.sin(theta_i) * np.sin(phi_i), np.cos(theta_i)], axis=-1)
+        size = self.spectra.shape[-1]
+        u_x, u_y = self.warp.forward(size)
+        turn = of_azimuth(phi_i.reshape(-1, 1, 1)) - 0.5 if self.isotropic else 0.0
+        m = directions(u_x, u_y + turn)
+        wi = np.broadcast_to(wi.reshape(-1, 1, 1, 3), m.shape).reshape(-1, 3)
+        m = m.reshape(-1, 3)
+        wr = 2.0 * np.sum(wi * m, axis=-1, keepdims=True) * m - wi
+        values = self._last_channels.reshape(len(m), -1)
+        if self.jacobian:
+            u_i = of_polar_angle(theta_i), of_azimuth(phi_i)
+            sigma = np.broadcast_to(bilinear(self.sigma, *u_i).reshape(-1, 1, 1), u_x.shape).reshape(-1)
+            values = values * (bilinear(self.ndf, u_x.reshape(-1), u_y.reshape(-1)) / (4.0 * sigma))[:, np.newaxis]
+        above = wr[:, 2] > 0.0
+        cosine = np.where(above, wr[:, 2], 1.0)
+        return wi, wr, values / cosine[:, np.newaxis]
+
     def mixture(self, places: Places) -> Mixture:
         """Return the slices that are mixed at places."""
         j, v = _between(self.theta_i, places.theta_i)

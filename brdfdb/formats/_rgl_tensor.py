@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 import os
 import struct
 from collections.abc import Mapping
@@ -53,7 +54,10 @@ def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     OSError
         If it cannot be read.
     """
-    content = Path(path).read_bytes()
+    with Path(path).open("rb") as file:
+        if not file.read(1):
+            raise FileFormatError(f"{path}: it is no tensor file")
+        content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)  # files of Mueller matrices have a gigabyte
     header = _Header(path, content)
     if header.take(len(MAGIC)) != MAGIC:
         raise FileFormatError(f"{path}: it is no tensor file")
@@ -68,7 +72,7 @@ def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
 class _Header:
     """Reader of the header of a tensor file that never reads beyond its end."""
 
-    def __init__(self, path: str | os.PathLike[str], content: bytes) -> None:
+    def __init__(self, path: str | os.PathLike[str], content: mmap.mmap) -> None:
         self._path, self._content, self._at = path, content, 0
 
     def take(self, count: int) -> bytes:

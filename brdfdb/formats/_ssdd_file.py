@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ _RANGES_DEG = ((0.0, 90.0), (-360.0, 360.0), (0.0, 180.0), (-360.0, 360.0))  # o
 _ROUNDING_DEG = 1e-3
 _TYPES = ("brdf", "btdf", "specular_reflectance", "specular_transmittance")
 _CHANNELS = {"monochrome": 1, "rgb": 3, "xyz": 3}
+_LONGEST = 1 << 24  # bytes of a line of a header: a list of angles or wavelengths
 _SPACES = b" \t\n\v\f\r"
 
 
@@ -79,16 +81,21 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
         If it cannot be read.
     """
     check_size(path, MOST_TEXT)
-    data = path.read_bytes()
+    with path.open("rb") as file:
+        if not file.read(1):
+            return [], []
+        data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     comments: list[str] = []
     blocks: list[Block] = []
     entries: dict[str, str] = {}
     at = 0
     while at < len(data):
-        end = data.find(b"\n", at)
+        end = data.find(b"\n", at, at + _LONGEST)
         end = len(data) if end < 0 else end
-        if data.find(b"\0", at, end) >= 0:
-            raise FileFormatError(f"{path}: a line of its text has a zero byte")
+        if data.find(b"\0", at, min(end, at + _LONGEST)) >= 0:
+            raise FileFormatError(f"{path}: byte {at}: a line of its header has a zero byte")
+        if end - at > _LONGEST:
+            raise FileFormatError(f"{path}: byte {at}: a line of its header has more than {_LONGEST} bytes")
         line = data[at:end].decode("utf-8", "replace").strip()
         at = end + 1
         if line.startswith("#"):
@@ -105,7 +112,7 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     return comments, blocks
 
 
-def _values(path: Path, data: bytes, at: int, entries: Mapping[str, str]) -> tuple[Block, int]:
+def _values(path: Path, data: mmap.mmap, at: int, entries: Mapping[str, str]) -> tuple[Block, int]:
     """Return the block whose values begin at a byte, and the byte behind it."""
     if entries.get("DATA_TYPE") not in _TYPES or "PARAM0_LIST" not in entries:
         raise FileFormatError(f"{path}: a block of data has no DATA_TYPE of {', '.join(_TYPES)}, or no PARAM0_LIST")

@@ -8,6 +8,7 @@ Anisotropic tables and all wavelengths fit. The specular part does not.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import os
@@ -21,9 +22,10 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
-from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE
+from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import lines, of_lines, record, specular_remark
+from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -135,20 +137,25 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     name = str(document.get("name") or path.stem)
     nodes = tuple(np.unique(column) for column in rows[:, :4].T)
     count = math.prod(axis.size for axis in nodes)
-    if count != len(rows) or (nodes[1].size == 1 and nodes[1][0] != 0.0):
-        theta_i, phi_i, theta_r, phi_r = rows[:, :4].T
-        from brdfdb.measurements.samples import Samples
-
-        return Samples(name, theta_i, phi_i, theta_r, phi_r, names, at, rows[:, 4:], record=document)
+    listed = functools.partial(samples_at_angles, rows[:, :4], rows[:, 4:], name, names, at, document)
+    if count != len(rows) or (nodes[1].size == 1 and nodes[1][0] != 0.0) or np.any(np.isnan(rows[:, 4:])):
+        return listed()
     order = np.lexsort(rows[:, 3::-1].T)
-    values = rows[order, 4:].reshape(*(axis.size for axis in nodes), len(names)).astype(np.float32)
+    values = (
+        np.maximum(rows[order, 4:], 0.0)
+        .reshape(  # as libbsdf
+            *(axis.size for axis in nodes), len(names)
+        )
+        .astype(np.float32)
+    )
     anisotropic = nodes[1].size > 1
     one_side = not anisotropic and not np.any((nodes[3] > np.pi + 1e-6) & (nodes[3] < 2.0 * np.pi - 1e-6))
     if not anisotropic:
         nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
     if one_side:
         nodes, values = (*nodes[:2], nodes[2][nodes[2] < 4.0]), values[:, :, nodes[2] < 4.0]
-    return FileTable(name, names, at, AngularGrid(Spherical(anisotropic, one_side), nodes, values).evaluate, document)
+    grid = AngularGrid(Spherical(anisotropic, one_side), nodes, values)
+    return FileTable(name, names, at, grid.evaluate, document, listed)
 
 
 def _write_rows(stream: Sink, grid: AngularGrid, names: tuple[str, ...]) -> None:
@@ -171,7 +178,7 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
     """Return comments, the names of the channels, and the rows."""
     comments: list[str] = []
     columns: tuple[str, ...] = ()
-    texts = lines_of(path)
+    texts = (line for _, line in lines_of(path))
     for line in itertools.islice(texts, _LONGEST_HEADER):
         word, _, rest = line.strip().partition(" ")
         if word == "VARS":
@@ -186,12 +193,11 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
             rows = np.loadtxt(texts, delimiter=",", ndmin=2)
     except FileFormatError:
         raise
-    except (ValueError, UserWarning):
-        raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none") from None
+    except (ValueError, UserWarning) as error:
+        raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none ({error})") from None
     if rows.shape[1] != len(columns) or not np.all(np.isfinite(rows)):
         raise FileFormatError(f"{path}: a row has no {len(columns)} finite numbers")
     rows[:, :4] = np.where(rows[:, :4] < 0.0, rows[:, :4] + 2.0 * np.pi, rows[:, :4])
-    rows[:, 4:] = np.maximum(rows[:, 4:], 0.0)  # as libbsdf
     return comments, columns[4:], rows
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,8 +21,8 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
-from brdfdb.formats._input import lines_of
 from brdfdb.formats._record import lines, of_lines, specular_remark
+from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -99,13 +100,16 @@ def write(
 
 
 def recognises(head: bytes) -> bool:
-    """Return True for the first bytes of a text whose columns begin with angles, or that says so."""
+    """Return True for the first bytes of a text whose columns are angles, then f_r or wavelengths, or that says so."""
     try:
         text = head.decode("utf-8", "ignore")
     except ValueError:
         return False
     first = [line for line in text.splitlines() if not line.startswith("#")][:1]
-    return f"# {_COLUMNS}" in text or bool(first and first[0].partition(",")[0].strip() in _ANGLES)
+    names = [name.strip() for name in first[0].split(",")] if first else []
+    of_values = tuple(itertools.dropwhile(_ANGLES.__contains__, names))
+    alone = len(of_values) == 1 or (bool(of_values) and _wavelengths(of_values) is not None)
+    return f"# {_COLUMNS}" in text or (alone and len(of_values) < len(names))
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
@@ -121,7 +125,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     path = Path(path)
     comments: list[str] = []
     try:
-        texts = lines_of(path)
+        texts = (line for _, line in lines_of(path))
         for line in texts:
             if not line.startswith("#"):
                 break
@@ -129,10 +133,12 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         else:
             line = ""
         names = tuple(name.strip() for name in line.split(","))
-        numbers = np.loadtxt(texts, delimiter=",", ndmin=2, dtype=np.float64)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an empty file
+            numbers = np.loadtxt(texts, delimiter=",", ndmin=2, dtype=np.float64)
     except FileFormatError:
         raise
-    except ValueError as error:
+    except (ValueError, UserWarning) as error:
         raise FileFormatError(f"{path}: it is no table of numbers ({error})") from error
     angles = tuple(name for name in names if name in _ANGLES)
     if not angles or numbers.shape[1] != len(names) or names[: len(angles)] != angles or len(names) == len(angles):

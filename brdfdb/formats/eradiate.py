@@ -26,6 +26,7 @@ from brdfdb.errors import CannotHoldError, FileFormatError, import_extra
 from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._dense_files import record_of_attributes
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
+from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import Comparison
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".nc"
@@ -144,11 +146,25 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     except (FileFormatError, FileNotFoundError):
         raise
     except Exception as error:  # SciPy raises what its parser comes to
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
+        first = str(error).partition("\n")[0]
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
     name, nm = str(known.get("name") or Path(path).stem), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
-    return FileTable(name, channels, at, functools.partial(_evaluated, values), known)
+    nodes = functools.partial(_samples, values, name, channels, at, known)
+    return FileTable(name, channels, at, functools.partial(_evaluated, values), known, nodes)
+
+
+def _samples(
+    values: NDArray[Any], name: str, channels: tuple[str, ...], at: NDArray[np.float64] | None, known: dict[str, Any]
+) -> Samples:
+    """Return the values of a file at the nodes that the kernel interpolates between."""
+    viewers, turns, lights = values.shape
+    nodes = np.linspace(0.0, 1.0, viewers), np.linspace(0.0, 2.0 * np.pi, turns), np.linspace(0.0, 1.0, lights)
+    viewer, turn, light = (grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij"))
+    angles = np.stack([np.arccos(light), turn, np.arccos(viewer), np.zeros(values.size)], axis=1)
+    angles[:, 1], angles[:, 3] = 0.0, -turn % (2.0 * np.pi)
+    return samples_at_angles(angles, values.reshape(-1, 1).astype(np.float64), name, channels, at, known)
 
 
 def _smallest(table: Table, comparison: Comparison, tolerance: float) -> tuple[int, int, int]:

@@ -11,23 +11,26 @@ part is left out.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
+from array import array
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import CannotHoldError, FileFormatError
+from brdfdb.errors import CannotHoldError, FileFormatError, counted
 from brdfdb.formats._angles import Spherical
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import at_wavelength
-from brdfdb.formats._input import lines_of
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
+from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -135,7 +138,6 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
 
     path = Path(path)
     rows = _rows(path)
@@ -146,12 +148,10 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
     grid = _grid(rows)
-    if grid is not None:
-        return FileTable(name, channels, at, grid.evaluate, known)
-    theta_i, phi_i, theta_r, phi_r = np.deg2rad(rows[:, :4]).T
-    return Samples(
-        name, theta_i, phi_i, theta_r, (phi_i + np.pi - phi_r) % (2.0 * np.pi), channels, at, rows[:, 4:], record=known
-    )
+    angles = np.deg2rad(rows[:, :4])
+    angles[:, 3] = np.deg2rad((rows[:, 1] + 180.0 - rows[:, 3]) % 360.0)
+    nodes = functools.partial(samples_at_angles, angles, rows[:, 4:], name, channels, at, known)
+    return nodes() if grid is None else FileTable(name, channels, at, grid.evaluate, known, nodes)
 
 
 def _write_blocks(stream: Sink, grid: AngularGrid) -> int:
@@ -180,31 +180,33 @@ def _write_blocks(stream: Sink, grid: AngularGrid) -> int:
 
 def _rows(path: Path) -> NDArray[np.float64]:
     """Return rows of theta_i, phi_i, theta_r, phi_r [degree] and f_r [1/sr]."""
-    texts = lines_of(path)
-    first, second = next(texts, "").strip().lower(), next(texts, "").lower()
+    lines = lines_of(path)
+    first, second = (next(lines, (0, ""))[1].strip().lower() for _ in range(2))
     if first != _TITLE or "angles=deg" not in second or "bsdf=value" not in second:
-        raise FileFormatError(f"{path}: it does not begin with the lines {_TITLE!r} and {_FORMAT!r}")
+        raise FileFormatError(f"{path}: line 1: it does not begin with the lines {_TITLE!r} and {_FORMAT!r}")
+    numbers = array("d")
+    light: list[float] | None = None
     try:
         scale = float(second.partition("scale=")[2].split()[0])
-        lines = [[float(word) for word in line.split()] for line in texts if line.strip()]
-    except FileFormatError:
-        raise
-    except (ValueError, IndexError) as error:
-        raise FileFormatError(f"{path}: it holds what is no number ({error})") from None
-    rows: list[list[float]] = []
-    light: list[float] | None = None
-    for line in lines:
+    except (ValueError, IndexError):
+        raise FileFormatError(f"{path}: line 2, field scale: it is no number") from None
+    for number, text in lines:
+        try:
+            line = [float(word) for word in text.split()]
+        except ValueError as error:
+            raise FileFormatError(f"{path}: line {number} holds what is no number ({error})") from None
+        if not np.all(np.isfinite(line)):
+            raise FileFormatError(f"{path}: line {number} holds a number that is not finite")
         if len(line) == 2:
             light = line
         elif len(line) == 3 and light is not None:
-            rows.append([*light, *line[:2], scale * line[2]])
-        else:
-            raise FileFormatError(
-                f"{path}: a line has {len(line)} numbers; a light has two, and a viewer below it three"
-            )
-    if not rows or not np.all(np.isfinite(rows)):
-        raise FileFormatError(f"{path}: it holds no values, or one that is not finite")
-    return np.array(rows)
+            numbers.extend([*light, *line[:2], scale * line[2]])
+        elif line:
+            count = counted(len(line), "number")
+            raise FileFormatError(f"{path}: line {number} has {count}; a light has two, and a viewer below it three")
+    if not numbers:
+        raise FileFormatError(f"{path}: it holds no values")
+    return np.frombuffer(numbers, dtype=np.float64).reshape(-1, 5)
 
 
 def _grid(rows: NDArray[np.float64]) -> AngularGrid | None:

@@ -26,6 +26,7 @@ from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".npz"
@@ -95,8 +96,10 @@ def recognises(head: bytes) -> bool:
     return head.startswith(b"PK\x03\x04") and head[30:].startswith((b"theta_i.npy", b"theta_h.npy"))
 
 
-def read(path: str | os.PathLike[str]) -> FileTable:
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of an .npz archive with ``brdf`` and the axes that it lists, interpolated linearly.
+
+    A grid with holes, nan, gives samples.
 
     Raises
     ------

@@ -10,19 +10,23 @@ left out.
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb.formats._interface import TOLERANCE, Option
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._rgl_fields import Fields
     from brdfdb.formats._written import Written
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".bsdf"
@@ -140,9 +144,18 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     fields = fields_of(path, read_tensors(path))
     document = document_of(fields.description)
     name = str(document.get("name") or Path(path).stem)
-    if fields.wavelength_nm is None:
-        return FileTable(name, RGB, None, fields.evaluate, document)
-    if document.get("channels") == ["grey"] and fields.wavelength_nm.size == 1:
-        return FileTable(name, ("grey",), None, fields.evaluate, document)
-    at = fields.wavelength_nm.astype(np.float64)
-    return FileTable(name, tuple(f"{value:g}nm" for value in at), at, fields.evaluate, document)
+    at = None if fields.wavelength_nm is None else fields.wavelength_nm.astype(np.float64)
+    channels = RGB if at is None else tuple(f"{value:g}nm" for value in at)
+    if document.get("channels") == ["grey"] and at is not None and at.size == 1:
+        channels, at = ("grey",), None
+    nodes = functools.partial(_samples, fields, name, channels, at, document)
+    return FileTable(name, channels, at, fields.evaluate, document, nodes)
+
+
+def _samples(
+    fields: Fields, name: str, channels: tuple[str, ...], at: NDArray[np.float64] | None, document: dict[str, Any]
+) -> Samples:
+    """Return the values of a file at its own directions."""
+    from brdfdb.formats._nodes import samples_at_vectors
+
+    return samples_at_vectors(*fields.at_nodes(), name, channels, at, document)

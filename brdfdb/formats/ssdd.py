@@ -9,6 +9,7 @@ Anisotropic tables, all wavelengths and the specular part fit.
 
 from __future__ import annotations
 
+import functools
 import os
 from importlib.metadata import version
 from pathlib import Path
@@ -22,6 +23,7 @@ from brdfdb.formats import _ssdd_file
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, mirrored, reciprocal
 from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import lines, of_lines, record
 from brdfdb.formats._written import Written, whole
 
@@ -141,7 +143,9 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     at = block.wavelength_nm
     names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else tuple(f"{value:g}nm" for value in at)
     name = str(document.get("name") or block.entries.get("NAME") or path.stem)
-    return FileTable(name, names, at, grid.evaluate, document)
+    angles = [np.deg2rad(axis) for axis in block.angles]
+    nodes = functools.partial(samples_of_grid, grid.system, angles, block.values, name, names, at, document)
+    return FileTable(name, names, at, grid.evaluate, document, nodes)
 
 
 def _systems(table: Table, comparison: Comparison) -> list[System]:

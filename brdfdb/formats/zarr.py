@@ -19,6 +19,7 @@ from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".zarr"
@@ -75,8 +76,8 @@ def recognises(head: bytes) -> bool:
     return b'"zarr_format"' in head and b'"group"' in head
 
 
-def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a zarr group with ``brdf`` over angles [degree], interpolated linearly.
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+    """Return f_r of a zarr group with ``brdf`` over angles [degree], interpolated linearly; or samples.
 
     Raises
     ------

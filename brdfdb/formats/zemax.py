@@ -10,9 +10,10 @@ alone (``--colour``). The specular part is left out.
 
 from __future__ import annotations
 
+import functools
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +24,15 @@ from brdfdb.formats._angles import Specular
 from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import CONVENTION, lines, of_lines, record, specular_remark
+from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._record import CONVENTION, lines, of_comments, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import FileError
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.albedo import TableAlbedo
     from brdfdb.tables.table import Table
 
@@ -165,7 +168,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     if text.scatter != "BRDF":
         raise FileFormatError(f"{path}: its ScatterType is {text.scatter!r}; only BRDF is read")
     turns, incidences, azimuths, radials = (np.deg2rad(axis) for axis in text.angles)
-    values = text.values.transpose(2, 1, 4, 3, 0)
+    values = text.values.transpose(2, 1, 4, 3, 0).astype(np.float32)
     both_sides = text.symmetry == "PlaneSymmetrical"
     if both_sides and azimuths[-1] < np.pi:  # the interval around 180 degrees has its mirror image at the other end
         azimuths, values = np.append(azimuths, np.pi), np.concatenate([values, values[..., -1:, :]], axis=3)
@@ -176,7 +179,27 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     document |= {"theta_i_deg": text.angles[1].tolist(), "tis": np.moveaxis(text.tis, 0, -1).tolist()}
     luminous = document.get("channels") == list(LUMINOUS)
     names = XYZ if text.content == "XYZ" else LUMINOUS if luminous else ("grey",)
-    return FileTable(str(document.get("name") or path.stem), names, None, grid.evaluate, document)
+    name = str(document.get("name") or path.name.partition(".")[0])
+    listed = functools.partial(_samples, name, names, text, document)
+    return FileTable(name, names, None, grid.evaluate, document, listed)
+
+
+def _samples(name: str, names: tuple[str, ...], text: _zemax_file.Text, document: dict[str, Any]) -> Samples:
+    """Return the values of a file at their own angles."""
+    nodes = [np.deg2rad(text.angles[axis]) for axis in (1, 0, 3, 2)]
+    instrument, wavelength_nm = of_comments(document)
+    known = wavelength_nm is not None and names == ("grey",)
+    return samples_of_grid(
+        Specular(anisotropic=True, mirrored=False),
+        nodes,
+        text.values.transpose(2, 1, 4, 3, 0),
+        name,
+        (f"{wavelength_nm:g}nm",) if known else names,
+        np.array([wavelength_nm]) if known else None,
+        document,
+        instrument=instrument,
+        provenance=str(document.get("Sample", "")),
+    )
 
 
 def _albedo(

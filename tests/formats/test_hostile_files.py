@@ -14,7 +14,7 @@ import pytest
 
 from brdfdb import formats
 from brdfdb.errors import FileFormatError
-from brdfdb.formats import _input
+from brdfdb.formats import _text_file
 from brdfdb.formats._rgl_tensor import read_tensors, write_tensors
 from tests.formats.small_tables import DIFFUSE, GREY, SPECTRAL, small_table
 
@@ -62,7 +62,7 @@ def test_a_record_that_is_nested_too_deep_is_no_record(name: str, options: dict[
 
 
 def test_a_record_in_a_field_is_no_record_if_it_is_nested_too_deep(tmp_path: Path) -> None:
-    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.05)
+    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.1)
     arrays = read_tensors(path) | {"description": np.frombuffer(NESTED.encode(), np.uint8)}
     write_tensors(path, arrays)
     assert formats.read(path).record == {}
@@ -108,7 +108,7 @@ def vndf_of_zeros(arrays: dict[str, Any]) -> dict[str, Any]:
     ],
 )
 def test_fields_of_a_tensor_file_are_in_range(change: Any, words: str, tmp_path: Path) -> None:
-    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.05)
+    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.1)
     arrays = read_tensors(path)
     write_tensors(path, arrays | change(arrays))
     with pytest.raises(FileFormatError, match=words):
@@ -116,7 +116,7 @@ def test_fields_of_a_tensor_file_are_in_range(change: Any, words: str, tmp_path:
 
 
 def test_a_density_may_be_zero_on_a_line(tmp_path: Path) -> None:
-    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.05)
+    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.1)
     arrays = read_tensors(path)
     vndf = arrays["vndf"].copy()
     vndf[..., :2, :] = 0.0
@@ -126,7 +126,7 @@ def test_a_density_may_be_zero_on_a_line(tmp_path: Path) -> None:
 
 
 def test_a_field_of_no_size_has_no_shape_beyond_all_arrays(tmp_path: Path) -> None:
-    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.05)
+    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.1)
     data = path.read_bytes()
     at = data.index(b"\x03\x00ndf") + 5 + 11  # behind the name, the number of axes, the type and the offset
     path.write_bytes(data[:at] + (0).to_bytes(8, "little") + (1 << 63).to_bytes(8, "little") + data[at + 16 :])
@@ -220,7 +220,11 @@ def test_lists_of_ssdd_are_in_range(entry: str, words: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("count", "words"), [("1e300", r"AngleOfIncidence is a list of 1e\+300 angles"), ("1.5", "a list of 1.5 angles")]
+    ("count", "words"),
+    [
+        ("1e300", "AngleOfIncidence: '1e300' is no number of values"),
+        ("1.5", "AngleOfIncidence: '1.5' is no number of values"),
+    ],
 )
 def test_counts_of_zemax_are_short_and_whole(count: str, words: str, tmp_path: Path) -> None:
     path = written(tmp_path, "zemax", tolerance=1.0)
@@ -317,7 +321,7 @@ def test_a_group_that_claims_many_nodes_is_refused_before_they_are_read(
 def test_a_text_ends_at_the_first_zero_byte(
     name: str, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(_input, "_LONGEST", 1 << 16)
+    monkeypatch.setattr(_text_file, "_LONGEST", 1 << 16)
     path = written(tmp_path, name, kind, **(REGULAR if name == "csv" else {"tolerance": 1.0}))
     with path.open("r+b") as file:
         file.truncate(int(0.7 * path.stat().st_size))
