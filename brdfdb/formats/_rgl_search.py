@@ -46,10 +46,7 @@ _FEW = 3  # channels that rungs are compared by
 _OF_SPECTRUM = 0.5  # share of the tolerance that straight lines between wavelengths may take
 _REMEMBERED = 3  # files: the search returns to the one before the last
 _PAIRS = 4001  # pairs of directions that they are tested with
-REDUCED = (
-    "the file holds a quarter or half of the azimuths of the light, which Mitsuba 3 mirrors; "
-    "pbrt-v4 and RGL's loader take files with azimuth full"
-)
+_PART = {2: "half", 4: "a quarter"}  # of the azimuths of the light, by their reduction
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +108,10 @@ def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full
     remarks = channels.remarks
     search = _Search(table, Comparison(table, channels), kind, tolerance, full)
     if search.surface.reduction > 1:
-        remarks += (REDUCED,)
+        remarks += (
+            f"the file holds {_PART[search.surface.reduction]} of the azimuths of the light, which Mitsuba 3 mirrors; "
+            "for pbrt-v4 and RGL's loader write it with azimuth full",
+        )
     ladders = search.ladders(most_bytes, copies)
     first = [search.p99(plans[min(_FIRST, len(plans) - 1)]) for plans in ladders]
     fields, error = search.best(ladders[int(np.argmin(first))])

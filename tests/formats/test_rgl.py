@@ -275,7 +275,8 @@ def test_a_warp_and_its_inverse() -> None:
 @pytest.mark.parametrize(("kind", "azimuth"), [("spectral", "reduced"), ("rgb", "reduced"), ("rgb", "full")])
 def test_a_file_is_not_larger_than_its_limit(kind: str, azimuth: str, tmp_path: Path) -> None:
     table, path = small_table(ANISOTROPIC), tmp_path / "a.bsdf"
-    rgl.write(table, path, kind=kind, azimuth=azimuth, tolerance=1e-3, megabytes=1.5)
+    files = rgl.write(table, path, kind=kind, azimuth=azimuth, tolerance=1e-3, megabytes=1.5)
     assert 5e5 < path.stat().st_size <= 1.5e6
+    assert any("a quarter of the azimuths" in remark for remark in files.remarks) == (azimuth == "reduced")
     with pytest.raises(ParameterError, match=r"megabytes: .* MB for the values are too few: the smallest file of "):
         rgl.write(table, path, kind=kind, azimuth=azimuth, megabytes=0.1)

@@ -138,11 +138,6 @@ def test_a_report_that_is_named_must_be_one(store: Path, tmp_path: Path, capsys:
     assert not out.exists()
 
 
-def test_names_and_all_exclude_each_other(store: Path, tmp_path: Path, capsys: Captured) -> None:
-    assert run("export", "list", "grey", "--all", "--store", store, "--out", tmp_path / "out") == 2
-    assert capsys.readouterr().err == "brdfdb: export: name materials or give --all, not both\n"
-
-
 def test_an_output_that_is_a_file_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "out").write_text("a file")
     assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == 2
