@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from brdfdb.formats import EXPORTERS, Option, options_of
@@ -102,13 +104,36 @@ def _option(option: Option) -> dict[str, Any]:
     return _parameter(option.name, schema, option.help)
 
 
-# Of all formats: an option that a format does not have is refused
-EXPORT_OPTIONS = [
-    _option(option)
-    for option in {
-        name: option for exporter in EXPORTERS.values() for name, option in options_of(exporter).items()
-    }.values()
-]
+# Sizes that the service makes a file of: larger ones take gigabytes or minutes, and are for `brdfdb export`
+_SERVED = {
+    "eradiate": {"resolution": 129.0},
+    "png": {"size": 512.0},
+    "radiance": {"cells": 600_000.0},
+    "rgl": {"megabytes": 64.0},
+    **{file_format: {"size": 16.0} for file_format in ("astm", "fred", "ssdd", "zemax")},
+}
+
+
+def served_options(file_format: str) -> dict[str, Option]:
+    """Return the options of a format by name, with the ranges that the service allows."""
+    highest = _SERVED.get(file_format, {})
+    return {
+        name: replace(option, high=min(option.high, highest.get(name, math.inf)))
+        for name, option in options_of(EXPORTERS[file_format]).items()
+    }
+
+
+def _export_options() -> Iterator[dict[str, Any]]:
+    """Return the options of all formats, each with the widest range; one that a format does not have is refused."""
+    by_name: dict[str, Option] = {}
+    for file_format in EXPORTERS:
+        for name, option in served_options(file_format).items():
+            other = by_name.get(name, option)
+            by_name[name] = replace(option, low=min(option.low, other.low), high=max(option.high, other.high))
+    return map(_option, by_name.values())
+
+
+EXPORT_OPTIONS = [*_export_options()]
 
 
 def answers(model: type | None, *statuses: int, media: dict[str, str] | None = None) -> dict[int | str, dict[str, Any]]:
@@ -118,7 +143,10 @@ def answers(model: type | None, *statuses: int, media: dict[str, str] | None = N
         404: {"description": "No such material or revision; the closest names are listed", "model": Problem},
         413: {"description": "Too large a body, or too many points for one answer", "model": Problem},
         422: {"description": "A parameter is missing, unknown or out of range; it is named", "model": Problem},
-        503: {"description": "The store, or the files of this material, cannot be read", "model": Problem},
+        503: {
+            "description": "The store, or the files of this material, cannot be read; or too much is asked for at once",
+            "model": Problem,
+        },
     }
     success: dict[str, Any] = {"description": "Success"}
     if model is not None:
