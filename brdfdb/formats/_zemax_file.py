@@ -6,12 +6,12 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._angular_grid import Sink
 from brdfdb.formats._input import lines_of
 
 LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
@@ -49,7 +49,7 @@ class Text:
     values: NDArray[np.float32]
 
 
-def write(stream: BinaryIO, text: Text) -> None:
+def write(stream: Sink, text: Text) -> None:
     """Write a file."""
     head = [f"# {comment}" for comment in (TITLE, *text.comments)]
     head += ["Source Measured", f"Symmetry {text.symmetry}", f"SpectralContent {text.content}"]

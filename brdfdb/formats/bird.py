@@ -4,7 +4,8 @@ The lists hold the polar angles and azimuths of light and viewer, in degrees, f_
 directions form a grid. The format does not say how to interpolate. The stated error is that of straight lines along all
 angles at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not.
+Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
+needs more is written with the error it has.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ The columns are the angles in degrees, then f_r in 1/sr, with five significant d
 record. The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors
 (``--axes``). The cosine is not included. Readers interpolate in straight lines along all axes at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not.
+Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
+needs more is written with the error it has.
 """
 
 from __future__ import annotations

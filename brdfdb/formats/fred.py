@@ -15,23 +15,24 @@ import json
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError
 from brdfdb.formats._angles import Spherical
-from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._input import lines_of
-from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
+from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._stated_error import FileError
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
@@ -43,12 +44,11 @@ kinds = ()
 options = (
     TOLERANCE,
     WAVELENGTH,
-    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+    SIZE,
 )
 
 _TITLE = "type bsdf_data"
 _FORMAT = "format angles=deg bsdf=value scale=1"
-_CHARACTERS = 24  # of a line
 
 
 def write(
@@ -73,7 +73,7 @@ def write(
     wavelength : float [nm]
         The wavelength of a spectral table that is written.
     size : float [MB]
-        Largest file.
+        Largest size of the file and its record.
     verdict : str, optional
         Verdict of the audit of this revision.
 
@@ -82,7 +82,7 @@ def write(
     CannotHoldError
         If the table is anisotropic: what the azimuth of the light counts from is not published.
     ParameterError
-        If the wavelength is outside those of the table.
+        If the wavelength is outside those of the table, or no file of it is so small.
     WriteError
         If a file cannot be written.
     """
@@ -91,23 +91,31 @@ def write(
     if table.anisotropic:
         raise CannotHoldError(f"{table.name}: is anisotropic, and this format is written for isotropic tables only")
     comparison = Comparison(table, at_wavelength(table, wavelength))
+    path = Path(path)
+    remarks = (*specular_remark(table), *comparison.channels.remarks)
+    at = comparison.channels.wavelength_nm
+
+    def text_beside(error: FileError, rows: int) -> bytes:
+        document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
+        document |= {"wavelength_nm": None if at is None else float(at[0]), "rows": rows}
+        return json.dumps(document, indent=1).encode()
+
+    def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
+        sink.write(text_beside(error, _write_blocks(sink, grid)))
+
     grid, error = chosen(
         table,
         comparison,
         [Spherical(anisotropic=False, mirrored=True)],
         tolerance,
-        int(size * 1e6 / _CHARACTERS / 2),  # the file has both sides
+        size,
+        write_all,
         lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
     )
-    path = Path(path)
-    remarks = (*specular_remark(table), *comparison.channels.remarks)
-    document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
-    at = comparison.channels.wavelength_nm
-    document["wavelength_nm"] = None if at is None else float(at[0])
     with whole(path, beside(path)) as (file, there):
-        with file.open("w", encoding="ascii", newline="\n") as stream:
-            document["rows"] = _write_blocks(stream, grid)
-        there.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        with file.open("wb") as stream:
+            rows = _write_blocks(stream, grid)
+        there.write_bytes(text_beside(error, rows))
     return Written((path, beside(path)), error, tolerance, remarks)
 
 
@@ -146,7 +154,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     )
 
 
-def _write_blocks(stream: TextIO, grid: AngularGrid) -> int:
+def _write_blocks(stream: Sink, grid: AngularGrid) -> int:
     """Write a block a polar angle of the light, and return the number of viewers in all blocks.
 
     Viewers are on both sides of the plane of incidence, the normal once.
@@ -157,15 +165,16 @@ def _write_blocks(stream: TextIO, grid: AngularGrid) -> int:
     other = half[(forward > 0.0) & (forward < 180.0)][::-1]
     azimuths = np.concatenate([forward, 360.0 - forward[(forward > 0.0) & (forward < 180.0)][::-1]])
     columns = np.concatenate([half, other])
-    stream.write(f"{_TITLE}\n{_FORMAT}\n")
+    stream.write(f"{_TITLE}\n{_FORMAT}\n".encode())
     count = 0
     for number, angle in enumerate(theta_i):
-        stream.write(f"{angle:.9g}\t0\n")
+        stream.write(f"{angle:.9g}\t0\n".encode())
         for row, theta in enumerate(theta_r):
             values = grid.values[number, row, :, 0]
             some = [(0.0, columns[0])] if theta == 0.0 else list(zip(azimuths, columns, strict=True))
             count += len(some)
-            stream.writelines(f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in some)
+            rows = [f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in some]
+            stream.write("".join(rows).encode())
     return count
 
 

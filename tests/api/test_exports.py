@@ -28,14 +28,14 @@ FOIL, FELT, TILE, METAL = (
         ("rgl?megabytes=65", 64),
         ("radiance?cells=600001", 600_000),
         ("png?size=513", 512),
-        ("eradiate?resolution=130", 129),
+        ("eradiate?nodes=130", 129),
         *((f"{name}?size=17", 16) for name in ("astm", "fred", "ssdd", "zemax")),
     ],
 )
 def test_sizes_of_files_have_lower_limits_than_at_the_command_line(client: Client, query: str, highest: int) -> None:
     problem = client.problem("GET", f"{FELT}/export/{query}", 422)
     assert problem["parameter"] == query.partition("?")[2].partition("=")[0]
-    assert problem["detail"].endswith(f", {highest:g}]")
+    assert f", {highest:g}]" in problem["detail"]
 
 
 def test_few_files_are_made_at_once(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:

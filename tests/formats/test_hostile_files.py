@@ -62,7 +62,7 @@ def test_a_record_that_is_nested_too_deep_is_no_record(name: str, options: dict[
 
 
 def test_a_record_in_a_field_is_no_record_if_it_is_nested_too_deep(tmp_path: Path) -> None:
-    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.05)
+    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.1)
     arrays = read_tensors(path) | {"description": np.frombuffer(NESTED.encode(), np.uint8)}
     write_tensors(path, arrays)
     assert formats.read(path).record == {}
@@ -108,7 +108,7 @@ def vndf_of_zeros(arrays: dict[str, Any]) -> dict[str, Any]:
     ],
 )
 def test_fields_of_a_tensor_file_are_in_range(change: Any, words: str, tmp_path: Path) -> None:
-    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.05)
+    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.1)
     arrays = read_tensors(path)
     write_tensors(path, arrays | change(arrays))
     with pytest.raises(FileFormatError, match=words):
@@ -116,7 +116,7 @@ def test_fields_of_a_tensor_file_are_in_range(change: Any, words: str, tmp_path:
 
 
 def test_a_density_may_be_zero_on_a_line(tmp_path: Path) -> None:
-    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.05)
+    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.1)
     arrays = read_tensors(path)
     vndf = arrays["vndf"].copy()
     vndf[..., :2, :] = 0.0
@@ -126,7 +126,7 @@ def test_a_density_may_be_zero_on_a_line(tmp_path: Path) -> None:
 
 
 def test_a_field_of_no_size_has_no_shape_beyond_all_arrays(tmp_path: Path) -> None:
-    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.05)
+    path = written(tmp_path, "rgl", tolerance=1.0, megabytes=0.1)
     data = path.read_bytes()
     at = data.index(b"\x03\x00ndf") + 5 + 11  # behind the name, the number of axes, the type and the offset
     path.write_bytes(data[:at] + (0).to_bytes(8, "little") + (1 << 63).to_bytes(8, "little") + data[at + 16 :])

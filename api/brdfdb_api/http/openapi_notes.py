@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -92,21 +91,9 @@ ERROR = _parameter(
 )
 
 
-def _option(option: Option) -> dict[str, Any]:
-    schema: dict[str, Any] = {"type": "string", "default": option.default}
-    if isinstance(option.default, bool):
-        schema |= {"enum": ["false", "true"], "default": str(option.default).lower()}
-    elif option.choices:
-        schema["enum"] = list(option.choices)
-    else:
-        ends = {"minimum": option.low, "maximum": option.high}
-        schema |= {"type": "number", **{end: value for end, value in ends.items() if math.isfinite(value)}}
-    return _parameter(option.name, schema, option.help)
-
-
 # Sizes that the service makes a file of: larger ones take gigabytes or minutes, and are for `brdfdb export`
 _SERVED = {
-    "eradiate": {"resolution": 129.0},
+    "eradiate": {"nodes": 129.0},
     "png": {"size": 512.0},
     "radiance": {"cells": 600_000.0},
     "rgl": {"megabytes": 64.0},
@@ -123,17 +110,33 @@ def served_options(file_format: str) -> dict[str, Option]:
     }
 
 
-def _export_options() -> Iterator[dict[str, Any]]:
-    """Return the options of all formats, each with the widest range; one that a format does not have is refused."""
-    by_name: dict[str, Option] = {}
+def _option(name: str) -> dict[str, Any]:
+    """Return the parameter of an option of one or more formats, with the values that any of them allows."""
+    formats: dict[Option, list[str]] = {}
     for file_format in EXPORTERS:
-        for name, option in served_options(file_format).items():
-            other = by_name.get(name, option)
-            by_name[name] = replace(option, low=min(option.low, other.low), high=max(option.high, other.high))
-    return map(_option, by_name.values())
+        if option := served_options(file_format).get(name):
+            formats.setdefault(option, []).append(file_format)
+    options, defaults = list(formats), {option.default for option in formats}
+    if all(isinstance(option.default, str) for option in options):
+        choices = [choice for option in options for choice in option.choices]
+        schema: dict[str, Any] = {"type": "string", "enum": list(dict.fromkeys(choices))}
+    elif all(isinstance(option.default, bool) for option in options):
+        schema = {"type": "string", "enum": ["false", "true"]}
+    elif any(isinstance(option.default, bool | str) for option in options):
+        schema = {"type": "string"}
+    else:
+        low = min(end for option in options for end in (option.low, float(option.default)))
+        high = max(end for option in options for end in (option.high, float(option.default)))
+        schema = {"type": "number", "minimum": low, "maximum": high}
+    if len(defaults) == 1:
+        default = defaults.pop()
+        schema["default"] = str(default).lower() if isinstance(default, bool) else default
+    texts = [f"{', '.join(names)}: {option.help}; {option.allowed}" for option, names in formats.items()]
+    return _parameter(name, schema, ". ".join(texts))
 
 
-EXPORT_OPTIONS = [*_export_options()]
+# Of all formats: an option that a format does not have is refused
+EXPORT_OPTIONS = [_option(name) for name in dict.fromkeys(name for key in EXPORTERS for name in served_options(key))]
 
 
 def answers(model: type | None, *statuses: int, media: dict[str, str] | None = None) -> dict[int | str, dict[str, Any]]:

@@ -21,6 +21,7 @@ from brdfdb import __version__
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS
 from brdfdb.geometry import radians
+from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import Options, Points, evaluate, parsed
 from brdfdb_api.http.openapi_notes import (
@@ -252,7 +253,7 @@ def _exported(
     with tempfile.TemporaryDirectory() as folder:  # formats write files
         path = FilePath(folder) / f"{table.name}{kind}{exporter.suffix}"
         try:
-            written = exporter.write(table, path, verdict=verdict, **options)
+            written = exporter.write(table, path, verdict=verdict or NOT_AUDITED, **options)
         except (CannotHoldError, ParameterError) as error:
             raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
         single = len(written.paths) == 1 and path.is_file()
