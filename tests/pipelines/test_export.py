@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +21,7 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
+from brdfdb_pipelines.exit_codes import TERMINATED
 from tests.pipelines.command import Captured, run
 
 P99 = {"grey": 0.01, "dark": 0.03001}
@@ -48,6 +51,27 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         table = {"title": name, "model": "lambert", "source": "no paper", "parameters": {"rho": 0.5}}
         publish_dataset(tmp_path / "store", name, tabulate(Layout(Material.from_table(name, table), grid)))
     return tmp_path / "store"
+
+
+def test_sigterm_leaves_no_half_file(
+    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    def ended(_: Any, path: Path, **__: Any) -> Written:
+        with whole(path) as (half,):
+            half.write_text("half")
+            os.kill(os.getpid(), signal.SIGTERM)
+            half.write_text("whole")
+        return Written((path,))
+
+    monkeypatch.setattr(LIST, "write", ended)
+    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == TERMINATED == 143
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert capsys.readouterr().err.endswith("\nbrdfdb: interrupted\n")
+    assert [(path.name, path.read_text()) for path in (tmp_path / "out").iterdir()] == [("grey.list", "whole")]
 
 
 def test_all_leaves_out_what_the_format_cannot_hold(store: Path, tmp_path: Path, capsys: Captured) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 from brdfdb.formats import EXPORTERS, Option, options_of
@@ -89,11 +91,30 @@ ERROR = _parameter(
 )
 
 
+# Sizes that the service makes a file of: larger ones take gigabytes or minutes, and are for `brdfdb export`
+_SERVED = {
+    "eradiate": {"nodes": 129.0},
+    "png": {"size": 512.0},
+    "radiance": {"cells": 600_000.0},
+    "rgl": {"megabytes": 64.0},
+    **{file_format: {"size": 16.0} for file_format in ("astm", "fred", "ssdd", "zemax")},
+}
+
+
+def served_options(file_format: str) -> dict[str, Option]:
+    """Return the options of a format by name, with the ranges that the service allows."""
+    highest = _SERVED.get(file_format, {})
+    return {
+        name: replace(option, high=min(option.high, highest.get(name, math.inf)))
+        for name, option in options_of(EXPORTERS[file_format]).items()
+    }
+
+
 def _option(name: str) -> dict[str, Any]:
     """Return the parameter of an option of one or more formats, with the values that any of them allows."""
     formats: dict[Option, list[str]] = {}
-    for file_format, exporter in EXPORTERS.items():
-        if option := options_of(exporter).get(name):
+    for file_format in EXPORTERS:
+        if option := served_options(file_format).get(name):
             formats.setdefault(option, []).append(file_format)
     options, defaults = list(formats), {option.default for option in formats}
     if all(isinstance(option.default, str) for option in options):
@@ -115,9 +136,7 @@ def _option(name: str) -> dict[str, Any]:
 
 
 # Of all formats: an option that a format does not have is refused
-EXPORT_OPTIONS = [
-    _option(name) for name in dict.fromkeys(name for each in EXPORTERS.values() for name in options_of(each))
-]
+EXPORT_OPTIONS = [_option(name) for name in dict.fromkeys(name for key in EXPORTERS for name in served_options(key))]
 
 
 def answers(model: type | None, *statuses: int, media: dict[str, str] | None = None) -> dict[int | str, dict[str, Any]]:
@@ -127,7 +146,10 @@ def answers(model: type | None, *statuses: int, media: dict[str, str] | None = N
         404: {"description": "No such material or revision; the closest names are listed", "model": Problem},
         413: {"description": "Too large a body, or too many points for one answer", "model": Problem},
         422: {"description": "A parameter is missing, unknown or out of range; it is named", "model": Problem},
-        503: {"description": "The store, or the files of this material, cannot be read", "model": Problem},
+        503: {
+            "description": "The store, or the files of this material, cannot be read; or too much is asked for at once",
+            "model": Problem,
+        },
     }
     success: dict[str, Any] = {"description": "Success"}
     if model is not None:
