@@ -34,7 +34,7 @@ def estimates_of(fitted: Fitted, *, profiles: bool) -> list[Estimate]:
     estimates = []
     for index, one in enumerate(surface.shape):
         variance = covariance.shape[index, index]
-        profile = Profile(fitted.problem, fitted.point, covariance.noise, shape=index) if profiles else None
+        profile = Profile(fitted.problem, fitted.point, covariance, shape=index) if profiles else None
         estimates.append(_of_variable(fitted, index, one, float(variance), profile))
     several = len(fitted.samples.channels) > 1
     for number, coefficient in enumerate(surface.coefficients):
@@ -42,7 +42,7 @@ def estimates_of(fitted: Fitted, *, profiles: bool) -> list[Estimate]:
             value, variance = (float(a[number, channel]) for a in (fitted.point.values, covariance.coefficients))
             profile = None
             if profiles and not several:
-                profile = Profile(fitted.problem, fitted.point, covariance.noise, coefficient=number)
+                profile = Profile(fitted.problem, fitted.point, covariance, coefficient=number)
             error = float(np.sqrt(variance)) if np.isfinite(variance) else None
             low, high, method = _interval(value, error, coefficient.low, coefficient.high, profile)
             spec = surface.terms[coefficient.term].spec

@@ -25,7 +25,7 @@ _STEP = 1e-6  # of differences, in the unit cube
 _INSIDE = 1e-9  # distance of beginnings from the surface of the cube
 _COARSE, _FINE = 20, 60  # evaluations of descents, at some and at all samples
 _PROMISING = 1.5  # times the least cost at some samples
-_AT_END = 1e-4  # distance from the surface of the cube that is on it
+_AT_END = 1e-12  # distance of a coefficient from an end of its range that is the end, in its unit
 
 
 class Point(NamedTuple):
@@ -114,7 +114,8 @@ class Problem:
     def coefficient_jacobian(self, point: Point) -> tuple[Floats, NDArray[np.bool_]]:
         """Return the derivatives (K, N, C) of residuals by coefficients, 0 for those at a bound, and which are free."""
         span = self.high - self.low
-        free = (point.values > self.low + _AT_END * span) & (point.values < self.high - _AT_END * span) & (span > 0.0)
+        units = np.array([[one.unit] for one in self.surface.coefficients]).reshape(-1, 1)
+        free = (point.values > self.low + _AT_END * units) & (point.values < self.high - _AT_END * units) & (span > 0.0)
         jacobian = slopes_of(self.surface, point.basis, point.values) * self.residual.slope(point.f_r)
         return jacobian * free[:, np.newaxis, :], free
 

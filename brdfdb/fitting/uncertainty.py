@@ -110,16 +110,22 @@ class Profile:
         The problem, of one channel where a coefficient is held.
     point : Point
         Its best point.
-    noise : float
-        Factor between cost and deviance, of `covariance`.
+    known : Covariance
+        Its covariance.
     shape, coefficient : int, optional
         The number that is held, one of the two.
     """
 
     def __init__(
-        self, problem: Problem, point: Point, noise: float, *, shape: int | None = None, coefficient: int | None = None
+        self,
+        problem: Problem,
+        point: Point,
+        known: Covariance,
+        *,
+        shape: int | None = None,
+        coefficient: int | None = None,
     ) -> None:
-        self.problem, self.point, self.noise = problem, point, noise
+        self.problem, self.point, self.noise = problem, point, known.noise
         self.shape, self.coefficient = shape, coefficient
         if shape is not None:
             self.low, self.high, self.best = 0.0, 1.0, float(point.x[shape])
@@ -127,6 +133,10 @@ class Profile:
             assert coefficient is not None
             one = problem.surface.coefficients[coefficient]
             self.low, self.high, self.best = one.low, one.high, float(point.values[coefficient, 0])
+        shapes = len(problem.surface.shape)
+        index = shape if shape is not None else shapes + int(coefficient or 0)
+        along = np.nan_to_num(known.both[:shapes, index] / known.both[index, index])
+        self.along = np.where(np.isfinite(along), along, 0.0)  # where the others go with the number that is held
 
     def deviation(self, at: float) -> float:
         """Return the square root of the deviance with the number held: 1.96 at the ends of a 95 % interval."""
@@ -135,7 +145,8 @@ class Profile:
         held = None if self.coefficient is None else {self.coefficient: at}
         one = Problem(p.surface, p.wi, p.wr, p.residual, fixed, held)
         one.scale = p.scale
-        cost = one.descend(self.point.x[one.free], _EVALUATIONS).cost
+        begin = np.clip(self.point.x + self.along * (at - self.best), 0.0, 1.0)
+        cost = one.descend(begin[one.free], _EVALUATIONS).cost
         return float(np.sqrt(max(2.0 * (cost - self.point.cost) / self.noise, 0.0)))
 
     def agrees(self, error: float) -> bool:
