@@ -12,7 +12,10 @@ import pkgutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.formats._input import check_file
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options
 
 if TYPE_CHECKING:
@@ -51,7 +54,7 @@ def write(
     file_format : str
         One of `EXPORTERS`.
     verdict : str, optional
-        Verdict of the audit of this revision, for the record in the file.
+        Verdict of the audit of this revision, for the record in the file, which says "not stated" without one.
     **options
         Options of the format, as `brdfdb export FORMAT --help` lists them, with underscores.
 
@@ -82,8 +85,8 @@ def write(
             "file_format", f"{file_format!r} is not one of {', '.join(EXPORTERS)}", file_format, tuple(EXPORTERS)
         )
     exporter = EXPORTERS[file_format]
-    parsed_options(exporter, {name: _text(value) for name, value in options.items()})
-    return exporter.write(table, Path(path), verdict=verdict, **options)
+    parsed = parsed_options(exporter, {name: _text(value) for name, value in options.items()})
+    return exporter.write(table, Path(path), verdict=verdict, **parsed)
 
 
 def _text(value: Any) -> str:
@@ -104,9 +107,10 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     Raises
     ------
     ParameterError
-        If there is no such format.
+        If there is no such format, or its files are only written.
     FileFormatError
-        If no format recognises the file, or it is damaged.
+        If no format recognises the file, its format is only written, it is damaged, or it is no regular file of at most
+        2 GiB.
     OSError
         If the file cannot be read.
 
@@ -118,16 +122,37 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
     path = Path(path)
+    check_file(path)
+    importer = _importer(path, file_format)
+    try:
+        reading = importer.read(path)
+    except ParameterError as error:  # of samples that are none
+        raise FileFormatError(f"{path}: {error}") from error
+    at = reading.wavelength_nm
+    if at is not None and not np.all((at > 0.0) & (at < np.inf)):
+        wrong = at[~((at > 0.0) & (at < np.inf))][0]
+        raise FileFormatError(f"{path}: a wavelength is {wrong:g} nm; allowed are positive numbers")
+    return reading
+
+
+def _importer(path: Path, file_format: str) -> Importer:
+    """Return the importer of a format by its name, or the one that recognises a file."""
+    only_written = {name: exporter for name, exporter in EXPORTERS.items() if name not in IMPORTERS}
     if file_format:
+        if file_format in only_written:
+            raise ParameterError("file_format", f"files of {file_format} are only written, not read", file_format)
         if file_format not in IMPORTERS:
             raise ParameterError(
                 "file_format", f"{file_format!r} is not one of {', '.join(IMPORTERS)}", file_format, tuple(IMPORTERS)
             )
-        return IMPORTERS[file_format].read(path)
+        return IMPORTERS[file_format]
     with (path / "zarr.json" if path.is_dir() else path).open("rb") as file:  # a zarr group is a directory
         head = file.read(_HEAD)
     by_suffix = sorted(IMPORTERS.values(), key=lambda importer: not path.name.endswith(importer.suffix))
     for importer in by_suffix:
         if importer.recognises(head):
-            return importer.read(path)
+            return importer
+    for name, exporter in only_written.items():
+        if path.name.endswith(exporter.suffix):
+            raise FileFormatError(f"{path}: files of {name} are only written, not read")
     raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}")

@@ -11,11 +11,13 @@ from typing import Any
 from xml.sax.saxutils import escape
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._input import check_size
 from brdfdb.formats._record import lines, of_lines
 
 # Names of the sides in these files are those of WINDOW, whose front is outdoors. Radiance's front is the back
 FRONT_OF_RADIANCE = "Reflection Back"
 VISIBLE = "Visible"
+_MOST_BYTES, _PIECE = 1 << 29, 1 << 20  # size of a file that is read, and of what is parsed at a time [byte]
 _NAMESPACE = "http://windows.lbl.gov"
 _HEAD = f"""<?xml version="1.0" encoding="UTF-8"?>
 <WindowElement xmlns="{_NAMESPACE}" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">
@@ -157,11 +159,10 @@ def read(path: str | os.PathLike[str]) -> BsdfFile:
     OSError
         If it cannot be read.
     """
-    data = Path(path).read_bytes()
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities may grow without limit
-        raise FileFormatError(f"{path}: it declares a document type, which these files do not have")
     try:
-        root = ElementTree.fromstring(data)
+        root = _root(path)
+    except FileFormatError:
+        raise
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise FileFormatError(f"{path}: it is not XML: {error}") from None
     layer, definition = root.find("{*}Optical/{*}Layer"), root.find("{*}Optical/{*}Layer/{*}DataDefinition")
@@ -186,6 +187,21 @@ def read(path: str | os.PathLike[str]) -> BsdfFile:
         of_lines(_text(definition, "Comments").splitlines()),
         blocks,
     )
+
+
+def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
+    """Return the root of a document, which is parsed in pieces: the first one that is no XML ends it."""
+    check_size(Path(path), _MOST_BYTES)
+    parser, end = ElementTree.XMLParser(), b""
+    with open(path, "rb") as file:
+        while piece := file.read(_PIECE):
+            seen = end + piece
+            if b"<!DOCTYPE" in seen or b"<!ENTITY" in seen:  # entities may grow without limit
+                raise FileFormatError(f"{path}: it declares a document type, which these files do not have")
+            parser.feed(piece)
+            end = piece[-len(b"<!DOCTYPE") :]
+    root: ElementTree.Element = parser.close()
+    return root
 
 
 def _text(parent: ElementTree.Element, name: str) -> str:

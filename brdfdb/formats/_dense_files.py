@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._json_tables import degrees_of
 from brdfdb.formats._record import CONVENTION, record, specular_remark
 
 if TYPE_CHECKING:
@@ -48,7 +50,11 @@ _TURNED = {
     "theta_d": "angle between the light and the half vector",
     "phi_d": "azimuth of the light about the half vector",
 }
-_MOST_VALUES = 1 << 28  # of a file that is read
+_MOST_VALUES = 1 << 27  # of a file that is read
+_MOST_NODES = 1 << 22  # of an axis that is read
+_NM_PER = {"": 1.0, "nm": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3, "m": 1e9}  # by the unit of a file
+_DEGREES, _RADIANS = ("", "degree", "degrees", "deg", "°"), ("rad", "radian", "radians")
+_PER_SR = ("", "sr-1", "1/sr", "sr^-1", "sr**-1")
 
 
 def dense_record(table: Table, dense: DenseTable, verdict: str | None, *, specular: bool) -> dict[str, Any]:
@@ -93,7 +99,7 @@ def record_of_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, str) and value[:1] in ("{", "["):
             try:
                 document[key] = json.loads(value)
-            except ValueError:
+            except (ValueError, RecursionError):
                 continue
     return document
 
@@ -114,12 +120,42 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable:
     spectral = ("wavelength",) if "wavelength" in brdf.dims else ()
     if set(brdf.dims) != {*names, *spectral} or not set(brdf.dims) <= set(opened.coords):
         raise FileFormatError(f"{path}: brdf over {', '.join(map(str, brdf.dims))} lacks axes or has too many")
-    if brdf.size > _MOST_VALUES:
-        raise FileFormatError(f"{path}: {brdf.size} values are more than {_MOST_VALUES}")
+    check_sizes(path, {name: opened[name].shape for name in ("brdf", *brdf.dims)})
+    if _unit(brdf) not in _PER_SR:
+        raise FileFormatError(f"{path}: brdf has the units {_unit(brdf)!r}; allowed is sr-1")
     values = brdf.transpose(*names, *spectral).values
-    at = opened["wavelength"].values if spectral else None
-    axes = {name: opened[name].values for name in names}
+    at = _in_nm(path, opened["wavelength"]) if spectral else None
+    axes = {name: _in_degrees(path, opened[name]) for name in names}
     return file_table(path, axes, values, at, record_of_attributes(opened.attrs))
+
+
+def check_sizes(path: Path, shapes: Mapping[Any, tuple[int, ...]]) -> None:
+    """Raise FileFormatError if the values or the nodes of an axis are more than are read."""
+    for name, shape in shapes.items():
+        most = _MOST_NODES if len(shape) == 1 else _MOST_VALUES
+        if math.prod(shape) > most:
+            raise FileFormatError(f"{path}: {math.prod(shape)} numbers of {name} are more than {most}")
+
+
+def _unit(variable: xr.DataArray) -> str:
+    return str(variable.attrs.get("units", "")).strip()
+
+
+def _in_nm(path: Path, variable: xr.DataArray) -> NDArray[Any]:
+    """Return wavelengths [nm], in the unit that a file names."""
+    if _unit(variable) not in _NM_PER:
+        raise FileFormatError(f"{path}: {variable.name} has the units {_unit(variable)!r}; allowed are nm, um and m")
+    scale = _NM_PER[_unit(variable)]
+    return np.asarray(variable.values if scale == 1.0 else np.round(variable.values * scale, 9))
+
+
+def _in_degrees(path: Path, variable: xr.DataArray) -> NDArray[Any]:
+    """Return angles [degree], in the unit that a file names."""
+    if _unit(variable) in _RADIANS:
+        return degrees_of(variable.values, "rad")
+    if _unit(variable) not in _DEGREES:
+        raise FileFormatError(f"{path}: {variable.name} has the units {_unit(variable)!r}; allowed are degree and rad")
+    return np.asarray(variable.values)
 
 
 def file_table(
@@ -148,9 +184,11 @@ def file_table(
     shape = grid.shape if at is None else (*grid.shape, at.size)
     if values.shape != shape or values.dtype.kind not in "iuf":
         raise FileFormatError(f"{path}: brdf is {values.dtype} of shape {values.shape}, not numbers of shape {shape}")
-    if not np.all(np.isfinite(values)):
-        raise FileFormatError(f"{path}: brdf holds values that are not finite")
-    table = interpolated(grid, values.astype(np.float32), at)
+    with np.errstate(over="ignore"):
+        stored = values.astype(np.float32)
+    if not np.all(np.isfinite(stored)):
+        raise FileFormatError(f"{path}: brdf holds values that are not finite, or above those of 32 bits")
+    table = interpolated(grid, stored, at)
     channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
     return FileTable(
         name=str(known.get("name") or Path(path).stem),

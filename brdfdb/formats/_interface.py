@@ -24,8 +24,8 @@ class Option:
     ----------
     name : str
         Name of the keyword argument.
-    default : bool, float or str
-        Value that is used if none is given; its type is that of the option.
+    default : bool, int, float or str
+        Value that is used if none is given, also where it is outside of the range; its type is that of the option.
     help : str
         A few words for people, with the unit.
     low, high : float
@@ -35,13 +35,24 @@ class Option:
     """
 
     name: str
-    default: bool | float | str
+    default: bool | int | float | str
     help: str
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[str, ...] = ()
 
-    def parse(self, text: str) -> bool | float | str:
+    @property
+    def allowed(self) -> str:
+        """Return the values of the option in words."""
+        if isinstance(self.default, bool):
+            return "true or false"
+        if isinstance(self.default, str):
+            return ", ".join(self.choices)
+        number = "a whole number" if isinstance(self.default, int) else "a number"
+        other = "" if self.low <= self.default <= self.high else f", or {self.default:g}"
+        return f"{number} in [{self.low:g}, {self.high:g}]{other}"
+
+    def parse(self, text: str) -> bool | int | float | str:
         """Return the value that a text stands for.
 
         Raises
@@ -61,10 +72,10 @@ class Option:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not self.low <= value <= self.high:
-            allowed = f"a number in [{self.low:g}, {self.high:g}]"
-            raise ParameterError(self.name, f"{text!r} is not {allowed}", text, (self.low, self.high))
-        return value
+        is_whole = isinstance(self.default, int)
+        if (not self.low <= value <= self.high and value != self.default) or (is_whole and value != int(value)):
+            raise ParameterError(self.name, f"{text!r} is not {self.allowed}", text, (self.low, self.high))
+        return int(value) if is_whole else value
 
 
 TOLERANCE = Option(
@@ -105,8 +116,8 @@ class Exporter(Protocol):
         All other keyword arguments.
     write : callable
         ``write(table, path, verdict=None, **options)`` writes the file, and those that stand beside it: whole, or not
-        at all. `verdict` is that of the audit of this revision. It raises CannotHoldError for a table that the format
-        has no place for.
+        at all. `verdict` is that of the audit of this revision, or None where the caller knows none. It raises
+        CannotHoldError for a table that the format has no place for.
     """
 
     suffix: str

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._input import check_size
 
 MOST_BYTES = 40_000_000  # size of a file that is written, about
 _MOST_READ = 1 << 29  # of a file that is read
@@ -19,8 +20,7 @@ _DECIMALS = 4  # of angles [degree]: radians in files have six
 
 def parsed(path: Path) -> dict[str, Any]:
     """Return the object in a JSON file; FileFormatError if it holds none, or more than 512 MiB."""
-    if path.stat().st_size > _MOST_READ:
-        raise FileFormatError(f"{path}: it has more than {_MOST_READ} bytes")
+    check_size(path, _MOST_READ)
     try:
         document = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:

@@ -17,6 +17,7 @@ from brdfdb.parameters import Floats
 
 _REQUIRED = {"theta_i": 1, "phi_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "luminance": 4, "jacobian": 1}
 _BYTES = ("description", "jacobian")
+_ROUNDING = 1e-3  # of the angles of a file [rad]
 
 Floats32 = NDArray[np.float32]
 
@@ -197,6 +198,7 @@ def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) 
     for name in ("theta_i", "phi_i", *(("wavelengths",) if spectral else ())):
         if arrays[name].size < 1 or not np.all(np.diff(arrays[name]) > 0.0):
             raise FileFormatError(f"{path}: field {name!r} does not ascend")
+    _check_numbers(path, arrays)
     return Fields(
         **{name: arrays[name] for name in ("theta_i", "phi_i", "ndf", "sigma", "vndf", "luminance")},
         spectra=arrays[values],
@@ -204,6 +206,21 @@ def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) 
         jacobian=bool(arrays["jacobian"][0]),
         description=arrays["description"].tobytes().decode("utf-8", "replace"),
     )
+
+
+def _check_numbers(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Raise FileFormatError for angles out of range, and for densities that cannot be warped or divided by."""
+    for name, low, high in (("theta_i", 0.0, 0.5 * np.pi), ("phi_i", -2.0 * np.pi, 2.0 * np.pi)):
+        first, last = arrays[name][[0, -1]]
+        if first < low - _ROUNDING or last > high + _ROUNDING:
+            raise FileFormatError(
+                f"{path}: field {name!r} is from {first:g} to {last:g}; allowed is [{low:.4g}, {high:.4g}] rad"
+            )
+    vndf = arrays["vndf"]
+    if np.any(vndf < 0.0) or not np.all(np.any(vndf > 0.0, axis=(2, 3))):
+        raise FileFormatError(f"{path}: field 'vndf' has a negative number, or a slice of zeros")
+    if arrays["jacobian"][0] and not np.all(arrays["sigma"] > 0.0):
+        raise FileFormatError(f"{path}: field 'sigma' has the number {arrays['sigma'].min():g}; it divides f_r")
 
 
 def directions(u_x: Array, u_y: Array) -> Array:

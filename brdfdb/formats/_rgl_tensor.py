@@ -98,5 +98,7 @@ class _Header:
         size = math.prod(shape)  # of Python's integers, which do not overflow
         if offset + size * dtype.itemsize > len(self._content):
             raise FileFormatError(f"{self._path}: damaged: field {name!r} of shape {shape} lies beyond its end")
+        if not size and any(shape[1:]):  # NumPy has no arrays of such shapes; texts may be empty
+            raise FileFormatError(f"{self._path}: damaged: field {name!r} of shape {shape} is empty")
         values = np.frombuffer(self._content, dtype, size, offset) if size else np.empty(0, dtype)
-        return name, values.reshape(shape)
+        return name, values.reshape(shape) if size else values

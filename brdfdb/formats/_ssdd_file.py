@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._input import MOST_TEXT, check_size
 from brdfdb.parameters import Floats
 
 VERSION = "0.3"
 LISTS = ("PARAM0_LIST", "PARAM1_LIST", "PARAM2_LIST", "PARAM3_LIST")
+_RANGES_DEG = ((0.0, 90.0), (-360.0, 360.0), (0.0, 180.0), (-360.0, 360.0))  # of the lists
+_ROUNDING_DEG = 1e-3
 _TYPES = ("brdf", "btdf", "specular_reflectance", "specular_transmittance")
 _CHANNELS = {"monochrome": 1, "rgb": 3, "xyz": 3}
 _SPACES = b" \t\n\v\f\r"
@@ -32,18 +35,14 @@ class Block:
         The lists of angles that are there, from PARAM0_LIST on; (0,) for one that is left out.
     values : float32 array (n0, n1, ..., C)
         Values over the lists, and last the channels.
+    wavelength_nm : array (C,) [nm] or None
+        Wavelengths of the channels; None if they are none.
     """
 
     entries: Mapping[str, str]
     angles: tuple[NDArray[np.float64], ...]
     values: NDArray[np.float32]
-
-    @property
-    def wavelength_nm(self) -> NDArray[np.float64] | None:
-        """Wavelengths [nm] of the channels; None if they are none."""
-        if self.entries["COLOR_MODEL"] != "spectrum":
-            return None
-        return np.array([float(text) for text in self.entries["WAVELENGTH_LIST"].split()])
+    wavelength_nm: NDArray[np.float64] | None
 
 
 def header(software: str, comments: Sequence[str]) -> bytes:
@@ -79,6 +78,7 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     OSError
         If it cannot be read.
     """
+    check_size(path, MOST_TEXT)
     data = path.read_bytes()
     comments: list[str] = []
     blocks: list[Block] = []
@@ -87,6 +87,8 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     while at < len(data):
         end = data.find(b"\n", at)
         end = len(data) if end < 0 else end
+        if data.find(b"\0", at, end) >= 0:
+            raise FileFormatError(f"{path}: a line of its text has a zero byte")
         line = data[at:end].decode("utf-8", "replace").strip()
         at = end + 1
         if line.startswith("#"):
@@ -110,12 +112,23 @@ def _values(path: Path, data: bytes, at: int, entries: Mapping[str, str]) -> tup
     try:
         lists = {name: np.array([float(text) for text in entries.get(name, "0").split()]) for name in LISTS}
         model = entries.get("COLOR_MODEL", "")
-        channels = len(entries["WAVELENGTH_LIST"].split()) if model == "spectrum" else _CHANNELS[model]
+        spectral = model == "spectrum"
+        nm = np.array([float(text) for text in entries["WAVELENGTH_LIST"].split()]) if spectral else None
+        channels = _CHANNELS[model] if nm is None else nm.size
     except (KeyError, ValueError):
         raise FileFormatError(f"{path}: COLOR_MODEL, or a list of angles or wavelengths, cannot be read") from None
     angles = tuple(lists.values())
     if not channels or not all(nodes.size and np.all(np.diff(nodes) > 0.0) for nodes in angles):
         raise FileFormatError(f"{path}: a list of angles is empty or does not increase")
+    if nm is not None and not (channels and nm[0] > 0.0 and nm[-1] < np.inf and np.all(np.diff(nm) > 0.0)):
+        raise FileFormatError(f"{path}: WAVELENGTH_LIST is not of positive numbers [nm] that increase")
+    for (name, nodes), (low, high) in zip(lists.items(), _RANGES_DEG, strict=True):
+        if not low <= nodes[0] <= nodes[-1] <= high + _ROUNDING_DEG:
+            raise FileFormatError(
+                f"{path}: {name} is from {nodes[0]:g} to {nodes[-1]:g} degrees; allowed is [{low:g}, {high:g}]"
+            )
+    if entries["DATA"] not in ("binary", "ascii"):
+        raise FileFormatError(f"{path}: DATA is {entries['DATA']!r:.40}; allowed are binary and ascii")
     count = channels * math.prod(nodes.size for nodes in angles)
     if entries["DATA"] == "binary":
         end = at + 4 * count
@@ -136,4 +149,4 @@ def _values(path: Path, data: bytes, at: int, entries: Mapping[str, str]) -> tup
         raise FileFormatError(f"{path}: a value is not finite")
     shape = tuple(nodes.size for nodes in reversed(angles))
     values = np.moveaxis(flat.reshape(*shape, channels), -1, 0).T
-    return Block(dict(entries), angles, np.ascontiguousarray(values)), end
+    return Block(dict(entries), angles, np.ascontiguousarray(values), nm), end

@@ -6,17 +6,20 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._angular_grid import Sink
+from brdfdb.formats._input import lines_of
 
 LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
 TITLE = "BSDF Data Interchange file"
 _SYMMETRIES = ("PlaneSymmetrical", "Asymmetrical", "ASymmetrical", "ASymmetrical4D", "Asymmetrical4D")
 _PARTS = {"Monochrome": ("Monochrome",), "XYZ": ("TristimulusX", "TristimulusY", "TristimulusZ")}
+
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +49,7 @@ class Text:
     values: NDArray[np.float32]
 
 
-def write(stream: BinaryIO, text: Text) -> None:
+def write(stream: Sink, text: Text) -> None:
     """Write a file."""
     head = [f"# {comment}" for comment in (TITLE, *text.comments)]
     head += ["Source Measured", f"Symmetry {text.symmetry}", f"SpectralContent {text.content}"]
@@ -82,7 +85,9 @@ def parsed(path: Path) -> Text:
             entries[word] = next(words, "")
         elif word in LISTS:
             count = _numbers(path, words, 1, word)[0]
-            angles[word] = _numbers(path, words, max(int(count), 0), word)
+            if not 1.0 <= count <= path.stat().st_size or count != int(count):
+                raise FileFormatError(f"{path}: {word} is a list of {count:g} angles, and the file holds no such list")
+            angles[word] = _numbers(path, words, int(count), word)
         elif any(word in parts for parts in _PARTS.values()):
             break
     content = entries["SpectralContent"]
@@ -102,9 +107,11 @@ def parsed(path: Path) -> Text:
             if word == "TIS":
                 break
         tis[number] = _numbers(path, words, 1, "TIS")[0]
-        rows.append(_numbers(path, words, lists[2].size * lists[3].size, "TIS").astype(np.float32))
+        rows.append(_numbers(path, words, lists[2].size * lists[3].size, "TIS"))
+        if np.any(np.abs(rows[-1]) > _LARGEST):
+            raise FileFormatError(f"{path}: a value is beyond {_LARGEST:g}, the largest one of 32 bits")
     shape = (parts, *(nodes.size for nodes in lists))
-    values = np.concatenate(rows).reshape(shape)
+    values = np.concatenate(rows, dtype=np.float32, casting="same_kind").reshape(shape)
     return Text(
         tuple(comments),
         entries["Symmetry"],
@@ -118,12 +125,11 @@ def parsed(path: Path) -> Text:
 
 def _words(path: Path, comments: list[str]) -> Iterator[str]:
     """Give the words of a file that are not in comments, which are collected."""
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in file:
-            if line.lstrip().startswith("#"):
-                comments.append(line.lstrip()[1:].strip())
-            else:
-                yield from line.split()
+    for line in lines_of(path):
+        if line.lstrip().startswith("#"):
+            comments.append(line.lstrip()[1:].strip())
+        else:
+            yield from line.split()
 
 
 def _numbers(path: Path, words: Iterator[str], count: int, name: str) -> NDArray[np.float64]:
@@ -132,6 +138,8 @@ def _numbers(path: Path, words: Iterator[str], count: int, name: str) -> NDArray
         raise FileFormatError(f"{path}: {count} numbers of {name} are more than the file has")
     try:
         numbers = np.array(list(itertools.islice(words, count)), dtype=np.float64)
+    except FileFormatError:  # of a line
+        raise
     except ValueError:
         raise FileFormatError(f"{path}: a number of {name} cannot be read") from None
     if numbers.size < count or not np.all(np.isfinite(numbers)):

@@ -4,7 +4,8 @@ The lists hold the polar angles and azimuths of light and viewer, in degrees, f_
 directions form a grid. The format does not say how to interpolate. The stated error is that of straight lines along all
 angles at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not.
+Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
+needs more is written with the error it has.
 """
 
 from __future__ import annotations
@@ -44,6 +45,12 @@ SCHEMA = "https://raw.githubusercontent.com/BiRD-project/BiRD_view/master/BRDF_J
 _LAST_DEG = 89.99  # polar angles stay below 90
 _DIGITS, _ENTRY_BYTES = 5, 45  # of a number, and of the numbers of one entry
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
+_MICRONS = ("um", "µm", "μm")
+_UNITS = {
+    "angle": ("deg", "degree", "degrees", "°", "rad", ""),
+    "BRDF": ("1/sr", "sr-1", "sr^-1", ""),
+    "wavelength": ("nm", *_MICRONS, ""),
+}
 _NOT_STATED = "not stated"
 
 
@@ -151,7 +158,11 @@ def _lists(path: Path, data: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
         entry = data.get(name)
         if isinstance(entry, dict):
             numbers, unit = column(path, name, entry.get("values")), str(entry.get("unit", ""))
-            lists[name] = degrees_of(numbers, unit) if name in _ANGLES else numbers * (1e3 if unit == "μm" else 1.0)
+            units = _UNITS["angle" if name in _ANGLES else name.partition("_")[0]]
+            if unit not in units:
+                allowed = ", ".join(word for word in units if word)
+                raise FileFormatError(f"{path}: {name} has the unit {unit!r:.40}; allowed are {allowed}")
+            lists[name] = degrees_of(numbers, unit) if name in _ANGLES else numbers * (1e3 if unit in _MICRONS else 1.0)
         elif name in (*_ANGLES, "BRDF"):
             raise FileFormatError(f"{path}: data has no object {name}")
     if "wavelength_r" in lists:

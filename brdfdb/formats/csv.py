@@ -4,7 +4,8 @@ The columns are the angles in degrees, then f_r in 1/sr, with five significant d
 record. The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors
 (``--axes``). The cosine is not included. Readers interpolate in straight lines along all axes at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not.
+Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
+needs more is written with the error it has.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
+from brdfdb.formats._input import lines_of
 from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._written import Written, whole
 
@@ -35,7 +37,6 @@ kinds = ()
 options = OPTIONS
 _DIGITS = 5
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
-_MOST_READ = 1 << 30  # of a file that is read
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
 _COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
 
@@ -118,19 +119,19 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     from brdfdb.measurements.samples import Samples
 
     path = Path(path)
-    if path.stat().st_size > _MOST_READ:
-        raise FileFormatError(f"{path}: it has more than {_MOST_READ} bytes")
     comments: list[str] = []
     try:
-        with path.open(encoding="utf-8") as file:
-            for line in file:
-                if not line.startswith("#"):
-                    break
-                comments.append(line[1:].strip())
-            else:
-                line = ""
-            names = tuple(name.strip() for name in line.split(","))
-            numbers = np.loadtxt(file, delimiter=",", ndmin=2, dtype=np.float64)
+        texts = lines_of(path)
+        for line in texts:
+            if not line.startswith("#"):
+                break
+            comments.append(line[1:].strip())
+        else:
+            line = ""
+        names = tuple(name.strip() for name in line.split(","))
+        numbers = np.loadtxt(texts, delimiter=",", ndmin=2, dtype=np.float64)
+    except FileFormatError:
+        raise
     except ValueError as error:
         raise FileFormatError(f"{path}: it is no table of numbers ({error})") from error
     angles = tuple(name for name in names if name in _ANGLES)

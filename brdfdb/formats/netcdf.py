@@ -3,7 +3,8 @@
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
 f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has a variable of its own.
+Anisotropic tables, all wavelengths and the specular part fit. The specular part has a variable of its own. The values
+take 100 MB at most: a table that needs more is written with the error it has.
 """
 
 from __future__ import annotations

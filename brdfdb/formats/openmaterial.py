@@ -4,7 +4,7 @@ A row holds a wavelength in metres, three angles in radians, and f_r in 1/sr. Th
 viewer. The format does not say how to interpolate. The stated error is that of straight lines along all angles at once.
 
 All wavelengths fit. Grey tables are written at 550 nm. Anisotropic tables are refused, and the specular part is left
-out.
+out. A file has about 40 MB at most: a table that needs more is written with the error it has.
 """
 
 from __future__ import annotations

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from brdfdb.measurements.samples import Instrument, Samples
+from brdfdb.measurements.samples import Instrument, Samples, joined
 
-__all__ = ["Instrument", "Samples"]
+__all__ = ["Instrument", "Samples", "joined"]

@@ -45,7 +45,7 @@ def _prose(text: str) -> str:
 def _allowed(option: Option) -> str:
     if option.choices:
         return ", ".join(f"`{choice}`" for choice in option.choices)
-    return "" if isinstance(option.default, bool) else f"{option.low:g} to {option.high:g}"
+    return "" if isinstance(option.default, bool) else plain(option.allowed)
 
 
 def _default(option: Option) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from brdfdb.formats import EXPORTERS, Option, options_of
@@ -90,24 +89,34 @@ ERROR = _parameter(
 )
 
 
-def _option(option: Option) -> dict[str, Any]:
-    schema: dict[str, Any] = {"type": "string", "default": option.default}
-    if isinstance(option.default, bool):
-        schema |= {"enum": ["false", "true"], "default": str(option.default).lower()}
-    elif option.choices:
-        schema["enum"] = list(option.choices)
+def _option(name: str) -> dict[str, Any]:
+    """Return the parameter of an option of one or more formats, with the values that any of them allows."""
+    formats: dict[Option, list[str]] = {}
+    for file_format, exporter in EXPORTERS.items():
+        if option := options_of(exporter).get(name):
+            formats.setdefault(option, []).append(file_format)
+    options, defaults = list(formats), {option.default for option in formats}
+    if all(isinstance(option.default, str) for option in options):
+        choices = [choice for option in options for choice in option.choices]
+        schema: dict[str, Any] = {"type": "string", "enum": list(dict.fromkeys(choices))}
+    elif all(isinstance(option.default, bool) for option in options):
+        schema = {"type": "string", "enum": ["false", "true"]}
+    elif any(isinstance(option.default, bool | str) for option in options):
+        schema = {"type": "string"}
     else:
-        ends = {"minimum": option.low, "maximum": option.high}
-        schema |= {"type": "number", **{end: value for end, value in ends.items() if math.isfinite(value)}}
-    return _parameter(option.name, schema, option.help)
+        low = min(end for option in options for end in (option.low, float(option.default)))
+        high = max(end for option in options for end in (option.high, float(option.default)))
+        schema = {"type": "number", "minimum": low, "maximum": high}
+    if len(defaults) == 1:
+        default = defaults.pop()
+        schema["default"] = str(default).lower() if isinstance(default, bool) else default
+    texts = [f"{', '.join(names)}: {option.help}; {option.allowed}" for option, names in formats.items()]
+    return _parameter(name, schema, ". ".join(texts))
 
 
 # Of all formats: an option that a format does not have is refused
 EXPORT_OPTIONS = [
-    _option(option)
-    for option in {
-        name: option for exporter in EXPORTERS.values() for name, option in options_of(exporter).items()
-    }.values()
+    _option(name) for name in dict.fromkeys(name for each in EXPORTERS.values() for name in options_of(each))
 ]
 
 

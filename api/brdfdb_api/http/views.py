@@ -18,6 +18,7 @@ from starlette.responses import Response
 from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS, options_of, parsed_options
 from brdfdb.geometry import radians
+from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import Options, Points, evaluate, parsed
 from brdfdb_api.http.openapi_notes import EXPORT_OPTIONS, LOBE_NPY_ANSWER, LOBE_OPTIONS, WAVELENGTHS, answers
@@ -213,7 +214,7 @@ def export(
     with tempfile.TemporaryDirectory() as folder:  # formats write files
         path = FilePath(folder) / f"{name}{kind}{exporter.suffix}"
         try:
-            written = exporter.write(table, path, verdict=verdict, **options)
+            written = exporter.write(table, path, verdict=verdict or NOT_AUDITED, **options)
         except (CannotHoldError, ParameterError) as error:
             raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
         if len(written.paths) == 1 and path.is_file():
