@@ -15,6 +15,7 @@ Kind = Literal["log", "relative", "cosine", "uncertainty"]
 KINDS: tuple[Kind, ...] = ("log", "relative", "cosine", "uncertainty")
 
 _LEAST = 1e-6  # share of the smallest sample that is added to both sides before logarithms: the model may be 0
+_NOTHING = 1e-12  # the same of the largest, for samples that fall beneath what any instrument resolves
 _HORIZON_COSINE = 1e-4  # directions closer to the horizon are left out: models are 0 there
 
 
@@ -71,7 +72,9 @@ class Residual:
         if not self.used.any():
             raise ParameterError("samples", f"{samples.name} has no value that a {kind} residual can use", samples.name)
         y = np.where(self.used, self.truth, 1.0)
-        self.floor = _LEAST * float(y[self.used].min()) if kind == "log" else 0.0
+        usable_y = y[self.used]
+        least = max(_LEAST * float(usable_y.min()), _NOTHING * float(usable_y.max()))
+        self.floor = least if kind == "log" else 0.0
         if kind == "log":
             self.weight, self.goal = np.where(self.used, 1.0, 0.0), np.log(y + self.floor)
             return
