@@ -123,7 +123,7 @@ class Problem:
         """Return the point at which a descent from the free variables `begin` ends.
 
         Coefficients are eliminated by variable projection: the derivatives are those of residuals at fixed
-        coefficients, less the part that coefficients undo (Kaufman 1975).
+        coefficients, less the part that coefficients undo.
         """
         from scipy.optimize import least_squares
 

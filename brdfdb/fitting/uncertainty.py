@@ -47,7 +47,7 @@ class Covariance(NamedTuple):
 
 
 def noise_of(problem: Problem, residuals: Floats, searched: int) -> tuple[float, float]:
-    """Return two factors: of the covariance of a robust fit (Huber 1981), and between cost and deviance."""
+    """Return two factors: of the covariance of a robust fit, and between cost and deviance."""
     r = residuals[problem.residual.used]
     z = (r / problem.scale) ** 2
     squares = float(np.sum(r * r / (1.0 + z))) / max(r.size - searched, 1)
