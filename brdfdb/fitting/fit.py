@@ -182,9 +182,9 @@ def fits(
     return document, [fitted for _, fitted in made]
 
 
-def _rank(one: Fit) -> tuple[float, int]:
-    """Return what fits are sorted by: the error held out to three digits, then the number of numbers; or BIC."""
-    return (one.bic, 0) if one.held_out is None else (float(f"{one.held_out.rms:.3g}"), one.numbers)
+def _rank(one: Fit) -> tuple[float, float]:
+    """Return what fits are sorted by: the error held out to three digits, then BIC, which outliers hardly change."""
+    return (0.0 if one.held_out is None else float(f"{one.held_out.rms:.3g}"), one.bic)
 
 
 def _document(fitted: Fitted) -> Fit:
