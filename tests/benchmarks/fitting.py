@@ -33,7 +33,7 @@ MATERIALS = (
 NOISE, GAPS, HOLES = 0.03, 0.2, 0.05  # relative noise; shares of directions and of values that are missing
 SEEDS, QUICK_SEEDS = 6, 1
 MANY, QUICK_MANY = 7000, 500
-MEASURED = "The share of true parameters in the 95 % intervals of fits to noisy samples, and the time of a fit of many samples."
+MEASURED = "The share of true parameters in the 95 % intervals of fits to noisy samples, and the time of one fit."
 
 Array = NDArray[np.float64]
 
