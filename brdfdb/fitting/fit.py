@@ -17,7 +17,7 @@ from brdfdb.fitting.material import material_of
 from brdfdb.fitting.problem import Point, Problem
 from brdfdb.fitting.remarks import remarks_of
 from brdfdb.fitting.residuals import Kind, Residual
-from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, candidates
+from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitted_by_default
 from brdfdb.geometry import degrees
 from brdfdb.measurements import Samples
 
@@ -120,7 +120,7 @@ def fits(
     samples : Samples
         f_r at some directions.
     models : sequence of str, optional
-        Models and sums, by default `brdfdb.fitting.surface.candidates`.
+        Models and sums, by default `brdfdb.fitting.surface.fitted_by_default`.
     residual, refractive_index
         As of `fit`.
     profiles : bool
@@ -142,7 +142,7 @@ def fits(
     counting = Residual(samples, residual)
     made: list[tuple[Fit, Fitted]] = []
     skipped: dict[str, str] = {}
-    for model in candidates() if models is None else models:
+    for model in fitted_by_default() if models is None else models:
         tick(model)
         try:
             fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)

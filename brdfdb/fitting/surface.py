@@ -322,7 +322,7 @@ def _is_simple(name: str) -> bool:
     return len(term.free) <= _MOST_SHAPE
 
 
-def candidates(*, sums: bool = True) -> list[str]:
+def fitted_by_default(*, sums: bool = True) -> list[str]:
     """Return the surfaces that are fitted unless others are named: every model, and sums with a uniform f_r.
 
     Models whose values are integrals are left out. Sums have one or two lobes of a model without a uniform part.

@@ -145,7 +145,7 @@ def _read(path: Path, importer: Importer, **keywords: Any) -> FileTable | Sample
     except FileFormatError:
         raise
     except ParameterError as error:  # of samples that are none
-        if error.parameter in keywords:
+        if error.parameter in getattr(importer, "keywords", ()):
             raise
         raise FileFormatError(f"{path}: {error}") from error
     at = reading.wavelength_nm

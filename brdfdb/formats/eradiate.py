@@ -158,9 +158,8 @@ def read(path: str | os.PathLike[str]) -> FileTable:
 def _samples(
     values: NDArray[Any], name: str, channels: tuple[str, ...], at: NDArray[np.float64] | None, known: dict[str, Any]
 ) -> Samples:
-    """Return the values of a file at the nodes that the kernel interpolates between."""
-    viewers, turns, lights = values.shape
-    nodes = np.linspace(0.0, 1.0, viewers), np.linspace(0.0, 2.0 * np.pi, turns), np.linspace(0.0, 1.0, lights)
+    """Return the values of a file at its nodes."""
+    nodes = (axis for _, axis, _ in _coordinates(values.shape).values())
     viewer, turn, light = (grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij"))
     angles = np.stack([np.arccos(light), turn, np.arccos(viewer), np.zeros(values.size)], axis=1)
     angles[:, 1], angles[:, 3] = 0.0, -turn % (2.0 * np.pi)

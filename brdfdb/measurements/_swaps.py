@@ -38,14 +38,14 @@ def reciprocity_of(samples: Samples, one_side: bool) -> Reciprocity | None:
     theta_i, phi_i, theta_r, phi_r = (np.rint(angle / _SAME_DEG).astype(np.int64) for angle in angles)
     turn = round(360.0 / _SAME_DEG)
     if samples.turned:
-        here = theta_i, np.where(theta_i == 0, 0, phi_i % turn), theta_r, np.where(theta_r == 0, 0, phi_r % turn)
-        swapped = here[2], here[3], here[0], here[1]
+        coordinates = theta_i, np.where(theta_i == 0, 0, phi_i % turn), theta_r, np.where(theta_r == 0, 0, phi_r % turn)
+        swapped = coordinates[2], coordinates[3], coordinates[0], coordinates[1]
     else:
         delta = np.where((theta_i == 0) | (theta_r == 0), 0, (phi_r - phi_i) % turn)
         other = np.where(delta == 0, 0, turn - delta)
         delta, other = (np.minimum(delta, other),) * 2 if one_side else (delta, other)
-        here, swapped = (theta_i, theta_r, delta, 0 * delta), (theta_r, theta_i, other, 0 * delta)
-    code, code_swapped = (((a * turn + b) * turn + c) * turn + d for a, b, c, d in (_wide(here), _wide(swapped)))
+        coordinates, swapped = (theta_i, theta_r, delta, 0 * delta), (theta_r, theta_i, other, 0 * delta)
+    code, code_swapped = (((a * turn + b) * turn + c) * turn + d for a, b, c, d in (_wide(coordinates), _wide(swapped)))
     order = np.argsort(code, kind="stable")
     place = np.clip(np.searchsorted(code[order], code_swapped), 0, len(order) - 1)
     partner = order[place]

@@ -14,7 +14,7 @@ from brdfdb.fitting.document import Estimate, Fit, Fits
 from brdfdb.fitting.figure import figure_of
 from brdfdb.fitting.fit import fits
 from brdfdb.fitting.residuals import Kind
-from brdfdb.fitting.surface import candidates
+from brdfdb.fitting.surface import fitted_by_default
 from brdfdb.measurements import Samples
 from brdfdb.parameters import closest
 from brdfdb.store.files import write_file
@@ -66,7 +66,7 @@ def run(
         If a recipe is asked for and no fit is one model of the registry.
     """
     samples = _selected(formats.samples(data), channel, wavelength_nm)
-    count = len(models or candidates()) + 1
+    count = len(models or fitted_by_default()) + 1
     with terminal.progress(transient=True) as bar:
         task = bar.add_task("fit", total=count)
 

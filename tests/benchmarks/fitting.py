@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb.fitting.fit import fit, fits
-from brdfdb.fitting.surface import NotDescribedError, candidates
+from brdfdb.fitting.surface import NotDescribedError, fitted_by_default
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import Material, presets
 from brdfdb.measurements import Samples
@@ -92,7 +92,7 @@ def times(run: Run, count: int) -> None:
     rows = np.tile(np.arange(len(few)), -(-count // len(few)))[:count]
     noise = 1.0 + NOISE * np.random.default_rng(1).standard_normal((count, 1))
     many = replace(few.selected(rows), values=few.values[rows] * noise)
-    for model in candidates(sums=False):
+    for model in fitted_by_default(sums=False):
         try:
             fit(few, model)  # compiles
         except NotDescribedError:

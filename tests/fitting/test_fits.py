@@ -11,7 +11,7 @@ from brdfdb.fitting.estimates import estimates_of
 from brdfdb.fitting.fit import fit, fits
 from brdfdb.fitting.problem import Problem
 from brdfdb.fitting.residuals import Residual
-from brdfdb.fitting.surface import NotDescribedError, Surface, candidates
+from brdfdb.fitting.surface import NotDescribedError, Surface, fitted_by_default
 from brdfdb.fitting.uncertainty import NORMAL_95
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements import Samples
@@ -55,7 +55,7 @@ def noisy(values: Array, seed: int = 1) -> Array:
 WARD = {"rho_d": 0.2, "rho_s": 0.1, "alpha_x": 0.15, "alpha_y": 0.15}
 
 
-@pytest.mark.parametrize("name", candidates())
+@pytest.mark.parametrize("name", fitted_by_default())
 def test_polynomial_of_a_surface_is_the_model(name: str) -> None:
     surface = Surface(name, None, 1, turned=True)
     theta_i, phi_i, theta_r, phi_r = directions()
