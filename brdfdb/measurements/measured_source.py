@@ -203,6 +203,12 @@ class MeasuredSource(FunctionSource):
         """Return which pairs of unit vectors (N, 3) lie outside of the directions that were measured."""
         return np.zeros(len(wi), dtype=bool) if self._hull is None else self._hull.outside(wi, wr)
 
+    def recorded(self, **changes: Any) -> Self:
+        """Return the source with some entries of its record changed."""
+        changed = self.model_copy()
+        changed._measured = self._measured.model_copy(update=changes)
+        return changed
+
     def made(self, law: str, margin: float = 0.0) -> Self:
         """Return the nearest source that keeps a law; its record says what was changed.
 
@@ -270,8 +276,15 @@ def _named(names: tuple[str, ...], values: Floats) -> dict[str, float]:
 def _brdf_of(f_r: Evaluate, channels: tuple[str, ...], wavelength_nm: NDArray[np.float64] | None) -> Callable[..., Any]:
     """Return f_r at wavelengths as `FunctionSource` takes it: straight lines between those of the data."""
 
+    last: list[Floats] = []  # tables evaluate one wavelength after another at the same directions
+
+    def evaluated(wi: Floats, wr: Floats) -> Floats:
+        if not (last and np.array_equal(last[0], wi) and np.array_equal(last[1], wr)):
+            last[:] = wi, wr, np.asarray(f_r(wi, wr))
+        return last[2]
+
     def brdf(wi: Floats, wr: Floats, at: NDArray[np.float64] | None) -> Floats:
-        values = np.asarray(f_r(wi, wr))
+        values = evaluated(wi, wr)
         if at is None or wavelength_nm is None:
             return values
         stored = spectra_of_colours() if channels in _COLOURS else np.eye(wavelength_nm.size)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import directions_from_half_difference, radians, unit_vector
+from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.tables.grids import RECIPROCITY, Axis
 from brdfdb.tables.layout import TABLE_VERSION, Layout
@@ -263,6 +264,7 @@ def metadata_of(layout: Layout) -> TableMetadata:
         table_version=TABLE_VERSION,
         **source.attributes(),
         source_record=source.document(),
+        measured=source.measured if isinstance(source, MeasuredSource) else None,
         conventions=(
             "directions point away from the surface; delta_phi = phi_r - phi_i, 0 is back towards the light, "
             "180 degrees the mirror half plane; f_r without cosine; isotropic tables are even in delta_phi"

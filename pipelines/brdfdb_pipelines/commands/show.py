@@ -56,8 +56,10 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     if metadata.gaps:
         print(terminal.plain(f"  incomplete  the table {metadata.gaps}"))
     _print_grid(table)
-    _print_error(table.error, "its source" if metadata.model is None else "its formula")
-    _print_formula_error(metadata.formula_error)
+    truth = "its formula" if metadata.model is not None else "its source" if metadata.measured is None else "the data"
+    _print_error(table.error, truth)
+    if metadata.measured is None:
+        _print_formula_error(metadata.formula_error)
     _print_answers(audited, table.name)
     _print_validity(table)
     _print_albedo(table)
@@ -104,6 +106,8 @@ def _origin(metadata: TableMetadata) -> list[str]:
         lines.append(f"    {parameter:<16}{text:<{_VALUE_WIDTH}}{note}".rstrip())
     if metadata.source is not None:
         lines.append(f"  source      {metadata.source}")
+    if metadata.measured is not None:
+        lines += [f"  {'measured' if not n else '':<12}{line}" for n, line in enumerate(metadata.measured.in_words())]
     if metadata.refractive_index:
         lines.append(f"  n, k        {metadata.refractive_index} of refractiveindex.info")
     if metadata.note:
