@@ -51,7 +51,7 @@ class Interpolation:
     alpha : float
         Width [1] of the lobe that the coordinates crowd in.
     level : array (C,) [1/sr]
-        Noise of small values.
+        Noise of small values: their uncertainty, or the root mean square of the values below 0.
     scales : tuple
         Scales of the coordinates, and the noise of the logarithm that no uncertainty states, relative to its spread.
     turned : bool
@@ -224,7 +224,8 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
 def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
     """Return the problem, the noise (C,) [1/sr] of small values, and the scheme by which groups are held out."""
     wi, wr, values, uncertainty = _listed(samples)
-    level = floor_of(samples)
+    below = np.where(values < 0.0, values, 0.0)
+    level = np.maximum(np.sqrt(np.sum(below**2, axis=0) / np.maximum(np.sum(below < 0.0, axis=0), 1)), floor_of(samples))
     if uncertainty is not None:
         level = np.maximum(np.nanmedian(uncertainty, axis=0), level)
     of_base = _logarithm(base(wi, wr), level)
