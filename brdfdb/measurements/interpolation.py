@@ -58,6 +58,9 @@ class Interpolation:
         True if the samples can tell the azimuth of the light.
     mean : array (C,)
         Mean of the logarithm of the ratio.
+    lowest : float
+        Smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values there,
+        as in tables: a lobe that is continued may reflect any amount.
     centres, weights : array (M, D), (M, C)
         Centres of the radial functions in the coordinates, and their weights.
     """
@@ -68,11 +71,13 @@ class Interpolation:
     scales: _Scales
     turned: bool
     mean: Floats
+    lowest: float
     centres: Floats = field(default_factory=lambda: np.empty((0, 0)))
     weights: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
     def __call__(self, wi: Floats, wr: Floats) -> Floats:
         """Return f_r [1/sr] (N, C), at least 0, at unit vectors (N, 3)."""
+        wi, wr = (_raised(w, self.lowest) for w in (wi, wr))
         values = np.empty((len(wi), self.level.size))
         for start in range(0, len(wi), 1 << 13):
             some = slice(start, start + (1 << 13))
@@ -80,6 +85,13 @@ class Interpolation:
             number = _logarithm(self.base(wi[some], wr[some]), self.level) + self.mean
             values[some] = 2.0 * self.level * np.sinh(number + _radial(x, self.centres) @ self.weights)
         return np.maximum(values, 0.0)
+
+
+def _raised(w: Floats, lowest: float) -> Floats:
+    """Return unit vectors (N, 3) with cosines of at least `lowest`, at the same azimuths."""
+    sine = np.sqrt((1.0 - lowest**2) / np.maximum(1.0 - w[:, 2] ** 2, 1e-12))
+    raised = np.stack([w[:, 0] * sine, w[:, 1] * sine, np.full(len(w), lowest)], axis=1)
+    return np.where((w[:, 2] < lowest)[:, np.newaxis], raised, w)
 
 
 def _logarithm(f_r: Floats, level: Floats) -> Floats:
@@ -204,12 +216,13 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     small. Samples without such a pattern are held out in ten parts, by chance.
     """
     own, alpha, words = lambert_and_lobe(samples)
-    problem, level, scheme = _problem(samples, own if base is None else base)
-    mean = problem.y.mean(axis=0)
+    f_base = own if base is None else base
+    problem, level, scheme = _problem(samples, f_base)
+    mean, lowest = problem.y.mean(axis=0), float(min(problem.wi[:, 2].min(), problem.wr[:, 2].min()))
     order = np.random.default_rng(_SEED).permutation(len(problem.wi))
     few = problem.some(order[:_SEARCHED])
     tried = [
-        Interpolation(own if base is None else base, alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean)
+        Interpolation(f_base, alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest)
         for half, both, noise in itertools.product((1.0, 2.0), _SCALES, _ROUGHNESS)
     ]
     scores = [np.mean(np.minimum(np.abs(_held_out(one, few, few) - few.y), 3.0)) for one in tried]
