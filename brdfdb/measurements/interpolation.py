@@ -22,6 +22,7 @@ FLOOR = 1e-3  # floor of relative errors, as a share of the mean f_r times cosin
 _CENTRES = 700  # largest number of radial functions
 _SEARCHED = 300  # samples among which scales are chosen
 _ALPHAS = np.geomspace(0.01, 2.0, 24)  # widths of the lobe of the base that are tried
+_SEEN = 5  # samples within the width of a lobe that are needed to see its height
 _SCALES = (0.5, 1.0, 2.0, 4.0)  # of the coordinates, tried against each other
 _ROUGHNESS = (0.01, 0.1)  # noise that no uncertainty states, relative to the spread of the logarithm, tried
 _PARTS = 10  # parts of samples without a pattern, held out one at a time
@@ -109,7 +110,8 @@ def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
     """Return the base that fits samples best, the width of its lobe [1], and its name in words.
 
     It is Lambert and one lobe in tan theta_h, Gaussian or with a tail, alone and with Schlick's fifth power, over a
-    denominator that is never 0; coefficients are not negative.
+    denominator that is never 0; coefficients are not negative. A lobe that a few samples do not lie within could have any
+    height, and is not tried.
     """
     from scipy.optimize import nnls
 
@@ -118,7 +120,9 @@ def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
     wi, wr, values = wi[some], wr[some], values[some]
     weight = 1.0 / (np.abs(values) + FLOOR * np.nanmean(np.abs(values), axis=0))
     best: tuple[float, float, str, Floats] | None = None
-    for alpha, tail in itertools.product(_ALPHAS, (False, True)):
+    tan2 = np.sort(half_angles(wi, wr)[0])
+    narrowest = np.sqrt(tan2[min(_SEEN, tan2.size) - 1])
+    for alpha, tail in itertools.product(np.append(_ALPHAS[_ALPHAS >= narrowest], _ALPHAS[-1]), (False, True)):
         columns = _columns(wi, wr, alpha, tail=tail)
         fits = [
             nnls(columns[good] * weight[good, c, np.newaxis], values[good, c] * weight[good, c])

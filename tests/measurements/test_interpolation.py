@@ -66,6 +66,13 @@ def test_values_below_zero_count_and_do_not_bias_the_mean() -> None:
     assert values.mean() == pytest.approx(0.01, rel=0.35)  # clipped at 0 the samples have a mean of 0.0108
 
 
+def test_noise_makes_no_lobe_where_there_are_no_samples() -> None:
+    fitted = fit(scattered(lambda wi, _: np.full((len(wi), 1), 0.3), 300, 0.1))
+    theta = radians(np.linspace(0.0, 75.0, 60))
+    values = fitted.f_r(unit_vector(theta, np.zeros(60)), unit_vector(theta, np.full(60, np.pi)))
+    assert 0.2 < values.min() < values.max() < 0.45
+
+
 def test_too_few_samples_are_refused_with_their_number() -> None:
     with pytest.raises(ParameterError, match="6 values are too few"):
         fit(scattered(lambda wi, _: np.full((len(wi), 1), 0.1), 6, 0.0))
