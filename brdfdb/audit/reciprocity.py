@@ -60,8 +60,8 @@ class Reciprocity(Finding):
     order = 2
     explanation = (
         "Asymmetry is |f − f′| / (|f| + |f′|), where f′ has light and viewer exchanged. 0 is reciprocal "
-        "(Helmholtz), 1 is the largest possible asymmetry. Measured data have noise: 99 of 100 of their asymmetries are "
-        "judged by the uncertainty that they state."
+        "(Helmholtz), 1 is the largest possible asymmetry. Measured data have noise: 99 of 100 of their "
+        "asymmetries are judged by the uncertainty that they state."
     )
 
     model_random: Asymmetry | None = Field(description="viewers over the hemisphere; null: the source is not known")
@@ -126,7 +126,9 @@ class Reciprocity(Finding):
             )
             for name, asymmetry in self.named()
         ]
-        return [NumberTable("Asymmetry", ("of", "pairs", "mean", "median", "99th percentile", "largest", "allowed"), rows)]
+        return [
+            NumberTable("Asymmetry", ("of", "pairs", "mean", "median", "99th percentile", "largest", "allowed"), rows)
+        ]
 
     def named(self) -> list[tuple[str, Asymmetry]]:
         """Return the sets of pairs that there are, with their names."""
@@ -209,6 +211,4 @@ def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmet
     whole = np.zeros(max(differs.size, 1))
     whole[: relative.size] = relative
     median, p99 = (float(value) for value in np.percentile(whole, [50.0, 99.0]))
-    return Asymmetry(
-        pairs=len(f), min=smallest, mean=mean, median=median, p99=p99, max=largest, tolerance=tolerance
-    )
+    return Asymmetry(pairs=len(f), min=smallest, mean=mean, median=median, p99=p99, max=largest, tolerance=tolerance)

@@ -118,8 +118,8 @@ class FunctionSource(FunctionRecord, Lookups):
     ------
     ParameterError
         If a value of the record is not allowed. If the function gives another shape, or a value that is negative or not
-        finite. If it is not reciprocal and does not say so, or lacks a symmetry that tables use. The function is called at 64 pairs of
-        directions to check this.
+        finite. If it is not reciprocal and does not say so, or lacks a symmetry that tables use. The function is called
+        at 64 pairs of directions to check this.
 
     Examples
     --------

@@ -23,8 +23,8 @@ def half_angles(wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
 def features(wi: Floats, wr: Floats, alpha: float, scales: tuple[float, float, float], *, turned: bool) -> Floats:
     """Return coordinates (N, 3 or 5) in which f_r of a lobe is smooth, each divided by its scale.
 
-    They are ln(1 + tan(theta_h)^2 / alpha^2) / 2, theta_d, and cos theta_r - cos theta_i, which changes its sign if light
-    and viewer are exchanged. All are the same for the mirror image. If the surface may be `turned`, the slopes of the
+    They are ln(1 + tan(theta_h)^2 / alpha^2) / 2, theta_d, and cos theta_r - cos theta_i, which changes its sign if
+    light and viewer are exchanged. All are the same for the mirror image. If the surface may be `turned`, the slopes of the
     half vector join them, crowded towards the lobe.
     """
     tan2, theta_d = half_angles(wi, wr)
@@ -67,7 +67,9 @@ class Hull:
         """Return which pairs of unit vectors (N, 3) lie outside of the hull."""
         x = _places(wi, wr, turned=self._turned) - self._centre
         beyond = np.any(np.abs(x @ self._across.T) > _WITHIN, axis=1)
-        return np.asarray(beyond | np.any((x @ self._along.T) @ self._planes[:, :-1].T > _WITHIN - self._planes[:, -1], axis=1))
+        return np.asarray(
+            beyond | np.any((x @ self._along.T) @ self._planes[:, :-1].T > _WITHIN - self._planes[:, -1], axis=1)
+        )
 
 
 def _places(wi: Floats, wr: Floats, *, turned: bool) -> Floats:

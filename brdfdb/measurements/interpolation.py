@@ -60,8 +60,8 @@ class Interpolation:
     mean : array (C,)
         Mean of the logarithm of the ratio.
     lowest : float
-        Smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values there,
-        as in tables: a lobe that is continued may reflect any amount.
+        Smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values
+        there, as in tables: a lobe that is continued may reflect any amount.
     centres, weights : array (M, D), (M, C)
         Centres of the radial functions in the coordinates, and their weights.
     """
@@ -110,8 +110,8 @@ def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
     """Return the base that fits samples best, the width of its lobe [1], and its name in words.
 
     It is Lambert and one lobe in tan theta_h, Gaussian or with a tail, alone and with Schlick's fifth power, over a
-    denominator that is never 0; coefficients are not negative. A lobe that a few samples do not lie within could have any
-    height, and is not tried.
+    denominator that is never 0; coefficients are not negative. A lobe that a few samples do not lie within could
+    have any height, and is not tried.
     """
     from scipy.optimize import nnls
 
@@ -122,7 +122,7 @@ def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
     best: tuple[float, float, str, Floats] | None = None
     tan2 = np.sort(half_angles(wi, wr)[0])
     narrowest = np.sqrt(tan2[min(_SEEN, tan2.size) - 1])
-    for alpha, tail in itertools.product(np.append(_ALPHAS[_ALPHAS >= narrowest], _ALPHAS[-1]), (False, True)):
+    for alpha, tail in itertools.product(np.append(_ALPHAS[narrowest <= _ALPHAS], _ALPHAS[-1]), (False, True)):
         columns = _columns(wi, wr, alpha, tail=tail)
         fits = [
             nnls(columns[good] * weight[good, c, np.newaxis], values[good, c] * weight[good, c])
@@ -242,7 +242,9 @@ def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
     """Return the problem, the noise (C,) [1/sr] of small values, and the scheme by which groups are held out."""
     wi, wr, values, uncertainty = _listed(samples)
     below = np.where(values < 0.0, values, 0.0)
-    level = np.maximum(np.sqrt(np.sum(below**2, axis=0) / np.maximum(np.sum(below < 0.0, axis=0), 1)), floor_of(samples))
+    level = np.maximum(
+        np.sqrt(np.sum(below**2, axis=0) / np.maximum(np.sum(below < 0.0, axis=0), 1)), floor_of(samples)
+    )
     if uncertainty is not None:
         level = np.maximum(np.nanmedian(uncertainty, axis=0), level)
     of_base = _logarithm(base(wi, wr), level)

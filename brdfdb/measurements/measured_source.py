@@ -186,6 +186,7 @@ class MeasuredSource(FunctionSource):
             order = np.argsort(wavelength_nm)
             given = f_r
             f_r, wavelength_nm = (lambda wi, wr: given(wi, wr)[:, order]), wavelength_nm[order]
+        width = None if turned else _width(f_r)
         source = cls(
             brdf=_brdf_of(f_r, channels, wavelength_nm),
             name=slug(name),
@@ -194,7 +195,7 @@ class MeasuredSource(FunctionSource):
             wavelengths_nm=None if wavelength_nm is None else tuple(wavelength_nm.tolist()),
             anisotropic=turned,
             reciprocal=measured.reciprocity.assumed,
-            alpha=None if turned else _width(f_r),
+            alpha=None if width is None else (width, width),
         )
         source._measured, source._hull, source._channels_at = measured, hull, f_r
         return source
@@ -227,7 +228,9 @@ class MeasuredSource(FunctionSource):
             If there is no such law.
         """
         if law not in ("reciprocal", "conserving"):
-            raise ParameterError("law", f"{law!r} is neither reciprocal nor conserving", law, ("reciprocal", "conserving"))
+            raise ParameterError(
+                "law", f"{law!r} is neither reciprocal nor conserving", law, ("reciprocal", "conserving")
+            )
         before = self._channels_at
         if law == "reciprocal":
             after = laws.reciprocal(before)
@@ -243,9 +246,7 @@ class MeasuredSource(FunctionSource):
         kept = self._measured.reciprocity
         if law == "reciprocal":
             kept = kept.model_copy(update={"assumed": True})
-        measured = self._measured.model_copy(
-            update={"changes": [*self._measured.changes, change], "reciprocity": kept}
-        )
+        measured = self._measured.model_copy(update={"changes": [*self._measured.changes, change], "reciprocity": kept})
         at = None if self.wavelengths_nm is None else np.array(self.wavelengths_nm)
         return self._of(
             after, tuple(measured.channels), at, measured, self._hull, self.anisotropic,
@@ -276,12 +277,15 @@ def _named(names: tuple[str, ...], values: Floats) -> dict[str, float]:
 def _brdf_of(f_r: Evaluate, channels: tuple[str, ...], wavelength_nm: NDArray[np.float64] | None) -> Callable[..., Any]:
     """Return f_r at wavelengths as `FunctionSource` takes it: straight lines between those of the data."""
 
-    last: list[Floats] = []  # tables evaluate one wavelength after another at the same directions
+    last: list[tuple[Floats, Floats, Floats]] = []  # tables evaluate wavelength after wavelength at the same directions
 
     def evaluated(wi: Floats, wr: Floats) -> Floats:
-        if not (last and np.array_equal(last[0], wi) and np.array_equal(last[1], wr)):
-            last[:] = wi, wr, np.asarray(f_r(wi, wr))
-        return last[2]
+        for light, viewer, values in tuple(last):
+            if np.array_equal(light, wi) and np.array_equal(viewer, wr):
+                return values
+        values = np.asarray(f_r(wi, wr))
+        last[:] = [(wi, wr, values)]
+        return values
 
     def brdf(wi: Floats, wr: Floats, at: NDArray[np.float64] | None) -> Floats:
         values = evaluated(wi, wr)
@@ -290,7 +294,7 @@ def _brdf_of(f_r: Evaluate, channels: tuple[str, ...], wavelength_nm: NDArray[np
         stored = spectra_of_colours() if channels in _COLOURS else np.eye(wavelength_nm.size)
         weights = np.stack([np.interp(at, wavelength_nm, row) for row in stored])
         values = rgb_of(channels, values) if channels in _COLOURS else values
-        return np.maximum(np.einsum("nc,cl->nl", values, weights), 0.0)
+        return np.asarray(np.maximum(np.einsum("nc,cl->nl", values, weights), 0.0))
 
     return brdf
 
@@ -336,6 +340,6 @@ def _width(f_r: Evaluate) -> float | None:
         far, peak = float(values.min()), float(values[0])
         if not peak > _CLEAR * far:
             return None
-        below = np.flatnonzero(values - far < (peak - far) / np.e)
+        below = np.flatnonzero(values - far < (peak - far) * np.exp(-1.0))
         slopes.append(np.tan(theta[below[0]]) if below.size else 1.0)
     return float(np.clip(np.median(slopes), 0.003, 3.0))

@@ -81,7 +81,9 @@ class Measured(BaseModel):
     negative: float = Field(description="share of the values below 0; f_r is 0 there")
     interpolation: str = Field(description="the way from samples to f_r everywhere, in words")
     reciprocity: Symmetry
-    mirror: Symmetry | None = Field(description="f_r of an isotropic surface and of its mirror image; null: anisotropic")
+    mirror: Symmetry | None = Field(
+        description="f_r of an isotropic surface and of its mirror image; null: anisotropic"
+    )
     extrapolated: float | None = Field(
         default=None, description="share of the nodes above the horizon that lie outside of the samples"
     )
@@ -115,7 +117,11 @@ class Measured(BaseModel):
         for name, symmetry in (("reciprocity", self.reciprocity), ("mirror symmetry", self.mirror)):
             if symmetry is not None:
                 seen = symmetry.asymmetry
-                how = "the data cannot tell" if seen is None else f"asymmetry median {seen.median:.2g}, p99 {seen.p99:.2g}"
+                how = (
+                    "the data cannot tell"
+                    if seen is None
+                    else f"asymmetry median {seen.median:.2g}, p99 {seen.p99:.2g}"
+                )
                 lines.append(f"{name} {'assumed' if symmetry.assumed else 'not assumed'}: {how}")
         if self.extrapolated is not None:
             lines.append(f"{100.0 * self.extrapolated:.3g} % of the nodes lie outside of the samples: extrapolated")

@@ -106,6 +106,7 @@ def _grid(source: Source, count: int) -> Grid:
     lobe = source.lobe(np.ones(1), None)
     alpha = None if lobe is None else float(lobe.alpha_x[0])
     half = alpha is not None and alpha < _WIDE
+    names: tuple[str, ...]
     if source.anisotropic:
         names = ANISOTROPIC_HALF_DIFFERENCE_AXES if half else ANISOTROPIC_AXES
     else:

@@ -174,7 +174,8 @@ class _Builder:
             self._leave()
         if self.error is not None:
             raise self.error
-        built = [self.built[job.name] for job in (*self.jobs, *self.measured)]
+        names = [job.name for job in self.jobs] + [job.name for job in self.measured]
+        built = [self.built[name] for name in names]
         states = [b.state for b in built]
         self.report(
             {

@@ -126,7 +126,7 @@ class Recipe(BaseModel):
     )
     define: dict[str, dict[str, Any]] = Field(
         default={},
-        description="materials of your own, as in the preset files; those with samples, the path of a file, are measured",
+        description="materials of your own, as in the preset files; with samples, a file, they are measured",
     )
     sweep: dict[str, dict[str, Any]] = Field(
         default={}, description="families of materials: written like a material, with lists as values of parameters"

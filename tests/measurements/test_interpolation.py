@@ -60,7 +60,7 @@ def test_values_below_zero_count_and_do_not_bias_the_mean() -> None:
     rng = np.random.default_rng(3)
     dark = scattered(lambda wi, _: np.full((len(wi), 1), 0.01), 800, 0.0)
     noisy = dark.values + 0.01 * rng.standard_normal(dark.values.shape)
-    samples = scattered(lambda wi, _: noisy, 800, 0.0)
+    samples = scattered(lambda *_: noisy, 800, 0.0)
     assert np.mean(samples.values < 0.0) > 0.1
     values = fit(samples).f_r(dark.w_i, dark.w_r)
     assert values.mean() == pytest.approx(0.01, rel=0.35)  # clipped at 0 the samples have a mean of 0.0108

@@ -95,7 +95,7 @@ def test_record_of_samples_has_noise_instrument_and_incidences() -> None:
 
 @pytest.mark.parametrize("of_light", [True, False])
 def test_conserving_source_has_no_albedo_above_1(of_light: bool) -> None:
-    bright = _of(lambda wi, wr: (0.5 / (wi[:, 2:] + 0.3) if of_light else 0.5 / (wi[:, 2:] + wr[:, 2:])))
+    bright = _of(lambda wi, wr: 0.5 / (wi[:, 2:] + 0.3) if of_light else 0.5 / (wi[:, 2:] + wr[:, 2:]))
     made = bright.made("conserving")
     x, weight = np.polynomial.legendre.leggauss(200)
     cosine = 0.5 * (x + 1.0)

@@ -1,4 +1,4 @@
-"""Tables of measured data: not reciprocal where the data are not, with a record, and errors that have the uncertainty."""
+"""Tables of measured data: as little reciprocal as the data, with a record and their uncertainty."""
 
 from __future__ import annotations
 
