@@ -24,8 +24,8 @@ def features(wi: Floats, wr: Floats, alpha: float, scales: tuple[float, float, f
     """Return coordinates (N, 3 or 5) in which f_r of a lobe is smooth, each divided by its scale.
 
     They are ln(1 + tan(theta_h)^2 / alpha^2) / 2, theta_d, and cos theta_r - cos theta_i, which changes its sign if
-    light and viewer are exchanged. All are the same for the mirror image. If the surface may be `turned`, the slopes of the
-    half vector join them, crowded towards the lobe.
+    light and viewer are exchanged. All are the same for the mirror image. If the surface may be `turned`, the
+    slopes of the half vector join them, crowded towards the lobe.
     """
     tan2, theta_d = half_angles(wi, wr)
     first = 0.5 * np.log1p(tan2 / alpha**2)

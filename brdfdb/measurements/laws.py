@@ -28,13 +28,14 @@ def conserving(f_r: Evaluate, *, reciprocal: bool, turned: bool, margin: float) 
     viewers, weight = _hemisphere()
     lights = [unit_vector(t, phi) for t in theta for phi in (np.arange(0.0, 2.0 * np.pi, 0.5) if turned else (0.0,))]
     values = [f_r(np.broadcast_to(light, viewers.shape), viewers) for light in lights]
-    each = len(lights) // theta.size
     theta_r = np.arccos(viewers[:, 2])
     limit = 1.0 - margin
     factors = np.ones((theta.size, values[0].shape[1]))
     for _ in range(_ROUNDS if reciprocal else 1):
         of_viewer = _at(factors, theta, theta_r) if reciprocal else 1.0
-        albedo = np.stack([weight @ (f * of_viewer) for f in values]).reshape(theta.size, each, -1).max(axis=1)
+        albedo = (
+            np.stack([weight @ (f * of_viewer) for f in values]).reshape(theta.size, -1, factors.shape[1]).max(axis=1)
+        )
         factors = np.minimum(factors, limit / np.maximum(albedo, limit))
 
     def scaled(wi: Floats, wr: Floats) -> Floats:
