@@ -129,6 +129,7 @@ EXTRAS = {
     "report": ("jinja2", "matplotlib", "mpmath", "colour"),
     "dask": ("distributed",),
     "http": ("fsspec", "aiohttp"),
+    "measurements": ("scipy", "h5py"),
 }
 
 

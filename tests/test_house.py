@@ -74,10 +74,10 @@ def test_the_library_has_few_files_of_its_own_and_the_design_names_every_room() 
     assert sorted(named) == sorted(files + rooms)
 
 
-def test_the_rooms_stand_in_ten_layers_at_most() -> None:
+def test_the_rooms_stand_in_eleven_layers_at_most() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     (layers,) = [each["layers"] for each in settings["contracts"] if each.get("containers") == ["brdfdb"]]
-    assert len(layers) <= 10
+    assert len(layers) <= 11
 
 
 @pytest.mark.parametrize("name", documents.SCHEMAS)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brdfdb.conversion.document import Conversion, percent, toml_of
+from brdfdb.conversion.document import Conversion, percent
 from brdfdb.conversion.measurement import (
     VIEWS_DEG,
     l1_at,
@@ -30,6 +30,7 @@ from brdfdb.integrals.pairs import Counts, Symmetry
 from brdfdb.lobes import Lobe
 from brdfdb.materials import Material, Source, written_name
 from brdfdb.materials.provenance import MOST_NAME
+from brdfdb.materials.recipe_text import rounded, toml_of
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec, closest
 
@@ -38,8 +39,6 @@ Array = NDArray[np.float64]
 FIT = "fit"  # the refractive index that asks for a search of n and k
 SEARCHED = 5  # wavelengths at most at which shared parameters are searched
 ASSUMED_NM = 550.0  # wavelength of the n and k that are searched for a grey source
-DIGITS = 6  # significant digits of the parameters; what is left is measured with these
-_ZERO = 1e-12  # parameters that are not larger are 0
 STEPS = _SEARCH_STEPS  # calls of `tick` in a conversion
 
 
@@ -319,8 +318,8 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
         model=spec.name,
         weigh=request.weigh,
         parameters=material.parameters,
-        n=_rounded(searched["n"]) if searched else None,
-        k=_rounded(searched["k"]) if searched else None,
+        n=rounded(searched["n"]) if searched else None,
+        k=rounded(searched["k"]) if searched else None,
         fixed=sorted(target.fixed),
         refractive_index=target.entry,
         wavelengths_nm=None if request.at is None else request.at.tolist(),
@@ -351,19 +350,19 @@ def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
         name = parameter.name
         column = next((i for i, variable in enumerate(target.colours) if variable.name == name), None)
         if column is not None and at is not None:
-            colour = [_rounded(target.colours[column].value(u)) for u in fit.colours[:, column].tolist()]
+            colour = [rounded(target.colours[column].value(u)) for u in fit.colours[:, column].tolist()]
             values[name] = {"wavelengths_nm": at.tolist(), "values": colour, "origin": origin}
             continue
         value = {**target.fixed, **fit.result.numbers}[name]
         in_file = float(degrees(value)) if parameter.unit == "rad" else value
-        values[written_name(parameter)] = value if isinstance(value, bool) else _rounded(in_file)
+        values[written_name(parameter)] = value if isinstance(value, bool) else rounded(in_file)
     table: dict[str, Any] = {
         "title": f"{request.source.title}, as {target.spec.title}",
         "model": target.spec.name,
         "source": origin,
     }
     if target.searched_index:
-        n, k = (_rounded(fit.result.numbers[name]) for name in ("n", "k"))
+        n, k = (rounded(fit.result.numbers[name]) for name in ("n", "k"))
         table["refractive_index"] = f"constant/{n!r}/{k!r}"
     elif target.entry is not None:
         table["refractive_index"] = target.entry
@@ -371,7 +370,3 @@ def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
     if at is not None and stated and (target.spec.spectral or target.colours):
         table["wavelengths_nm"] = at.tolist()
     return {**table, "parameters": values}
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}") if abs(value) > _ZERO else 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -83,22 +83,3 @@ class Conversion(_Record):
 def percent(share: float) -> str:
     """Return a share as text in percent: whole from 10 % on, of two digits below."""
     return f"{100.0 * share:.0f} %" if share >= 0.0995 else f"{100.0 * share:.2g} %"
-
-
-def toml_of(name: str, table: dict[str, Any]) -> str:
-    """Return a table of a recipe as TOML: text, numbers, lists, and tables of them in one line."""
-    lines = [f"[define.{name}]", *(f"{key} = {_value(value)}" for key, value in table.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ").replace("\t", " ")
-        return f'"{escaped}"'
-    return repr(value)

@@ -1,4 +1,4 @@
-"""Minimisation of a function of a few bounded variables: points spread evenly, then simplexes downhill."""
+"""Minimisation of a function of a few bounded variables: simplexes that go downhill."""
 
 from __future__ import annotations
 
@@ -12,26 +12,6 @@ Function = Callable[[Array], float]
 
 _EXTENT = 100.0  # size of the last simplex, relative to the tolerance of its values
 _NOTHING = 0.01  # value below which differences are relative to this one: there is hardly anything to gain
-_NEAR = 0.05  # distance, in the unit cube, below which two points are the same beginning
-
-
-def spread(count: int, variables: int) -> Array:
-    """Return points (count, variables) spread evenly over the unit cube: Halton's sequence, the same at every call."""
-    from scipy.stats.qmc import Halton
-
-    halton = Halton(variables, scramble=False).fast_forward(1)  # its first point is a corner of the cube
-    return np.asarray(halton.random(count))
-
-
-def best_apart(points: Array, values: Array, count: int) -> Array:
-    """Return the points with the least values, of which no two are near each other."""
-    chosen: list[Array] = []
-    for index in np.argsort(values, kind="stable"):
-        if all(np.max(np.abs(points[index] - other)) > _NEAR for other in chosen):
-            chosen.append(points[index])
-        if len(chosen) == count:
-            break
-    return np.array(chosen)
 
 
 def downhill(

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.conversion.minimisation import best_apart, downhill, spread
+from brdfdb.conversion.minimisation import downhill
 from brdfdb.conversion.nodes import Nodes
 from brdfdb.conversion.target import Target
+from brdfdb.fitting.variables import best_apart, spread
 from brdfdb.integrals.pairs import WIDTHS
 
 Array = NDArray[np.float64]

@@ -12,7 +12,10 @@ import pkgutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.formats._input import check_file
 from brdfdb.formats._interface import Exporter, Importer, Option, options_of, parsed_options
 
 if TYPE_CHECKING:
@@ -21,8 +24,20 @@ if TYPE_CHECKING:
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
-__all__ = ["EXPORTERS", "IMPORTERS", "Exporter", "Importer", "Option", "options_of", "parsed_options", "read", "write"]
+__all__ = [
+    "EXPORTERS",
+    "IMPORTERS",
+    "Exporter",
+    "Importer",
+    "Option",
+    "options_of",
+    "parsed_options",
+    "read",
+    "samples",
+    "write",
+]
 
+_TEXT = "text"
 _HEAD = 4096  # bytes of a file that tell its format
 
 
@@ -51,7 +66,7 @@ def write(
     file_format : str
         One of `EXPORTERS`.
     verdict : str, optional
-        Verdict of the audit of this revision, for the record in the file.
+        Verdict of the audit of this revision, for the record in the file, which says "not stated" without one.
     **options
         Options of the format, as `brdfdb export FORMAT --help` lists them, with underscores.
 
@@ -82,8 +97,8 @@ def write(
             "file_format", f"{file_format!r} is not one of {', '.join(EXPORTERS)}", file_format, tuple(EXPORTERS)
         )
     exporter = EXPORTERS[file_format]
-    parsed_options(exporter, {name: _text(value) for name, value in options.items()})
-    return exporter.write(table, Path(path), verdict=verdict, **options)
+    parsed = parsed_options(exporter, {name: _text(value) for name, value in options.items()})
+    return exporter.write(table, Path(path), verdict=verdict, **parsed)
 
 
 def _text(value: Any) -> str:
@@ -104,9 +119,10 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     Raises
     ------
     ParameterError
-        If there is no such format.
+        If there is no such format, or its files are only written.
     FileFormatError
-        If no format recognises the file, or it is damaged.
+        If no format recognises the file, its format is only written, it is damaged, or it is no regular file of at most
+        2 GiB.
     OSError
         If the file cannot be read.
 
@@ -118,16 +134,102 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
     path = Path(path)
+    check_file(path)
+    return _read(path, _importer(path, file_format))
+
+
+def _read(path: Path, importer: Importer, **keywords: Any) -> FileTable | Samples:
+    """Return what an importer reads; FileFormatError if directions or wavelengths cannot be."""
+    try:
+        reading: FileTable | Samples = importer.read(path, **keywords)
+    except FileFormatError:
+        raise
+    except ParameterError as error:  # of samples that are none
+        if error.parameter in keywords:
+            raise
+        raise FileFormatError(f"{path}: {error}") from error
+    at = reading.wavelength_nm
+    if at is not None and not np.all((at > 0.0) & (at < np.inf)):
+        wrong = at[~((at > 0.0) & (at < np.inf))][0]
+        raise FileFormatError(f"{path}: a wavelength is {wrong:g} nm; allowed are positive numbers")
+    return reading
+
+
+def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -> Samples:
+    """Return the samples that a file lists, or the values of a grid at its own directions above the horizon.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    file_format : str
+        As of `read`.
+    **keywords
+        Of a text its columns, quantity and angles, as of `brdfdb.formats.text.read`: with one of them any file is read
+        as text. Of an archive the `member`, as of `brdfdb.formats.neural.read`.
+
+    Returns
+    -------
+    Samples
+        Values as the file has them: negative ones stay, and holes are nan. Of grids the rows below the horizon are left
+        out and counted in the record, and a value that stands at all azimuths of the normal is given once. Klems
+        matrices and tensor trees give their averages at the middles of patches and cells. A network, which is a
+        formula, gives values on a grid that its record names.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such format, keyword or column.
+    FileFormatError
+        If no format recognises the file, it is damaged, or it holds a formula and no values.
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> from brdfdb import formats
+    >>> tile = formats.samples("tile.csv", quantity="reflectance_factor")  # doctest: +SKIP
+    """
+    from brdfdb.measurements.samples import Samples
+
+    path = Path(path)
+    every = {key for some in IMPORTERS.values() for key in getattr(some, "keywords", ())}
+    for name, value in keywords.items():
+        if name not in every:
+            allowed = ", ".join(sorted(every))
+            raise ParameterError(name, f"no format takes it; there are {allowed}", value, tuple(sorted(every)))
+    text = bool(keywords) and set(keywords) <= set(_MODULES[_TEXT].keywords)
+    importer = _importer(path, file_format or (_TEXT if text else ""))
+    for name, value in keywords.items():
+        if name not in getattr(importer, "keywords", ()):
+            raise ParameterError(name, f"the format of {path} does not take it", value)
+    reading = _read(path, importer, **keywords)
+    if isinstance(reading, Samples):
+        return reading
+    if reading.nodes is None:
+        raise FileFormatError(f"{path}: it holds a formula, and no values at directions")
+    return reading.nodes()
+
+
+def _importer(path: Path, file_format: str) -> Importer:
+    """Return the importer of a format by its name, or the one that recognises a file."""
+    only_written = {name: exporter for name, exporter in EXPORTERS.items() if name not in IMPORTERS}
     if file_format:
+        if file_format in only_written:
+            raise ParameterError("file_format", f"files of {file_format} are only written, not read", file_format)
         if file_format not in IMPORTERS:
             raise ParameterError(
                 "file_format", f"{file_format!r} is not one of {', '.join(IMPORTERS)}", file_format, tuple(IMPORTERS)
             )
-        return IMPORTERS[file_format].read(path)
+        return IMPORTERS[file_format]
     with (path / "zarr.json" if path.is_dir() else path).open("rb") as file:  # a zarr group is a directory
         head = file.read(_HEAD)
     by_suffix = sorted(IMPORTERS.values(), key=lambda importer: not path.name.endswith(importer.suffix))
     for importer in by_suffix:
         if importer.recognises(head):
-            return importer.read(path)
-    raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}")
+            return importer
+    for name, exporter in only_written.items():
+        if path.name.endswith(exporter.suffix):
+            raise FileFormatError(f"{path}: files of {name} are only written, not read")
+    hint = "" if b"\0" in head else "; a text is read with the names of its columns, such as theta_i=NAME"
+    raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}{hint}")

@@ -42,8 +42,11 @@ class System(Protocol):
     def angles(self, wi: Floats, wr: Floats) -> Floats:
         """Return the angles [rad], shape (N, axes), of unit vectors (N, 3) of light and viewer."""
 
+    def vectors(self, angles: Floats) -> tuple[Floats, Floats]:
+        """Return unit vectors (N, 3) of light and viewer for angles (N, axes) [rad], also below the horizon."""
+
     def directions(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Return unit vectors (N, 3) of light and viewer above the horizon for angles [rad] of shape (N, axes)."""
+        """Return unit vectors (N, 3) of light and viewer for angles (N, axes) [rad], held above the horizon."""
 
     def steeper(self) -> System:
         """Return the same system with directions of nodes that come closer to the horizon."""
@@ -108,15 +111,16 @@ class Spherical:
         phi_r = _folded(phi_r) if self.mirrored else phi_r
         return np.stack([_polar(wi), *([phi_i] if self.anisotropic else []), _polar(wr), phi_r], axis=1)
 
-    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+    def vectors(self, angles: Floats) -> tuple[Floats, Floats]:
         from brdfdb.geometry import unit_vector
 
-        columns = list(angles.T)
-        phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
-        theta_i, theta_r, phi_r = columns
-        return unit_vector(np.minimum(theta_i, self.steepest), phi_i), unit_vector(
-            np.minimum(theta_r, self.steepest), phi_r
-        )
+        theta_i, phi_i, theta_r, phi_r = _four(angles)
+        return unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        theta_i, phi_i, theta_r, phi_r = _four(angles)
+        held = np.minimum(theta_i, self.steepest), phi_i, np.minimum(theta_r, self.steepest), phi_r
+        return self.vectors(np.stack(held, axis=1))
 
 
 @dataclass(frozen=True)
@@ -159,19 +163,20 @@ class Specular:
         phi_s = _folded(phi_s) if self.mirrored else phi_s
         return np.stack([theta_i, *([phi_i] if self.anisotropic else []), _polar(w), phi_s], axis=1)
 
-    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+    def vectors(self, angles: Floats) -> tuple[Floats, Floats]:
         from brdfdb.geometry import unit_vector
 
-        columns = list(angles.T)
-        phi_i = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
-        theta_i, theta_s, phi_s = columns
+        theta_i, phi_i, theta_s, phi_s = _four(angles)
+        return unit_vector(theta_i, phi_i), _turned(_tilted(unit_vector(theta_s, phi_s), -theta_i), phi_i)
+
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        theta_i, phi_i, theta_s, phi_s = _four(angles)
         theta_i = np.minimum(theta_i, self.steepest)
         # the cosine to the normal is length cos(theta_s - inclined): it is the lowest one at the largest theta_s
         inclined = np.arctan2(np.sin(theta_i) * np.cos(phi_s), np.cos(theta_i))
         length = np.hypot(np.cos(theta_i), np.sin(theta_i) * np.cos(phi_s))
         largest = inclined + np.arccos(np.minimum(np.cos(self.steepest) / length, 1.0))
-        w = unit_vector(np.minimum(theta_s, np.maximum(largest, 0.0)), phi_s)
-        return unit_vector(theta_i, phi_i), _turned(_tilted(w, -theta_i), phi_i)
+        return self.vectors(np.stack([theta_i, phi_i, np.minimum(theta_s, np.maximum(largest, 0.0)), phi_s], axis=1))
 
 
 @dataclass(frozen=True)
@@ -220,20 +225,28 @@ class HalfDifference:
         theta_d = np.minimum(_polar(d), HALF_PI)
         return np.stack([theta_h, *([phi_h] if self.anisotropic else []), theta_d, phi_d], axis=1)
 
-    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+    def vectors(self, angles: Floats) -> tuple[Floats, Floats]:
         from brdfdb.geometry import unit_vector
 
-        columns = list(angles.T)
-        phi_h = columns.pop(1) if self.anisotropic else np.zeros(len(angles))
-        theta_h, theta_d, phi_d = columns
+        theta_h, phi_h, theta_d, phi_d = _four(angles)
+        d = unit_vector(theta_d, phi_d)
+        opposite = d * np.array([-1.0, -1.0, 1.0])
+        return _turned(_tilted(d, theta_h), phi_h), _turned(_tilted(opposite, theta_h), phi_h)
+
+    def directions(self, angles: Floats) -> tuple[Floats, Floats]:
+        theta_h, phi_h, theta_d, phi_d = _four(angles)
         theta_h = np.minimum(theta_h, self.steepest)
         # the lower one of the two directions has the cosine length cos(theta_d + inclined) to the normal
         inclined = np.arctan2(np.sin(theta_h) * np.abs(np.cos(phi_d)), np.cos(theta_h))
         length = np.hypot(np.cos(theta_h), np.sin(theta_h) * np.cos(phi_d))
         largest = np.maximum(np.arccos(np.minimum(np.cos(self.steepest) / length, 1.0)) - inclined, 0.0)
-        d = unit_vector(np.minimum(theta_d, largest), phi_d)
-        opposite = d * np.array([-1.0, -1.0, 1.0])
-        return _turned(_tilted(d, theta_h), phi_h), _turned(_tilted(opposite, theta_h), phi_h)
+        return self.vectors(np.stack([theta_h, phi_h, np.minimum(theta_d, largest), phi_d], axis=1))
+
+
+def _four(angles: Floats) -> Floats:
+    """Return four rows of angles (N, 3) or (N, 4) [rad]; the second angle is 0 if there are three."""
+    columns = angles.T
+    return columns if len(columns) == 4 else np.insert(columns, 1, 0.0, axis=0)
 
 
 def _folded(phi: Floats) -> Floats:

@@ -14,12 +14,14 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.formats._angles import HalfDifference, System
+from brdfdb.formats._interface import Option
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
@@ -39,6 +41,26 @@ _DECIMALS = 5  # of nodes in degrees, so that text holds them
 _SEARCHES = 8
 _SAME = 1e-3  # largest p99 between a table and its image under a symmetry
 _NEAR = 0.85  # a grid whose error is above this share of the tolerance is small enough
+_SAMPLE = 20_000  # nodes of the grid that the size of a node in the file is taken from
+_SHRUNK = 0.99  # share of the nodes that should fit, when a file was too large
+
+SIZE = Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0)
+
+
+class Sink(Protocol):
+    """Bytes are written to it: a file, or a counter of bytes."""
+
+    def write(self, data: bytes, /) -> object: ...
+
+
+class _Counter:
+    """The number of bytes that are written to it."""
+
+    def __init__(self) -> None:
+        self.nbytes = 0
+
+    def write(self, data: bytes, /) -> None:
+        self.nbytes += len(data)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +80,11 @@ class AngularGrid:
     system: System
     nodes: tuple[Floats, ...]
     values: NDArray[np.float32]
+
+    @property
+    def count(self) -> int:
+        """The number of nodes."""
+        return math.prod(self.values.shape[:-1])
 
     def evaluate(self, wi: Floats, wr: Floats) -> Floats:
         """Return f_r [1/sr], shape (N, C), at unit vectors (N, 3). Lines continue beyond the first and last node."""
@@ -122,7 +149,7 @@ class Plan:
     def __init__(self, table: Table, comparison: Comparison, system: System, target: float) -> None:
         above = np.flatnonzero(comparison.wr[:, 2] > 0.0)[::_EVERY]
         self.system = system
-        self._table, self._comparison, self._target = table, comparison, target
+        self.table, self._comparison, self._target = table, comparison, target
         self._truth = comparison.truth[above]
         self._angles = system.angles(comparison.wi[above], comparison.wr[above])
         scale = np.maximum(self._truth, comparison.floor)
@@ -157,11 +184,11 @@ class Plan:
 
     def steeper(self) -> Plan:
         """Return the plan with directions of nodes that come closer to the horizon."""
-        return Plan(self._table, self._comparison, self.system.steeper(), self._target)
+        return Plan(self.table, self._comparison, self.system.steeper(), self._target)
 
     def grid(self, target: float, written: Callable[[AngularGrid], AngularGrid]) -> tuple[AngularGrid, FileError]:
         """Return the grid of a target as a file holds it, and its error."""
-        grid = written(filled(self._table, self._comparison, self.system, self.nodes(target)))
+        grid = written(filled(self.table, self._comparison, self.system, self.nodes(target)))
         return grid, self._comparison.error_of(grid.evaluate)
 
     def _balance(self, nodes: Sequence[Floats]) -> None:
@@ -184,7 +211,7 @@ class Plan:
     def _values(self, some: NDArray[np.intp], axis: int, at: Floats) -> Floats:
         moved = self._angles[some].copy()
         moved[:, axis] = at
-        return self._comparison.channels.values(self._table, *self.system.directions(moved))
+        return self._comparison.channels.values(self.table, *self.system.directions(moved))
 
     def _halved(self, axis: int, end: float, target: float) -> tuple[Floats, Floats]:
         """Return edges [rad] of intervals from 0 to `end`, and the error over each, by halving."""
@@ -233,7 +260,8 @@ def chosen(
     comparison: Comparison,
     systems: Sequence[System],
     tolerance: float,
-    most: int,
+    size: float,
+    write: Callable[[Sink, AngularGrid, FileError], None],
     written: Callable[[AngularGrid], AngularGrid] = lambda grid: grid,
 ) -> tuple[AngularGrid, FileError]:
     """Return the smallest grid within a tolerance, and its error; if there is none, that of the smallest error.
@@ -248,18 +276,57 @@ def chosen(
         Systems of angles among which the one with the fewest nodes is taken.
     tolerance : float [1]
         Largest p99.
-    most : int
-        Largest number of nodes.
+    size : float [MB]
+        Largest size of the file.
+    write : callable
+        ``write(sink, grid, error)`` writes the file, from whose bytes its size is known.
     written : callable
         Gives the grid as the file holds it, with its rounded numbers.
+
+    Raises
+    ------
+    ParameterError
+        If the file of a grid with two nodes an angle is larger.
     """
+
+    def size_of(grid: AngularGrid, error: FileError) -> int:
+        counter = _Counter()
+        write(counter, grid, error)
+        return counter.nbytes
+
     plans = [Plan(table, comparison, system, tolerance / 2.0) for system in systems]
     plan = min(plans, key=lambda some: some.count(tolerance / 2.0))
-    grid, error = _smallest(plan, tolerance, most, written)
+    grid, error = _fitting(plan, tolerance, 1e6 * size, size_of, written)
     if error.p99 > tolerance:
-        other = _smallest(plan.steeper(), tolerance, most, written)
+        other = _fitting(plan.steeper(), tolerance, 1e6 * size, size_of, written)
         grid, error = min((grid, error), other, key=lambda some: _rank(some[0], some[1], tolerance))
     return grid, error
+
+
+def _fitting(
+    plan: Plan,
+    tolerance: float,
+    most_bytes: float,
+    size_of: Callable[[AngularGrid, FileError], int],
+    written: Callable[[AngularGrid], AngularGrid],
+) -> tuple[AngularGrid, FileError]:
+    """Return the smallest grid of a plan within a tolerance, or that of the smallest error, whose file is small enough.
+
+    The size of a file is known only when its numbers are: the number of nodes is reduced until it is small enough.
+    """
+    grid, error = plan.grid(plan.finest(_SAMPLE), written)
+    most = int(grid.count * most_bytes / size_of(grid, error))
+    while True:
+        grid, error = _smallest(plan, tolerance, most, written)
+        nbytes = size_of(grid, error)
+        if nbytes <= most_bytes:
+            return grid, error
+        if max(grid.values.shape[:-1]) <= 2:
+            name, mega = plan.table.name, nbytes / 1e6
+            raise ParameterError(
+                SIZE.name, f"{most_bytes / 1e6:g} MB are too few: the smallest file of {name} has {mega:.3g} MB", most
+            )
+        most = min(grid.count - 1, int(_SHRUNK * grid.count * most_bytes / nbytes))
 
 
 def _smallest(

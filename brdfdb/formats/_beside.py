@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
+
+from brdfdb.formats._record import document_of
 
 _LARGEST = 1 << 20  # byte of a record
 
@@ -18,9 +19,8 @@ def record_beside(path: Path) -> dict[str, Any]:
     """Return the record beside a file; empty if there is none, or it is not one."""
     there = beside(path)
     try:
-        if there.stat().st_size > _LARGEST:
+        if not there.is_file() or there.stat().st_size > _LARGEST:
             return {}
-        document = json.loads(there.read_bytes())
-    except (OSError, ValueError):
+        return document_of(there.read_bytes())
+    except OSError:
         return {}
-    return document if isinstance(document, dict) else {}

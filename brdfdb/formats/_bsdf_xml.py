@@ -11,11 +11,15 @@ from typing import Any
 from xml.sax.saxutils import escape
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._input import check_size
 from brdfdb.formats._record import lines, of_lines
 
 # Names of the sides in these files are those of WINDOW, whose front is outdoors. Radiance's front is the back
 FRONT_OF_RADIANCE = "Reflection Back"
+SIDES = {"back": FRONT_OF_RADIANCE, "front": "Reflection Front"}
 VISIBLE = "Visible"
+_MOST_BYTES, _PIECE = 1 << 29, 1 << 20  # size of a file that is read, and of what is parsed at a time [byte]
+_HEAD_BYTES = 4096  # in which the first element stands
 _NAMESPACE = "http://windows.lbl.gov"
 _HEAD = f"""<?xml version="1.0" encoding="UTF-8"?>
 <WindowElement xmlns="{_NAMESPACE}" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">
@@ -70,7 +74,7 @@ class BsdfFile:
     record : mapping
         Our record; empty of files of other programs.
     blocks : mapping
-        Blocks of the front of Radiance, by wavelength.
+        Blocks of the side, by wavelength.
     """
 
     name: str
@@ -147,8 +151,8 @@ def is_window_element(head: bytes) -> bool:
     return b"<WindowElement" in head
 
 
-def read(path: str | os.PathLike[str]) -> BsdfFile:
-    """Return what a file says of the side that is Radiance's front.
+def read(path: str | os.PathLike[str], side: str = FRONT_OF_RADIANCE) -> BsdfFile:
+    """Return what a file says of a side: by default of the one that is Radiance's front.
 
     Raises
     ------
@@ -157,11 +161,10 @@ def read(path: str | os.PathLike[str]) -> BsdfFile:
     OSError
         If it cannot be read.
     """
-    data = Path(path).read_bytes()
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities may grow without limit
-        raise FileFormatError(f"{path}: it declares a document type, which these files do not have")
     try:
-        root = ElementTree.fromstring(data)
+        root = _root(path)
+    except FileFormatError:
+        raise
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise FileFormatError(f"{path}: it is not XML: {error}") from None
     layer, definition = root.find("{*}Optical/{*}Layer"), root.find("{*}Optical/{*}Layer/{*}DataDefinition")
@@ -170,15 +173,14 @@ def read(path: str | os.PathLike[str]) -> BsdfFile:
     blocks: dict[str, Block] = {}
     for entry in layer.findall("{*}WavelengthData"):
         for part in entry.findall("{*}WavelengthDataBlock"):
-            if _text(part, "WavelengthDataDirection").lower() == FRONT_OF_RADIANCE.lower():
+            if _text(part, "WavelengthDataDirection").lower() == side.lower():
                 wavelength = _text(entry, "Wavelength")
                 basis = _text(part, "AngleBasis") or _text(part, "ColumnAngleBasis")
                 numbers = _text(part, "ScatteringData")
-                blocks[wavelength.lower()] = Block(
-                    wavelength, FRONT_OF_RADIANCE, basis, _text(part, "RowAngleBasis"), numbers
-                )
+                blocks[wavelength.lower()] = Block(wavelength, side, basis, _text(part, "RowAngleBasis"), numbers)
     if VISIBLE.lower() not in blocks:
-        raise FileFormatError(f"{path}: it has no {VISIBLE} block of {FRONT_OF_RADIANCE}, which is Radiance's front")
+        of_radiance = ", which is Radiance's front" if side == FRONT_OF_RADIANCE else ""
+        raise FileFormatError(f"{path}: it has no {VISIBLE} block of {side}{of_radiance}")
     return BsdfFile(
         _text(layer, "Material/{*}Name") or Path(path).stem,
         _text(definition, "IncidentDataStructure"),
@@ -186,6 +188,24 @@ def read(path: str | os.PathLike[str]) -> BsdfFile:
         of_lines(_text(definition, "Comments").splitlines()),
         blocks,
     )
+
+
+def _root(path: str | os.PathLike[str]) -> ElementTree.Element:
+    """Return the root of a document, which is parsed in pieces: the first one that is no XML ends it."""
+    check_size(Path(path), _MOST_BYTES)
+    parser, end = ElementTree.XMLParser(), b""
+    with open(path, "rb") as file:
+        if not is_window_element(file.read(_HEAD_BYTES)):
+            raise FileFormatError(f"{path}: line 1: it does not begin with a WindowElement")
+        file.seek(0)
+        while piece := file.read(_PIECE):
+            seen = end + piece
+            if b"<!DOCTYPE" in seen or b"<!ENTITY" in seen:  # entities may grow without limit
+                raise FileFormatError(f"{path}: it declares a document type, which these files do not have")
+            parser.feed(piece)
+            end = piece[-len(b"<!DOCTYPE") :]
+    root: ElementTree.Element = parser.close()
+    return root
 
 
 def _text(parent: ElementTree.Element, name: str) -> str:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import json
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +16,15 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._json_tables import degrees_of
+from brdfdb.formats._nodes import samples_at_angles
+from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import CONVENTION, record, specular_remark
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.formats._dense_grid import DenseTable
-    from brdfdb.formats._readings import FileTable
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
@@ -48,7 +53,11 @@ _TURNED = {
     "theta_d": "angle between the light and the half vector",
     "phi_d": "azimuth of the light about the half vector",
 }
-_MOST_VALUES = 1 << 28  # of a file that is read
+_MOST_VALUES = 1 << 27  # of a file that is read
+_MOST_NODES = 1 << 22  # of an axis that is read
+_NM_PER = {"": 1.0, "nm": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3, "m": 1e9}  # by the unit of a file
+_DEGREES, _RADIANS = ("", "degree", "degrees", "deg", "°"), ("rad", "radian", "radians")
+_PER_SR = ("", "sr-1", "1/sr", "sr^-1", "sr**-1")
 
 
 def dense_record(table: Table, dense: DenseTable, verdict: str | None, *, specular: bool) -> dict[str, Any]:
@@ -93,13 +102,14 @@ def record_of_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, str) and value[:1] in ("{", "["):
             try:
                 document[key] = json.loads(value)
-            except ValueError:
+            except (ValueError, RecursionError):
                 continue
     return document
 
 
-def read_dataset(path: Path, opened: xr.Dataset) -> FileTable:
-    """Return f_r of a dataset that a file holds; FileFormatError if it is no dense table."""
+def read_dataset(path: Path, opened: xr.Dataset) -> FileTable | Samples:
+    """Return f_r of a dataset that a file holds, or its samples; FileFormatError if it is neither."""
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.grids import axes_among
 
     if "brdf" not in opened.data_vars:
@@ -107,6 +117,11 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable:
             f"{path}: it has no variable brdf, only {', '.join(map(str, opened.data_vars)) or 'none'}"
         )
     brdf = opened["brdf"]
+    if "sample" in brdf.dims:
+        try:
+            return Samples.from_xarray(opened)
+        except (ValueError, TypeError) as error:
+            raise FileFormatError(f"{path}: {error}") from None
     try:
         names = axes_among(brdf.dims)
     except ParameterError as error:
@@ -114,12 +129,42 @@ def read_dataset(path: Path, opened: xr.Dataset) -> FileTable:
     spectral = ("wavelength",) if "wavelength" in brdf.dims else ()
     if set(brdf.dims) != {*names, *spectral} or not set(brdf.dims) <= set(opened.coords):
         raise FileFormatError(f"{path}: brdf over {', '.join(map(str, brdf.dims))} lacks axes or has too many")
-    if brdf.size > _MOST_VALUES:
-        raise FileFormatError(f"{path}: {brdf.size} values are more than {_MOST_VALUES}")
+    check_sizes(path, {name: opened[name].shape for name in ("brdf", *brdf.dims)})
+    if _unit(brdf) not in _PER_SR:
+        raise FileFormatError(f"{path}: brdf has the units {_unit(brdf)!r}; allowed is sr-1")
     values = brdf.transpose(*names, *spectral).values
-    at = opened["wavelength"].values if spectral else None
-    axes = {name: opened[name].values for name in names}
+    at = _in_nm(path, opened["wavelength"]) if spectral else None
+    axes = {name: _in_degrees(path, opened[name]) for name in names}
     return file_table(path, axes, values, at, record_of_attributes(opened.attrs))
+
+
+def check_sizes(path: Path, shapes: Mapping[Any, tuple[int, ...]]) -> None:
+    """Raise FileFormatError if the values or the nodes of an axis are more than are read."""
+    for name, shape in shapes.items():
+        most = _MOST_NODES if len(shape) == 1 else _MOST_VALUES
+        if math.prod(shape) > most:
+            raise FileFormatError(f"{path}: {math.prod(shape)} numbers of {name} are more than {most}")
+
+
+def _unit(variable: xr.DataArray) -> str:
+    return str(variable.attrs.get("units", "")).strip()
+
+
+def _in_nm(path: Path, variable: xr.DataArray) -> NDArray[Any]:
+    """Return wavelengths [nm], in the unit that a file names."""
+    if _unit(variable) not in _NM_PER:
+        raise FileFormatError(f"{path}: {variable.name} has the units {_unit(variable)!r}; allowed are nm, um and m")
+    scale = _NM_PER[_unit(variable)]
+    return np.asarray(variable.values if scale == 1.0 else np.round(variable.values * scale, 9))
+
+
+def _in_degrees(path: Path, variable: xr.DataArray) -> NDArray[Any]:
+    """Return angles [degree], in the unit that a file names."""
+    if _unit(variable) in _RADIANS:
+        return degrees_of(variable.values, "rad")
+    if _unit(variable) not in _DEGREES:
+        raise FileFormatError(f"{path}: {variable.name} has the units {_unit(variable)!r}; allowed are degree and rad")
+    return np.asarray(variable.values)
 
 
 def file_table(
@@ -128,16 +173,15 @@ def file_table(
     values: NDArray[Any],
     wavelength_nm: NDArray[Any] | None,
     known: Mapping[str, Any],
-) -> FileTable:
-    """Return f_r that is interpolated linearly on the grid of a file.
+) -> FileTable | Samples:
+    """Return f_r that is interpolated linearly on the grid of a file; its samples where the grid has holes, nan.
 
     Raises
     ------
     FileFormatError
-        If the axes, the wavelengths or the shape are not those of a table, or a value is not a finite number.
+        If the axes, the wavelengths or the shape are not those of a table, or a value is infinite.
     """
     from brdfdb.formats._dense_grid import interpolated
-    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.grids import Grid, check_wavelengths
 
     try:
@@ -148,16 +192,30 @@ def file_table(
     shape = grid.shape if at is None else (*grid.shape, at.size)
     if values.shape != shape or values.dtype.kind not in "iuf":
         raise FileFormatError(f"{path}: brdf is {values.dtype} of shape {values.shape}, not numbers of shape {shape}")
-    if not np.all(np.isfinite(values)):
-        raise FileFormatError(f"{path}: brdf holds values that are not finite")
-    table = interpolated(grid, values.astype(np.float32), at)
+    with np.errstate(over="ignore"):
+        stored = values.astype(np.float32)
+    if np.any(np.isinf(stored)) or np.all(np.isnan(stored)):
+        raise FileFormatError(
+            f"{path}: brdf holds holes alone, or values that are not finite, or above those of 32 bits"
+        )
     channels = ("grey",) if at is None else tuple(f"{value:g}nm" for value in at)
+    name = str(known.get("name") or Path(path).stem)
+
+    def nodes() -> Samples:
+        angles = np.stack(np.broadcast_arrays(*grid.directions()), axis=-1).reshape(-1, 4)
+        flat = values.reshape(-1, len(channels)).astype(np.float64)
+        return samples_at_angles(angles, flat, name, channels, at, known)
+
+    if np.any(np.isnan(values)):
+        return nodes()
+    table = interpolated(grid, stored, at)
     return FileTable(
-        name=str(known.get("name") or Path(path).stem),
+        name=name,
         channels=channels,
         wavelength_nm=at,
         evaluate=lambda wi, wr: np.asarray(table.lookup_vectors(wi, wr)).reshape(len(wi), len(channels)),
         record=known,
+        nodes=nodes,
     )
 
 
@@ -167,6 +225,7 @@ def reading_of_rows(
     values: NDArray[np.float64],
     wavelength_nm: NDArray[np.float64] | None,
     known: Mapping[str, Any],
+    nodes: Callable[[], Samples] | None = None,
 ) -> FileTable | Samples:
     """Return f_r of rows of angles [degree]: interpolated linearly if the rows are those of a grid, else as samples.
 
@@ -182,36 +241,54 @@ def reading_of_rows(
         Wavelengths of the columns.
     known : mapping
         The record of the file.
+    nodes : callable, optional
+        Gives the samples of the file (default: `samples_of_rows`).
 
     Raises
     ------
     FileFormatError
         If the rows are over half and difference vectors and no grid, or there are more values than wavelengths.
     """
-    from brdfdb.measurements.samples import Samples
-
     if values.shape[1] != (1 if wavelength_nm is None else wavelength_nm.size):
         raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")
-    nodes = {name: np.unique(column) for name, column in angles.items()}
-    shape = tuple(column.size for column in nodes.values())
-    if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, nodes):
+    of_axes = {name: np.unique(column) for name, column in angles.items()}
+    shape = tuple(column.size for column in of_axes.values())
+    of_vectors = {"theta_i", "theta_r"} <= set(angles)
+    if of_vectors and nodes is None:
+        nodes = functools.partial(samples_of_rows, path, angles, values, wavelength_nm, known)
+    if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, of_axes):
         ordered = values.reshape(*shape, -1)
-        return file_table(path, nodes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
-    if not {"theta_i", "theta_r"} <= set(angles):
+        table = file_table(path, of_axes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
+        return replace(table, nodes=nodes) if isinstance(table, FileTable) and nodes is not None else table
+    if nodes is None:
         raise FileFormatError(f"{path}: rows over {', '.join(angles)} are not those of a grid")
+    return nodes()
+
+
+def samples_of_rows(
+    path: Path,
+    angles: Mapping[str, NDArray[np.float64]],
+    values: NDArray[np.float64],
+    wavelength_nm: NDArray[np.float64] | None,
+    known: Mapping[str, Any],
+    **keywords: Any,
+) -> Samples:
+    """Return the samples of rows of theta_i, theta_r and their azimuths, or delta_phi [degree].
+
+    Parameters
+    ----------
+    path, angles, values, wavelength_nm, known
+        As of `reading_of_rows`.
+    **keywords
+        Those of `samples_at_angles`.
+    """
     zero = np.zeros(len(values))
-    turned = {name: np.deg2rad(column) for name, column in angles.items()}
-    phi_i = turned.get("phi_i", zero)
-    return Samples(
-        name=str(known.get("name") or path.stem),
-        theta_i=turned["theta_i"],
-        phi_i=phi_i,
-        theta_r=turned["theta_r"],
-        phi_r=phi_i + turned["delta_phi"] if "delta_phi" in turned else turned.get("phi_r", zero),
-        channels=("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm),
-        wavelength_nm=wavelength_nm,
-        values=values,
-        record=known,
+    phi_i = angles.get("phi_i", zero)
+    phi_r = phi_i + angles["delta_phi"] if "delta_phi" in angles else angles.get("phi_r", zero)
+    rows = np.deg2rad(np.stack([angles["theta_i"], phi_i, angles["theta_r"], phi_r], axis=1))
+    channels = ("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm)
+    return samples_at_angles(
+        rows, values, str(known.get("name") or path.stem), channels, wavelength_nm, known, **keywords
     )
 
 

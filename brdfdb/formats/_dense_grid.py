@@ -260,10 +260,15 @@ class _Plan:
     def _nodes_of(self, axis: int, need: Floats, level: float) -> Floats:
         """Return the nodes [degree] of an axis whose cells leave an error of a level."""
         end = self.coarsest.axes[self.names[axis]][-1]
-        total = np.concatenate([[0.0], np.cumsum(need)]) * (radians(end) / _BINS)
-        count = 1 + max(1, math.ceil(total[-1] / math.sqrt(8.0 * level)))
+        total = np.append(0.0, np.cumsum(need))
+        count = self._count(axis, need, level)
         at = np.interp(np.linspace(0.0, total[-1], count), total, np.linspace(0.0, end, _BINS + 1))
         return np.append(np.round(at[:-1], 4), end)
+
+    def _count(self, axis: int, need: Floats, level: float) -> int:
+        """Return the number of nodes of an axis whose cells leave an error of a level."""
+        bin_width = radians(self.coarsest.axes[self.names[axis]][-1]) / _BINS
+        return 1 + max(1, math.ceil(float(need.sum()) * bin_width / math.sqrt(8.0 * level)))
 
     def _need(self, axis: int) -> Floats:
         """Return the root of the second derivative of f_r, relative to f_r, in the bins of an axis [1/rad]."""
@@ -326,12 +331,7 @@ class _Plan:
         return high
 
     def _nodes(self, level: float) -> int:
-        ends = [radians(nodes[-1]) / _BINS for nodes in self.coarsest.axes.values()]
-        counts = [
-            1 + max(1, math.ceil(need.sum() * end / math.sqrt(8.0 * level)))
-            for need, end in zip(self.needs, ends, strict=True)
-        ]
-        return math.prod(counts)
+        return math.prod(self._count(axis, need, level) for axis, need in enumerate(self.needs))
 
     def _p99(self, grid: Grid) -> float:
         """Return the p99 of a grid from the corners of the cells with the pairs: no other nodes are looked up."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -24,8 +23,8 @@ class Option:
     ----------
     name : str
         Name of the keyword argument.
-    default : bool, float or str
-        Value that is used if none is given; its type is that of the option.
+    default : bool, int, float or str
+        Value that is used if none is given, also where it is outside of the range; its type is that of the option.
     help : str
         A few words for people, with the unit.
     low, high : float
@@ -35,13 +34,24 @@ class Option:
     """
 
     name: str
-    default: bool | float | str
+    default: bool | int | float | str
     help: str
     low: float = -math.inf
     high: float = math.inf
     choices: tuple[str, ...] = ()
 
-    def parse(self, text: str) -> bool | float | str:
+    @property
+    def allowed(self) -> str:
+        """Return the values of the option in words."""
+        if isinstance(self.default, bool):
+            return "true or false"
+        if isinstance(self.default, str):
+            return ", ".join(self.choices)
+        number = "a whole number" if isinstance(self.default, int) else "a number"
+        other = "" if self.low <= self.default <= self.high else f", or {self.default:g}"
+        return f"{number} in [{self.low:g}, {self.high:g}]{other}"
+
+    def parse(self, text: str) -> bool | int | float | str:
         """Return the value that a text stands for.
 
         Raises
@@ -61,10 +71,10 @@ class Option:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not self.low <= value <= self.high:
-            allowed = f"a number in [{self.low:g}, {self.high:g}]"
-            raise ParameterError(self.name, f"{text!r} is not {allowed}", text, (self.low, self.high))
-        return value
+        is_whole = isinstance(self.default, int)
+        if (not self.low <= value <= self.high and value != self.default) or (is_whole and value != int(value)):
+            raise ParameterError(self.name, f"{text!r} is not {self.allowed}", text, (self.low, self.high))
+        return int(value) if is_whole else value
 
 
 TOLERANCE = Option(
@@ -105,8 +115,8 @@ class Exporter(Protocol):
         All other keyword arguments.
     write : callable
         ``write(table, path, verdict=None, **options)`` writes the file, and those that stand beside it: whole, or not
-        at all. `verdict` is that of the audit of this revision. It raises CannotHoldError for a table that the format
-        has no place for.
+        at all. `verdict` is that of the audit of this revision, or None where the caller knows none. It raises
+        CannotHoldError for a table that the format has no place for.
     """
 
     suffix: str
@@ -128,12 +138,13 @@ class Importer(Protocol):
     recognises : callable
         ``recognises(head)`` is true if the first bytes of a file, 4096 of them or all, are those of this format.
     read : callable
-        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists.
+        ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists. A module whose
+        `read` takes more has a tuple ``keywords`` with their names.
     """
 
     suffix: str
     recognises: Callable[[bytes], bool]
-    read: Callable[[str | os.PathLike[str]], FileTable | Samples]
+    read: Callable[..., FileTable | Samples]
 
 
 def options_of(exporter: Exporter) -> dict[str, Option]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._text_file import check_text
 
 MOST_BYTES = 40_000_000  # size of a file that is written, about
 _MOST_READ = 1 << 29  # of a file that is read
@@ -19,8 +20,7 @@ _DECIMALS = 4  # of angles [degree]: radians in files have six
 
 def parsed(path: Path) -> dict[str, Any]:
     """Return the object in a JSON file; FileFormatError if it holds none, or more than 512 MiB."""
-    if path.stat().st_size > _MOST_READ:
-        raise FileFormatError(f"{path}: it has more than {_MOST_READ} bytes")
+    check_text(path, _MOST_READ)
     try:
         document = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
@@ -30,13 +30,13 @@ def parsed(path: Path) -> dict[str, Any]:
     return document
 
 
-def column(path: Path, name: str, values: Any) -> NDArray[np.float64]:
-    """Return a list of numbers; FileFormatError if it holds anything else."""
+def column(path: Path, name: str, values: Any, *, holes: bool = False) -> NDArray[np.float64]:
+    """Return a list of numbers, with nan for null if it may have holes; FileFormatError if it holds anything else."""
     try:
         numbers = np.array(values, dtype=np.float64)
     except (ValueError, TypeError, OverflowError):
         numbers = np.empty((0, 0))
-    if numbers.ndim != 1 or not numbers.size or not np.all(np.isfinite(numbers)):
+    if numbers.ndim != 1 or not numbers.size or np.any(np.isinf(numbers) | (np.isnan(numbers) & ~holes)):
         raise FileFormatError(f"{path}: {name} is not a list of numbers")
     return numbers
 

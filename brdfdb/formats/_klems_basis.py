@@ -56,6 +56,16 @@ class Basis:
         cosine2 = np.cos(np.radians(self.bounds_deg)) ** 2
         return np.asarray((np.pi * (cosine2[:-1] - cosine2[1:]) / np.array(self.counts))[self.rings])
 
+    @property
+    def middles(self) -> Floats:
+        """Unit vectors (patches, 3) at the middles of the patches; of a patch that is a whole ring, at its axis."""
+        bounds = np.radians(self.bounds_deg)
+        theta = np.where(np.array(self.counts) == 1, bounds[:-1], 0.5 * (bounds[:-1] + bounds[1:]))[self.rings]
+        counts = np.array(self.counts)
+        number = np.arange(len(self)) - np.repeat(np.cumsum(counts) - counts, counts)
+        phi = 2.0 * np.pi * number / counts[self.rings]
+        return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+
     def vectors(self, patch: Index, place: Floats) -> Floats:
         """Return unit vectors (..., 3) at places (..., 2) in [0, 1]^2 of patches (...), which have equal measure."""
         counts = np.array(self.counts)

@@ -24,6 +24,10 @@ _MOST_ANISOTROPY = 0.98  # of a standard surface
 _MOST_F_0 = 0.99999  # of the dielectric of OpenPBR
 _EDGE = 1.0 / 7.0  # cosine of about 82 degrees, at which the colour of the edge of OpenPBR's metal is stated
 
+_SLACK = (
+    1e-4  # added to a factor at the edge, for the six digits of a file and the cosines between those that are tried
+)
+
 # Coefficients of the rational function of cosine x and alpha y that MaterialX has for the directional albedo of GGX:
 # columns for 1, x, y, xy, x^2, y^2, x^2 y, x y^2, x^2 y^2; two rows of numerators, two of denominators
 _ALBEDO = np.array(
@@ -189,9 +193,21 @@ def _metal(at: _Geometry, reflectance: Floats) -> Floats:
 
 def _schlick(cos: Floats, normal: Floats, edge: Floats) -> Floats:
     """Return Hoffman's reflectance (N, C) [1] of metals, from that at 0 degrees and a factor at 82 degrees."""
-    at_edge = normal + (1.0 - normal) * (1.0 - _EDGE) ** 5
+    at_edge = _at_edge(normal)
     less = at_edge * (1.0 - edge) / (_EDGE * (1.0 - _EDGE) ** 6)
     return np.asarray(normal + (1.0 - normal) * (1.0 - cos) ** 5 - less * cos * (1.0 - cos) ** 6)
+
+
+def _at_edge(normal: Floats) -> Floats:
+    return np.asarray(normal + (1.0 - normal) * (1.0 - _EDGE) ** 5)
+
+
+def darkest_edge(normal: Floats) -> Floats:
+    """Return the least factor (C,) [1] at 82 degrees with which Hoffman's reflectance is nowhere negative."""
+    cos = np.linspace(0.0, 1.0, 1026)[1:-1, np.newaxis]
+    share = (normal + (1.0 - normal) * (1.0 - cos) ** 5) / (cos * (1.0 - cos) ** 6)
+    least = 1.0 - share.min(axis=0) * (_EDGE * (1.0 - _EDGE) ** 6) / _at_edge(normal)
+    return np.asarray(np.clip(least + _SLACK, 0.0, 1.0))
 
 
 def artistic_index(reflectivity: Floats, edge: Floats) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from brdfdb.conversion.nodes import COARSE, Nodes
 from brdfdb.errors import import_extra
 from brdfdb.formats._channels import Channels
-from brdfdb.formats._materialx_closures import OPEN_PBR, Surface
+from brdfdb.formats._materialx_closures import OPEN_PBR, Surface, darkest_edge
 from brdfdb.integrals.pairs import Symmetry
 from brdfdb.lobes import Lobe
 from brdfdb.parameters import Floats
@@ -70,6 +70,9 @@ def fitted(kind: str, table: Table, channels: Channels) -> Surface:
     normal = lobe(np.asarray(1.0))
     smooth = table.specular is not None and normal is not None and not np.any(normal.share)
     nodes = Nodes(lobe, COARSE, symmetry, truth, mirror if smooth else None, "lightness")
+    if not np.any(nodes.truth) and not (smooth and np.any(nodes.specular)):
+        black = (0.0,) * nodes.truth.shape[1]
+        return Surface(kind, black, black, specular_weight=0.0)
     search = _Search(kind, nodes, normal, smooth, table.anisotropic)
     return _tidied(min((search.descent(metal) for metal in search.metals), key=search.distance))
 
@@ -105,7 +108,9 @@ class _Search:
             return Surface(
                 self.kind, base, base_diffuse_roughness=roughness, specular_weight=0.0, specular_roughness=rough
             )
-        edge, rest = tuple(numbers[1 + colors : 1 + 2 * colors].tolist()), numbers[1 + 2 * colors :]
+        edge, rest = numbers[1 + colors : 1 + 2 * colors], numbers[1 + 2 * colors :]
+        if self.kind == OPEN_PBR:
+            edge = np.maximum(edge, darkest_edge(numbers[1 : 1 + colors]))
         root, metal, weight = rest[:3].tolist()
         facets: dict[str, Any] = {"specular_roughness": 0.0}
         if self.widths.size:
@@ -113,7 +118,7 @@ class _Search:
         return Surface(
             self.kind,
             base,
-            edge,
+            tuple(edge.tolist()),
             base_diffuse_roughness=roughness,
             base_metalness=1.0 if self.black else metal,
             specular_weight=weight if self.kind == OPEN_PBR else 1.0,

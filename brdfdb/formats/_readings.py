@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,9 @@ from brdfdb.errors import ParameterError
 from brdfdb.geometry import checked_angles, checked_vectors, unit_vector
 from brdfdb.materials.source import FourAngles, Lookups
 from brdfdb.parameters import Floats
+
+if TYPE_CHECKING:
+    from brdfdb.measurements.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +34,8 @@ class FileTable(Lookups):
         Gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer above the horizon.
     record : mapping
         The record in the file or beside it; empty of files of other programs.
+    nodes : callable or None
+        Gives the values of the file at their own directions above the horizon, unaltered; None of a formula.
     """
 
     name: str
@@ -38,6 +43,7 @@ class FileTable(Lookups):
     wavelength_nm: NDArray[np.float64] | None
     evaluate: Callable[[Floats, Floats], Floats] = field(repr=False)
     record: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    nodes: Callable[[], Samples] | None = field(default=None, repr=False)
 
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Return f_r [1/sr] for unit vectors: a last axis for the channels, or for the wavelengths that are given."""

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
+
+from brdfdb.measurements.samples import Instrument
 
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import FileError
     from brdfdb.tables.table import Table
 
-NOT_AUDITED = "not audited"
+NOT_STATED = "not stated"
 CONVENTION = "f_r [1/sr], the BRDF without the cosine; unit vectors of light and viewer point away from the surface"
 _MEASURED = "refractive index and extinction: refractiveindex.info, CC0 1.0"
 
@@ -33,7 +37,7 @@ def record(
     error : FileError or None
         Error of the file against the table.
     verdict : str or None
-        Verdict of the audit of this revision; None: it was not audited.
+        Verdict of the audit of this revision; None: not stated.
     holds : str
         Quantity, unit and cosine convention of the numbers in the file.
     remarks : tuple of str
@@ -52,7 +56,7 @@ def record(
         "note": known.note,
         "revision": table.revision,
         "digest": table.digest,
-        "audit": verdict or NOT_AUDITED,
+        "audit": verdict or NOT_STATED,
         "holds": holds,
         "error_of_file": None if error is None else {"against": "the table", **error.document()},
         "tolerance": tolerance,
@@ -79,6 +83,15 @@ def lines(document: dict[str, Any]) -> list[str]:
     return [f"{key}: {' '.join(value.split())}" for key, value in pairs]
 
 
+def document_of(text: str | bytes) -> dict[str, Any]:
+    """Return the record that stands in a text as JSON; empty if there is none, or it is damaged."""
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
 def of_lines(texts: list[str]) -> dict[str, Any]:
     """Return the record that `lines` wrote; other lines are left out."""
     document: dict[str, Any] = {}
@@ -87,6 +100,25 @@ def of_lines(texts: list[str]) -> dict[str, Any]:
         if colon:
             try:
                 document[key] = json.loads(value)
-            except ValueError:
+            except (ValueError, RecursionError):
                 document[key] = value
     return document
+
+
+_NM, _SPOT = re.compile(r"\b(\d+(?:\.\d+)?) ?nm\b"), re.compile(r"(\d+(?:\.\d+)?) ?mm spot")
+_INSTRUMENTS = ("Instrument", "Scatterometer", "Gonioreflectometer", "Goniophotometer")
+
+
+def of_comments(document: Mapping[str, Any]) -> tuple[Instrument, float | None]:
+    """Return the instrument that comments of a file name, and its wavelength [nm] if they name one and no other.
+
+    Parameters
+    ----------
+    document : mapping
+        Comments by the words before their colons, as `of_lines` gives them.
+    """
+    text = "\n".join(value for value in document.values() if isinstance(value, str))
+    lengths, spots = set(_NM.findall(text)), set(_SPOT.findall(text))
+    name = next((str(document[key]) for key in _INSTRUMENTS if key in document), "")
+    spot = float(spots.pop()) if len(spots) == 1 else None
+    return Instrument(name, spot_mm=spot or None), float(lengths.pop()) if len(lengths) == 1 else None

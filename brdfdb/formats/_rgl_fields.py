@@ -17,6 +17,7 @@ from brdfdb.parameters import Floats
 
 _REQUIRED = {"theta_i": 1, "phi_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "luminance": 4, "jacobian": 1}
 _BYTES = ("description", "jacobian")
+_ROUNDING = 1e-3  # of the angles of a file [rad]
 
 Floats32 = NDArray[np.float32]
 
@@ -117,6 +118,26 @@ class Fields:
             values *= (bilinear(self.ndf, *places.u_m) / (4.0 * bilinear(self.sigma, *places.u_i)))[:, np.newaxis]
         return np.asarray(values / places.cosine[:, np.newaxis])
 
+    def at_nodes(self) -> tuple[Array, Array, Array]:
+        """Return light and viewer (M, 3) of all values, and f_r (M, W) [1/sr]; viewers may be below the horizon."""
+        phi_i, theta_i = np.meshgrid(self.phi_i.astype(np.float64), self.theta_i.astype(np.float64), indexing="ij")
+        wi = np.stack([np.sin(theta_i) * np.cos(phi_i), np.sin(theta_i) * np.sin(phi_i), np.cos(theta_i)], axis=-1)
+        size = self.spectra.shape[-1]
+        u_x, u_y = self.warp.forward(size)
+        turn = of_azimuth(phi_i.reshape(-1, 1, 1)) - 0.5 if self.isotropic else 0.0
+        m = directions(u_x, u_y + turn)
+        wi = np.broadcast_to(wi.reshape(-1, 1, 1, 3), m.shape).reshape(-1, 3)
+        m = m.reshape(-1, 3)
+        wr = 2.0 * np.sum(wi * m, axis=-1, keepdims=True) * m - wi
+        values = self._last_channels.reshape(len(m), -1)
+        if self.jacobian:
+            u_i = of_polar_angle(theta_i), of_azimuth(phi_i)
+            sigma = np.broadcast_to(bilinear(self.sigma, *u_i).reshape(-1, 1, 1), u_x.shape).reshape(-1)
+            values = values * (bilinear(self.ndf, u_x.reshape(-1), u_y.reshape(-1)) / (4.0 * sigma))[:, np.newaxis]
+        above = wr[:, 2] > 0.0
+        cosine = np.where(above, wr[:, 2], 1.0)
+        return wi, wr, values / cosine[:, np.newaxis]
+
     def mixture(self, places: Places) -> Mixture:
         """Return the slices that are mixed at places."""
         j, v = _between(self.theta_i, places.theta_i)
@@ -197,6 +218,7 @@ def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) 
     for name in ("theta_i", "phi_i", *(("wavelengths",) if spectral else ())):
         if arrays[name].size < 1 or not np.all(np.diff(arrays[name]) > 0.0):
             raise FileFormatError(f"{path}: field {name!r} does not ascend")
+    _check_numbers(path, arrays)
     return Fields(
         **{name: arrays[name] for name in ("theta_i", "phi_i", "ndf", "sigma", "vndf", "luminance")},
         spectra=arrays[values],
@@ -204,6 +226,21 @@ def fields_of(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) 
         jacobian=bool(arrays["jacobian"][0]),
         description=arrays["description"].tobytes().decode("utf-8", "replace"),
     )
+
+
+def _check_numbers(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Raise FileFormatError for angles out of range, and for densities that cannot be warped or divided by."""
+    for name, low, high in (("theta_i", 0.0, 0.5 * np.pi), ("phi_i", -2.0 * np.pi, 2.0 * np.pi)):
+        first, last = arrays[name][[0, -1]]
+        if first < low - _ROUNDING or last > high + _ROUNDING:
+            raise FileFormatError(
+                f"{path}: field {name!r} is from {first:g} to {last:g}; allowed is [{low:.4g}, {high:.4g}] rad"
+            )
+    vndf = arrays["vndf"]
+    if np.any(vndf < 0.0) or not np.all(np.any(vndf > 0.0, axis=(2, 3))):
+        raise FileFormatError(f"{path}: field 'vndf' has a negative number, or a slice of zeros")
+    if arrays["jacobian"][0] and not np.all(arrays["sigma"] > 0.0):
+        raise FileFormatError(f"{path}: field 'sigma' has the number {arrays['sigma'].min():g}; it divides f_r")
 
 
 def directions(u_x: Array, u_y: Array) -> Array:

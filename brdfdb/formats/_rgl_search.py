@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.errors import ParameterError
 from brdfdb.formats._channels import RGB, Channels, channels_of
 from brdfdb.formats._rgl_build import Plan, build
 from brdfdb.formats._rgl_fields import Fields, Floats32
@@ -45,10 +46,7 @@ _FEW = 3  # channels that rungs are compared by
 _OF_SPECTRUM = 0.5  # share of the tolerance that straight lines between wavelengths may take
 _REMEMBERED = 3  # files: the search returns to the one before the last
 _PAIRS = 4001  # pairs of directions that they are tested with
-REDUCED = (
-    "the file holds a quarter or half of the azimuths of the light, which Mitsuba 3 mirrors; "
-    "pbrt-v4 and RGL's loader take files with azimuth full"
-)
+_PART = {2: "half", 4: "a quarter"}  # of the azimuths of the light, by their reduction
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,34 +71,48 @@ def smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full:
     tolerance : float [1]
         Largest p99.
     most_bytes : float
-        Largest size that is tried; of files with all azimuths as many times larger as they are reduced otherwise.
+        Largest size.
     full : bool
         The file holds all azimuths of the light.
+
+    Raises
+    ------
+    ParameterError
+        If the smallest file is larger.
     """
     if table.wavelength_nm is not None:
         return _smallest(table, kind, tolerance, most_bytes, full)
-    fit = _smallest_grey(table, tolerance, most_bytes, full)
     if kind == "spectral":
-        return fit
-    fields = replace(fit.fields, spectra=np.repeat(fit.fields.spectra, 3, axis=2), wavelength_nm=None)
+        return _smallest_grey(table, tolerance, most_bytes, full)
+    copies = len(RGB)
+    fit = _smallest_grey(table, tolerance, most_bytes, full)
+    if fit.fields.nbytes + (copies - 1) * fit.fields.spectra.nbytes > most_bytes:
+        fit = _smallest_grey(table, tolerance, most_bytes, full, copies)
+    fields = replace(fit.fields, spectra=np.repeat(fit.fields.spectra, copies, axis=2), wavelength_nm=None)
     return replace(fit, fields=fields, channels=RGB, remarks=(*channels_of(table, "rgb").remarks, *fit.remarks))
 
 
 @functools.lru_cache(maxsize=2)
-def _smallest_grey(table: Table, tolerance: float, most_bytes: float, full: bool) -> Fit:
-    """Return the file of a grey table: those for both kinds of renderers have the same values."""
-    return _smallest(table, "spectral", tolerance, most_bytes, full)
+def _smallest_grey(table: Table, tolerance: float, most_bytes: float, full: bool, copies: int = 1) -> Fit:
+    """Return the file of a grey table, which holds its values so many times.
+
+    Those for both kinds of renderers have the same values, if both are small enough.
+    """
+    return _smallest(table, "spectral", tolerance, most_bytes, full, copies)
 
 
-def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool) -> Fit:
+def _smallest(table: Table, kind: str, tolerance: float, most_bytes: float, full: bool, copies: int = 1) -> Fit:
     from brdfdb.formats._stated_error import Comparison
 
     channels = channels_of(table, "" if kind == "spectral" else "rgb")
     remarks = channels.remarks
     search = _Search(table, Comparison(table, channels), kind, tolerance, full)
     if search.surface.reduction > 1:
-        remarks += (REDUCED,)
-    ladders = search.ladders(most_bytes)
+        remarks += (
+            f"the file holds {_PART[search.surface.reduction]} of the azimuths of the light, which Mitsuba 3 mirrors; "
+            "for pbrt-v4 and RGL's loader write it with azimuth full",
+        )
+    ladders = search.ladders(most_bytes, copies)
     first = [search.p99(plans[min(_FIRST, len(plans) - 1)]) for plans in ladders]
     fields, error = search.best(ladders[int(np.argmin(first))])
     names = channels.names if search.nodes is None else tuple(f"{value:g}nm" for value in search.nodes)
@@ -111,7 +123,7 @@ class _Search:
     """Files of one table, compared with it."""
 
     def __init__(self, table: Table, comparison: Comparison, kind: str, tolerance: float, full: bool) -> None:
-        self._comparison, self._tolerance = comparison, tolerance
+        self._comparison, self._tolerance, self._name = comparison, tolerance, table.name
         channels = comparison.channels
         at = channels.wavelength_nm if kind == "spectral" else None
         self._kept = np.arange(len(channels.names)) if at is None else _thinned(comparison, at, tolerance)
@@ -128,19 +140,30 @@ class _Search:
         if few.size < self._kept.size:
             self._sample = Surface(table, _some(channels, self._kept[few]), full)
 
-    def ladders(self, most_bytes: float) -> list[list[Plan]]:
-        """Return plans from small to large: of isotropic tables with both kinds of warps."""
+    def ladders(self, most_bytes: float, copies: int = 1) -> list[list[Plan]]:
+        """Return plans from small to large: of isotropic tables with both kinds of warps.
+
+        The values are held so many times. ParameterError if there is none of at most so many bytes.
+        """
         if self.surface.isotropic:
             soft = [Plan(s, n, 1, *((33, 65) if s > _COARSE else (17, 33))) for s, n in _ISOTROPIC]
             hard = [Plan(s, n, 1, *((65, 65) if s > _COARSE else (33, 33)), _HORIZON) for s, n in _ISOTROPIC]
             ladders = [soft, hard]
         else:
             parts = 4 // self.surface.reduction
-            most_bytes *= parts
             ladders = [
                 [Plan(s, n, parts * (p - 1) + 1, *((33, 33) if s > _COARSE else (17, 17))) for s, n, p in _ANISOTROPIC]
             ]
-        return [[plan for plan in ladder if self._nbytes(plan) <= most_bytes] or ladder[:1] for ladder in ladders]
+        fitting = [[plan for plan in ladder if self._nbytes(plan, copies) <= most_bytes] for ladder in ladders]
+        if not any(fitting):
+            least = min(self._nbytes(ladder[0], copies) for ladder in ladders)
+            raise ParameterError(
+                "megabytes",
+                f"{most_bytes / 1e6:.3g} MB for the values are too few: the smallest file of {self._name} needs "
+                f"{least / 1e6:.3g} MB",
+                most_bytes / 1e6,
+            )
+        return [ladder for ladder in fitting if ladder]
 
     def best(self, ladder: list[Plan]) -> tuple[Fields, FileError]:
         """Return the first of a ladder within the tolerance, else the last."""
@@ -184,9 +207,12 @@ class _Search:
         values = fields.evaluate(wi, wr)
         return values if self._mixing is None else np.asarray(values @ self._mixing)
 
-    def _nbytes(self, plan: Plan) -> int:
-        texels = (self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
-        return 4 * plan.lights * plan.azimuths * texels
+    def _nbytes(self, plan: Plan, copies: int) -> int:
+        """Return the size of the values of a plan [byte]."""
+        texels = (copies * self._kept.size + 1) * plan.size**2 + plan.rows * plan.columns
+        azimuths = plan.azimuths + (1 if self.surface.reduction == 4 else 0)  # as `build` adds one
+        factors = sum(factor.size for factor in self.surface.factors)
+        return 4 * (plan.lights * azimuths * texels + factors)
 
 
 def _some(channels: Channels, kept: NDArray[np.int64]) -> Channels:

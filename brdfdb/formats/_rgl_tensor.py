@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 import os
 import struct
 from collections.abc import Mapping
@@ -53,7 +54,10 @@ def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     OSError
         If it cannot be read.
     """
-    content = Path(path).read_bytes()
+    with Path(path).open("rb") as file:
+        if not file.read(1):
+            raise FileFormatError(f"{path}: it is no tensor file")
+        content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)  # files of Mueller matrices have a gigabyte
     header = _Header(path, content)
     if header.take(len(MAGIC)) != MAGIC:
         raise FileFormatError(f"{path}: it is no tensor file")
@@ -68,7 +72,7 @@ def read_tensors(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
 class _Header:
     """Reader of the header of a tensor file that never reads beyond its end."""
 
-    def __init__(self, path: str | os.PathLike[str], content: bytes) -> None:
+    def __init__(self, path: str | os.PathLike[str], content: mmap.mmap) -> None:
         self._path, self._content, self._at = path, content, 0
 
     def take(self, count: int) -> bytes:
@@ -98,5 +102,7 @@ class _Header:
         size = math.prod(shape)  # of Python's integers, which do not overflow
         if offset + size * dtype.itemsize > len(self._content):
             raise FileFormatError(f"{self._path}: damaged: field {name!r} of shape {shape} lies beyond its end")
+        if not size and any(shape[1:]):  # NumPy has no arrays of such shapes; texts may be empty
+            raise FileFormatError(f"{self._path}: damaged: field {name!r} of shape {shape} is empty")
         values = np.frombuffer(self._content, dtype, size, offset) if size else np.empty(0, dtype)
-        return name, values.reshape(shape)
+        return name, values.reshape(shape) if size else values

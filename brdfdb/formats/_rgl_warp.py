@@ -74,7 +74,9 @@ class Warp:
         last = np.full_like(i, self.columns - 1)
         below = (1.0 - v) * mixture.of(self._columns, j, i) + v * mixture.of(self._columns, j + 1, i)
         row, above = mixture.of(self._columns, j, last), mixture.of(self._columns, j + 1, last)
-        s_x = (below + u * (low + 0.5 * u * (high - low))) / ((1.0 - v) * row + v * above)
+        whole = (1.0 - v) * row + v * above
+        part = below + u * (low + 0.5 * u * (high - low))
+        s_x = np.divide(part, whole, out=np.zeros_like(part), where=whole > 0.0)  # no density on the line
         s_y = mixture.of(self._rows, j) + v * (row + 0.5 * v * (above - row))
         return s_x, s_y
 

@@ -54,7 +54,7 @@ def write_source(
     Returns
     -------
     Written
-        The file, with the error of the model against the table.
+        The file, with the error of the model, or its fit, against the table.
 
     Raises
     ------

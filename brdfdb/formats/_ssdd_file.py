@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._input import MOST_TEXT, check_size
 from brdfdb.parameters import Floats
 
 VERSION = "0.3"
 LISTS = ("PARAM0_LIST", "PARAM1_LIST", "PARAM2_LIST", "PARAM3_LIST")
+_RANGES_DEG = ((0.0, 90.0), (-360.0, 360.0), (0.0, 180.0), (-360.0, 360.0))  # of the lists
+_ROUNDING_DEG = 1e-3
 _TYPES = ("brdf", "btdf", "specular_reflectance", "specular_transmittance")
 _CHANNELS = {"monochrome": 1, "rgb": 3, "xyz": 3}
+_LONGEST = 1 << 24  # bytes of a line of a header: a list of angles or wavelengths
 _SPACES = b" \t\n\v\f\r"
 
 
@@ -32,18 +37,14 @@ class Block:
         The lists of angles that are there, from PARAM0_LIST on; (0,) for one that is left out.
     values : float32 array (n0, n1, ..., C)
         Values over the lists, and last the channels.
+    wavelength_nm : array (C,) [nm] or None
+        Wavelengths of the channels; None if they are none.
     """
 
     entries: Mapping[str, str]
     angles: tuple[NDArray[np.float64], ...]
     values: NDArray[np.float32]
-
-    @property
-    def wavelength_nm(self) -> NDArray[np.float64] | None:
-        """Wavelengths [nm] of the channels; None if they are none."""
-        if self.entries["COLOR_MODEL"] != "spectrum":
-            return None
-        return np.array([float(text) for text in self.entries["WAVELENGTH_LIST"].split()])
+    wavelength_nm: NDArray[np.float64] | None
 
 
 def header(software: str, comments: Sequence[str]) -> bytes:
@@ -79,14 +80,22 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     OSError
         If it cannot be read.
     """
-    data = path.read_bytes()
+    check_size(path, MOST_TEXT)
+    with path.open("rb") as file:
+        if not file.read(1):
+            return [], []
+        data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     comments: list[str] = []
     blocks: list[Block] = []
     entries: dict[str, str] = {}
     at = 0
     while at < len(data):
-        end = data.find(b"\n", at)
+        end = data.find(b"\n", at, at + _LONGEST)
         end = len(data) if end < 0 else end
+        if data.find(b"\0", at, min(end, at + _LONGEST)) >= 0:
+            raise FileFormatError(f"{path}: byte {at}: a line of its header has a zero byte")
+        if end - at > _LONGEST:
+            raise FileFormatError(f"{path}: byte {at}: a line of its header has more than {_LONGEST} bytes")
         line = data[at:end].decode("utf-8", "replace").strip()
         at = end + 1
         if line.startswith("#"):
@@ -103,19 +112,30 @@ def parsed(path: Path) -> tuple[list[str], list[Block]]:
     return comments, blocks
 
 
-def _values(path: Path, data: bytes, at: int, entries: Mapping[str, str]) -> tuple[Block, int]:
+def _values(path: Path, data: mmap.mmap, at: int, entries: Mapping[str, str]) -> tuple[Block, int]:
     """Return the block whose values begin at a byte, and the byte behind it."""
     if entries.get("DATA_TYPE") not in _TYPES or "PARAM0_LIST" not in entries:
         raise FileFormatError(f"{path}: a block of data has no DATA_TYPE of {', '.join(_TYPES)}, or no PARAM0_LIST")
     try:
         lists = {name: np.array([float(text) for text in entries.get(name, "0").split()]) for name in LISTS}
         model = entries.get("COLOR_MODEL", "")
-        channels = len(entries["WAVELENGTH_LIST"].split()) if model == "spectrum" else _CHANNELS[model]
+        spectral = model == "spectrum"
+        nm = np.array([float(text) for text in entries["WAVELENGTH_LIST"].split()]) if spectral else None
+        channels = _CHANNELS[model] if nm is None else nm.size
     except (KeyError, ValueError):
         raise FileFormatError(f"{path}: COLOR_MODEL, or a list of angles or wavelengths, cannot be read") from None
     angles = tuple(lists.values())
     if not channels or not all(nodes.size and np.all(np.diff(nodes) > 0.0) for nodes in angles):
         raise FileFormatError(f"{path}: a list of angles is empty or does not increase")
+    if nm is not None and not (channels and nm[0] > 0.0 and nm[-1] < np.inf and np.all(np.diff(nm) > 0.0)):
+        raise FileFormatError(f"{path}: WAVELENGTH_LIST is not of positive numbers [nm] that increase")
+    for (name, nodes), (low, high) in zip(lists.items(), _RANGES_DEG, strict=True):
+        if not low <= nodes[0] <= nodes[-1] <= high + _ROUNDING_DEG:
+            raise FileFormatError(
+                f"{path}: {name} is from {nodes[0]:g} to {nodes[-1]:g} degrees; allowed is [{low:g}, {high:g}]"
+            )
+    if entries["DATA"] not in ("binary", "ascii"):
+        raise FileFormatError(f"{path}: DATA is {entries['DATA']!r:.40}; allowed are binary and ascii")
     count = channels * math.prod(nodes.size for nodes in angles)
     if entries["DATA"] == "binary":
         end = at + 4 * count
@@ -136,4 +156,4 @@ def _values(path: Path, data: bytes, at: int, entries: Mapping[str, str]) -> tup
         raise FileFormatError(f"{path}: a value is not finite")
     shape = tuple(nodes.size for nodes in reversed(angles))
     values = np.moveaxis(flat.reshape(*shape, channels), -1, 0).T
-    return Block(dict(entries), angles, np.ascontiguousarray(values)), end
+    return Block(dict(entries), angles, np.ascontiguousarray(values), nm), end

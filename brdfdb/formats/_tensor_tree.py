@@ -37,7 +37,7 @@ class Tree:
     halvings : int array (leaves,)
         Each axis of the grid of a leaf has 2^halvings cells.
     values : array (N,)
-        Values of all leaves.
+        Values of all leaves; negative ones stand for 0.
     """
 
     rank: int
@@ -47,7 +47,7 @@ class Tree:
     values: Floats
 
     def at(self, place: Floats) -> Floats:
-        """Return the values (N,) at positions (N, rank) in the unit cube."""
+        """Return the values (N,) at positions (N, rank) in the unit cube; negative ones are 0, as for Radiance."""
         rest = place.copy()
         node = np.full(len(place), 0 if len(self.children) else -1, dtype=np.int64)
         bits = 1 << np.arange(self.rank)
@@ -64,7 +64,28 @@ class Tree:
         offset = np.zeros(len(place), dtype=np.int64)
         for j in range(self.rank):
             offset = (offset << halvings) + cell[:, j]
-        return np.asarray(self.values[self.start[leaf] + offset])
+        return np.asarray(np.maximum(self.values[self.start[leaf] + offset], 0.0))
+
+    def middles(self) -> Floats:
+        """Return the positions (N, rank) of the middles of all cells, in the order of the values."""
+        corner, size = np.zeros((len(self.start), self.rank)), np.ones(len(self.start))
+        below = np.zeros((len(self.children), self.rank)), np.ones(len(self.children))
+        for node, children in enumerate(self.children):  # parents before their children
+            for number, child in enumerate(children.tolist()):
+                half = 0.5 * below[1][node]
+                place = below[0][node] + half * (number >> np.arange(self.rank) & 1)
+                corners, sizes = below if child >= 0 else (corner, size)
+                at = child if child >= 0 else -1 - child
+                corners[at], sizes[at] = place, half
+        counts = 1 << self.rank * self.halvings
+        leaf = np.repeat(np.arange(len(self.start)), counts)
+        offset = np.arange(len(self.values)) - self.start[leaf]
+        middles = np.empty((len(self.values), self.rank))
+        for axis in range(self.rank):
+            halvings = self.halvings[leaf]
+            cell = (offset >> halvings * (self.rank - 1 - axis)) & ((1 << halvings) - 1)
+            middles[:, axis] = corner[leaf, axis] + size[leaf] * (cell + 0.5) / (1 << halvings)
+        return middles
 
     def at_vectors(self, wi: Floats, wr: Floats) -> Floats:
         """Return the values (N,) at unit vectors (N, 3) of light and viewer."""
@@ -145,7 +166,7 @@ def _braces(tree: Tree, numbers: list[str]) -> Iterator[str]:
 
 
 def parsed(text: str, rank: int) -> Tree:
-    """Return the tree that a text describes; negative values are 0, as Radiance reads them.
+    """Return the tree that a text describes.
 
     Raises
     ------
@@ -184,7 +205,7 @@ def parsed(text: str, rank: int) -> Tree:
         raise ValueError("a value is not finite")
     inner = np.array(nodes, dtype=np.int64).reshape(-1, 1 << rank)
     inner = np.where(inner >= 0, len(nodes) - 1 - inner, inner)[::-1]  # the root is the first node, not the last
-    return Tree(rank, inner, np.array(start), np.array(halvings), np.maximum(numbers_read, 0.0))
+    return Tree(rank, inner, np.array(start), np.array(halvings), numbers_read)
 
 
 def _halvings(count: int, rank: int) -> int:

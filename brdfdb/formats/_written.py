@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import uuid
 from collections.abc import Iterator
@@ -15,6 +16,8 @@ from brdfdb.errors import WriteError
 
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import FileError
+
+_OF_ZARR = re.compile(r"(?:.+/)?(?:zarr\.json|c(?:/[0-9]+)*)")  # files of a zarr 3 group: metadata and chunks
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
     ------
     WriteError
         If one of them cannot be written: the directory is missing or a file, the disk is full, the name is that of a
-        directory. A zarr group, a directory, is replaced by another one only.
+        directory. A zarr group, a directory, is replaced by another one only, and not if it holds other files.
     """
     final = tuple(Path(path) for path in paths)
     mark = uuid.uuid4().hex
@@ -75,21 +78,50 @@ def whole(*paths: str | os.PathLike[str]) -> Iterator[tuple[Path, ...]]:
         for path in final:
             if path.is_dir() and path.suffix != ".zarr":
                 raise WriteError(f"cannot write {path}: it is a directory")
-            if path.is_dir() and not (path / "zarr.json").exists():
-                raise WriteError(f"cannot write {path}: it is a directory that is no zarr group")
+            if path.is_dir():
+                _check_zarr_group(path)
         yield halves
         for path, half in zip(final, halves, strict=True):
             if half.is_dir() and path.exists():
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
-            os.replace(half, path)
+                _exchange(half, path)
+            else:
+                os.replace(half, path)
     except OSError as error:
         if isinstance(error, WriteError):
             raise
         raise WriteError(f"cannot write {final[0]}: {error.strerror or error}") from error
     finally:
         for half in halves:
-            if half.is_dir():
-                shutil.rmtree(half, ignore_errors=True)
-            else:
-                with contextlib.suppress(OSError):  # also where its directory is a file
-                    half.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # also where its directory is a file
+                _remove(half)
+
+
+def _check_zarr_group(path: Path) -> None:
+    """Raise WriteError if a directory is no zarr group, or holds a file that does not belong to one."""
+    if not (path / "zarr.json").exists():
+        raise WriteError(f"cannot write {path}: it is a directory that is no zarr group")
+    for part in path.rglob("*"):
+        of_group = part.is_dir() or _OF_ZARR.fullmatch(part.relative_to(path).as_posix())
+        if part.is_symlink() or not of_group:
+            raise WriteError(f"cannot write {path}: it holds {part.name}, which is no part of a zarr group")
+
+
+def _exchange(half: Path, path: Path) -> None:
+    """Replace what stands at a path by a directory; a failure leaves it as it was."""
+    aside = half.with_name(f"{half.name}.old")
+    os.replace(path, aside)
+    try:
+        os.replace(half, path)
+    except BaseException:
+        os.replace(aside, path)
+        raise
+    with contextlib.suppress(OSError):  # the new one is in its place
+        _remove(aside)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file or a directory; one that is not there is no error."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats._angular_grid import Sink
+from brdfdb.formats._words import Words
+from brdfdb.parameters import Floats
 
 LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
 TITLE = "BSDF Data Interchange file"
 _SYMMETRIES = ("PlaneSymmetrical", "Asymmetrical", "ASymmetrical", "ASymmetrical4D", "Asymmetrical4D")
 _PARTS = {"Monochrome": ("Monochrome",), "XYZ": ("TristimulusX", "TristimulusY", "TristimulusZ")}
+
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,7 @@ class Text:
         The four lists: rotations of the sample, angles of incidence, azimuths and radial angles.
     tis : array (C, rotations, incidences)
         Total integrated scatter.
-    values : float32 array (C, rotations, incidences, azimuths, radials) [1/sr]
+    values : array (C, rotations, incidences, azimuths, radials) [1/sr]
         f_r.
     """
 
@@ -43,10 +45,10 @@ class Text:
     scatter: str
     angles: tuple[NDArray[np.float64], ...]
     tis: NDArray[np.float64]
-    values: NDArray[np.float32]
+    values: Floats
 
 
-def write(stream: BinaryIO, text: Text) -> None:
+def write(stream: Sink, text: Text) -> None:
     """Write a file."""
     head = [f"# {comment}" for comment in (TITLE, *text.comments)]
     head += ["Source Measured", f"Symmetry {text.symmetry}", f"SpectralContent {text.content}"]
@@ -73,25 +75,26 @@ def parsed(path: Path) -> Text:
     OSError
         If it cannot be read.
     """
-    comments: list[str] = []
-    words = _words(path, comments)
+    words = Words(path)
     entries = {"Source": "", "Symmetry": "", "SpectralContent": "", "ScatterType": ""}
     angles: dict[str, NDArray[np.float64]] = {}
     for word in words:
         if word in entries:
-            entries[word] = next(words, "")
+            entries[word] = words.next(word)
         elif word in LISTS:
-            count = _numbers(path, words, 1, word)[0]
-            angles[word] = _numbers(path, words, max(int(count), 0), word)
+            angles[word] = words.numbers(words.count(word), word)
+            if not angles[word].size or np.any(np.diff(angles[word]) <= 0.0):
+                raise words.error(word, "the angles do not increase, or there are none")
         elif any(word in parts for parts in _PARTS.values()):
             break
     content = entries["SpectralContent"]
     if entries["Symmetry"] not in _SYMMETRIES or content not in _PARTS:
         raise FileFormatError(f"{path}: its Symmetry or SpectralContent is not that of a Zemax BSDF file")
     angles.setdefault("SampleRotation", np.zeros(1))
-    lists = tuple(angles.get(name, np.empty(0)) for name in LISTS)
-    if not all(nodes.size and np.all(np.diff(nodes) > 0.0) for nodes in lists):
-        raise FileFormatError(f"{path}: one of {', '.join(LISTS)} is missing or does not increase")
+    missing = [name for name in LISTS if name not in angles]
+    if missing:
+        raise FileFormatError(f"{path}: {', '.join(missing)} is missing")
+    lists = tuple(angles[name] for name in LISTS)
     parts = len(_PARTS[content])
     blocks = parts * lists[0].size * lists[1].size
     if blocks > path.stat().st_size:
@@ -101,12 +104,14 @@ def parsed(path: Path) -> Text:
         for word in words:
             if word == "TIS":
                 break
-        tis[number] = _numbers(path, words, 1, "TIS")[0]
-        rows.append(_numbers(path, words, lists[2].size * lists[3].size, "TIS").astype(np.float32))
+        tis[number] = words.numbers(1, "TIS")[0]
+        rows.append(words.numbers(lists[2].size * lists[3].size, f"block {number + 1} of {blocks}"))
+        if np.any(np.abs(rows[-1]) > _LARGEST):
+            raise words.error("TIS", f"a value is beyond {_LARGEST:g}, the largest one of 32 bits")
     shape = (parts, *(nodes.size for nodes in lists))
-    values = np.concatenate(rows).reshape(shape)
+    values = np.concatenate(rows, dtype=np.float32, casting="same_kind").reshape(shape)
     return Text(
-        tuple(comments),
+        tuple(words.comments),
         entries["Symmetry"],
         content,
         entries["ScatterType"],
@@ -114,26 +119,3 @@ def parsed(path: Path) -> Text:
         tis.reshape(shape[:3]),
         values,
     )
-
-
-def _words(path: Path, comments: list[str]) -> Iterator[str]:
-    """Give the words of a file that are not in comments, which are collected."""
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in file:
-            if line.lstrip().startswith("#"):
-                comments.append(line.lstrip()[1:].strip())
-            else:
-                yield from line.split()
-
-
-def _numbers(path: Path, words: Iterator[str], count: int, name: str) -> NDArray[np.float64]:
-    """Return the next numbers of a file."""
-    if count > path.stat().st_size:
-        raise FileFormatError(f"{path}: {count} numbers of {name} are more than the file has")
-    try:
-        numbers = np.array(list(itertools.islice(words, count)), dtype=np.float64)
-    except ValueError:
-        raise FileFormatError(f"{path}: a number of {name} cannot be read") from None
-    if numbers.size < count or not np.all(np.isfinite(numbers)):
-        raise FileFormatError(f"{path}: a number of {name} is missing or not finite")
-    return numbers

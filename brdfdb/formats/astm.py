@@ -8,25 +8,29 @@ Anisotropic tables and all wavelengths fit. The specular part does not.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import os
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._angles import Spherical
-from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
-from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
+from brdfdb.formats._interface import TOLERANCE
+from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import lines, of_lines, record, specular_remark
+from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._stated_error import FileError
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
@@ -37,12 +41,11 @@ tools = "libbsdf, ALTA"
 kinds = ()
 options = (
     TOLERANCE,
-    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+    SIZE,
 )
 
 _TITLE = b"ASTM E1392\n"
 _ANGLES = ("theta_i", "phi_i", "theta_s", "phi_s")
-_CHARACTERS = 10  # of a number
 _LONGEST_HEADER = 1000  # lines
 
 
@@ -71,6 +74,8 @@ def write(
 
     Raises
     ------
+    ParameterError
+        If no file of this table is so small.
     WriteError
         If the file cannot be written.
 
@@ -84,21 +89,25 @@ def write(
     from brdfdb.formats._stated_error import Comparison
 
     comparison = Comparison(table)
-    channels = len(comparison.channels.names)
+    remarks = specular_remark(table)
+    names = comparison.channels.names if table.wavelength_nm is not None else ("BRDF",)
+
+    def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
+        document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
+        sink.write(_TITLE + "".join(f"COMMENT {line}\n" for line in lines(document)).encode())
+        _write_rows(sink, grid, names)
+
     grid, error = chosen(
         table,
         comparison,
         [Spherical(table.anisotropic, mirrored=not table.anisotropic)],
         tolerance,
-        int(size * 1e6 / _CHARACTERS / (4 + channels)),
+        size,
+        write_all,
         lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
     )
-    remarks = specular_remark(table)
-    document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
-    names = comparison.channels.names if table.wavelength_nm is not None else ("BRDF",)
     with whole(path) as (file,), file.open("wb") as stream:
-        stream.write(_TITLE + "".join(f"COMMENT {line}\n" for line in lines(document)).encode())
-        _write_rows(stream, grid, names)
+        write_all(stream, grid, error)
     return Written((Path(path),), error, tolerance, remarks)
 
 
@@ -128,23 +137,28 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     name = str(document.get("name") or path.stem)
     nodes = tuple(np.unique(column) for column in rows[:, :4].T)
     count = math.prod(axis.size for axis in nodes)
-    if count != len(rows) or (nodes[1].size == 1 and nodes[1][0] != 0.0):
-        theta_i, phi_i, theta_r, phi_r = rows[:, :4].T
-        from brdfdb.measurements.samples import Samples
-
-        return Samples(name, theta_i, phi_i, theta_r, phi_r, names, at, rows[:, 4:], record=document)
+    listed = functools.partial(samples_at_angles, rows[:, :4], rows[:, 4:], name, names, at, document)
+    if count != len(rows) or (nodes[1].size == 1 and nodes[1][0] != 0.0) or np.any(np.isnan(rows[:, 4:])):
+        return listed()
     order = np.lexsort(rows[:, 3::-1].T)
-    values = rows[order, 4:].reshape(*(axis.size for axis in nodes), len(names)).astype(np.float32)
+    values = (
+        np.maximum(rows[order, 4:], 0.0)
+        .reshape(  # as libbsdf
+            *(axis.size for axis in nodes), len(names)
+        )
+        .astype(np.float32)
+    )
     anisotropic = nodes[1].size > 1
     one_side = not anisotropic and not np.any((nodes[3] > np.pi + 1e-6) & (nodes[3] < 2.0 * np.pi - 1e-6))
     if not anisotropic:
         nodes, values = (nodes[0], *nodes[2:]), values[:, 0]
     if one_side:
         nodes, values = (*nodes[:2], nodes[2][nodes[2] < 4.0]), values[:, :, nodes[2] < 4.0]
-    return FileTable(name, names, at, AngularGrid(Spherical(anisotropic, one_side), nodes, values).evaluate, document)
+    grid = AngularGrid(Spherical(anisotropic, one_side), nodes, values)
+    return FileTable(name, names, at, grid.evaluate, document, listed)
 
 
-def _write_rows(stream: BinaryIO, grid: AngularGrid, names: tuple[str, ...]) -> None:
+def _write_rows(stream: Sink, grid: AngularGrid, names: tuple[str, ...]) -> None:
     """Write the number of rows, the names of the columns, and the rows."""
     nodes, values = list(grid.nodes), grid.values
     if len(nodes) == 3:
@@ -164,25 +178,26 @@ def _parsed(path: Path) -> tuple[list[str], tuple[str, ...], NDArray[np.float64]
     """Return comments, the names of the channels, and the rows."""
     comments: list[str] = []
     columns: tuple[str, ...] = ()
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in itertools.islice(file, _LONGEST_HEADER):
-            word, _, rest = line.strip().partition(" ")
-            if word == "VARS":
-                columns = tuple(text.strip() for text in rest.split(","))
-                break
-            comments.append(rest)
-        if columns[:4] != _ANGLES or len(columns) < 5:
-            raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} with channels behind it")
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")  # an empty file
-                rows = np.loadtxt(file, delimiter=",", ndmin=2)
-        except (ValueError, UserWarning):
-            raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none") from None
+    texts = (line for _, line in lines_of(path))
+    for line in itertools.islice(texts, _LONGEST_HEADER):
+        word, _, rest = line.strip().partition(" ")
+        if word == "VARS":
+            columns = tuple(text.strip() for text in rest.split(","))
+            break
+        comments.append(rest)
+    if columns[:4] != _ANGLES or len(columns) < 5:
+        raise FileFormatError(f"{path}: it has no line VARS {','.join(_ANGLES)} with channels behind it")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an empty file
+            rows = np.loadtxt(texts, delimiter=",", ndmin=2)
+    except FileFormatError:
+        raise
+    except (ValueError, UserWarning) as error:
+        raise FileFormatError(f"{path}: a row has no {len(columns)} numbers, or there is none ({error})") from None
     if rows.shape[1] != len(columns) or not np.all(np.isfinite(rows)):
         raise FileFormatError(f"{path}: a row has no {len(columns)} finite numbers")
     rows[:, :4] = np.where(rows[:, :4] < 0.0, rows[:, :4] + 2.0 * np.pi, rows[:, :4])
-    rows[:, 4:] = np.maximum(rows[:, 4:], 0.0)  # as libbsdf
     return comments, columns[4:], rows
 
 

@@ -4,11 +4,13 @@ The lists hold the polar angles and azimuths of light and viewer, in degrees, f_
 directions form a grid. The format does not say how to interpolate. The stated error is that of straight lines along all
 angles at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not.
+Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
+needs more is written with the error it has.
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import uuid
@@ -20,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows
+from brdfdb.formats._dense_files import dense_record, reading_of_rows, samples_of_rows
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, column, degrees_of, parsed, title_of
 from brdfdb.formats._record import specular_remark
@@ -44,6 +46,12 @@ SCHEMA = "https://raw.githubusercontent.com/BiRD-project/BiRD_view/master/BRDF_J
 _LAST_DEG = 89.99  # polar angles stay below 90
 _DIGITS, _ENTRY_BYTES = 5, 45  # of a number, and of the numbers of one entry
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
+_MICRONS = ("um", "µm", "μm")
+_UNITS = {
+    "angle": ("deg", "degree", "degrees", "°", "rad", ""),
+    "BRDF": ("1/sr", "sr-1", "sr^-1", ""),
+    "wavelength": ("nm", *_MICRONS, ""),
+}
 _NOT_STATED = "not stated"
 
 
@@ -131,27 +139,37 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     lists = _lists(path, data if isinstance(data, dict) else {})
     known = metadata.get("adhoc_section", {}) if isinstance(metadata, dict) else {}
     values, at = lists.pop("BRDF")[:, np.newaxis], lists.pop("wavelength_i", None)
+    uncertainty = lists["uBRDF"][:, np.newaxis] if "uBRDF" in lists else None
+    lists.pop("uBRDF", None)
     if at is not None:
         nodes = np.unique(at)
         if len(values) % nodes.size or not np.array_equal(at, np.tile(nodes, len(values) // nodes.size)):
             raise FileFormatError(f"{path}: not each direction has the same wavelengths, in order")
         values, at = values.reshape(-1, nodes.size), nodes
+        uncertainty = None if uncertainty is None else uncertainty.reshape(values.shape)
         lists = {name: angle[:: nodes.size] for name, angle in lists.items()}
+    known = known if isinstance(known, dict) else {}
+    listed = functools.partial(samples_of_rows, path, lists, values, at, known, uncertainty=uncertainty)
     if not np.any(lists["phi_i"]) and np.max(lists["phi_r"]) <= 180.0:
         lists = {"theta_i": lists["theta_i"], "theta_r": lists["theta_r"], "delta_phi": lists["phi_r"]}
     else:
         lists, values = _closed(lists, values)
-    return reading_of_rows(path, lists, values, at, known if isinstance(known, dict) else {})
+    return reading_of_rows(path, lists, values, at, known, listed)
 
 
 def _lists(path: Path, data: dict[str, Any]) -> dict[str, NDArray[np.float64]]:
-    """Return the lists of a file: angles [degree], f_r [1/sr] and wavelengths [nm]."""
+    """Return the lists of a file: angles [degree], f_r with its uncertainty [1/sr] and wavelengths [nm]."""
     lists: dict[str, NDArray[np.float64]] = {}
-    for name in (*_ANGLES, "BRDF", "wavelength_i", "wavelength_r"):
+    for name in (*_ANGLES, "BRDF", "uBRDF", "wavelength_i", "wavelength_r"):
         entry = data.get(name)
         if isinstance(entry, dict):
-            numbers, unit = column(path, name, entry.get("values")), str(entry.get("unit", ""))
-            lists[name] = degrees_of(numbers, unit) if name in _ANGLES else numbers * (1e3 if unit == "μm" else 1.0)
+            numbers = column(path, name, entry.get("values"), holes=name == "BRDF")
+            unit = str(entry.get("unit", ""))
+            units = _UNITS["angle" if name in _ANGLES else "BRDF" if name == "uBRDF" else name.partition("_")[0]]
+            if unit not in units:
+                allowed = ", ".join(word for word in units if word)
+                raise FileFormatError(f"{path}: {name} has the unit {unit!r:.40}; allowed are {allowed}")
+            lists[name] = degrees_of(numbers, unit) if name in _ANGLES else numbers * (1e3 if unit in _MICRONS else 1.0)
         elif name in (*_ANGLES, "BRDF"):
             raise FileFormatError(f"{path}: data has no object {name}")
     if "wavelength_r" in lists:

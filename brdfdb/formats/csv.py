@@ -4,13 +4,15 @@ The columns are the angles in degrees, then f_r in 1/sr, with five significant d
 record. The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors
 (``--axes``). The cosine is not included. Readers interpolate in straight lines along all axes at once.
 
-Anisotropic tables and all wavelengths fit. The specular part does not.
+Anisotropic tables and all wavelengths fit. The specular part does not. A file has about 40 MB at most: a table that
+needs more is written with the error it has.
 """
 
 from __future__ import annotations
 
 import itertools
 import os
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +22,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
 from brdfdb.formats._record import lines, of_lines, specular_remark
+from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -35,7 +38,6 @@ kinds = ()
 options = OPTIONS
 _DIGITS = 5
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
-_MOST_READ = 1 << 30  # of a file that is read
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
 _COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
 
@@ -98,13 +100,16 @@ def write(
 
 
 def recognises(head: bytes) -> bool:
-    """Return True for the first bytes of a text whose columns begin with angles, or that says so."""
+    """Return True for the first bytes of a text whose columns are angles, then f_r or wavelengths, or that says so."""
     try:
         text = head.decode("utf-8", "ignore")
     except ValueError:
         return False
     first = [line for line in text.splitlines() if not line.startswith("#")][:1]
-    return f"# {_COLUMNS}" in text or bool(first and first[0].partition(",")[0].strip() in _ANGLES)
+    names = [name.strip() for name in first[0].split(",")] if first else []
+    of_values = tuple(itertools.dropwhile(_ANGLES.__contains__, names))
+    alone = len(of_values) == 1 or (bool(of_values) and _wavelengths(of_values) is not None)
+    return f"# {_COLUMNS}" in text or (alone and len(of_values) < len(names))
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
@@ -118,20 +123,22 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     from brdfdb.measurements.samples import Samples
 
     path = Path(path)
-    if path.stat().st_size > _MOST_READ:
-        raise FileFormatError(f"{path}: it has more than {_MOST_READ} bytes")
     comments: list[str] = []
     try:
-        with path.open(encoding="utf-8") as file:
-            for line in file:
-                if not line.startswith("#"):
-                    break
-                comments.append(line[1:].strip())
-            else:
-                line = ""
-            names = tuple(name.strip() for name in line.split(","))
-            numbers = np.loadtxt(file, delimiter=",", ndmin=2, dtype=np.float64)
-    except ValueError as error:
+        texts = (line for _, line in lines_of(path))
+        for line in texts:
+            if not line.startswith("#"):
+                break
+            comments.append(line[1:].strip())
+        else:
+            line = ""
+        names = tuple(name.strip() for name in line.split(","))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an empty file
+            numbers = np.loadtxt(texts, delimiter=",", ndmin=2, dtype=np.float64)
+    except FileFormatError:
+        raise
+    except (ValueError, UserWarning) as error:
         raise FileFormatError(f"{path}: it is no table of numbers ({error})") from error
     angles = tuple(name for name in names if name in _ANGLES)
     if not angles or numbers.shape[1] != len(names) or names[: len(angles)] != angles or len(names) == len(angles):

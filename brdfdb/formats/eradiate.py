@@ -1,7 +1,8 @@
 """Eradiate: tables of its BSDF ``mqdiffuse``, measured and almost diffuse, as netCDF.
 
-f_r in 1/sr is on a regular grid: the cosines of light and viewer, and the azimuth between them. Eradiate's kernel
-interpolates in straight lines along all three. Narrow lobes need more nodes than a grid can have.
+f_r in 1/sr is on a regular grid: the cosines of light and viewer, and the azimuth between them. Eradiate repeats the
+first azimuth behind the last one, and its kernel interpolates in straight lines along all three. Narrow lobes need more
+nodes than a grid can have. A grid that is searched has 193 cosines and 256 azimuths at most, 38 MB.
 
 The file holds one wavelength (``--wavelength``) of an isotropic table. Anisotropic tables are refused. The specular
 part is left out.
@@ -21,10 +22,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import CannotHoldError, FileFormatError, ParameterError, import_extra
+from brdfdb.errors import CannotHoldError, FileFormatError, import_extra
 from brdfdb.formats._channels import at_wavelength
 from brdfdb.formats._dense_files import record_of_attributes
 from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
+from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import Comparison
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".nc"
@@ -45,16 +48,16 @@ kinds = ()
 options = (
     TOLERANCE,
     WAVELENGTH,
-    Option("resolution", 0.0, "number of cosines of light and viewer; 0: as few as the tolerance takes", high=513.0),
+    Option("nodes", 0, "number of cosines of light and viewer; 0: as few as the tolerance takes", low=3.0, high=513.0),
 )
 _DIMS = ("cos_theta_o", "phi_d", "cos_theta_i")
 _COSINES = (2, 4, 6, 9, 13, 19, 28, 41, 60, 88, 129, 193)
-_AZIMUTHS = (3, 5, 7, 9, 13, 19, 27, 41, 61, 91, 131, 193, 257)  # odd: a node is at the mirror direction
+_AZIMUTHS = (2, 4, 6, 8, 12, 18, 26, 40, 60, 90, 130, 192, 256)  # even: a node is at the mirror direction
 _FROM_POLE = 0.25  # cosine in steps of the grid that stands for 0 where f_r has a pole at the horizon
 _MOST_VALUES = 1 << 28  # of a file that is read
 HOLDS = (
-    "f_r [1/sr], the BRDF without the cosine, as Eradiate's kernel reads it: its node d of phi_d is at "
-    "2 pi d / (N - 1), so that the last node is the first again; cos_theta_o is that of the viewer"
+    "f_r [1/sr], the BRDF without the cosine, at the coordinates; Eradiate repeats phi_d = 0 at 2 pi; "
+    "cos_theta_o is that of the viewer"
 )
 
 
@@ -64,7 +67,7 @@ def write(
     *,
     tolerance: float = 0.02,
     wavelength: float = 550.0,
-    resolution: float = 0.0,
+    nodes: int = 0,
     verdict: str | None = None,
 ) -> Written:
     """Write f_r at one wavelength for Eradiate's ``mqdiffuse``: whole, or not at all.
@@ -79,8 +82,9 @@ def write(
         Largest p99 of the error against the table. If a grid of 38 MB is not within it, the nearest one is written.
     wavelength : float [nm]
         Wavelength of a table of several.
-    resolution : float
-        Number of cosines, and of azimuths; 0: the smallest grid within the tolerance.
+    nodes : int
+        Number of cosines of light and viewer, 3 to 513. The azimuths are as many, or one more if that is odd: 513 take
+        541 MB. 0: the smallest grid within the tolerance.
     verdict : str, optional
         Verdict of the audit of this revision.
 
@@ -89,15 +93,15 @@ def write(
     CannotHoldError
         If the table is anisotropic.
     ParameterError
-        If the table does not reach the wavelength, or the resolution is not a whole number of at least 3.
+        If the table does not reach the wavelength.
     WriteError
         If the file cannot be written.
 
     Notes
     -----
-    The dimensions are cos_theta_o, phi_d and cos_theta_i: cosines from 0 to 1 and azimuths from 0 to 2 pi, both in
-    equal steps. Eradiate checks that the coordinates phi_d are 2 pi d / N, but its kernel (eradiate-mitsuba 0.5) reads
-    node d at 2 pi d / (N - 1). The values are those for its kernel, which renders with them.
+    The dimensions are cos_theta_o, phi_d and cos_theta_i: cosines from 0 to 1, and azimuths 2 pi d / N, both in equal
+    steps. Eradiate's ``MQDiffuseBSDF`` appends the values of phi_d = 0 at 2 pi before it calls the kernel, whose plugin
+    alone would read node d of N at 2 pi d / (N - 1).
     """
     from brdfdb.formats._stated_error import Comparison
 
@@ -105,15 +109,12 @@ def write(
     if table.anisotropic:
         raise CannotHoldError(f"{table.name}: is anisotropic, and mqdiffuse holds isotropic tables only")
     channels = at_wavelength(table, wavelength)
-    if resolution and (resolution < 3.0 or resolution != int(resolution)):
-        raise ParameterError("resolution", f"{resolution:g} is not a whole number of at least 3", resolution)
     comparison = Comparison(table, channels)
-    count = int(resolution)
-    shape = (count, count | 1, count) if count else _smallest(table, comparison, tolerance)
+    shape = (nodes, nodes + nodes % 2, nodes) if nodes else _smallest(table, comparison, tolerance)
     values = _values(table, channels, shape)
     error = comparison.error_of(functools.partial(_evaluated, values))
     remarks = (*specular_remark(table), *channels.remarks)
-    wanted = None if resolution else tolerance
+    wanted = None if nodes else tolerance
     known = record(table, error, verdict, holds=HOLDS, remarks=remarks, tolerance=wanted)
     known["wavelength_nm"] = None if channels.wavelength_nm is None else float(channels.wavelength_nm[0])
     with whole(path) as (half,):
@@ -145,11 +146,25 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     except (FileFormatError, FileNotFoundError):
         raise
     except Exception as error:  # SciPy raises what its parser comes to
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
+        first = str(error).partition("\n")[0]
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
     name, nm = str(known.get("name") or Path(path).stem), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
-    return FileTable(name, channels, at, functools.partial(_evaluated, values), known)
+    nodes = functools.partial(_samples, values, name, channels, at, known)
+    return FileTable(name, channels, at, functools.partial(_evaluated, values), known, nodes)
+
+
+def _samples(
+    values: NDArray[Any], name: str, channels: tuple[str, ...], at: NDArray[np.float64] | None, known: dict[str, Any]
+) -> Samples:
+    """Return the values of a file at the nodes that the kernel interpolates between."""
+    viewers, turns, lights = values.shape
+    nodes = np.linspace(0.0, 1.0, viewers), np.linspace(0.0, 2.0 * np.pi, turns), np.linspace(0.0, 1.0, lights)
+    viewer, turn, light = (grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij"))
+    angles = np.stack([np.arccos(light), turn, np.arccos(viewer), np.zeros(values.size)], axis=1)
+    angles[:, 1], angles[:, 3] = 0.0, -turn % (2.0 * np.pi)
+    return samples_at_angles(angles, values.reshape(-1, 1).astype(np.float64), name, channels, at, known)
 
 
 def _smallest(table: Table, comparison: Comparison, tolerance: float) -> tuple[int, int, int]:
@@ -169,7 +184,7 @@ def _smallest(table: Table, comparison: Comparison, tolerance: float) -> tuple[i
         if known and (best := min(known, key=order)) and known[best] <= tolerance:
             if cosines**2 * _AZIMUTHS[0] >= math.prod(best):
                 break
-            if not within(cosines, max(n for n in _AZIMUTHS if cosines**2 * n < math.prod(best) or n == 3)):
+            if not within(cosines, max(n for n in _AZIMUTHS if cosines**2 * n < math.prod(best) or n == _AZIMUTHS[0])):
                 continue
         elif not within(cosines, _AZIMUTHS[-1]):
             continue
@@ -183,7 +198,7 @@ def _node(table: Table, channels: Channels, shape: tuple[int, int, int], viewer:
 
     lowest = _FROM_POLE if table.source is None or table.source.grazing_pole else 0.0
     theta_r, theta_i = (np.arccos(np.maximum(node, lowest) / (shape[0] - 1)) for node in (viewer, light))
-    azimuth = np.minimum(turn, shape[1] - 1 - turn) * (2.0 * np.pi / (shape[1] - 1))
+    azimuth = np.minimum(turn, shape[1] - turn) * (2.0 * np.pi / shape[1])
     wi, wr = unit_vector(theta_i, np.zeros(1)), unit_vector(theta_r, azimuth)
     for w in (wi, wr):
         w[..., 2] = np.maximum(w[..., 2], 0.0)  # rounding at the horizon
@@ -202,15 +217,17 @@ def _interpolated(
 ) -> Floats:
     """Return f_r [1/sr], shape (N, 1), as Eradiate's kernel interpolates the nodes of a grid."""
     turn = np.arctan2(wi[:, 1], wi[:, 0]) - np.arctan2(wr[:, 1], wr[:, 0])
-    x = np.stack([wr[:, 2], np.mod(turn / (2.0 * np.pi), 1.0), wi[:, 2]]) * (np.array(shape)[:, np.newaxis] - 1)
+    steps = np.array([shape[0] - 1, shape[1], shape[2] - 1])[:, np.newaxis]
+    x = np.stack([wr[:, 2], np.mod(turn / (2.0 * np.pi), 1.0), wi[:, 2]]) * steps
     x = np.maximum(x, 0.0)  # viewers below the horizon, whose values do not count
-    first = np.minimum(x.astype(np.int64), np.array(shape)[:, np.newaxis] - 2)
+    first = np.minimum(x.astype(np.int64), steps - 1)
     share = x - first
     total: Floats = np.zeros((len(wi), 1))
     for corner in itertools.product((0, 1), repeat=3):
         side = np.array(corner)[:, np.newaxis]
         weight = np.prod(np.where(side == 1, share, 1.0 - share), axis=0)
-        total = total + weight[:, np.newaxis] * node(*(first + side))
+        viewer, azimuth, light = first + side
+        total = total + weight[:, np.newaxis] * node(viewer, azimuth % shape[1], light)
     return np.where(wr[:, 2:] > 0.0, total, 0.0)
 
 
@@ -243,7 +260,7 @@ def _checked(opened: xr.Dataset, path: Path) -> NDArray[Any]:
     if "brdf" not in opened.data_vars or set(opened["brdf"].dims) != set(_DIMS):
         raise FileFormatError(f"{path}: it has no variable brdf over {', '.join(_DIMS)}")
     brdf = opened["brdf"].transpose(*_DIMS)
-    if brdf.size > _MOST_VALUES or min(brdf.shape) < 2 or brdf.shape[1] < 2:
+    if brdf.size > _MOST_VALUES or min(brdf.shape) < 2:
         raise FileFormatError(f"{path}: brdf has the shape {brdf.shape}; it takes at least two nodes an axis")
     for name, (_, expected, _) in _coordinates(brdf.shape).items():
         if name not in opened.coords or not np.allclose(opened[name], expected):

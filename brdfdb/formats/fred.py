@@ -11,26 +11,31 @@ part is left out.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
+from array import array
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import CannotHoldError, FileFormatError
+from brdfdb.errors import CannotHoldError, FileFormatError, counted
 from brdfdb.formats._angles import Spherical
-from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import at_wavelength
-from brdfdb.formats._interface import TOLERANCE, WAVELENGTH, Option
+from brdfdb.formats._interface import TOLERANCE, WAVELENGTH
+from brdfdb.formats._nodes import samples_at_angles
 from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._text_file import lines_of
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._stated_error import FileError
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
@@ -42,13 +47,11 @@ kinds = ()
 options = (
     TOLERANCE,
     WAVELENGTH,
-    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+    SIZE,
 )
 
 _TITLE = "type bsdf_data"
 _FORMAT = "format angles=deg bsdf=value scale=1"
-_CHARACTERS = 24  # of a line
-_MOST_BYTES = 1 << 30  # of a file that is read
 
 
 def write(
@@ -73,7 +76,7 @@ def write(
     wavelength : float [nm]
         The wavelength of a spectral table that is written.
     size : float [MB]
-        Largest file.
+        Largest size of the file and its record.
     verdict : str, optional
         Verdict of the audit of this revision.
 
@@ -82,7 +85,7 @@ def write(
     CannotHoldError
         If the table is anisotropic: what the azimuth of the light counts from is not published.
     ParameterError
-        If the wavelength is outside those of the table.
+        If the wavelength is outside those of the table, or no file of it is so small.
     WriteError
         If a file cannot be written.
     """
@@ -91,23 +94,31 @@ def write(
     if table.anisotropic:
         raise CannotHoldError(f"{table.name}: is anisotropic, and this format is written for isotropic tables only")
     comparison = Comparison(table, at_wavelength(table, wavelength))
+    path = Path(path)
+    remarks = (*specular_remark(table), *comparison.channels.remarks)
+    at = comparison.channels.wavelength_nm
+
+    def text_beside(error: FileError, rows: int) -> bytes:
+        document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
+        document |= {"wavelength_nm": None if at is None else float(at[0]), "rows": rows}
+        return json.dumps(document, indent=1).encode()
+
+    def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
+        sink.write(text_beside(error, _write_blocks(sink, grid)))
+
     grid, error = chosen(
         table,
         comparison,
         [Spherical(anisotropic=False, mirrored=True)],
         tolerance,
-        int(size * 1e6 / _CHARACTERS / 2),  # the file has both sides
+        size,
+        write_all,
         lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
     )
-    path = Path(path)
-    remarks = (*specular_remark(table), *comparison.channels.remarks)
-    document = record(table, error, verdict, remarks=remarks, tolerance=tolerance)
-    at = comparison.channels.wavelength_nm
-    document["wavelength_nm"] = None if at is None else float(at[0])
     with whole(path, beside(path)) as (file, there):
-        with file.open("w", encoding="ascii", newline="\n") as stream:
-            _write_blocks(stream, grid)
-        there.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        with file.open("wb") as stream:
+            rows = _write_blocks(stream, grid)
+        there.write_bytes(text_beside(error, rows))
     return Written((path, beside(path)), error, tolerance, remarks)
 
 
@@ -127,67 +138,75 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         If it cannot be read.
     """
     from brdfdb.formats._readings import FileTable
-    from brdfdb.measurements.samples import Samples
 
     path = Path(path)
     rows = _rows(path)
     known = record_beside(path)
+    if known.get("rows", len(rows)) != len(rows):
+        raise FileFormatError(f"{path}: its record says {known['rows']!r:.20} viewers, and it has {len(rows)}")
     name, nm = str(known.get("name") or path.name.partition(".")[0]), known.get("wavelength_nm")
     at = np.array([float(nm)]) if isinstance(nm, int | float) else None
     channels = ("grey",) if at is None else (f"{at[0]:g}nm",)
     grid = _grid(rows)
-    if grid is not None:
-        return FileTable(name, channels, at, grid.evaluate, known)
-    theta_i, phi_i, theta_r, phi_r = np.deg2rad(rows[:, :4]).T
-    return Samples(
-        name, theta_i, phi_i, theta_r, (phi_i + np.pi - phi_r) % (2.0 * np.pi), channels, at, rows[:, 4:], record=known
-    )
+    angles = np.deg2rad(rows[:, :4])
+    angles[:, 3] = np.deg2rad((rows[:, 1] + 180.0 - rows[:, 3]) % 360.0)
+    nodes = functools.partial(samples_at_angles, angles, rows[:, 4:], name, channels, at, known)
+    return nodes() if grid is None else FileTable(name, channels, at, grid.evaluate, known, nodes)
 
 
-def _write_blocks(stream: TextIO, grid: AngularGrid) -> None:
-    """Write a block a polar angle of the light: both sides of the plane of incidence, the normal once."""
+def _write_blocks(stream: Sink, grid: AngularGrid) -> int:
+    """Write a block a polar angle of the light, and return the number of viewers in all blocks.
+
+    Viewers are on both sides of the plane of incidence, the normal once.
+    """
     theta_i, theta_r, delta_phi = (np.rad2deg(axis) for axis in grid.nodes)
     forward = 180.0 - delta_phi[::-1]
     half = np.arange(forward.size)[::-1]
     other = half[(forward > 0.0) & (forward < 180.0)][::-1]
     azimuths = np.concatenate([forward, 360.0 - forward[(forward > 0.0) & (forward < 180.0)][::-1]])
     columns = np.concatenate([half, other])
-    stream.write(f"{_TITLE}\n{_FORMAT}\n")
+    stream.write(f"{_TITLE}\n{_FORMAT}\n".encode())
+    count = 0
     for number, angle in enumerate(theta_i):
-        stream.write(f"{angle:.9g}\t0\n")
+        stream.write(f"{angle:.9g}\t0\n".encode())
         for row, theta in enumerate(theta_r):
             values = grid.values[number, row, :, 0]
-            some = [(0.0, columns[0])] if theta == 0.0 else zip(azimuths, columns, strict=True)
-            stream.writelines(f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in some)
+            some = [(0.0, columns[0])] if theta == 0.0 else list(zip(azimuths, columns, strict=True))
+            count += len(some)
+            rows = [f"{theta:.9g}\t{phi:.9g}\t{values[column]:.5g}\n" for phi, column in some]
+            stream.write("".join(rows).encode())
+    return count
 
 
 def _rows(path: Path) -> NDArray[np.float64]:
     """Return rows of theta_i, phi_i, theta_r, phi_r [degree] and f_r [1/sr]."""
-    if path.stat().st_size > _MOST_BYTES:
-        raise FileFormatError(f"{path}: it is larger than {_MOST_BYTES >> 20} MiB")
-    with path.open(encoding="utf-8", errors="replace") as file:
-        first, second = file.readline().strip().lower(), file.readline().lower()
-        if first != _TITLE or "angles=deg" not in second or "bsdf=value" not in second:
-            raise FileFormatError(f"{path}: it does not begin with the lines {_TITLE!r} and {_FORMAT!r}")
-        try:
-            scale = float(second.partition("scale=")[2].split()[0])
-            lines = [[float(word) for word in line.split()] for line in file if line.strip()]
-        except (ValueError, IndexError) as error:
-            raise FileFormatError(f"{path}: it holds what is no number ({error})") from None
-    rows: list[list[float]] = []
+    lines = lines_of(path)
+    first, second = (next(lines, (0, ""))[1].strip().lower() for _ in range(2))
+    if first != _TITLE or "angles=deg" not in second or "bsdf=value" not in second:
+        raise FileFormatError(f"{path}: line 1: it does not begin with the lines {_TITLE!r} and {_FORMAT!r}")
+    numbers = array("d")
     light: list[float] | None = None
-    for line in lines:
+    try:
+        scale = float(second.partition("scale=")[2].split()[0])
+    except (ValueError, IndexError):
+        raise FileFormatError(f"{path}: line 2, field scale: it is no number") from None
+    for number, text in lines:
+        try:
+            line = [float(word) for word in text.split()]
+        except ValueError as error:
+            raise FileFormatError(f"{path}: line {number} holds what is no number ({error})") from None
+        if not np.all(np.isfinite(line)):
+            raise FileFormatError(f"{path}: line {number} holds a number that is not finite")
         if len(line) == 2:
             light = line
         elif len(line) == 3 and light is not None:
-            rows.append([*light, *line[:2], scale * line[2]])
-        else:
-            raise FileFormatError(
-                f"{path}: a line has {len(line)} numbers; a light has two, and a viewer below it three"
-            )
-    if not rows or not np.all(np.isfinite(rows)):
-        raise FileFormatError(f"{path}: it holds no values, or one that is not finite")
-    return np.array(rows)
+            numbers.extend([*light, *line[:2], scale * line[2]])
+        elif line:
+            count = counted(len(line), "number")
+            raise FileFormatError(f"{path}: line {number} has {count}; a light has two, and a viewer below it three")
+    if not numbers:
+        raise FileFormatError(f"{path}: it holds no values")
+    return np.frombuffer(numbers, dtype=np.float64).reshape(-1, 5)
 
 
 def _grid(rows: NDArray[np.float64]) -> AngularGrid | None:

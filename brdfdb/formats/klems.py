@@ -19,20 +19,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from brdfdb.errors import FileFormatError
+from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import _bsdf_xml
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block, BsdfFile
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import FIXED, Option
 from brdfdb.formats._klems_basis import BASES, FLIPPED, Basis, averages
+from brdfdb.formats._nodes import samples_at_vectors
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".xml"
+keywords = ("side",)
 media_type = "application/xml"
 summary = "BSDF files of WINDOW: averages over the patches of Klems"
 tools = "WINDOW and pyWinCalc, EnergyPlus, Radiance"
@@ -142,7 +145,7 @@ def _text(matrix: Floats) -> str:
 
 
 def _numbers(text: str) -> Floats:
-    return np.maximum(np.array(text.replace(",", " ").split(), dtype=np.float64), 0.0)
+    return np.array(text.replace(",", " ").split(), dtype=np.float64)
 
 
 def _definition(basis: Basis) -> Iterator[str]:
@@ -167,16 +170,20 @@ def recognises(head: bytes) -> bool:
     return _bsdf_xml.is_window_element(head) and b"TensorTree" not in head
 
 
-def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of the side that is Radiance's front, evaluated as Radiance does: the value of the pair of patches.
+def read(path: str | os.PathLike[str], side: str = "back") -> FileTable:
+    """Return f_r of one side, evaluated as Radiance does: the value of the pair of patches.
 
     Parameters
     ----------
     path : path
         File of this package, or of others: in bases of Klems or in one that it defines itself.
+    side : {"back", "front"}
+        Side of reflection as the file names it. The back is Radiance's front.
 
     Raises
     ------
+    ParameterError
+        If there is no such side.
     FileFormatError
         If the file is damaged or holds no matrix.
     OSError
@@ -188,7 +195,9 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._readings import FileTable
 
-    file = _bsdf_xml.read(path)
+    if side not in _bsdf_xml.SIDES:
+        raise ParameterError("side", f"{side!r} is not one of {', '.join(_bsdf_xml.SIDES)}", side, (*_bsdf_xml.SIDES,))
+    file = _bsdf_xml.read(path, _bsdf_xml.SIDES[side])
     if file.structure.lower() not in ("columns", "rows"):
         raise FileFormatError(f"{path}: its structure {file.structure!r} is not Columns or Rows")
     bases = {basis.name.lower(): basis for basis in BASES.values()}
@@ -203,7 +212,30 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     lights, viewers = bases[visible.basis.lower()], bases[visible.row_basis.lower()]
     matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
     of_colour = XYZ if len(names) > 1 else LUMINOUS
-    return FileTable(file.name, of_colour, None, functools.partial(evaluated, matrix, viewers, lights), file.record)
+    evaluate = functools.partial(evaluated, np.maximum(matrix, 0.0), viewers, lights)
+    nodes = functools.partial(_samples, path, file, viewers, lights)
+    return FileTable(file.name, of_colour, None, evaluate, file.record, nodes)
+
+
+def _samples(path: str | os.PathLike[str], file: BsdfFile, viewers: Basis, lights: Basis) -> Samples:
+    """Return all blocks of the front in these bases at the middles of patches; a channel is a block."""
+    names = [
+        block.wavelength
+        for block in file.blocks.values()
+        if (block.basis.lower(), block.row_basis.lower()) == (lights.name.lower(), viewers.name.lower())
+    ]
+    matrix = np.stack([_matrix(path, file, name, viewers, lights) for name in names], axis=-1)
+    viewer, light = np.divmod(np.arange(len(viewers) * len(lights)), len(lights))
+    channels = [LUMINOUS[0] if name == VISIBLE else name for name in names]
+    return samples_at_vectors(
+        lights.middles[light] * FLIPPED,
+        viewers.middles[viewer],
+        matrix.reshape(len(viewer), -1),
+        file.name,
+        channels,
+        None,
+        {**file.record, "side": file.blocks[VISIBLE.lower()].side, "patches": f"{viewers.name}, f_r is their average"},
+    )
 
 
 def _matrix(path: str | os.PathLike[str], file: BsdfFile, name: str, viewers: Basis, lights: Basis) -> Floats:

@@ -21,7 +21,7 @@ from brdfdb.errors import FileFormatError
 from brdfdb.formats._channels import RGB, channels_of, has_spectrum
 from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface
-from brdfdb.formats._record import record, specular_remark
+from brdfdb.formats._record import document_of, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         raise FileFormatError(f"{path}: no node {' or '.join(kinds)} in the document")
     surface = _surface(path, node)
     material = root.find("surfacematerial")
-    document = _record(None if material is None else material.get("doc"))
+    document = document_of("" if material is None else material.get("doc", ""))
     name = document.get("name") or node.get("name") or path.stem
     surface = replace(surface, base_color=_colors(surface.base_color), specular_color=_colors(surface.specular_color))
     grey = all(len(set(color)) == 1 for color in (surface.base_color, surface.specular_color))
@@ -245,12 +245,3 @@ def _numbers(text: str) -> tuple[float, ...]:
     except ValueError:
         return ()
     return numbers if all(0.0 <= number <= _MOST for number in numbers) else ()
-
-
-def _record(doc: str | None) -> dict[str, Any]:
-    """Return the record in the `doc` of a material; empty where there is another text."""
-    try:
-        document = json.loads(doc or "")
-    except ValueError:
-        return {}
-    return document if isinstance(document, dict) else {}

@@ -9,10 +9,11 @@ The file holds linear sRGB. Anisotropic tables are refused, and the specular par
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +24,14 @@ from brdfdb.formats._angular_grid import AngularGrid, reciprocal
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".binary"
@@ -147,7 +150,17 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     known = record_beside(path)
     samples = "edges" if known.get("samples") == "edges" else "centres"
     name = str(known.get("name") or path.stem)
-    return FileTable(name, RGB, None, _Reader(planes, samples), known)
+    nodes = functools.partial(_samples, planes, samples, name, known)
+    return FileTable(name, RGB, None, _Reader(planes, samples), known, nodes)
+
+
+def _samples(planes: Floats, samples: str, name: str, known: dict[str, Any]) -> Samples:
+    """Return the values of a file at its bins; negative numbers stand for what was not measured."""
+    offset = 0.5 if samples == "centres" else 0.0
+    at = [np.arange(count) + offset for count in SHAPE]
+    nodes = [np.deg2rad(axis) for axis in (_degrees_h(at[0]), at[1], at[2])]
+    values = np.where(planes < 0.0, np.nan, planes) * SCALE[:, np.newaxis, np.newaxis, np.newaxis]
+    return samples_of_grid(_SYSTEM, nodes, np.moveaxis(values, 0, -1), name, RGB, None, known)
 
 
 def _nodes(samples: str) -> tuple[NDArray[np.bool_], Floats]:

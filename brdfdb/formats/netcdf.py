@@ -3,7 +3,8 @@
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
 f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has a variable of its own.
+Anisotropic tables, all wavelengths and the specular part fit. The specular part has a variable of its own. The values
+take 100 MB at most: a table that needs more is written with the error it has.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".nc"
@@ -75,12 +77,12 @@ def write(
 
 
 def recognises(head: bytes) -> bool:
-    """Return True for the first bytes of a netCDF 3 file with a variable ``brdf`` over the axes of a grid."""
-    return head.startswith(_MAGIC) and any(name in head for name in (b"theta_r", b"theta_h"))
+    """Return True for the first bytes of a netCDF 3 file with a dimension of a grid, or one of samples."""
+    return head.startswith(_MAGIC) and any(name in head for name in (b"theta_r", b"theta_h", b"\0\0\0\x06sample"))
 
 
-def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly.
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+    """Return f_r of a netCDF file with ``brdf`` over angles [degree], interpolated linearly; or samples.
 
     Raises
     ------
@@ -96,4 +98,20 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     except (FileFormatError, FileNotFoundError):
         raise
     except Exception as error:  # SciPy raises what its parser comes to
-        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({error})") from error
+        first = str(error).partition("\n")[0]
+        raise FileFormatError(f"{path}: it is no netCDF 3 file, or is damaged ({first})") from error
+
+
+def write_samples(samples: Samples, path: str | os.PathLike[str]) -> None:
+    """Write samples as netCDF, which `read` gives back: whole, or not at all.
+
+    Raises
+    ------
+    MissingExtraError
+        If SciPy, which writes netCDF, is not installed.
+    WriteError
+        If the file cannot be written.
+    """
+    import_extra("scipy.io")
+    with whole(path) as (half,):
+        samples.to_xarray().to_netcdf(half, engine="scipy", format="NETCDF3_64BIT")

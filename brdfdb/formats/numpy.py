@@ -3,7 +3,8 @@
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
 f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own.
+Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own. The values
+take 100 MB at most: a table that needs more is written with the error it has.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats._dense_files import OPTIONS, dense_record, file_table
-from brdfdb.formats._record import specular_remark
+from brdfdb.formats._record import document_of, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".npz"
@@ -33,7 +35,7 @@ summary = "f_r on a plain grid of angles as NumPy arrays"
 tools = "NumPy"
 kinds = ()
 options = OPTIONS
-_MOST_BYTES = 1 << 30  # of an array that is read
+_MOST_BYTES, _MOST_OTHER = 1 << 29, 1 << 24  # of the values that are read, and of any other array
 
 
 def write(
@@ -94,39 +96,44 @@ def recognises(head: bytes) -> bool:
     return head.startswith(b"PK\x03\x04") and head[30:].startswith((b"theta_i.npy", b"theta_h.npy"))
 
 
-def read(path: str | os.PathLike[str]) -> FileTable:
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of an .npz archive with ``brdf`` and the axes that it lists, interpolated linearly.
+
+    A grid with holes, nan, gives samples.
 
     Raises
     ------
     FileFormatError
-        If the file is damaged, lacks an array, or holds one of more than 1 GiB.
+        If the file is damaged, lacks an array, or holds more than 512 MiB of values.
     """
     path = Path(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            names = [str(name) for name in _array(archive, "axes")]
-            at = _array(archive, "wavelength") if "wavelength" in names else None
-            axes = {name: _array(archive, name) for name in names if name != "wavelength"}
-            known = json.loads(str(_array(archive, "record"))) if "record.npy" in archive.namelist() else {}
-            values = _array(archive, "brdf")
-    # zipfile calls a compression that it does not know not implemented, which is a RuntimeError
-    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, EOFError, RuntimeError) as error:
+            names = [str(name) for name in _array(archive, "axes", _MOST_OTHER)]
+            arrays = {name: _array(archive, name, _MOST_OTHER) for name in names}
+            has_record = "record.npy" in archive.namelist()
+            known = document_of(str(_array(archive, "record", _MOST_OTHER))) if has_record else {}
+            values = _array(archive, "brdf", _MOST_BYTES)
+    except OSError:
+        raise
+    except Exception as error:  # zipfile, zlib and the parser of headers raise what they come to
         raise FileFormatError(f"{path}: it is no archive of NumPy arrays, or is damaged ({error})") from error
-    return file_table(path, axes, values, at, known if isinstance(known, dict) else {})
+    at = arrays.pop("wavelength", None)
+    return file_table(path, arrays, values, at, known)
 
 
-def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+def _array(archive: zipfile.ZipFile, name: str, most: int) -> NDArray[Any]:
     """Return an array of an archive; its header says no more than the archive holds."""
     member = archive.getinfo(f"{name}.npy")
-    if member.file_size > _MOST_BYTES:
+    if member.file_size > most:
         raise ValueError(f"{name} has {member.file_size} bytes")
-    data = io.BytesIO(archive.read(member))
+    content = archive.read(member)
+    data = io.BytesIO(content)
     header = np.lib.format.read_magic(data)
     parse = np.lib.format.read_array_header_1_0 if header == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = parse(data)
+    shape, by_columns, dtype = parse(data)
     size = member.file_size - data.tell()
     if dtype.hasobject or int(np.prod(shape, dtype=object)) * dtype.itemsize != size:
         raise ValueError(f"{name} says {dtype} of shape {shape} and has {size} bytes")
-    data.seek(0)
-    return np.asarray(np.lib.format.read_array(data, allow_pickle=False))
+    values = np.frombuffer(content, dtype, offset=data.tell()) if size else np.empty(0, dtype)
+    return values.reshape(shape, order="F" if by_columns else "C")

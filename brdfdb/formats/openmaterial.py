@@ -4,12 +4,14 @@ A row holds a wavelength in metres, three angles in radians, and f_r in 1/sr. Th
 viewer. The format does not say how to interpolate. The stated error is that of straight lines along all angles at once.
 
 All wavelengths fit. Grey tables are written at 550 nm. Anisotropic tables are refused, and the specular part is left
-out.
+out. A file has about 40 MB at most: a table that needs more is written with the error it has.
 """
 
 from __future__ import annotations
 
+import functools
 import json
+import math
 import os
 import re
 import uuid
@@ -20,11 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import CannotHoldError, FileFormatError
-from brdfdb.formats._dense_files import dense_record, reading_of_rows
+from brdfdb.formats._dense_files import dense_record, reading_of_rows, samples_of_rows
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, degrees_of, parsed, title_of
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
+from brdfdb.measurements.samples import Instrument
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -150,9 +153,29 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         raise FileFormatError(f"{path}: wavelengths have different directions")
     names = ("theta_i", "theta_r", "delta_phi")
     angles = {name: degrees_of(blocks[0, :, 1 + index], "rad") for index, name in enumerate(names)}
-    known = metadata.get("brdfdb") or {"name": metadata.get("name", "")}
+    known = metadata.get("brdfdb")
+    known = known if isinstance(known, dict) else {**metadata, "name": metadata.get("name", "")}
+    nodes = functools.partial(
+        samples_of_rows,
+        path,
+        angles,
+        blocks[:, :, 4].T,
+        at,
+        known,
+        instrument=Instrument(receiver_solid_angle_sr=_solid_angle(brdf)),
+        provenance=str(metadata.get("sources", "")),
+    )
     angles, values = _folded(angles, blocks[:, :, 4].T)
-    return reading_of_rows(path, angles, values, at, known if isinstance(known, dict) else {})
+    return reading_of_rows(path, angles, values, at, known, nodes)
+
+
+def _solid_angle(brdf: Any) -> float | None:
+    """Return the solid angle [sr] of the receiver; None if it is not known, or not the same at all wavelengths."""
+    entries = brdf.get("receiverSolidAngles") if isinstance(brdf, dict) else None
+    entries = entries if isinstance(entries, list) else []
+    angles = {entry.get("solidAngle") for entry in entries if isinstance(entry, dict)}
+    angle = angles.pop() if len(angles) == 1 else None
+    return float(angle) if isinstance(angle, int | float) and 0.0 < angle < math.inf else None
 
 
 def _folded(

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +24,8 @@ from brdfdb.formats import _bsdf_xml
 from brdfdb.formats._bsdf_xml import FRONT_OF_RADIANCE, VISIBLE, Block
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._square_disk import ANISOTROPIC, ISOTROPIC
+from brdfdb.formats._nodes import samples_at_vectors
+from brdfdb.formats._square_disk import ANISOTROPIC, ISOTROPIC, lights, viewers
 from brdfdb.formats._tensor_colour import trees_of, xyz_of
 from brdfdb.formats._tensor_growth import Growth
 from brdfdb.formats._tensor_tree import Tree, parsed, rounded
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
     from brdfdb.formats._stated_error import Comparison, FileError
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".xml"
@@ -219,4 +222,14 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         except ValueError as error:
             raise FileFormatError(f"{path}: block {name} is no tensor tree: {error}") from None
     of_colour = XYZ if len(trees) > 1 else LUMINOUS
-    return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record)
+    nodes = functools.partial(_samples, file.name, tuple(trees), of_colour, file.record)
+    return FileTable(file.name, of_colour, None, functools.partial(evaluated, tuple(trees)), file.record, nodes)
+
+
+def _samples(name: str, trees: tuple[Tree, ...], channels: tuple[str, ...], record: Mapping[str, Any]) -> Samples:
+    """Return the values at the middles of the cells of the first tree."""
+    place = trees[0].middles()
+    used = slice(None) if trees[0].rank == ANISOTROPIC else place[:, 0] < 0.5
+    wi, wr = lights(place[used, : trees[0].rank - 2]), viewers(place[used, -2:])
+    values = trees[0].values[used, np.newaxis] if len(trees) == 1 else evaluated(trees, wi, wr)
+    return samples_at_vectors(wi, wr, values, name, channels, None, record)

@@ -10,19 +10,23 @@ left out.
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb.formats._interface import TOLERANCE, Option
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._rgl_fields import Fields
     from brdfdb.formats._written import Written
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".bsdf"
@@ -32,7 +36,13 @@ tools = "Mitsuba 3 (`measured`), pbrt-v4, RGL's loader"
 kinds = ("spectral", "rgb")
 options = (
     TOLERANCE,
-    Option("megabytes", 64.0, "largest size of a file that is tried for the tolerance [MB]", low=0.01, high=2000.0),
+    Option(
+        "megabytes",
+        64.0,
+        "largest file [MB]: a table that needs more is written with the error it has",
+        low=0.1,
+        high=2000.0,
+    ),
     Option(
         "azimuth",
         "reduced",
@@ -41,6 +51,8 @@ options = (
     ),
 )
 
+# Bytes beside the values and the record: its error and remarks, headers of fields, angles; and for each wavelength
+_BESIDE, _BESIDE_EACH = 4000, 30
 HOLDS = (
     "spectra * ndf(half vector) / (4 sigma(light)) is f_r cos(theta_r) [1/sr], the cosine included; "
     "half vectors are warped by vndf"
@@ -71,11 +83,11 @@ def write(
     tolerance : float [1]
         Largest error against the table that 99 of 100 values may have: the smallest file within it is written.
     megabytes : float [1e6 byte]
-        Largest size that is tried; where it is not enough, the file with the least error of that size is written.
-        Files of grey tables for "rgb" repeat their values three times, which does not count.
+        Largest size of the file; where it is not enough, the file with the least error of that size is written.
     azimuth : str
         "reduced" leaves out azimuths of the light that follow from the symmetry of an anisotropic table, as only
-        Mitsuba 3 knows it. "full" is also for pbrt-v4 and RGL's loader; the file may be four times as large.
+        Mitsuba 3 knows it. "full" is also for pbrt-v4 and RGL's loader: within the same error, the file is up to four
+        times as large.
     verdict : str, optional
         Verdict of the audit of this revision.
 
@@ -83,6 +95,8 @@ def write(
     ------
     CannotHoldError
         If the kind is "rgb", and the table has several wavelengths that do not reach over the visible ones.
+    ParameterError
+        If no file of this table is so small.
     WriteError
         If the file cannot be written.
     """
@@ -92,7 +106,9 @@ def write(
     from brdfdb.formats._written import Written, whole
 
     path = Path(path)
-    fit = smallest(table, kind, tolerance, 1e6 * megabytes, azimuth == "full")
+    wavelengths = 0 if table.wavelength_nm is None else table.wavelength_nm.size
+    about = len(json.dumps(record(table, None, verdict, holds=HOLDS))) + _BESIDE + _BESIDE_EACH * wavelengths
+    fit = smallest(table, kind, tolerance, 1e6 * megabytes - about, azimuth == "full")
     remarks = (*fit.remarks, *specular_remark(table))
     document = record(table, fit.error, verdict, holds=HOLDS, remarks=remarks, tolerance=tolerance)
     document["channels"] = list(fit.channels)
@@ -121,19 +137,25 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     """
     from brdfdb.formats._channels import RGB
     from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._record import document_of
     from brdfdb.formats._rgl_fields import fields_of
     from brdfdb.formats._rgl_tensor import read_tensors
 
     fields = fields_of(path, read_tensors(path))
-    try:
-        document = json.loads(fields.description)
-    except ValueError:
-        document = {}
-    document = document if isinstance(document, dict) else {}
+    document = document_of(fields.description)
     name = str(document.get("name") or Path(path).stem)
-    if fields.wavelength_nm is None:
-        return FileTable(name, RGB, None, fields.evaluate, document)
-    if document.get("channels") == ["grey"] and fields.wavelength_nm.size == 1:
-        return FileTable(name, ("grey",), None, fields.evaluate, document)
-    at = fields.wavelength_nm.astype(np.float64)
-    return FileTable(name, tuple(f"{value:g}nm" for value in at), at, fields.evaluate, document)
+    at = None if fields.wavelength_nm is None else fields.wavelength_nm.astype(np.float64)
+    channels = RGB if at is None else tuple(f"{value:g}nm" for value in at)
+    if document.get("channels") == ["grey"] and at is not None and at.size == 1:
+        channels, at = ("grey",), None
+    nodes = functools.partial(_samples, fields, name, channels, at, document)
+    return FileTable(name, channels, at, fields.evaluate, document, nodes)
+
+
+def _samples(
+    fields: Fields, name: str, channels: tuple[str, ...], at: NDArray[np.float64] | None, document: dict[str, Any]
+) -> Samples:
+    """Return the values of a file at its own directions."""
+    from brdfdb.formats._nodes import samples_at_vectors
+
+    return samples_at_vectors(*fields.at_nodes(), name, channels, at, document)

@@ -1,10 +1,12 @@
 """Slang: the closed form of a table's model as a function.
 
-The function gives f_r in 1/sr, without the cosine. It computes the model itself with the parameters of the material, so
-nothing is interpolated. The stated error is that of the model against the table.
+The function gives f_r in 1/sr, without the cosine. It computes the model with the parameters of the material, so
+nothing is interpolated. Tables of Oren and Nayar's integrals over facets are the exception: the function is the
+functional fit of their paper, up to 14 % off for presets, and the remarks of the file say so. The stated error is that
+of the function against the table.
 
-Anisotropic models fit, and colours in linear sRGB. Models with integrals or spectra of refractive indices have no
-closed form, and are refused. The specular part is left out.
+Anisotropic models fit, and colours in linear sRGB. Other models with integrals, and spectra of refractive indices, have
+no closed form, and are refused. The specular part is left out.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from brdfdb.formats._shader_source import Language, write_source
 
 suffix = ".slang"
 media_type = "text/plain"
-summary = "closed-form models as source code of Slang"
+summary = "closed-form models, or the published fit of one, as source code of Slang"
 tools = "Slang and the programs that compile it: Falcor, RTX Kit, Vulkan, CUDA; HLSL has the same text"
 kinds: tuple[str, ...] = ()
 options = ()

@@ -9,6 +9,7 @@ Anisotropic tables, all wavelengths and the specular part fit.
 
 from __future__ import annotations
 
+import functools
 import os
 from importlib.metadata import version
 from pathlib import Path
@@ -20,14 +21,15 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _ssdd_file
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
-from brdfdb.formats._angular_grid import AngularGrid, chosen, mirrored, reciprocal
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, mirrored, reciprocal
 from brdfdb.formats._interface import TOLERANCE, Option
+from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import lines, of_lines, record
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
-    from brdfdb.formats._stated_error import Comparison
+    from brdfdb.formats._stated_error import Comparison, FileError
     from brdfdb.tables.table import Table
 
 suffix = ".ssdd"
@@ -38,7 +40,7 @@ kinds = ()
 options = (
     TOLERANCE,
     Option("data", "binary", "form of the values", choices=("binary", "ascii")),
-    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+    SIZE,
 )
 
 _NAMES = {
@@ -47,7 +49,6 @@ _NAMES = {
     Spherical: "spherical_coordinate_system",
 }
 _COLOURS = {"monochrome": ("grey",), "rgb": ("R", "G", "B"), "xyz": ("X", "Y", "Z")}
-_CHARACTERS = 11  # of a value in ASCII
 
 
 def write(
@@ -78,6 +79,8 @@ def write(
 
     Raises
     ------
+    ParameterError
+        If no file of this table is so small.
     WriteError
         If the file cannot be written.
 
@@ -90,16 +93,18 @@ def write(
     from brdfdb.formats._stated_error import Comparison
 
     comparison = Comparison(table)
-    channels = len(comparison.channels.names)
-    most = int(size * 1e6 / channels / (4 if data == "binary" else _CHARACTERS))
-    grid, error = chosen(table, comparison, _systems(table, comparison), tolerance, most)
-    document = record(table, error, verdict, tolerance=tolerance)
     software = f"brdfdb-{version('brdfdb')}"
-    with whole(path) as (file,), file.open("wb") as stream:
-        stream.write(_ssdd_file.header(software, lines(document)))
-        stream.write(_ssdd_file.block(_entries(table, grid), _four(grid), data == "binary"))
+
+    def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
+        document = record(table, error, verdict, tolerance=tolerance)
+        sink.write(_ssdd_file.header(software, lines(document)))
+        sink.write(_ssdd_file.block(_entries(table, grid), _four(grid), data == "binary"))
         if table.specular is not None:
-            stream.write(_specular(table, data == "binary"))
+            sink.write(_specular(table, data == "binary"))
+
+    grid, error = chosen(table, comparison, _systems(table, comparison), tolerance, size, write_all)
+    with whole(path) as (file,), file.open("wb") as stream:
+        write_all(stream, grid, error)
     return Written((Path(path),), error, tolerance)
 
 
@@ -138,7 +143,9 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     at = block.wavelength_nm
     names = _COLOURS[block.entries["COLOR_MODEL"]] if at is None else tuple(f"{value:g}nm" for value in at)
     name = str(document.get("name") or block.entries.get("NAME") or path.stem)
-    return FileTable(name, names, at, grid.evaluate, document)
+    angles = [np.deg2rad(axis) for axis in block.angles]
+    nodes = functools.partial(samples_of_grid, grid.system, angles, block.values, name, names, at, document)
+    return FileTable(name, names, at, grid.evaluate, document, nodes)
 
 
 def _systems(table: Table, comparison: Comparison) -> list[System]:

@@ -9,10 +9,11 @@ Anisotropic tables fit. Spectral tables become linear sRGB. The specular part is
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,12 +23,14 @@ from brdfdb.formats._angular_grid import AngularGrid, filled
 from brdfdb.formats._beside import beside, record_beside
 from brdfdb.formats._channels import RGB, channels_of
 from brdfdb.formats._interface import FIXED, Option
+from brdfdb.formats._nodes import samples_of_grid
 from brdfdb.formats._record import record, specular_remark
 from brdfdb.formats._written import Written, whole
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".bin"
@@ -117,7 +120,7 @@ def recognises(head: bytes) -> bool:
         return False
     with np.errstate(invalid="ignore"):
         size = np.abs(numbers)
-        return bool(np.all((numbers == 0.0) | ((size > _LIKELY[0]) & (size < _LIKELY[1]))))
+        return bool(np.any(numbers)) and bool(np.all((numbers == 0.0) | ((size > _LIKELY[0]) & (size < _LIKELY[1]))))
 
 
 def read(path: str | os.PathLike[str]) -> FileTable:
@@ -141,8 +144,16 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         raise FileFormatError(f"{path}: a number is not finite")
     known = record_beside(path)
     numbers = np.pad(np.moveaxis(planes, 0, -1), [(0, 0), (0, 1), (0, 0), (0, 1), (0, 0)], mode="wrap")
-    evaluate = _Reader(numbers, "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear")
-    return FileTable(str(known.get("name") or path.stem), RGB, None, evaluate, known)
+    encoding = "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear"
+    name = str(known.get("name") or path.stem)
+    nodes = functools.partial(_samples, planes, encoding, name, known)
+    return FileTable(name, RGB, None, _Reader(numbers, encoding), known, nodes)
+
+
+def _samples(planes: Floats, encoding: str, name: str, known: dict[str, Any]) -> Samples:
+    """Return the values of a file at its own angles."""
+    nodes = [np.deg2rad(step * np.arange(count)) for step, count in zip(STEPS_DEG, SHAPE, strict=True)]
+    return samples_of_grid(_SYSTEM, nodes, _decoded(np.moveaxis(planes, 0, -1), encoding), name, RGB, None, known)
 
 
 def _encoded(f_r: Floats, encoding: str) -> Floats:

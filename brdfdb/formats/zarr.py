@@ -3,7 +3,8 @@
 The axes are polar angles and azimuths of light and viewer, or angles of the half and difference vectors (``--axes``).
 f_r is in 1/sr, without the cosine. Readers interpolate in straight lines along all axes at once.
 
-Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own.
+Anisotropic tables, all wavelengths and the specular part fit. The specular part has an array of its own. The values
+take 100 MB at most, before compression: a table that needs more is written with the error it has.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brdfdb.errors import FileFormatError
-from brdfdb.formats._dense_files import OPTIONS, dataset, read_dataset
+from brdfdb.formats._dense_files import OPTIONS, check_sizes, dataset, read_dataset
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
+    from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
 suffix = ".zarr"
@@ -74,8 +76,8 @@ def recognises(head: bytes) -> bool:
     return b'"zarr_format"' in head and b'"group"' in head
 
 
-def read(path: str | os.PathLike[str]) -> FileTable:
-    """Return f_r of a zarr group with ``brdf`` over angles [degree], interpolated linearly.
+def read(path: str | os.PathLike[str]) -> FileTable | Samples:
+    """Return f_r of a zarr group with ``brdf`` over angles [degree], interpolated linearly; or samples.
 
     Raises
     ------
@@ -83,8 +85,11 @@ def read(path: str | os.PathLike[str]) -> FileTable:
         If the group is damaged, or ``brdf`` is not over the axes of a grid.
     """
     import xarray as xr
+    import zarr
 
     try:
+        group = zarr.open_group(os.fspath(path), mode="r", zarr_format=3)
+        check_sizes(Path(path), {name: array.shape for name, array in group.arrays()})  # xarray reads axes at once
         with xr.open_zarr(os.fspath(path), chunks=None, consolidated=False) as opened:
             return read_dataset(Path(path), opened)
     except FileFormatError:

@@ -10,9 +10,10 @@ alone (``--colour``). The specular part is left out.
 
 from __future__ import annotations
 
+import functools
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +21,19 @@ from numpy.typing import NDArray
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import _zemax_file
 from brdfdb.formats._angles import Specular
-from brdfdb.formats._angular_grid import AngularGrid, chosen, rounded
+from brdfdb.formats._angular_grid import SIZE, AngularGrid, Sink, chosen, rounded
 from brdfdb.formats._channels import LUMINOUS, XYZ, channels_of
 from brdfdb.formats._interface import TOLERANCE, Option
-from brdfdb.formats._record import CONVENTION, lines, of_lines, record, specular_remark
+from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._record import CONVENTION, lines, of_comments, of_lines, record, specular_remark
 from brdfdb.formats._written import Written, whole
 
 if TYPE_CHECKING:
     from brdfdb.formats._channels import Channels
     from brdfdb.formats._readings import FileTable
+    from brdfdb.formats._stated_error import FileError
+    from brdfdb.measurements.samples import Samples
+    from brdfdb.tables.albedo import TableAlbedo
     from brdfdb.tables.table import Table
 
 suffix = ".bsdf"
@@ -39,10 +44,9 @@ kinds = ()
 options = (
     TOLERANCE,
     Option("colour", "auto", "CIE XYZ, or its Y alone; auto: XYZ of spectral tables", choices=("auto", "xyz", "grey")),
-    Option("size", 16.0, "largest file [MB]: a table that needs more is written with the error it has", 0.1, 1000.0),
+    SIZE,
 )
 
-_CHARACTERS = 10  # of a value
 _TIS_TOLERANCE = 1e-4  # absolute, of an albedo
 _HOLDS = f"{CONVENTION}; the sample is turned by phi_i, and angles of incidence and TIS are those of the table"
 
@@ -77,6 +81,8 @@ def write(
     ------
     CannotHoldError
         If the wavelengths of the table give no colour.
+    ParameterError
+        If no file of this table is so small.
     WriteError
         If the file cannot be written.
 
@@ -88,38 +94,50 @@ def write(
     specular part. OpticStudio's own model and libbsdf read files of one rotation only, those of isotropic tables.
     """
     from brdfdb.formats._stated_error import Comparison
+    from brdfdb.tables.albedo import directional_albedo
 
     channels = channels_of(table, colour)
-    count = len(channels.names)
     system = Specular(table.anisotropic, mirrored=not table.anisotropic)
+    remarks = (*channels.remarks, *specular_remark(table))
+    albedo = directional_albedo(table, tolerance=_TIS_TOLERANCE)
+
+    def write_all(sink: Sink, grid: AngularGrid, error: FileError) -> None:
+        document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
+        document["channels"] = list(channels.names)
+        _zemax_file.write(sink, _text(table, channels, albedo, grid, tuple(lines(document))))
+
     grid, error = chosen(
         table,
         Comparison(table, channels),
         [system],
         tolerance,
-        int(size * 1e6 / count / _CHARACTERS),
+        size,
+        write_all,
         lambda some: AngularGrid(some.system, some.nodes, rounded(some.values)),
     )
-    remarks = (*channels.remarks, *specular_remark(table))
-    document = record(table, error, verdict, holds=_HOLDS, remarks=remarks, tolerance=tolerance)
-    document["channels"] = list(channels.names)
+    with whole(path) as (file,), file.open("wb") as stream:
+        write_all(stream, grid, error)
+    return Written((Path(path),), error, tolerance, remarks)
+
+
+def _text(
+    table: Table, channels: Channels, albedo: TableAlbedo, grid: AngularGrid, comments: tuple[str, ...]
+) -> _zemax_file.Text:
+    """Return the content of the file of a grid."""
     angles = [np.rad2deg(axis) for axis in grid.nodes]
     values = grid.values
     if not table.anisotropic:
         angles.insert(1, np.zeros(1))
         values = values[:, np.newaxis]
-    text = _zemax_file.Text(
-        comments=tuple(lines(document)),
+    return _zemax_file.Text(
+        comments=comments,
         symmetry="ASymmetrical4D" if table.anisotropic else "PlaneSymmetrical",
-        content="XYZ" if count == 3 else "Monochrome",
+        content="XYZ" if len(channels.names) == 3 else "Monochrome",
         scatter="BRDF",
         angles=(angles[1], angles[0], angles[3], angles[2]),
-        tis=_albedo(table, channels, angles[0], angles[1]),
+        tis=_albedo(table, channels, albedo, angles[0], angles[1]),
         values=values.transpose(4, 1, 0, 3, 2),
     )
-    with whole(path) as (file,), file.open("wb") as stream:
-        _zemax_file.write(stream, text)
-    return Written((Path(path),), error, tolerance, remarks)
 
 
 def recognises(head: bytes) -> bool:
@@ -150,7 +168,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     if text.scatter != "BRDF":
         raise FileFormatError(f"{path}: its ScatterType is {text.scatter!r}; only BRDF is read")
     turns, incidences, azimuths, radials = (np.deg2rad(axis) for axis in text.angles)
-    values = text.values.transpose(2, 1, 4, 3, 0)
+    values = text.values.transpose(2, 1, 4, 3, 0).astype(np.float32)
     both_sides = text.symmetry == "PlaneSymmetrical"
     if both_sides and azimuths[-1] < np.pi:  # the interval around 180 degrees has its mirror image at the other end
         azimuths, values = np.append(azimuths, np.pi), np.concatenate([values, values[..., -1:, :]], axis=3)
@@ -161,16 +179,37 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     document |= {"theta_i_deg": text.angles[1].tolist(), "tis": np.moveaxis(text.tis, 0, -1).tolist()}
     luminous = document.get("channels") == list(LUMINOUS)
     names = XYZ if text.content == "XYZ" else LUMINOUS if luminous else ("grey",)
-    return FileTable(str(document.get("name") or path.stem), names, None, grid.evaluate, document)
+    name = str(document.get("name") or path.name.partition(".")[0])
+    listed = functools.partial(_samples, name, names, text, document)
+    return FileTable(name, names, None, grid.evaluate, document, listed)
+
+
+def _samples(name: str, names: tuple[str, ...], text: _zemax_file.Text, document: dict[str, Any]) -> Samples:
+    """Return the values of a file at their own angles."""
+    nodes = [np.deg2rad(text.angles[axis]) for axis in (1, 0, 3, 2)]
+    instrument, wavelength_nm = of_comments(document)
+    known = wavelength_nm is not None and names == ("grey",)
+    return samples_of_grid(
+        Specular(anisotropic=True, mirrored=False),
+        nodes,
+        text.values.transpose(2, 1, 4, 3, 0),
+        name,
+        (f"{wavelength_nm:g}nm",) if known else names,
+        np.array([wavelength_nm]) if known else None,
+        document,
+        instrument=instrument,
+        provenance=str(document.get("Sample", "")),
+    )
 
 
 def _albedo(
-    table: Table, channels: Channels, theta_i_deg: NDArray[np.float64], phi_i_deg: NDArray[np.float64]
+    table: Table,
+    channels: Channels,
+    known: TableAlbedo,
+    theta_i_deg: NDArray[np.float64],
+    phi_i_deg: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the directional albedo [1] of a table without its specular part, shape (C, phi_i, theta_i)."""
-    from brdfdb.tables.albedo import directional_albedo
-
-    known = directional_albedo(table, tolerance=_TIS_TOLERANCE)
     at = table.wavelength_nm
     albedo = known.albedo
     if channels.wavelength_nm is not None and at is not None:

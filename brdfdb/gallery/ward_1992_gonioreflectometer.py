@@ -9,37 +9,13 @@ from numpy.typing import NDArray
 
 from brdfdb.figure import Figure, Map, Panel, Statement, curve_of, listed, rows
 from brdfdb.geometry import degrees, radians, unit_vector
+from brdfdb.measurements.gonioreflectometer import eq_3, traced
 
 Array = NDArray[np.float64]
 
 GOOD_DEG = 1.0  # error of "a good approximation", our reading: the 108 by 80 pixels of the prototype have about 2°
 SMALL = 0.1  # D over R for "small in relation to R", our reading
 OFFSETS = (0.05, 0.1, 0.2)  # D over R of the statement
-
-
-def eq_3(theta_c: Array, phi_c: Array, D: float) -> Array:
-    """Return the directions from the target, unit vectors (..., 3), that eq. 3 gives for directions of the camera.
-
-    `theta_c` and `phi_c` [rad] refer to the camera. D is half of the distance of target and camera, and R is 1.
-    """
-    sine = np.sin(phi_c) * np.sin(theta_c)
-    r_c = D * sine + np.sqrt(D**2 * sine**2 + 1.0 - D**2)
-    x, y, z = r_c * np.cos(phi_c) * np.sin(theta_c), r_c * sine - 2.0 * D, r_c * np.cos(theta_c)
-    theta_r = np.arccos(z / np.sqrt(x**2 + y**2 + z**2))
-    return unit_vector(theta_r, np.arctan2(y, x))
-
-
-def traced(theta_c: Array, phi_c: Array, D: float) -> Array:
-    """Return the directions, unit vectors (..., 3), in which light leaves the sample towards the camera.
-
-    The camera is at (0, -D, 0) and the target at (0, D, 0), with the middle of a sphere of radius 1 between them. A ray
-    from the camera is mirrored once, and meets the sample at the target or close to it.
-    """
-    out = unit_vector(theta_c, phi_c)
-    camera = np.array([0.0, -D, 0.0])
-    along = out @ camera
-    point = camera + (-along + np.sqrt(along**2 + 1.0 - D**2))[..., None] * out
-    return np.asarray(2.0 * np.sum(out * point, axis=-1, keepdims=True) * point - out)
 
 
 def _grid() -> tuple[Array, Array]:

@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from brdfdb.measurements.measured_source import MeasuredSource
 from brdfdb.measurements.record import Measured, Noise
-from brdfdb.measurements.samples import Instrument, Samples
+from brdfdb.measurements.samples import Instrument, Samples, joined
 
-__all__ = ["Instrument", "Measured", "MeasuredSource", "Noise", "Samples"]
+__all__ = ["Instrument", "Measured", "MeasuredSource", "Noise", "Samples", "joined"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -234,6 +234,28 @@ class Samples:
             provenance=str(attributes.get("provenance", "")),
             record=json.loads(attributes.get("record", "{}")),
         )
+
+
+def joined(parts: Sequence[Samples]) -> Samples:
+    """Return the samples of several pictures or files of one surface as one.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or they have different channels.
+    """
+    if not parts:
+        raise ParameterError("parts", "there are no samples to join", 0)
+    first = parts[0]
+    for other in parts:
+        if other.channels != first.channels:
+            raise ParameterError("parts", f"channels {other.channels} and {first.channels} differ", other.channels)
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in (*ANGLES, "values")
+    }
+    noises = [part.uncertainty for part in parts if part.uncertainty is not None]
+    uncertainty = np.concatenate(noises) if len(noises) == len(parts) else None
+    return replace(first, **arrays, uncertainty=uncertainty)
 
 
 def _angle(dataset: xr.Dataset, name: str, count: int) -> Floats:

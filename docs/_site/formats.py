@@ -22,8 +22,21 @@ def write(docs: Path, _: Path) -> None:
         )
         for name, exporter in EXPORTERS.items()
     ]
-    parts = [table(("format", "files", "holds", "read by", "read again by brdfdb"), rows), *map(_section, EXPORTERS)]
+    readers = [name for name in IMPORTERS if name not in EXPORTERS]
+    read_alone = [(f"`{name}`", f"`{IMPORTERS[name].suffix}`", plain(_summary(name))) for name in readers]
+    parts = [
+        "These formats are read, and not written.\n",
+        table(("format", "files", "holds"), read_alone),
+        "These are written.\n",
+        table(("format", "files", "holds", "read by", "read again by brdfdb"), rows),
+        *map(_section, EXPORTERS),
+    ]
     write_page(docs / "reference" / "generated" / "formats.txt", "\n".join(parts))
+
+
+def _summary(name: str) -> str:
+    """Return the first line of the docstring of a format, without the name of the format."""
+    return (inspect.getdoc(IMPORTERS[name]) or "").splitlines()[0].partition(": ")[2]
 
 
 def _section(name: str) -> str:
@@ -45,7 +58,7 @@ def _prose(text: str) -> str:
 def _allowed(option: Option) -> str:
     if option.choices:
         return ", ".join(f"`{choice}`" for choice in option.choices)
-    return "" if isinstance(option.default, bool) else f"{option.low:g} to {option.high:g}"
+    return "" if isinstance(option.default, bool) else plain(option.allowed)
 
 
 def _default(option: Option) -> str:

@@ -20,7 +20,7 @@ _EXAMPLES = {
     "?theta_i=30&theta_r=30&phi_r=180'",
     "/v1/materials/{name}/albedo": "curl http://127.0.0.1:8000/v1/materials/rolled-brass/albedo",
     "/v1/materials/{name}/lobe": "curl 'http://127.0.0.1:8000/v1/materials/rolled-brass/lobe?theta_i=45'",
-    "/v1/materials/{name}/export/{file_format}": "curl -O http://127.0.0.1:8000/v1/materials/rolled-brass/export/exr",
+    "/v1/materials/{name}/export/{file_format}": "curl -OJ http://127.0.0.1:8000/v1/materials/rolled-brass/export/exr",
     "/v1/materials/{name}/audit": "curl http://127.0.0.1:8000/v1/materials/rolled-brass/audit",
     "/v1/materials/{name}/download.zarr": "curl -OJ http://127.0.0.1:8000/v1/materials/rolled-brass/download.zarr",
 }

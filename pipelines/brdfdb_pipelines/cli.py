@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import difflib
 import errno
 import io
 import os
 import platform
 import shlex
+import signal
 import sys
 import tempfile
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from brdfdb.errors import BrdfdbError, UnknownMaterialError, missing_extra
 from brdfdb_pipelines.commands import commands
-from brdfdb_pipelines.exit_codes import BUG, INTERRUPTED, REFUSED, VIOLATED
+from brdfdb_pipelines.exit_codes import BUG, INTERRUPTED, REFUSED, TERMINATED, VIOLATED
 
 _LONGEST = 1000  # characters of a sentence: what a recipe gives may be a megabyte
 # Errors of the operating system that concern the machine, also where they name no file
@@ -35,6 +38,7 @@ exit codes:
   {REFUSED}    refused or impossible, for the reason on stderr: bad input, a damaged store, a full disk, a missing extra
   {BUG}   a bug of brdfdb; stderr names the file with the traceback
   {INTERRUPTED}  interrupted by Ctrl-C
+  {TERMINATED}  ended by SIGTERM, as cleanly as by Ctrl-C
 """
 
 
@@ -89,6 +93,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if command in _WITHOUT_KERNELS and "BRDFDB_MODELS" not in os.environ:
             os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
     options = _parser(arguments).parse_args(arguments, argparse.Namespace(arguments=arguments))
+    with _sigterm_as_ctrl_c() as received:
+        code = _run(options, arguments)
+    return TERMINATED if received and code == INTERRUPTED else code
+
+
+@contextlib.contextmanager
+def _sigterm_as_ctrl_c() -> Iterator[list[int]]:
+    """Treat SIGTERM like Ctrl-C, so that no half file is left, and give a list of the signals that came."""
+    received: list[int] = []
+
+    def stop(number: int, _: object) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:  # a caller has its own
+        yield received
+        return
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _run(options: argparse.Namespace, arguments: Sequence[str]) -> int:
+    """Run the command and return its exit code; errors become sentences."""
     try:
         _add_models(options)
         code: int = options.run(options)

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 import brdfdb
-from brdfdb.errors import counted
+from brdfdb.errors import WriteError, counted
 from brdfdb.formats._written import whole
 from brdfdb.materials import presets
 from brdfdb.scenes.image import write_channels
@@ -53,11 +53,12 @@ CAPTION = (
 def run(root: str, names: Sequence[str], out: Path, jobs: int) -> None:
     """Write the contact sheet of materials of a store, by default of all, as PNG or EXR, and print its size.
 
-    An EXR is in linear light, and light brighter than white is not clipped.
+    An EXR is in linear light, and light brighter than white is not clipped. WriteError if the file cannot be written.
     """
     store = brdfdb.open(root)
     tables = {name: store[name] for name in names or store}
-    out.parent.mkdir(parents=True, exist_ok=True)
+    if not out.parent.is_dir():  # before the time is spent
+        raise WriteError(f"cannot write {out}: there is no directory {out.parent}")
     linear = out.suffix.lower() == ".exr"
     with terminal.progress() as bar, ThreadPoolExecutor(jobs) as pool:
         task = bar.add_task("rendering", total=len(tables))

@@ -7,20 +7,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-import brdfdb
 from brdfdb.conversion.convert import STEPS, convert
 from brdfdb.conversion.document import Conversion, percent
 from brdfdb.conversion.figure import figure_of
 from brdfdb.conversion.nodes import Weigh
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians
-from brdfdb.materials import Source, written_name
+from brdfdb.materials import written_name
 from brdfdb.models import MODELS
-from brdfdb.parameters import closest
-from brdfdb.tables.table_source import source_of_table
-from brdfdb_pipelines import recipe_file, terminal
+from brdfdb_pipelines import terminal
+from brdfdb_pipelines.named_source import named_source
 
 PATIENCE_S = 2.0  # time [s] after which the bar of progress appears
 
@@ -71,7 +68,7 @@ def run(
     ParameterError
         If the material is unknown, or the conversion is refused.
     """
-    source, at = _source(name, store, recipe_path)
+    source, at = named_source(name, store, recipe_path)
     if wavelength_nm is not None:
         at = np.array(wavelength_nm, dtype=np.float64)
     values = _values(model, fixed)
@@ -100,18 +97,6 @@ def run(
     else:
         print(terminal.plain("\n".join(lines(conversion))))
     return conversion
-
-
-def _source(name: str, root: Path | None, recipe_path: Path | None) -> tuple[Source, NDArray[np.float64] | None]:
-    """Return a material of the recipe or the store, with its wavelengths."""
-    jobs = {job.material.name: job for job in recipe_file.load(recipe_path, to_build=False).jobs()}
-    if name in jobs:
-        return jobs[name].material, jobs[name].wavelength_nm
-    store = brdfdb.open(root) if root is not None and root.exists() else None
-    if store is not None and name in store:
-        return source_of_table(store[name]), store[name].wavelength_nm
-    names = [*jobs, *(store or ())]
-    raise ParameterError(name, f"no such material, neither in the store nor in the recipe{closest(name, names)}", name)
 
 
 def _values(model: str, settings: Sequence[str]) -> dict[str, float]:

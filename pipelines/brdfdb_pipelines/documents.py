@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from brdfdb.audit import AuditReport
 from brdfdb.conversion.document import Conversion
+from brdfdb.fitting.document import Fits
 from brdfdb.forms.tradeoff_document import Charts
 from brdfdb.materials import Material
 from brdfdb.scenes.choice_document import Choice
@@ -28,6 +29,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "choice": Choice,
     "conversion": Conversion,
     "family": FamilyRecord,
+    "fits": Fits,
     "material": Material,
     "recipe": Recipe,
     "scene": Scene,

@@ -9,20 +9,22 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import brdfdb
-from brdfdb.errors import CannotHoldError, WriteError, counted
+from brdfdb.errors import CannotHoldError, ParameterError, WriteError, counted
 from brdfdb.formats import EXPORTERS
 from brdfdb.formats._written import Written
+from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb_pipelines import terminal, workers
 
 _FEW = 3  # materials that are written before other processes would have started
+_NAMED = 3  # materials that a remark names
 
 
 class _Export(NamedTuple):
-    """Result of the export of one material: its files, or the reason why the format cannot hold it."""
+    """Result of the export of one material: its files, and the reason why one of them cannot be written."""
 
     name: str
     files: list[Written]
-    refusal: CannotHoldError | None = None
+    refusal: str = ""
 
 
 def run(
@@ -31,14 +33,15 @@ def run(
     directory: Path,
     file_format: str,
     options: Mapping[str, Any],
-    audit: Path,
+    audit: Path | None,
     jobs: int,
 ) -> bool:
     """Write the named materials of a store, or all of them, in a format of `EXPORTERS`, and print what was written.
 
     A format with several kinds of files writes one of each, NAME_KIND.SUFFIX, unless the options choose a kind. Of all
     materials, those that the format cannot hold are left out and named. `audit` is the report whose verdicts are
-    written. A few materials are written by `jobs` threads, more by as many processes.
+    written; None: that of the store, if it has one. A few materials are written by `jobs` threads, more by as many
+    processes.
 
     Returns
     -------
@@ -47,19 +50,21 @@ def run(
 
     Raises
     ------
+    ParameterError
+        If `audit` is no report.
     CannotHoldError
-        If the format cannot hold a material that is named, or any of all.
+        If the format cannot hold a material that is named, or any of all; the others are written and printed.
     WriteError
         If a file cannot be written.
     """
     store = brdfdb.open(root)
     revisions = {name: store.head(name) for name in names or store}
+    verdicts = _verdicts(root, audit, revisions)
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = "it is a file, not a directory" if isinstance(error, FileExistsError) else error.strerror
         raise WriteError(f"cannot write to {directory}: {reason}") from None
-    verdicts = _verdicts(audit, revisions)
     write = partial(_write, root, directory, file_format, options, verdicts)
     exports: list[_Export] = []
     pool = workers.threads(jobs) if len(revisions) <= _FEW else workers.processes(jobs, patient=False)
@@ -70,61 +75,72 @@ def run(
         except BaseException:
             some.executor.shutdown(cancel_futures=True)
             raise
-    refused = [export for export in exports if export.refusal is not None]
-    if refused and (names or len(refused) == len(exports)):
-        assert refused[0].refusal is not None
-        raise refused[0].refusal
-    return _report(exports, directory, file_format)
+    refusals = [export.refusal for export in exports if export.refusal]
+    within = not any(export.files for export in exports) or _report(exports, directory, file_format)
+    if names and refusals:
+        raise CannotHoldError("; ".join(refusals))
+    if refusals and not any(export.files for export in exports):
+        raise CannotHoldError(refusals[0])
+    for refusal in refusals:
+        print(f"{refusal}; left out")
+    return within
 
 
 def _write(
     root: Path, directory: Path, file_format: str, options: Mapping[str, Any], verdicts: Mapping[str, str], name: str
 ) -> _Export:
     """Write the files of one material."""
-    exporter, table, verdict = EXPORTERS[file_format], brdfdb.open(root)[name], verdicts.get(name)
+    exporter, table, verdict = EXPORTERS[file_format], brdfdb.open(root)[name], verdicts.get(name, NOT_AUDITED)
     kinds = (options["kind"],) if "kind" in options else exporter.kinds
     paths = [(directory / f"{name}_{kind}{exporter.suffix}", {"kind": kind}) for kind in kinds]
+    files: list[Written] = []
     try:
-        return _Export(
-            name,
-            [
-                exporter.write(table, path, verdict=verdict, **{**options, **kind})
-                for path, kind in paths or [(directory / f"{name}{exporter.suffix}", {})]
-            ],
-        )
-    except CannotHoldError as error:
-        return _Export(name, [], error)
+        for path, kind in paths or [(directory / f"{name}{exporter.suffix}", {})]:
+            files.append(exporter.write(table, path, verdict=verdict, **{**options, **kind}))
+    except (CannotHoldError, ParameterError) as error:  # options that some tables cannot have
+        return _Export(name, files, str(error) if name in str(error) else f"{name}: {error}")
+    return _Export(name, files)
 
 
-def _verdicts(audit: Path, revisions: Mapping[str, str]) -> dict[str, str]:
-    """Return the verdicts of an audit report on these revisions by name; none if there is no report."""
+def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> dict[str, str]:
+    """Return the verdicts of an audit report on these revisions by name; none if the store has no report."""
+    path = root / "audit.json" if audit is None else audit
     try:
-        materials = json.loads(audit.read_bytes())["materials"]
+        materials = json.loads(path.read_bytes())["materials"]
         given = {entry["material"]: (entry["revision"], entry["verdict"]) for entry in materials}
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        if audit is None:
+            return {}
+        reason = error.strerror if isinstance(error, OSError) else "it is no report of `brdfdb audit`"
+        raise ParameterError("audit", f"{audit} cannot be read: {reason}", str(audit)) from None
     return {
         name: given[name][1] for name, revision in revisions.items() if name in given and given[name][0] == revision
     }
 
 
 def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:
-    """Print what was written, what is beyond its tolerance and what was left out; return True if nothing is beyond."""
+    """Print what was written, and what is beyond its tolerance; return True if nothing is beyond."""
     written = [(export.name, files) for export in exports for files in export.files]
-    count, total = sum(len(files.paths) for _, files in written), sum(files.nbytes for _, files in written)
-    print(f"{counted(count, f'{file_format.upper()} file')}, {terminal.size(total)}, in {directory}")
-    stated = [(files.error.p99, name) for name, files in written if files.error is not None]
+    beside, total = sum(len(files.paths) - 1 for _, files in written), sum(files.nbytes for _, files in written)
+    others = f" and {beside} beside {'it' if len(written) == 1 else 'them'}" if beside else ""
+    print(f"{counted(len(written), f'{file_format.upper()} file')}{others}, {terminal.size(total)}, in {directory}")
+    stated = [(files.error.document()["p99"], files.paths[0].name) for _, files in written if files.error is not None]
     if stated:
-        worst, name = max(stated)
-        print(f"error against the table: 99 of 100 values within {worst:.2%} ({name}), each file states its own")
-    beyond = [(name, files) for name, files in written if not files.within]
-    for name, files in beyond:
+        worst, file = max(stated)
+        print(f"error against the table: 99 of 100 values within {_share(worst)} ({file}), each file states its own")
+    beyond = [files for _, files in written if not files.within]
+    for files in beyond:
         assert files.error is not None
-        print(f"{name}: {files.error.p99:.2%}, beyond the tolerance of {files.tolerance:.2%}")
+        assert files.tolerance is not None
+        p99 = files.error.document()["p99"]
+        print(f"{files.paths[0].name}: {_share(p99)}, beyond the tolerance of {_share(files.tolerance)}")
     for remark in sorted({remark for _, files in written for remark in files.remarks}):
         names = list(dict.fromkeys(name for name, files in written if remark in files.remarks))
-        print(f"{', '.join(names) if len(names) < 4 else counted(len(names), 'material')}: {remark}")
-    for export in exports:
-        if export.refusal is not None:
-            print(f"{export.refusal}; left out")
+        more = f" and {counted(len(names) - _NAMED, 'other material')}" if len(names) > _NAMED else ""
+        print(f"{', '.join(names[:_NAMED])}{more}: {remark}")
     return not beyond
+
+
+def _share(error: float) -> str:
+    """Return a relative error in percent, or above 100 % as a multiple of the value."""
+    return f"{100.0 * error:.3g}%" if error <= 1.0 else f"{error:.3g} times the value"

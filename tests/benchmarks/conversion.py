@@ -21,8 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from brdfdb import models, roughness
 from brdfdb.conversion.convert import compare, convert
-from brdfdb.conversion.minimisation import spread
-from brdfdb.conversion.target import index_of
+from brdfdb.fitting.variables import index_of, spread
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.sampling import directions, mixture_density
 from brdfdb.lobes import GGX, Lobe

@@ -175,9 +175,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 worst = max(worst, abs(wrong), window or 0.0)
                 matrices.add(name, kind, written.nbytes / 1e6, seconds, error.p99, error.l1, total, wrong, window)
             if table.metadata.model == "ward":
-                balls.add(name, *picture(folder, table))
+                balls.add(name, *np.abs(picture(folder, table)))
         bounded = picture(folder, made("ward_bounded", BOUNDED))
-        balls.add("bounded Ward", *bounded)
+        balls.add("bounded Ward", *np.abs(bounded))
     for title, rows in (("trees", trees.rows), ("matrices", matrices.rows)):
         column = 2 if title == "trees" else 3
         run.say(

@@ -14,10 +14,9 @@ from brdfdb import models
 from brdfdb.conversion.convert import compare, convert
 from brdfdb.conversion.document import Conversion, percent
 from brdfdb.conversion.figure import figure_of
-from brdfdb.conversion.minimisation import spread
-from brdfdb.conversion.target import index_of
 from brdfdb.errors import ParameterError
 from brdfdb.figure import Panel
+from brdfdb.fitting.variables import index_of, spread
 from brdfdb.fresnel import unpolarised
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals.sampling import directions, mixture_density

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from brdfdb.errors import ParameterError
 from brdfdb.formats._angles import HalfDifference, Specular, Spherical, System
-from brdfdb.formats._angular_grid import AngularGrid, chosen, mirrored, reciprocal, rounded
-from brdfdb.formats._stated_error import Comparison
+from brdfdb.formats._angular_grid import AngularGrid, Sink, chosen, mirrored, reciprocal, rounded
+from brdfdb.formats._stated_error import Comparison, FileError
 from brdfdb.geometry import unit_vector
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, small_table
 
@@ -98,21 +99,31 @@ def test_a_table_without_mirror_images_is_noticed() -> None:
     assert not reciprocal(one_way, Comparison(one_way))
 
 
+def _write(sink: Sink, grid: AngularGrid, _: FileError) -> None:
+    """Write a header, which counts the more the smaller the file is, and six bytes a node."""
+    sink.write(b"_" * (1000 + 6 * grid.values.size))
+
+
 def test_a_smaller_tolerance_takes_more_nodes_and_a_limit_is_kept() -> None:
     table = small_table(GREY)
     comparison = Comparison(table)
-    loose, fine = (chosen(table, comparison, [HalfDifference(False)], tolerance, 10**6) for tolerance in (0.1, 0.03))
+    system = [HalfDifference(False)]
+    loose, fine = (chosen(table, comparison, system, tolerance, 4.0, _write) for tolerance in (0.1, 0.03))
     assert loose[1].p99 <= 0.1
     assert fine[1].p99 <= 0.03
     assert loose[0].values.size < fine[0].values.size / 2
-    least, error = chosen(table, comparison, [HalfDifference(False)], 0.001, 500)
-    assert least.values.size <= 500
+    least, error = chosen(table, comparison, system, 0.001, 0.003, _write)
+    assert 200 < least.values.size <= (3000 - 1000) / 6
     assert error.p99 > 0.001
+    with pytest.raises(
+        ParameterError, match=r"size: 0\.001 MB are too few: the smallest file of grey-ward has 0\.00105 MB"
+    ):
+        chosen(table, comparison, system, 0.001, 0.001, _write)
 
 
 def test_the_system_with_the_fewest_nodes_is_taken() -> None:
     table = small_table(DIFFUSE)
-    grid, _ = chosen(table, Comparison(table), [Specular(False, True), Spherical(False, True)], 0.05, 10**6)
+    grid, _ = chosen(table, Comparison(table), [Specular(False, True), Spherical(False, True)], 0.05, 4.0, _write)
     assert isinstance(grid.system, Spherical)
 
 

@@ -1,10 +1,9 @@
-"""Tables for Eradiate's mqdiffuse: its kernel, and its own checks, where they are installed."""
+"""Tables for Eradiate's mqdiffuse, as Eradiate's own loader and kernel see them where they are installed."""
 
 from __future__ import annotations
 
 import json
 import os
-import struct
 import subprocess
 from pathlib import Path
 
@@ -19,11 +18,13 @@ from brdfdb.formats._channels import Channels
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import unit_vector
+from brdfdb.parameters import Floats
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, SPECTRAL, small_table
 
-PYTHON = os.environ.get("BRDFDB_ERADIATE")  # of an environment with the package eradiate-mitsuba
-VALUES = Path(__file__).parents[1] / "models" / "eradiate_values.py"
+PYTHON = os.environ.get("BRDFDB_ERADIATE")  # of an environment with the package eradiate
+NOT_INSTALLED = 5  # exit status of eradiate_bsdf.py
 KERNEL_RTOL = 2e-5  # of the largest value: its textures compute with float32; worst seen 4e-6
+P99_RTOL = 1e-6  # of the error that Eradiate sees; worst seen 1e-7
 
 
 @pytest.mark.parametrize("kind", [GREY, DIFFUSE, SPECTRAL])
@@ -42,61 +43,68 @@ def test_a_file_read_back_is_within_the_error_that_it_states(kind: str, tmp_path
 
 
 def test_each_node_has_its_place_in_the_file(tmp_path: Path) -> None:
-    """The kernel reads node d of N azimuths at 2 pi d / (N - 1), the last axis with the direction of the light."""
+    """The last axis has the direction of the light; the first azimuth is not repeated."""
     table, path = small_table(DIFFUSE), tmp_path / "table.nc"
-    eradiate.write(table, path, resolution=5)
+    eradiate.write(table, path, nodes=5)
     with xr.open_dataset(path) as opened:
         brdf = opened["brdf"]
         assert brdf.dims == ("cos_theta_o", "phi_d", "cos_theta_i")
-        assert np.allclose(opened["phi_d"], 2.0 * np.pi * np.arange(5) / 5)
+        assert brdf.shape == (5, 6, 5)
+        assert np.allclose(opened["phi_d"], 2.0 * np.pi * np.arange(6) / 6)
         assert [opened[name].attrs["units"] for name in brdf.dims] == ["dimensionless", "rad", "dimensionless"]
-        expected = table.lookup(np.arccos(0.25), 0.0, np.arccos(0.75), np.pi / 2)
-        assert brdf[3, 1, 1].item() == brdf[3, 3, 1].item() == pytest.approx(float(expected), rel=1e-6)
+        expected = table.lookup(np.arccos(0.25), 0.0, np.arccos(0.75), np.pi / 3)
+        assert brdf[3, 1, 1].item() == brdf[3, 5, 1].item() == pytest.approx(float(expected), rel=1e-6)
 
 
-@pytest.mark.skipif(PYTHON is None, reason="BRDFDB_ERADIATE names no Python with eradiate-mitsuba")
+@pytest.mark.skipif(PYTHON is None, reason="BRDFDB_ERADIATE names no Python with eradiate")
 @pytest.mark.parametrize("kind", [GREY, DIFFUSE])
-def test_the_kernel_of_eradiate_reads_what_we_read(kind: str, tmp_path: Path) -> None:
-    path, volume = tmp_path / "table.nc", tmp_path / "table.vol"
-    eradiate.write(small_table(kind), path, resolution=13)
-    with xr.open_dataset(path) as opened:  # asymmetric values, which no exchange of axes or azimuths leaves the same
+def test_eradiate_reads_what_we_read(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "asymmetric.nc"
+    eradiate.write(small_table(kind), tmp_path / "table.nc", nodes=13)
+    with xr.open_dataset(tmp_path / "table.nc") as opened:  # no exchange of axes or azimuths leaves these values
         values = opened["brdf"].values[:9]
         values = values * np.random.default_rng(3).uniform(0.5, 1.5, values.shape).astype(np.float32)
         xr.Dataset({"brdf": (opened["brdf"].dims, values)}, eradiate._coordinates(values.shape)).to_netcdf(
-            tmp_path / "asymmetric.nc", engine="scipy"
+            path, engine="scipy"
         )
-    back = formats.read(tmp_path / "asymmetric.nc")
+    back = formats.read(path)
     assert isinstance(back, FileTable)
-    size = struct.pack("<3sBi4i6f", b"VOL", 3, 1, *values.shape[::-1], 1, 0, 0, 0, 1, 1, 1)
-    volume.write_bytes(size + values.tobytes())
     rng = np.random.default_rng(5)
     wi, wr = (unit_vector(np.arccos(rng.uniform(0.02, 1.0, 500)), rng.uniform(0.0, 7.0, 500)) for _ in range(2))
-    question = {"plugins": {"ours": {"type": "mqdiffuse", "filename": str(volume)}}}
-    # a path that comes from the camera has the viewer as wi
-    answer = subprocess.run(
-        [str(PYTHON), str(VALUES)],
-        input=json.dumps({**question, "wi": wr.tolist(), "wr": wi.tolist()}),
-        stdout=subprocess.PIPE,
-        text=True,
-        check=True,
-    )
-    theirs = np.array(json.loads(answer.stdout)["ours"])
+    theirs = _through_eradiate(path, wi, wr)
     assert np.abs(back.lookup_vectors(wi, wr) - theirs).max() <= KERNEL_RTOL * theirs.max()
 
 
-@pytest.mark.skipif(PYTHON is None, reason="BRDFDB_ERADIATE names no Python with eradiate-mitsuba")
-def test_eradiate_accepts_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "table.nc"
-    eradiate.write(small_table(DIFFUSE), path, resolution=9)
-    script = (
-        "import sys\ntry:\n    import eradiate\nexcept ImportError:\n    sys.exit(5)\n"
-        "import xarray\nfrom eradiate.scenes.bsdfs import MQDiffuseBSDF\neradiate.set_mode('mono_double')\n"
-        "MQDiffuseBSDF(data=xarray.load_dataset(sys.argv[1]))\n"
+@pytest.mark.skipif(PYTHON is None, reason="BRDFDB_ERADIATE names no Python with eradiate")
+@pytest.mark.parametrize("kind", [GREY, DIFFUSE])
+def test_eradiate_sees_the_error_that_the_file_states(kind: str, tmp_path: Path) -> None:
+    table, path = small_table(kind), tmp_path / "table.nc"
+    stated = eradiate.write(table, path, tolerance=0.1).error
+    comparison = Comparison(table)
+
+    def evaluate(wi: Floats, wr: Floats) -> Floats:
+        values = np.zeros((len(wi), 1))
+        above = wr[:, 2] > 0.0
+        values[above, 0] = _through_eradiate(path, wi[above], wr[above])
+        return values
+
+    assert stated is not None
+    assert comparison.error_of(evaluate).p99 == pytest.approx(stated.p99, rel=P99_RTOL)
+
+
+def _through_eradiate(path: Path, wi: Floats, wr: Floats) -> Floats:
+    """Return f_r [1/sr] of a file, which Eradiate loads."""
+    answer = subprocess.run(
+        [str(PYTHON), str(Path(__file__).with_name("eradiate_bsdf.py"))],
+        input=json.dumps({"path": str(path), "wi": wi.tolist(), "wr": wr.tolist()}),
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    answer = subprocess.run([str(PYTHON), "-c", script, str(path)], stderr=subprocess.PIPE, text=True, check=False)
-    if answer.returncode == 5:
+    if answer.returncode == NOT_INSTALLED:
         pytest.skip("eradiate is not installed beside eradiate-mitsuba")
     assert answer.returncode == 0, answer.stderr
+    return np.array(json.loads(answer.stdout))
 
 
 def test_what_the_format_cannot_hold_is_refused(tmp_path: Path) -> None:
@@ -104,17 +112,18 @@ def test_what_the_format_cannot_hold_is_refused(tmp_path: Path) -> None:
         eradiate.write(small_table(ANISOTROPIC), tmp_path / "table.nc")
     with pytest.raises(ParameterError, match=r"wavelength: 900 nm is outside \[400, 700\] nm"):
         eradiate.write(small_table(SPECTRAL), tmp_path / "table.nc", wavelength=900.0)
-    with pytest.raises(ParameterError, match=r"resolution: 4\.5 is not a whole number"):
-        eradiate.write(small_table(DIFFUSE), tmp_path / "table.nc", resolution=4.5)
+    for count in (1, 4.5, 514):
+        with pytest.raises(ParameterError, match=r"nodes: '.*' is not a whole number in \[3, 513\], or 0"):
+            formats.write(small_table(DIFFUSE), tmp_path / "table.nc", "eradiate", nodes=count)
     assert not list(tmp_path.iterdir())
 
 
 def test_files_that_eradiate_refuses_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "table.nc"
-    eradiate.write(small_table(DIFFUSE), path, resolution=5)
+    eradiate.write(small_table(DIFFUSE), path, nodes=5)
     with xr.open_dataset(path) as opened:
         opened.load()
-    opened.assign_coords(phi_d=np.linspace(0.0, 2.0 * np.pi, 5)).to_netcdf(path, engine="scipy")
+    opened.assign_coords(phi_d=np.linspace(0.0, 2.0 * np.pi, 6)).to_netcdf(path, engine="scipy")
     with pytest.raises(FileFormatError, match="coordinates phi_d are not in the equal steps"):
         formats.read(path)
     opened.isel(phi_d=0).to_netcdf(path, engine="scipy")

@@ -258,7 +258,7 @@ def test_export_writes_three_files_with_their_attributes(tmp_path: Path) -> None
             assert own.pop(f"{letter}_unit") == "degree"
             assert own.pop(f"{letter}_direction") == direction
         assert len(own.pop("description")) > 20
-        assert json.loads(own.pop("record"))["audit"] == "not audited"
+        assert json.loads(own.pop("record"))["audit"] == "not stated"
         assert own == {
             "material": "fake-brass",
             "revision": "r000003",

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from brdfdb import formats
-from brdfdb.errors import FileFormatError
+from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import klems
 from brdfdb.formats._channels import channels_of
 from brdfdb.formats._klems_basis import BASES, Basis, averages
 from brdfdb.geometry import unit_vector
+from brdfdb.measurements.statement import statement
 from brdfdb.parameters import Floats
 from brdfdb.tables.table import Table
 from tests.formats.bsdf_judges import check_bsdf, in_window, klems_total, made, queried
@@ -186,3 +187,23 @@ def test_the_totals_are_the_albedo(files: dict[tuple[str, str], Path], material:
         assert shares == pytest.approx([normal] * 2, rel=TOTAL)
     elif material == GREY:
         assert in_window(files[material, kind], kind) == []
+
+
+def test_the_statement_has_the_totals_of_windows_engine(files: dict[tuple[str, str], Path], tmp_path: Path) -> None:
+    path = files[GREY, "full"]
+    (window, _) = in_window(path, "full", "PHOTOPIC")
+    known = statement(formats.samples(path))
+    assert len(known.incidences) == len(BASES["full"])
+    assert known.incidences[0].theta_i_deg == 0.0
+    assert known.incidences[0].albedo[0] == pytest.approx(window, rel=TOTAL)
+    other = tmp_path / "other.xml"  # the front of the file is twice as bright
+    text = path.read_text(encoding="utf-8")
+    start = text.index("<ScatteringData>", text.index("Reflection Front")) + len("<ScatteringData>")
+    end = text.index("</ScatteringData>", start)
+    doubled = " ".join(f"{2.0 * float(number):.6g}" for number in text[start:end].replace(",", " ").split())
+    other.write_text(text[:start] + doubled + text[end:], encoding="utf-8")
+    assert statement(formats.samples(other)).incidences[0].albedo == known.incidences[0].albedo
+    front = statement(formats.samples(other, side="front"))
+    assert front.incidences[0].albedo[0] == pytest.approx(2.0 * known.incidences[0].albedo[0], rel=1e-4)
+    with pytest.raises(ParameterError, match="side: 'left' is not one of back, front"):
+        formats.samples(other, side="left")

@@ -15,10 +15,16 @@ from brdfdb import formats
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import materialx
 from brdfdb.formats._channels import channels_of
-from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface
-from brdfdb.formats._materialx_fit import of_alphas
+from brdfdb.formats._materialx_closures import OPEN_PBR, STANDARD, Surface, darkest_edge
+from brdfdb.formats._materialx_fit import fitted, of_alphas
 from brdfdb.formats._stated_error import Comparison
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.materials import FunctionSource, Material
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Layout
+from brdfdb.tables.planner import plan
+from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import block
 from tests.formats import opengl
 from tests.formats.round_trip import round_trip
 from tests.formats.small_tables import ANISOTROPIC, DIFFUSE, GREY, KINDS, SMOOTH, SPECTRAL, small_table
@@ -181,6 +187,43 @@ def test_a_highlight_is_wider_across_the_grain(tmp_path: Path) -> None:
         float(reading.lookup_vectors(unit_vector(slope, phi), unit_vector(slope, phi))) for phi in (0.0, np.pi / 2)
     )
     assert towards_y > 2.0 * towards_x
+
+
+@pytest.mark.parametrize("kind", materialx.kinds)
+def test_a_black_surface_is_black(kind: str, tmp_path: Path) -> None:
+    black = FunctionSource(brdf=lambda wi, _wr, _: np.zeros(len(wi)), name="black", title="Black", provenance="made up")
+    axes = {"theta_i": [0.0, 45.0, 90.0], "theta_r": [0.0, 45.0, 90.0], "delta_phi": [0.0, 180.0]}
+    layout = Layout(black, Grid(axes))
+    table = Table.of(layout, np.concatenate([block(layout, rows) for rows in layout.blocks]))
+    written = formats.write(table, tmp_path / "black.mtlx", "materialx", kind=kind)
+    assert written.error is not None
+    assert written.error.largest == 0.0
+    assert not np.any(formats.read(written.paths[0]).lookup_vectors(*pairs()))
+
+
+@pytest.mark.parametrize("normal", [0.0, 0.05, 0.3, 0.9])
+def test_the_darkest_edge_is_the_least_that_is_nowhere_negative(normal: float) -> None:
+    def metal(edge: float) -> float:
+        surface = Surface(OPEN_PBR, (normal,), (edge,), base_metalness=1.0, specular_roughness=1.0)
+        return float(surface.brdf(*pairs(1 << 16)).min())
+
+    edge = float(darkest_edge(np.array([normal]))[0])
+    assert metal(edge) >= 0.0
+    assert edge < 2e-4 or metal(edge - 0.01) < 0.0
+
+
+def test_a_narrow_lobe_does_not_become_negative() -> None:
+    ward = {"rho_d": 0.0, "rho_s": 0.02, "alpha_x": 0.01, "alpha_y": 0.01}
+    source = Material.from_table("w", {"title": "w", "model": "ward", "source": "no paper", "parameters": ward})
+    layout = plan(source, None, 0.05)
+    table = Table.of(layout, np.concatenate([block(layout, rows) for rows in layout.blocks]))
+    fields = {name: getattr(table, name) for name in table.__dataclass_fields__}
+    table = Table(**fields | {"attrs": {**table.attrs, "source_record": source.document()}})
+    surface = fitted(OPEN_PBR, table, channels_of(table, "grey"))
+    wi, _ = pairs()
+    near = wi * [-1.0, -1.0, 1.0] + np.random.default_rng(2).normal(0.0, 0.02, wi.shape)  # at the mirror direction
+    near[:, 2] = np.abs(near[:, 2])
+    assert surface.brdf(wi, near / np.linalg.norm(near, axis=1, keepdims=True)).min() >= 0.0
 
 
 @pytest.mark.parametrize(

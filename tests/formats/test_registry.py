@@ -9,14 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brdfdb.errors import ParameterError
+import brdfdb
+from brdfdb import formats
+from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats import EXPORTERS, Option, options_of, parsed_options
+from brdfdb.formats._readings import FileTable
 from brdfdb.formats._written import Written
 from brdfdb.materials import Material
 from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
+from brdfdb_api.http.openapi_notes import EXPORT_OPTIONS, served_options
 from tests.api.a_store import client_of
 from tests.pipelines.command import Captured, run
 
@@ -73,6 +77,40 @@ def test_a_format_of_fifteen_lines_is_an_address(store: Path) -> None:
     assert client.problem("GET", "/v1/materials/grey/export/list?digits=x", 422)["parameter"] == "digits"
     assert client.problem("GET", "/v1/materials/grey/export/list?kind=lobe", 422)["parameter"] == "kind"
     assert ", exr, " in client.problem("GET", "/v1/materials/grey/export/paper", 404)["detail"]
+
+
+def test_a_verdict_that_is_not_given_is_not_stated(store: Path, tmp_path: Path) -> None:
+    table = brdfdb.open(store)["grey"]
+    for verdict, stated in ((None, "not stated"), ("passes", "passes")):
+        formats.write(table, tmp_path / "grey.csv", "csv", resolution=45.0, verdict=verdict)
+        reading = formats.read(tmp_path / "grey.csv")
+        assert isinstance(reading, FileTable)
+        assert reading.record["audit"] == stated
+    assert b"audit: not audited" in client_of(store).get("/v1/materials/grey/export/csv?resolution=45").content
+
+
+@pytest.mark.parametrize("suffix", ["exr", "png", "glsl", "slang", "osl"])
+def test_files_that_are_only_written_are_named(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"grey.{suffix}"
+    path.write_bytes(b"something")
+    sentence = f"files of {suffix} are only written, not read"
+    with pytest.raises(FileFormatError, match=sentence):
+        formats.read(path)
+    with pytest.raises(ParameterError, match=f"file_format: {sentence}"):
+        formats.read(path, suffix)
+
+
+def test_an_option_over_http_allows_what_any_format_allows() -> None:
+    schemas = {parameter["name"]: parameter["schema"] for parameter in EXPORT_OPTIONS}
+    for file_format in EXPORTERS:
+        for name, option in served_options(file_format).items():
+            schema = schemas[name]
+            if isinstance(option.default, bool | str):
+                assert {*option.choices} <= {*schema.get("enum", option.choices)}
+            else:
+                assert schema["minimum"] <= min(option.low, option.default)
+                assert schema["maximum"] >= max(option.high, option.default)
+    assert "enum" not in schemas["colour"]  # a switch of one format, and a choice of another
 
 
 def test_modules_of_the_room_are_found() -> None:

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from brdfdb import formats
-from brdfdb.errors import FileFormatError, WriteError
+from brdfdb.errors import FileFormatError, ParameterError, WriteError
 from brdfdb.formats import rgl
 from brdfdb.formats._readings import FileTable
 from brdfdb.formats._rgl_fields import fields_of
@@ -270,3 +270,13 @@ def test_a_warp_and_its_inverse() -> None:
     everywhere = [axis.reshape(-1) for axis in np.meshgrid(fine, fine)]
     mixed = Mixture(np.tile([[0], [2]], 160000), np.tile([[0.25], [0.75]], 160000))
     assert np.mean(warp.density(mixed, *everywhere)) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(("kind", "azimuth"), [("spectral", "reduced"), ("rgb", "reduced"), ("rgb", "full")])
+def test_a_file_is_not_larger_than_its_limit(kind: str, azimuth: str, tmp_path: Path) -> None:
+    table, path = small_table(ANISOTROPIC), tmp_path / "a.bsdf"
+    files = rgl.write(table, path, kind=kind, azimuth=azimuth, tolerance=1e-3, megabytes=1.5)
+    assert 5e5 < path.stat().st_size <= 1.5e6
+    assert any("a quarter of the azimuths" in remark for remark in files.remarks) == (azimuth == "reduced")
+    with pytest.raises(ParameterError, match=r"megabytes: .* MB for the values are too few: the smallest file of "):
+        rgl.write(table, path, kind=kind, azimuth=azimuth, megabytes=0.1)

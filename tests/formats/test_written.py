@@ -68,6 +68,40 @@ def test_a_directory_is_replaced_by_a_directory_only(tmp_path: Path) -> None:
     assert (tmp_path / "c.zarr" / "thesis.txt").exists()
 
 
+def test_a_directory_that_cannot_be_replaced_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.zarr"
+    path.mkdir()
+    (path / "zarr.json").write_text("old")
+    replace = os.replace
+
+    def full(source: Path, target: Path) -> None:
+        if Path(target) == path and (Path(source) / "zarr.json").read_text() == "new":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new" / "zarr.json").write_text("new")
+    with pytest.raises(WriteError, match="No space left"), whole(path) as (half,):
+        (tmp_path / "new").rename(half)
+    assert list(tmp_path.iterdir()) == [path]
+    assert (path / "zarr.json").read_text() == "old"
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "theta_i/notes.txt", "theta_i/c/a"])
+def test_a_group_with_files_of_somebody_is_not_replaced(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.zarr"
+    (path / "theta_i" / "c" / "0").mkdir(parents=True)
+    for file in ("zarr.json", "theta_i/zarr.json", "theta_i/c/0/1", name):
+        (path / file).write_text("old")
+    with pytest.raises(WriteError, match=f"it holds {Path(name).name}, which is no part"), whole(path):
+        pytest.fail("it is refused before anything is computed")
+    (path / name).unlink()
+    with whole(path) as (half,):
+        half.mkdir()
+    assert list(path.iterdir()) == []
+
+
 @pytest.mark.parametrize("place", ["nowhere/a.bsdf", "file/a.bsdf"])
 def test_a_place_that_is_none_is_named(tmp_path: Path, place: str) -> None:
     (tmp_path / "file").write_text("a file where a directory must be")

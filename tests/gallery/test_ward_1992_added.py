@@ -10,6 +10,7 @@ import pytest
 from brdfdb.figure import Figure, Panel, Picture
 from brdfdb.gallery import ward_1992_box, ward_1992_gonioreflectometer, ward_1992_sampling
 from brdfdb.gallery._ward_sphere import Points
+from brdfdb.measurements import gonioreflectometer
 from brdfdb.reference import ward_1992 as reference
 from tests.gallery.figures import cases, check_phrases, check_statement
 
@@ -63,8 +64,8 @@ def test_a_figure_has_its_key_and_is_the_same_each_time(key: str) -> None:
 def test_a_camera_in_the_middle_sees_the_target_s_angles() -> None:
     theta, phi = np.array([0.2, 0.9]), np.array([0.4, -2.0])
     expected = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-    np.testing.assert_allclose(ward_1992_gonioreflectometer.eq_3(theta, phi, 0.0), expected, atol=1e-15)
-    np.testing.assert_allclose(ward_1992_gonioreflectometer.traced(theta, phi, 0.0), expected, atol=1e-15)
+    np.testing.assert_allclose(gonioreflectometer.eq_3(theta, phi, 0.0), expected, atol=1e-15)
+    np.testing.assert_allclose(gonioreflectometer.traced(theta, phi, 0.0), expected, atol=1e-15)
 
 
 def test_eq_3_points_from_the_target_to_where_the_camera_looks() -> None:
@@ -72,7 +73,7 @@ def test_eq_3_points_from_the_target_to_where_the_camera_looks() -> None:
     D, root = 0.2, np.sqrt(0.5)
     r_c = D * root + np.sqrt(D**2 / 2.0 + 1.0 - D**2)
     y, z = r_c * root - 2.0 * D, r_c * root
-    direction = ward_1992_gonioreflectometer.eq_3(np.array(np.pi / 4), np.array(np.pi / 2), D)
+    direction = gonioreflectometer.eq_3(np.array(np.pi / 4), np.array(np.pi / 2), D)
     np.testing.assert_allclose(direction, np.array([0.0, y, z]) / np.hypot(y, z), atol=1e-15)
 
 
@@ -84,7 +85,7 @@ def test_traced_rays_come_from_beside_the_target() -> None:
         camera = np.array([0.0, -D, 0.0])
         along = out @ camera
         point = camera + (np.sqrt(along**2 + 1.0 - D**2) - along)[..., None] * out
-        leaves = ward_1992_gonioreflectometer.traced(theta, phi, D)
+        leaves = gonioreflectometer.traced(theta, phi, D)
         sample = point - (point[..., 2] / leaves[..., 2])[..., None] * leaves
         assert np.linalg.norm(sample[..., :2] - [0.0, D], axis=-1).max() < 4.0 * D**2
 

@@ -133,8 +133,8 @@ def test_a_report_that_cannot_be_written_is_one_sentence(built: Path, tmp_path: 
 def test_export_takes_names_or_all_and_its_options_anywhere(
     built: Path, tmp_path: Path, names: list[str], capsys: Captured
 ) -> None:
-    said = "brdfdb: export: name materials, or give --all"
-    assert fails(capsys, "export", "exr", "--store", built) == said
+    assert fails(capsys, "export", "exr", "--store", built) == "brdfdb: export: name materials, or give --all"
+    said = "brdfdb: export: name materials or give --all, not both"
     assert fails(capsys, "export", "exr", "foam", "--all", "--store", built) == said
     assert run("export", "exr", "--store", built, "--out", tmp_path / "some", "foam", "mirror") == 0
     out, err = capsys.readouterr()

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from brdfdb.errors import CannotHoldError
+from brdfdb.errors import CannotHoldError, ParameterError
 from brdfdb.formats import EXPORTERS
+from brdfdb.formats._interface import TOLERANCE
 from brdfdb.formats._stated_error import FileError
 from brdfdb.formats._written import Written, whole
 from brdfdb.materials import Material
@@ -18,9 +21,10 @@ from brdfdb.store.publication import publish_dataset
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Layout
 from brdfdb.tables.tabulation import tabulate
+from brdfdb_pipelines.exit_codes import TERMINATED
 from tests.pipelines.command import Captured, run
 
-P99 = {"grey": 0.01, "dark": 0.03}
+P99 = {"grey": 0.01, "dark": 0.03001}
 
 
 def write(table: Any, path: Path, *, tolerance: float = 0.02, verdict: str | None = None) -> Written:
@@ -34,7 +38,7 @@ def write(table: Any, path: Path, *, tolerance: float = 0.02, verdict: str | Non
 
 
 LIST = SimpleNamespace(
-    suffix=".list", media_type="text/plain", summary="lists", tools="", kinds=(), options=(), write=write
+    suffix=".list", media_type="text/plain", summary="lists", tools="", kinds=(), options=(TOLERANCE,), write=write
 )
 
 
@@ -49,21 +53,83 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "store"
 
 
+def test_sigterm_leaves_no_half_file(
+    store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    def ended(_: Any, path: Path, **__: Any) -> Written:
+        with whole(path) as (half,):
+            half.write_text("half")
+            os.kill(os.getpid(), signal.SIGTERM)
+            half.write_text("whole")
+        return Written((path,))
+
+    monkeypatch.setattr(LIST, "write", ended)
+    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == TERMINATED == 143
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert capsys.readouterr().err.endswith("\nbrdfdb: interrupted\n")
+    assert [(path.name, path.read_text()) for path in (tmp_path / "out").iterdir()] == [("grey.list", "whole")]
+
+
 def test_all_leaves_out_what_the_format_cannot_hold(store: Path, tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "out"
     assert run("export", "list", "--all", "--store", store, "--out", out) == 0
     text = capsys.readouterr().out
     assert text.startswith("2 LIST files, ")
-    assert "99 of 100 values within 3.00% (dark)" in text
-    assert "dark: 3.00%, beyond the tolerance of 2.00%\n" in text
+    assert "99 of 100 values within 3.01% (dark.list)" in text  # rounded up as in the file
+    assert "dark.list: 3.01%, beyond the tolerance of 2%\n" in text
     assert "dark: a specular part is not in the file\n" in text
     assert text.endswith("strange: this format holds nothing strange; left out\n")
     assert sorted(path.name for path in out.iterdir()) == ["dark.list", "grey.list"]
 
 
-def test_a_material_that_is_named_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:
+def test_a_material_that_is_named_is_refused_and_others_are_written(
+    store: Path, tmp_path: Path, capsys: Captured
+) -> None:
     assert run("export", "list", "strange", "--store", store, "--out", tmp_path / "out") == 2
-    assert capsys.readouterr().err.endswith("brdfdb: strange: this format holds nothing strange\n")
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.endswith("\nbrdfdb: strange: this format holds nothing strange\n")
+    assert run("export", "list", "strange", "grey", "--store", store, "--out", tmp_path / "out") == 2
+    captured = capsys.readouterr()
+    assert captured.out.startswith("1 LIST file, ")
+    assert captured.err.endswith("\nbrdfdb: strange: this format holds nothing strange\n")
+
+
+def test_kinds_before_one_that_is_refused_count(
+    store: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def write_kind(_: Any, path: Path, *, kind: str, verdict: str | None = None) -> Written:
+        if kind == "colour":
+            raise ParameterError("wavelength", "900 nm is outside")
+        (path.with_suffix(".more")).write_text("")
+        path.write_text(str(verdict))
+        return Written((path, path.with_suffix(".more")))
+
+    kinds = SimpleNamespace(**{**vars(LIST), "kinds": ("plain", "colour"), "options": (), "write": write_kind})
+    monkeypatch.setitem(EXPORTERS, "list", kinds)
+    assert run("export", "list", "grey", "--store", store, "--out", tmp_path / "out") == 2
+    captured = capsys.readouterr()
+    assert captured.out.startswith("1 LIST file and 1 beside it, ")
+    assert captured.err.endswith("\nbrdfdb: grey: wavelength: 900 nm is outside\n")
+
+
+@pytest.mark.parametrize("name", ["glsl", "osl", "slang", "exr", "png"])
+def test_strict_is_no_option_of_formats_without_a_tolerance(tmp_path: Path, capsys: Captured, name: str) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        run("export", name, "grey", "--strict", "--out", tmp_path / "out")
+    assert "--strict" in capsys.readouterr().err
+
+
+def test_errors_above_all_of_the_value_are_multiples(
+    store: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(P99, "dark", 449.3)
+    assert run("export", "list", "dark", "--store", store, "--out", tmp_path / "out") == 0
+    assert "\ndark.list: 450 times the value, beyond the tolerance of 2%\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("name", "code"), [("grey", 0), ("dark", 1)])
@@ -78,10 +144,22 @@ def test_the_verdict_of_this_revision_is_written(store: Path, tmp_path: Path) ->
     (store / "audit.json").write_text(json.dumps(report))
     assert run("export", "list", "grey", "dark", "--store", store, "--out", tmp_path) == 0
     assert (tmp_path / "grey.list").read_text() == "passes"
-    assert (tmp_path / "dark.list").read_text() == "None"
+    assert (tmp_path / "dark.list").read_text() == "not audited"
     (store / "audit.json").write_text("[")
     assert run("export", "list", "grey", "--store", store, "--out", tmp_path) == 0
-    assert (tmp_path / "grey.list").read_text() == "None"
+    assert (tmp_path / "grey.list").read_text() == "not audited"
+
+
+@pytest.mark.parametrize("text", ["[", "[]", '{"materials": [1]}', None])
+def test_a_report_that_is_named_must_be_one(store: Path, tmp_path: Path, capsys: Captured, text: str | None) -> None:
+    report, reason = tmp_path / "report.json", "No such file or directory"
+    if text is not None:
+        report.write_text(text)
+        reason = "it is no report of `brdfdb audit`"
+    out = tmp_path / "out"
+    assert run("export", "list", "grey", "--audit", report, "--store", store, "--out", out) == 2
+    assert capsys.readouterr().err == f"brdfdb: audit: {report} cannot be read: {reason}\n"
+    assert not out.exists()
 
 
 def test_an_output_that_is_a_file_is_refused(store: Path, tmp_path: Path, capsys: Captured) -> None:

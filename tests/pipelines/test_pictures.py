@@ -46,7 +46,7 @@ def test_unknown_names_are_refused_before_anything_is_drawn(built: Path, tmp_pat
 
 
 def test_gallery_has_a_sphere_of_each_material(built: Path, tmp_path: Path, capsys: Captured) -> None:
-    out = tmp_path / "new" / "sheet.png"
+    out = tmp_path / "sheet.png"
     assert run("gallery", "--store", built, "--out", out, "--jobs", "2") == 0
     store = brdfdb.open(built)
     image = imread(out)[..., :3]
@@ -154,6 +154,13 @@ def test_gallery_refuses_other_files_before_it_draws(
     with pytest.raises(SystemExit, match="2"):
         run("gallery", "foam", "--store", built, "--out", f"{tmp_path}/{name}")
     assert sentence in capsys.readouterr().err
+
+
+def test_gallery_makes_no_directories(built: Path, tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "no" / "sheet.png"
+    assert run("gallery", "foam", "--store", built, "--out", out) == 2
+    assert capsys.readouterr().err == f"brdfdb: cannot write {out}: there is no directory {out.parent}\n"
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_gallery_of_one_material_says_so(built: Path, tmp_path: Path, capsys: Captured) -> None:

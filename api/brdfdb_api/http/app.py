@@ -19,7 +19,7 @@ from brdfdb_api.http.files import files
 from brdfdb_api.http.middleware import Edge
 from brdfdb_api.http.pages import pages
 from brdfdb_api.http.responses import REVISION
-from brdfdb_api.http.routes import LARGE_AT_ONCE, answer_point, router
+from brdfdb_api.http.routes import EXPORTS_AT_ONCE, LARGE_AT_ONCE, answer_point, router
 from brdfdb_api.http.views import views
 from brdfdb_api.serving.settings import Settings
 from brdfdb_api.serving.shelf import Shelf
@@ -90,6 +90,7 @@ def create_app(settings: Settings | None = None, store: Store | None = None) -> 
     app.state.settings = settings or Settings.from_environment()
     app.state.shelf = Shelf(app.state.settings, store)
     app.state.large = asyncio.Semaphore(LARGE_AT_ONCE)
+    app.state.exports = asyncio.Semaphore(EXPORTS_AT_ONCE)
     app.include_router(router)
     app.include_router(views)
     app.include_router(files)

@@ -31,12 +31,17 @@ class RequestError(BrdfdbError):
         The sentence.
     parameter : str, optional
         The parameter that is at fault.
+    retry_after_s : int, optional [s]
+        Time after which the same request may succeed.
     """
 
-    def __init__(self, status: int, detail: str, parameter: str | None = None) -> None:
+    def __init__(
+        self, status: int, detail: str, parameter: str | None = None, *, retry_after_s: int | None = None
+    ) -> None:
         super().__init__(detail)
         self.status = status
         self.parameter = parameter
+        self.headers = {} if retry_after_s is None else {"Retry-After": str(retry_after_s)}
 
 
 # Classes that the router hands to `handler`. Exception is what the server logs with its traceback, so that the other
@@ -59,7 +64,7 @@ def problem_of(error: Exception) -> Response:
     """
     match error:
         case RequestError():
-            return _problem(error.status, str(error), error.parameter)
+            return _problem(error.status, str(error), error.parameter, headers=error.headers)
         case RequestValidationError():
             first = error.errors()[0]
             parameter = str(first["loc"][1])  # ("query", name, ...)

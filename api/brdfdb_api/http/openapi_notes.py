@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from brdfdb.formats import EXPORTERS, Option, options_of
@@ -90,25 +91,52 @@ ERROR = _parameter(
 )
 
 
-def _option(option: Option) -> dict[str, Any]:
-    schema: dict[str, Any] = {"type": "string", "default": option.default}
-    if isinstance(option.default, bool):
-        schema |= {"enum": ["false", "true"], "default": str(option.default).lower()}
-    elif option.choices:
-        schema["enum"] = list(option.choices)
+# Sizes that the service makes a file of: larger ones take gigabytes or minutes, and are for `brdfdb export`
+_SERVED = {
+    "eradiate": {"nodes": 129.0},
+    "png": {"size": 512.0},
+    "radiance": {"cells": 600_000.0},
+    "rgl": {"megabytes": 64.0},
+    **{file_format: {"size": 16.0} for file_format in ("astm", "fred", "ssdd", "zemax")},
+}
+
+
+def served_options(file_format: str) -> dict[str, Option]:
+    """Return the options of a format by name, with the ranges that the service allows."""
+    highest = _SERVED.get(file_format, {})
+    return {
+        name: replace(option, high=min(option.high, highest.get(name, math.inf)))
+        for name, option in options_of(EXPORTERS[file_format]).items()
+    }
+
+
+def _option(name: str) -> dict[str, Any]:
+    """Return the parameter of an option of one or more formats, with the values that any of them allows."""
+    formats: dict[Option, list[str]] = {}
+    for file_format in EXPORTERS:
+        if option := served_options(file_format).get(name):
+            formats.setdefault(option, []).append(file_format)
+    options, defaults = list(formats), {option.default for option in formats}
+    if all(isinstance(option.default, str) for option in options):
+        choices = [choice for option in options for choice in option.choices]
+        schema: dict[str, Any] = {"type": "string", "enum": list(dict.fromkeys(choices))}
+    elif all(isinstance(option.default, bool) for option in options):
+        schema = {"type": "string", "enum": ["false", "true"]}
+    elif any(isinstance(option.default, bool | str) for option in options):
+        schema = {"type": "string"}
     else:
-        ends = {"minimum": option.low, "maximum": option.high}
-        schema |= {"type": "number", **{end: value for end, value in ends.items() if math.isfinite(value)}}
-    return _parameter(option.name, schema, option.help)
+        low = min(end for option in options for end in (option.low, float(option.default)))
+        high = max(end for option in options for end in (option.high, float(option.default)))
+        schema = {"type": "number", "minimum": low, "maximum": high}
+    if len(defaults) == 1:
+        default = defaults.pop()
+        schema["default"] = str(default).lower() if isinstance(default, bool) else default
+    texts = [f"{', '.join(names)}: {option.help}; {option.allowed}" for option, names in formats.items()]
+    return _parameter(name, schema, ". ".join(texts))
 
 
 # Of all formats: an option that a format does not have is refused
-EXPORT_OPTIONS = [
-    _option(option)
-    for option in {
-        name: option for exporter in EXPORTERS.values() for name, option in options_of(exporter).items()
-    }.values()
-]
+EXPORT_OPTIONS = [_option(name) for name in dict.fromkeys(name for key in EXPORTERS for name in served_options(key))]
 
 
 def answers(model: type | None, *statuses: int, media: dict[str, str] | None = None) -> dict[int | str, dict[str, Any]]:
@@ -118,7 +146,10 @@ def answers(model: type | None, *statuses: int, media: dict[str, str] | None = N
         404: {"description": "No such material or revision; the closest names are listed", "model": Problem},
         413: {"description": "Too large a body, or too many points for one answer", "model": Problem},
         422: {"description": "A parameter is missing, unknown or out of range; it is named", "model": Problem},
-        503: {"description": "The store, or the files of this material, cannot be read", "model": Problem},
+        503: {
+            "description": "The store, or the files of this material, cannot be read; or too much is asked for at once",
+            "model": Problem,
+        },
     }
     success: dict[str, Any] = {"description": "Success"}
     if model is not None:

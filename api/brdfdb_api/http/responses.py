@@ -289,9 +289,13 @@ def cache_headers(tag: str, kind: str = "json", *, immutable: bool = False) -> d
     return {"ETag": etag, "Cache-Control": kept, "Vary": "Accept"}
 
 
-def not_modified(held: str | None, headers: dict[str, str]) -> Response | None:
-    """Return the 304 for a client that already holds the answer with these headers, None for any other."""
+def not_modified(held: str | None, headers: dict[str, str], *, certain: bool = True) -> Response | None:
+    """Return the 304 for a client that already holds the answer with these headers, None for any other.
+
+    ``*`` stands for any answer, and so for none as long as it is not `certain` that the request is not refused.
+    """
     if held is None:
         return None
     tags = {tag.strip().removeprefix("W/") for tag in held.split(",")}
-    return Response(status_code=304, headers=headers) if tags & {headers["ETag"].removeprefix("W/"), "*"} else None
+    known = {headers["ETag"].removeprefix("W/"), *(["*"] if certain else [])}
+    return Response(status_code=304, headers=headers) if tags & known else None

@@ -51,6 +51,7 @@ INLINE_VALUES = 1000  # larger lookups run in a thread, so that the event loop c
 INLINE_BYTES = 96 * 2**10  # larger bodies are read in a thread; 1000 points take about this many bytes
 # Number of larger bodies, or larger answers, that are processed at a time
 LARGE_BYTES, LARGE_VALUES, LARGE_AT_ONCE = 2**20, 100_000, 8
+EXPORTS_AT_ONCE, EXPORT_WAIT_S = 2, 10  # files of other formats that are made at a time, and the wait for a turn [s]
 JSON_BYTES = 8 * 2**20  # limit on a JSON body [byte]: numbers in lists take twenty times the memory of the text
 LIMITS = {"json": (1, 100), "npy": (100, 1000)}  # points and values of one answer, as multiples of max_points
 SPECTRA_OF_COLOURS = 10  # factor on the number of values where only colours are returned
@@ -262,11 +263,12 @@ async def answer_point(scope: Scope, name: str, revision: str | None) -> Respons
     table = await _table(state.shelf, name, revision)
     kind = options.format or ("npy" if NPY in accept else "json")
     headers = lookup_headers(tag_of(table), table.revision, kind, immutable=revision is not None)
-    if held and (unchanged := not_modified(held, headers)):
+    if held and (unchanged := not_modified(held, headers, certain=False)):
         return unchanged
     values = checked_size(state.settings.max_points, points, options, table, kind)
     in_thread = slow(values, options)
-    return await run(write_answer, points, options, table, kind, headers, in_thread=in_thread)
+    answer = await run(write_answer, points, options, table, kind, headers, in_thread=in_thread)
+    return (held and not_modified(held, headers)) or answer
 
 
 def _headers(scope: Scope) -> tuple[str, str]:

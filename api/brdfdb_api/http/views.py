@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import tempfile
 import zipfile
@@ -12,15 +13,25 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from fastapi import APIRouter, Path, Query
 from numpy.typing import NDArray
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
+from brdfdb import __version__
 from brdfdb.errors import CannotHoldError, ParameterError
-from brdfdb.formats import EXPORTERS, options_of, parsed_options
+from brdfdb.formats import EXPORTERS
 from brdfdb.geometry import radians
+from brdfdb.store.summary_words import NOT_AUDITED
 from brdfdb_api.http.errors import RequestError
 from brdfdb_api.http.lookups import Options, Points, evaluate, parsed
-from brdfdb_api.http.openapi_notes import EXPORT_OPTIONS, LOBE_NPY_ANSWER, LOBE_OPTIONS, WAVELENGTHS, answers
+from brdfdb_api.http.openapi_notes import (
+    EXPORT_OPTIONS,
+    LOBE_NPY_ANSWER,
+    LOBE_OPTIONS,
+    WAVELENGTHS,
+    answers,
+    served_options,
+)
 from brdfdb_api.http.responses import (
     JSON,
     NPY,
@@ -35,10 +46,11 @@ from brdfdb_api.http.responses import (
     plain,
     tag_of,
 )
-from brdfdb_api.http.routes import both, checked_size, query_names, shelf_of
+from brdfdb_api.http.routes import EXPORT_WAIT_S, both, checked_size, query_names, shelf_of
 
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
+    from brdfdb_api.serving.shelf import Shelf
 
 View = Literal["cut", "hemisphere", "half-difference"]
 
@@ -125,14 +137,17 @@ def lobe(
     table = shelf_of(request).table(name, revision)
     kind = options.format or ("npy" if NPY in request.headers.get("accept", "") else "json")
     headers = cache_headers(tag_of(table), kind, immutable=revision is not None)
-    if held := not_modified(request.headers.get("if-none-match"), headers):
-        return held
+    held = request.headers.get("if-none-match")
+    if unchanged := not_modified(held, headers, certain=False):
+        return unchanged
     axes, angles = _directions(view, theta_i, phi_i)
     at = Points.from_query({"theta_i": "0", "theta_r": "0"}, wavelengths).wavelength_nm
     points = Points(angles, np.broadcast_shapes(*(np.shape(angle) for angle in angles)), at)
     # The view fixes the points; the client chooses only the wavelengths.
     checked_size(max(request.app.state.settings.max_points, _POINTS), points, options, table, kind)
     values = evaluate(points, options, table)
+    if unchanged := not_modified(held, headers):
+        return unchanged
     if kind == "npy":
         return Response(npy_bytes(values.brdf), media_type=NPY, headers=headers)
     document = {
@@ -186,7 +201,7 @@ def _directions(view: View, theta_i: float, phi_i: float) -> tuple[dict[str, NDA
     ),
     openapi_extra={"parameters": EXPORT_OPTIONS},
 )
-def export(
+async def export(
     request: Request,
     name: str,
     file_format: Annotated[str, Path(json_schema_extra={"enum": [*EXPORTERS]})],
@@ -195,31 +210,57 @@ def export(
     """Return the table, or a slice of it, as a file of another format, as `brdfdb export` writes it."""
     if file_format not in EXPORTERS:
         raise RequestError(404, f"{file_format!r} is no format; there are {', '.join(EXPORTERS)}")
-    exporter = EXPORTERS[file_format]
-    query, _ = parsed(request.scope["query_string"], tuple(options_of(exporter)))
+    allowed = served_options(file_format)
+    query, _ = parsed(request.scope["query_string"], tuple(allowed))
     try:
-        options = parsed_options(exporter, query)
+        options = {option: allowed[option].parse(text) for option, text in query.items()}
     except ParameterError as error:
         raise RequestError(422, str(error), error.parameter) from None
-    table = shelf_of(request).table(name, revision)
-    known = shelf_of(request).verdict(name)
-    verdict = known.finding["verdict"] if known and known.finding["revision"] == table.revision else None
-    # the file states the verdict, which a later audit may change
-    headers = cache_headers(f"{tag_of(table)}-{verdict}", file_format)
+    table, verdict = await run_in_threadpool(_with_verdict, shelf_of(request), name, revision)
+    # The file states the verdict, which a later audit may change, and the program. A weak tag: some state the time
+    headers = cache_headers(f"{tag_of(table)}-{verdict}-{__version__}", file_format)
+    headers["ETag"] = f"W/{headers['ETag']}"
+    held = request.headers.get("if-none-match")
+    if unchanged := not_modified(held, headers, certain=False):
+        return unchanged
+    exports = request.app.state.exports
+    try:
+        async with asyncio.timeout(EXPORT_WAIT_S):
+            await exports.acquire()
+    except TimeoutError:
+        raise RequestError(
+            503, "the server makes as many files as it can; ask again later", retry_after_s=EXPORT_WAIT_S
+        ) from None
+    try:
+        answer = await run_in_threadpool(_exported, file_format, table, verdict, options, headers)
+    finally:
+        exports.release()
+    return not_modified(held, headers) or answer
+
+
+def _with_verdict(shelf: Shelf, name: str, revision: str | None) -> tuple[Table, str | None]:
+    """Return a table, and the verdict of the audit of its revision."""
+    table, known = shelf.table(name, revision), shelf.verdict(name)
+    return table, known.finding["verdict"] if known and known.finding["revision"] == table.revision else None
+
+
+def _exported(
+    file_format: str, table: Table, verdict: str | None, options: dict[str, Any], headers: dict[str, str]
+) -> Response:
+    """Return a file of another format, or an archive of several, with these headers and its name."""
+    exporter = EXPORTERS[file_format]
     kind = f"_{options.get('kind', exporter.kinds[0])}" if exporter.kinds else ""
-    headers["Content-Disposition"] = f'attachment; filename="{name}{kind}{exporter.suffix}"'
-    if held := not_modified(request.headers.get("if-none-match"), headers):
-        return held
     with tempfile.TemporaryDirectory() as folder:  # formats write files
-        path = FilePath(folder) / f"{name}{kind}{exporter.suffix}"
+        path = FilePath(folder) / f"{table.name}{kind}{exporter.suffix}"
         try:
-            written = exporter.write(table, path, verdict=verdict, **options)
+            written = exporter.write(table, path, verdict=verdict or NOT_AUDITED, **options)
         except (CannotHoldError, ParameterError) as error:
             raise RequestError(422, str(error), getattr(error, "parameter", None)) from None
-        if len(written.paths) == 1 and path.is_file():
-            return Response(path.read_bytes(), media_type=exporter.media_type, headers=headers)
-        headers["Content-Disposition"] = f'attachment; filename="{name}{kind}{exporter.suffix}.zip"'
-        return Response(_zipped(FilePath(folder)), media_type="application/zip", headers=headers)
+        single = len(written.paths) == 1 and path.is_file()
+        content = path.read_bytes() if single else _zipped(FilePath(folder))
+    media_type = exporter.media_type if single else "application/zip"
+    named = {"Content-Disposition": f'attachment; filename="{path.name}{"" if single else ".zip"}"'}
+    return Response(content, media_type=media_type, headers=headers | named)
 
 
 def _zipped(folder: FilePath) -> bytes:

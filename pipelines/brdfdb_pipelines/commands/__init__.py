@@ -1,6 +1,7 @@
 """The commands of the program: one module each, under the name of the command.
 
-A module whose name begins with an underscore is no command. Importing a command loads nothing heavy, because
+A module whose name begins with an underscore is no command. One underscore at its end is left out of the name of the
+command, for words that Python keeps for itself. Importing a command loads nothing heavy, because
 ``brdfdb --help`` imports all of them: what a command needs is imported when it runs.
 """
 
@@ -33,4 +34,5 @@ class Command(Protocol):
 def commands() -> dict[str, Command]:
     """Return the modules of all commands by name, in alphabetical order."""
     names = sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
-    return {name: cast(Command, importlib.import_module(f"{__name__}.{name}")) for name in names}
+    modules = {name: cast(Command, importlib.import_module(f"{__name__}.{name}")) for name in names}
+    return {name.removesuffix("_"): module for name, module in modules.items()}

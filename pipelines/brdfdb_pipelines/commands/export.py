@@ -39,9 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             help="report of `brdfdb audit` whose verdicts go into the files (default: DIR/audit.json of the store)",
         )
         add_jobs(command, "materials that are written at a time")
-        command.add_argument(
-            "--strict", action="store_true", help="exit with 1 if a file is not within the tolerance that was asked for"
-        )
+        if "tolerance" in options_of(exporter):
+            command.add_argument(
+                "--strict",
+                action="store_true",
+                help="exit with 1 if a file is not within the tolerance that was asked for",
+            )
         for option in options_of(exporter).values():
             _add(command, option)
 
@@ -55,7 +58,7 @@ def _add(command: argparse.ArgumentParser, option: Option) -> None:
         text = f"{option.help}: {', '.join(option.choices)} (default: {default})"
         command.add_argument(flag, dest=target, metavar=option.name.upper(), help=text)
     else:
-        text = f"{option.help} (default: {option.default:g})"
+        text = f"{option.help}; {option.allowed} (default: {option.default:g})"
         command.add_argument(flag, dest=target, metavar="X", help=text)
 
 
@@ -64,11 +67,14 @@ def run(options: argparse.Namespace) -> int:
     from brdfdb.formats import EXPORTERS, options_of, parsed_options
     from brdfdb_pipelines import export
 
-    if bool(options.names) == options.all:
+    if options.names and options.all:
+        raise ParameterError("export", "name materials or give --all, not both")
+    if not options.names and not options.all:
         raise ParameterError("export", "name materials, or give --all")
     exporter = EXPORTERS[options.file_format]
     texts = {name: getattr(options, f"option_{name}") for name in options_of(exporter)}
     given = parsed_options(exporter, {name: text for name, text in texts.items() if text is not None})
-    audit = options.audit or options.store / "audit.json"
-    within = export.run(options.store, options.names, options.out, options.file_format, given, audit, options.jobs)
-    return VIOLATED if options.strict and not within else 0
+    within = export.run(
+        options.store, options.names, options.out, options.file_format, given, options.audit, options.jobs
+    )
+    return VIOLATED if getattr(options, "strict", False) and not within else 0

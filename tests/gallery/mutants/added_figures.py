@@ -10,9 +10,9 @@ import numpy as np
 from brdfdb import fresnel
 from brdfdb.gallery import _he_torrance_cuts as cuts
 from brdfdb.gallery import _v_grooves as grooves
-from brdfdb.gallery import ward_1992_gonioreflectometer as gonioreflectometer
 from brdfdb.geometry import unit_vector
 from brdfdb.integrals import sampling
+from brdfdb.measurements import gonioreflectometer
 from brdfdb.models import he_torrance_1991 as he_torrance
 from brdfdb.models import he_torrance_1991_polarised as polarised
 from brdfdb.models import oren_nayar_1994_surfaces as surfaces

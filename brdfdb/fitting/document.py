@@ -1,0 +1,123 @@
+"""Types of the document of fits: the models in order, their parameters with intervals, and the error that is left."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from brdfdb.materials import Material
+
+
+class _Record(BaseModel):
+    """A part of the document: immutable, without keys that it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Estimate(_Record):
+    """One number of a fit with its uncertainty, angles in degrees."""
+
+    name: str = Field(description="parameter, as recipes write it; of a sum after the name of its term")
+    channel: str | None = Field(description="channel of a number that each channel has; null: shared by all")
+    unit: str
+    value: float
+    standard_error: float | None = Field(description="null: at an end of its range, or fixed by the data not at all")
+    low: float = Field(description="lower end of the 95 % interval, within the range of the model")
+    high: float
+    method: Literal["covariance", "profile", "end of range"] = Field(
+        description="covariance: from the derivatives at the best point. profile: where the cost of the best fit with "
+        "this number held rises by 3.84 times its noise. end of range: the best value is the end of what the model "
+        "allows, and no profile was made"
+    )
+
+
+class Correlation(_Record):
+    """A pair of numbers that the samples hardly tell apart."""
+
+    first: str
+    second: str
+    coefficient: float
+    sentence: str
+
+
+class HeldOut(_Record):
+    """Prediction of samples that the fit did not see: one group of incidences after the other is left out."""
+
+    theta_i_deg: list[list[float]] = Field(description="polar angles of the light of each group")
+    rms_ln: list[float] = Field(description="root mean square of ln(model / sample) of each group")
+    rms: float = Field(description="the same over all samples that were left out in turn")
+    median: float = Field(description="median of abs(ln(model / sample)) over them")
+
+
+class Albedo(_Record):
+    """The largest directional albedo of a fit, at the channel that reflects most."""
+
+    theta_i_deg: float
+    value: float
+    error: float = Field(description="estimated error of the quadrature")
+    conserves: bool = Field(description="false: the fit reflects more light than arrives")
+
+
+class Outlier(_Record):
+    """A sample that the best fit is far from."""
+
+    theta_i_deg: float
+    phi_i_deg: float
+    theta_r_deg: float
+    phi_r_deg: float
+    channel: str
+    value: float = Field(description="f_r of the sample, in 1/sr")
+    model: float = Field(description="f_r of the best fit, in 1/sr")
+    sigmas: float = Field(description="its residual over the robust standard deviation of all residuals")
+
+
+class Fit(_Record):
+    """One model, or sum of models, fitted to the samples."""
+
+    model: str = Field(description="a model of the registry, or models joined by +")
+    estimates: list[Estimate]
+    rms_ln: float | None = Field(description="root mean square of ln(model / sample) over positive samples")
+    median_ln: float | None = Field(description="median of its absolute value")
+    sigma: float = Field(description="robust standard deviation of the residuals: 1.4826 times their median size")
+    held_out: HeldOut | None = Field(description="null: the light has one direction alone")
+    numbers: int = Field(description="numbers that were searched")
+    aic: float = Field(description="Akaike's criterion, N ln(2 cost / N) + 2 p, of the robust cost")
+    bic: float = Field(description="Schwarz's criterion, N ln(2 cost / N) + p ln N")
+    pattern: float = Field(
+        description="correlation of each residual with that of the nearest sample: 0 for noise, 1 for a model that is "
+        "wrong in a smooth way"
+    )
+    albedo: Albedo
+    correlations: list[Correlation]
+    remarks: list[str]
+    material: Material | None = Field(description="the fit as a material; null for a sum")
+    recipe: str | None = Field(description="the material as a part of a recipe, [define.NAME] in TOML")
+
+
+class Left(_Record):
+    """Values of the samples that no fit uses."""
+
+    holes: int
+    at_horizon: int = Field(description="a direction at 90 degrees, where models are 0")
+    unusable: int = Field(description="not positive, where logarithms or relative differences are taken")
+
+
+class Fits(_Record):
+    """All models that were fitted to some samples, best first."""
+
+    name: str
+    provenance: str
+    samples: int = Field(description="values that count")
+    incidences: int
+    channels: list[str]
+    wavelengths_nm: list[float] | None
+    assumed_wavelength_nm: float | None = Field(description="for models with n and k, where the samples state none")
+    residual: Literal["log", "relative", "cosine", "uncertainty"]
+    refractive_index: str | None
+    left_out: Left
+    ranked_by: Literal["held-out rms of ln", "BIC"]
+    fits: list[Fit]
+    outliers: list[Outlier] = Field(description="the farthest samples of the best fit, farthest first")
+    outlier_count: int = Field(description="samples farther than 6 robust standard deviations from the best fit")
+    skipped: dict[str, str] = Field(description="models that cannot describe the samples, with the reason")

@@ -1,0 +1,259 @@
+"""Fits of models to samples: parameters with intervals, the error that is left, and a ranking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.fitting.albedo import albedo_of
+from brdfdb.fitting.document import Fit, Fits, Left, Outlier
+from brdfdb.fitting.estimates import correlations_of, estimates_of
+from brdfdb.fitting.fitted import Fitted
+from brdfdb.fitting.held_out import held_out
+from brdfdb.fitting.material import material_of
+from brdfdb.fitting.problem import Point, Problem
+from brdfdb.fitting.remarks import remarks_of
+from brdfdb.fitting.residuals import Kind, Residual
+from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, candidates
+from brdfdb.geometry import degrees
+from brdfdb.measurements import Samples
+
+Array = NDArray[np.float64]
+
+ROBUST = 3.0  # robust standard deviations of residuals from which on a sample counts less than squared
+FAR = 6.0  # the same, from which on a sample of the best fit is an outlier
+MAD = 1.4826  # standard deviation of normal noise over the median of its size
+_LISTED = 20  # outliers that are listed
+_SETTLED = 0.05  # relative change of the scale that ends the iterations
+_SCALES, _EVALUATIONS = 4, 60
+_LEAST_SCALE = 1e-9  # of noise-free samples
+
+
+def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_index: str | None = None) -> Fitted:
+    """Fit a model, or a sum of models, to samples.
+
+    Parameters
+    ----------
+    samples : Samples
+        f_r at some directions; the more incidences, the better.
+    model : str
+        A name in `brdfdb.models.MODELS`, or several joined by +, such as "A + 2 B": a sum of three terms, each with a
+        scale.
+    residual : {"log", "relative", "cosine", "uncertainty"}
+        What is made small, as `brdfdb.fitting.residuals.Residual` has it.
+    refractive_index : str, optional
+        For models with n and k, the entry ``shelf/book/page`` that has them. Without one they are searched.
+
+    Returns
+    -------
+    Fitted
+        The best point.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, or no sample counts.
+    NotDescribedError
+        If the model cannot describe such samples: an anisotropic one without azimuths of the light, a spectrum of what
+        is no polynomial, n and k of several channels.
+
+    Notes
+    -----
+    The cost is the sum of s^2 rho((r / s)^2) / 2 over the residuals r, with rho(z) = 2 (sqrt(1 + z) - 1): squares of
+    small residuals, sizes of large ones. s is three robust standard deviations of the residuals, and follows them. All
+    numbers stay within the ranges of the model. Coefficients in which f_r is a polynomial, such as reflectances, have a
+    value for each channel and are solved for at every shape (variable projection); the shape is shared.
+
+    References
+    ----------
+    golubpereyra1973
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from brdfdb.materials import presets
+    >>> from brdfdb.measurements import Samples
+    >>> theta_i, theta_r = np.repeat([0.3, 0.9], 40), np.tile(np.linspace(0.0, 1.3, 40), 2)
+    >>> phi_i, phi_r = np.zeros(80), np.full(80, np.pi)
+    >>> f_r = presets()["clay-vase"].lookup(theta_i, phi_i, theta_r, phi_r)[:, np.newaxis]
+    >>> fitted = fit(Samples("clay", theta_i, phi_i, theta_r, phi_r, ("grey",), None, f_r), "oren_nayar")
+    >>> print(np.round(fitted.point.values, 3))
+    [[0.7]]
+    """
+    surface = Surface(
+        model, samples.wavelength_nm, len(samples.channels), turned=samples.turned, entry=refractive_index
+    )
+    counting = Residual(samples, residual)
+    rows = np.flatnonzero(counting.used.any(axis=1))
+    problem = Problem(surface, samples.w_i[rows], samples.w_r[rows], counting.selected(rows))
+    point = problem.best()
+    sigma = _sigma(problem, point)
+    for _ in range(_SCALES):
+        problem.scale = max(ROBUST * sigma, _LEAST_SCALE)
+        point = problem.descend(point.x[problem.free], _EVALUATIONS)
+        last, sigma = sigma, _sigma(problem, point)
+        if abs(sigma - last) <= _SETTLED * last:
+            break
+    return Fitted(samples, problem, point, sigma)
+
+
+def _sigma(problem: Problem, point: Point) -> float:
+    return MAD * float(np.median(np.abs(point.residuals[problem.residual.used])))
+
+
+def fits(
+    samples: Samples,
+    models: Sequence[str] | None = None,
+    *,
+    residual: Kind = "log",
+    refractive_index: str | None = None,
+    profiles: bool = True,
+    tick: Callable[[str], None] = lambda _: None,
+) -> tuple[Fits, list[Fitted]]:
+    """Fit several models to samples and rank them.
+
+    Parameters
+    ----------
+    samples : Samples
+        f_r at some directions.
+    models : sequence of str, optional
+        Models and sums, by default `brdfdb.fitting.surface.candidates`.
+    residual, refractive_index
+        As of `fit`.
+    profiles : bool
+        True to correct the intervals of the best fit by profiles where the covariance misleads.
+    tick : callable
+        A function that is called with the name of each model before it is fitted.
+
+    Returns
+    -------
+    Fits, list of Fitted
+        The document, and the fits in its order. They are ranked by the root mean square of ln(model / sample) over
+        incidences that were left out, or by BIC where the light has one direction.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, a model that was named cannot describe the samples, or no sample counts.
+    """
+    counting = Residual(samples, residual)
+    made: list[tuple[Fit, Fitted]] = []
+    skipped: dict[str, str] = {}
+    for model in candidates() if models is None else models:
+        tick(model)
+        try:
+            fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
+        except NotDescribedError as error:
+            if models is not None and len(models) == 1:
+                raise
+            skipped[model] = error.sentence
+            continue
+        made.append((_document(fitted), fitted))
+    if not made:
+        raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
+    by_held_out = made[0][0].held_out is not None
+    made.sort(key=lambda one: _rank(one[0]))
+    if profiles:
+        tick("intervals")
+        first, fitted = made[0]
+        made[0] = first.model_copy(update={"estimates": estimates_of(fitted, profiles=True)}), fitted
+    far, count = _outliers(made[0][1])
+    indexed = any(fitted.surface.indexed for _, fitted in made)
+    document = Fits(
+        name=samples.name,
+        provenance=samples.provenance,
+        samples=counting.count,
+        incidences=int(np.unique(samples.incidence).size),
+        channels=list(samples.channels),
+        wavelengths_nm=None if samples.wavelength_nm is None else samples.wavelength_nm.tolist(),
+        assumed_wavelength_nm=ASSUMED_NM if indexed and samples.wavelength_nm is None else None,
+        residual=residual,
+        refractive_index=refractive_index,
+        left_out=Left(holes=counting.holes, at_horizon=counting.at_horizon, unusable=counting.left_out),
+        ranked_by="held-out rms of ln" if by_held_out else "BIC",
+        fits=[one for one, _ in made],
+        outliers=far,
+        outlier_count=count,
+        skipped=skipped,
+    )
+    return document, [fitted for _, fitted in made]
+
+
+def _rank(one: Fit) -> tuple[float, float]:
+    """Return what fits are sorted by: the error held out to three digits, then BIC, which outliers hardly change."""
+    return (0.0 if one.held_out is None else float(f"{one.held_out.rms:.3g}"), one.bic)
+
+
+def _document(fitted: Fitted) -> Fit:
+    """Return the record of a fit, with intervals of its covariance."""
+    logs = fitted.logarithms[np.isfinite(fitted.logarithms)]
+    used = fitted.problem.residual.count
+    searched = len(fitted.problem.free) + fitted.point.values.size
+    deviance = used * float(np.log(max(2.0 * fitted.point.cost / used, 1e-300)))
+    albedo = albedo_of(fitted.surface, fitted.point, fitted.samples)
+    material, recipe = material_of(fitted.surface, fitted.point, fitted.samples)
+    correlations = correlations_of(fitted)
+    record = Fit(
+        model=fitted.surface.name,
+        estimates=estimates_of(fitted, profiles=False),
+        rms_ln=float(np.sqrt(np.mean(logs**2))) if logs.size else None,
+        median_ln=float(np.median(np.abs(logs))) if logs.size else None,
+        sigma=fitted.sigma,
+        held_out=held_out(fitted.problem, fitted.point, fitted.samples),
+        numbers=searched,
+        aic=deviance + 2.0 * (searched + 1),
+        bic=deviance + (searched + 1) * float(np.log(used)),
+        pattern=_pattern(fitted),
+        albedo=albedo,
+        correlations=correlations,
+        remarks=[],
+        material=material,
+        recipe=recipe,
+    )
+    return record.model_copy(update={"remarks": remarks_of(record, fitted.surface, fitted.samples)})
+
+
+def _pattern(fitted: Fitted) -> float:
+    """Return the correlation of residuals with those of the nearest other direction."""
+    from scipy.spatial import cKDTree
+
+    problem = fitted.problem
+    pairs = np.concatenate([problem.wi, problem.wr], axis=1)
+    if len(pairs) < 3:
+        return 0.0
+    nearest = cKDTree(pairs).query(pairs, k=2)[1][:, 1]
+    used = problem.residual.used & problem.residual.used[nearest]
+    r = np.clip(fitted.point.residuals, -FAR * fitted.sigma, FAR * fitted.sigma)
+    size = float(np.sum((r * r)[used]))
+    return float(np.sum((r * r[nearest])[used]) / size) if size > 0.0 else 0.0
+
+
+def _outliers(fitted: Fitted) -> tuple[list[Outlier], int]:
+    """Return the samples that are far from a fit, the farthest first, and their number."""
+    samples, problem = fitted.samples, fitted.problem
+    residual = Residual(samples, problem.residual.kind)
+    f_r = fitted.f_r(samples.w_i, samples.w_r)
+    sigmas = np.where(residual.used, residual.of(f_r) / max(fitted.sigma, _LEAST_SCALE), 0.0)
+    far = np.argwhere(np.abs(sigmas) > FAR)
+    order = np.argsort(-np.abs(sigmas[far[:, 0], far[:, 1]]), kind="stable")[:_LISTED]
+    listed = [
+        Outlier(
+            theta_i_deg=_degrees(samples.theta_i[row]),
+            phi_i_deg=_degrees(samples.phi_i[row]),
+            theta_r_deg=_degrees(samples.theta_r[row]),
+            phi_r_deg=_degrees(samples.phi_r[row]),
+            channel=samples.channels[column],
+            value=float(samples.values[row, column]),
+            model=float(f_r[row, column]),
+            sigmas=float(sigmas[row, column]),
+        )
+        for row, column in far[order].tolist()
+    ]
+    return listed, len(far)
+
+
+def _degrees(angle: float) -> float:
+    return round(float(degrees(angle)), 6)

@@ -1,0 +1,122 @@
+"""Residuals of a fit: the difference of model and samples in logarithms, relative, weighted or by uncertainty."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.measurements import Samples
+from brdfdb.parameters import Floats
+
+Kind = Literal["log", "relative", "cosine", "uncertainty"]
+KINDS: tuple[Kind, ...] = ("log", "relative", "cosine", "uncertainty")
+
+_LEAST = 1e-6  # share of the smallest sample that is added to both sides before logarithms: the model may be 0
+_NOTHING = 1e-12  # the same of the largest, for samples that fall beneath what any instrument resolves
+_HORIZON_COSINE = 1e-4  # directions closer to the horizon are left out: models are 0 there
+
+
+class Residual:
+    """The residual of each sample as a function of the f_r of a model.
+
+    Parameters
+    ----------
+    samples : Samples
+        The samples.
+    kind : {"log", "relative", "cosine", "uncertainty"}
+        "log": ln f - ln y. "relative": (f - y) / y. "cosine": (f - y) cos theta_i cos theta_r over the root mean square
+        of y cos theta_i cos theta_r. "uncertainty": (f - y) / u, u the standard uncertainty of each sample.
+
+    Attributes
+    ----------
+    used : array (N, C) of bool
+        Samples that count. Holes do not, nor directions at the horizon, nor, of "log" and "relative", samples that are
+        not positive, nor, of "uncertainty", samples without a positive one.
+    holes, at_horizon, left_out : int
+        Numbers of values that do not count, in this order of reasons.
+
+    Raises
+    ------
+    ParameterError
+        If the kind is unknown, the samples have no uncertainty, or none is left.
+    """
+
+    def __init__(self, samples: Samples, kind: Kind) -> None:
+        if kind not in KINDS:
+            raise ParameterError("residual", f"{kind!r} is not one of {', '.join(KINDS)}", kind, KINDS)
+        if kind == "uncertainty" and samples.uncertainty is None:
+            raise ParameterError(
+                "residual", f"{samples.name} has no uncertainties; choose log, relative or cosine", kind, KINDS
+            )
+        self.kind, self.truth = kind, samples.values
+        cosines = np.cos(samples.theta_i) * np.cos(samples.theta_r)
+        above = np.minimum(np.cos(samples.theta_i), np.cos(samples.theta_r)) > _HORIZON_COSINE
+        known = samples.known
+        horizon = known & ~above[:, np.newaxis]
+        self.used = known & above[:, np.newaxis]
+        self.holes, self.at_horizon = int(np.sum(~known)), int(np.sum(horizon))
+        with np.errstate(invalid="ignore"):
+            positive = self.truth > 0.0
+            if kind in ("log", "relative"):
+                usable = positive
+            elif kind == "uncertainty":
+                assert samples.uncertainty is not None
+                usable = samples.uncertainty > 0.0
+            else:
+                usable = known
+        self.left_out = int(np.sum(self.used & ~usable))
+        self.used &= usable
+        if not self.used.any():
+            raise ParameterError("samples", f"{samples.name} has no value that a {kind} residual can use", samples.name)
+        y = np.where(self.used, self.truth, 1.0)
+        usable_y = y[self.used]
+        least = max(_LEAST * float(usable_y.min()), _NOTHING * float(usable_y.max()))
+        self.floor = least if kind == "log" else 0.0
+        if kind == "log":
+            self.weight, self.goal = np.where(self.used, 1.0, 0.0), np.log(y + self.floor)
+            return
+        if kind == "relative":
+            weight = 1.0 / y
+        elif kind == "cosine":
+            size = np.sqrt(np.mean((y * cosines[:, np.newaxis])[self.used] ** 2))
+            weight = np.broadcast_to(cosines[:, np.newaxis], y.shape) / (size if size > 0.0 else 1.0)
+        else:
+            assert samples.uncertainty is not None
+            weight = 1.0 / np.where(self.used, samples.uncertainty, 1.0)
+        self.weight, self.goal = np.where(self.used, weight, 0.0), y
+
+    @property
+    def count(self) -> int:
+        """Return the number of samples that count."""
+        return int(self.used.sum())
+
+    def selected(self, rows: NDArray[np.int64]) -> Residual:
+        """Return the residual of some of the samples, with the same weights."""
+        part = object.__new__(Residual)
+        part.kind, part.floor = self.kind, self.floor
+        part.holes = part.at_horizon = part.left_out = 0
+        for name in ("truth", "used", "weight", "goal"):
+            setattr(part, name, getattr(self, name)[rows])
+        return part
+
+    def of(self, f_r: Floats) -> Floats:
+        """Return the residuals (N, C) of f_r (N, C) [1/sr]; 0 where a sample does not count."""
+        values = np.log(np.maximum(f_r, 0.0) + self.floor) if self.kind == "log" else f_r
+        return np.asarray(self.weight * (values - self.goal))
+
+    def slope(self, f_r: Floats) -> Floats:
+        """Return the derivatives (N, C) [sr] of the residuals by f_r."""
+        if self.kind != "log":
+            return self.weight
+        return np.asarray(self.weight / (np.maximum(f_r, 0.0) + self.floor))
+
+
+def logarithms(samples: Samples, f_r: Floats) -> Floats:
+    """Return ln f - ln y (N, C), nan where a sample is no positive number or lies at the horizon."""
+    above = np.minimum(np.cos(samples.theta_i), np.cos(samples.theta_r)) > _HORIZON_COSINE
+    with np.errstate(all="ignore"):
+        difference = np.log(np.maximum(f_r, np.finfo(np.float64).tiny)) - np.log(samples.values)
+    return np.where(np.isfinite(difference) & above[:, np.newaxis], difference, np.nan)

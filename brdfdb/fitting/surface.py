@@ -1,0 +1,336 @@
+"""The surface that a fit searches: a registered model, or a sum of them, each with a scale."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.fitting.polynomials import Polynomial, coefficients, unit_of
+from brdfdb.fitting.variables import EDGE, NORMAL, index_of, index_variables, switches, variable
+from brdfdb.geometry import unit_vector
+from brdfdb.models import MODELS
+from brdfdb.parameters import Floats, ModelSpec, closest
+from brdfdb.spectra import refractive_index
+
+Array = NDArray[np.float64]
+
+ASSUMED_NM = 550.0  # wavelength of samples that state none, for models with n and k
+SCALE = "scale"
+_MOST_LOBES = 4  # terms of a sum
+_MOST_SHAPE = 2  # numbers of the shape of a lobe in the sums that are tried unasked
+_REMEMBERED = 2  # values of a term: those of a point and of its last neighbour
+_LEAST_K = 1e-6  # below it, k is 0
+
+
+class NotDescribedError(ParameterError):
+    """A model that cannot describe some samples; str() says why."""
+
+
+class Coefficient(NamedTuple):
+    """A number in which f_r is a polynomial, with a value for each channel: a reflectance, an amplitude or a scale.
+
+    `term` is its term, `name` its parameter, or "scale"; `label` names it in a sum. `unit` is the value at which the
+    term is evaluated.
+    """
+
+    term: int
+    name: str
+    label: str
+    low: float
+    high: float
+    unit: float
+
+
+class Term:
+    """One term of a sum.
+
+    Attributes
+    ----------
+    spec : ModelSpec
+        Its model.
+    label : str
+        What the names of its parameters begin with; empty if it stands alone.
+    fixed : dict
+        Parameters that are not searched.
+    linear : tuple of str
+        Parameters in which f_r is a polynomial; empty for a term with a scale.
+    free : list of Parameter
+        The others that are searched, without n and k.
+    tied : tuple of str or None
+        Two widths that are the same.
+    """
+
+    def __init__(self, spec: ModelSpec, label: str, *, alone: bool, beside_flat: bool, turned: bool) -> None:
+        self.spec, self.label = spec, label
+        self.fixed: dict[str, float] = switches(spec)
+        names, degree = coefficients(spec)
+        if beside_flat and spec.uniform is not None and spec.lobe is not None:
+            self.fixed[spec.uniform] = 0.0
+            names = tuple(name for name in names if name != spec.uniform)
+        bright = not names or _is_bright(spec, names, self.fixed)
+        self.scaled = bright and not alone
+        self.linear = () if self.scaled else names
+        self.polynomial = (
+            Polynomial(1, 1, constant=False) if self.scaled else Polynomial(len(names), degree, constant=bright)
+        )
+        self.memory: list[tuple[Floats, dict[str, Any], Floats]] = []
+        self.tied = None if turned else spec.lobe_axes
+        out = {*self.fixed, *self.linear, *(self.tied or ())[1:]}
+        self.free = [p for p in spec.parameters if p.name not in out]
+
+    def coefficients(self, number: int) -> list[Coefficient]:
+        """Return the coefficients of this term, whose number is given."""
+        if self.scaled:
+            return [Coefficient(number, SCALE, f"{self.label}{SCALE}", 0.0, 1.0, 1.0)]
+        parameters = [self.spec.parameter(name) for name in self.linear]
+        return [Coefficient(number, p.name, f"{self.label}{p.name}", p.low, p.high, unit_of(p)) for p in parameters]
+
+    def basis(self, wi: Floats, wr: Floats, numbers: Mapping[str, Any]) -> Floats:
+        """Return the factors (M, N) [1/sr] of the monomials of this term. The last ones are remembered."""
+        for light, given, part in self.memory:
+            if light is wi and given == numbers:
+                return part
+        part = self._computed(wi, wr, numbers)
+        self.memory = [(wi, dict(numbers), part), *self.memory[: _REMEMBERED - 1]]
+        return part
+
+    def _computed(self, wi: Floats, wr: Floats, numbers: Mapping[str, Any]) -> Floats:
+        if self.scaled:
+            return np.asarray(self.spec.vectors(wi, wr, **numbers))[np.newaxis]
+        units = [unit_of(self.spec.parameter(name)) for name in self.linear]
+        values = []
+        for node in self.polynomial.nodes.tolist():
+            given = {name: u * unit for name, u, unit in zip(self.linear, node, units, strict=True)}
+            values.append(self.spec.vectors(wi, wr, **numbers, **given))
+        return self.polynomial.parts(values)
+
+
+def _is_bright(spec: ModelSpec, names: tuple[str, ...], fixed: Mapping[str, float]) -> bool:
+    """Return True if the model reflects something where its reflectances are 0, as facets do at grazing."""
+    middle = {p.name: 0.5 * (p.low + min(p.high, 1.0)) for p in spec.parameters}
+    index = {"wavelength_nm": ASSUMED_NM, "n": 1.5, "k": 0.0} if spec.spectral else {}
+    wi, wr = unit_vector(np.full(3, 1.2), np.zeros(3)), unit_vector(np.array([0.1, 0.7, 1.2]), np.full(3, np.pi))
+    return bool(np.any(spec.vectors(wi, wr, **(middle | dict(fixed) | dict.fromkeys(names, 0.0) | index)) > 0.0))
+
+
+class Surface:
+    """A sum of terms as a function of a point of the unit cube (its shape) and of coefficients of each channel.
+
+    Parameters
+    ----------
+    name : str
+        A model, or models joined by " + "; "2 NAME" is two lobes of one.
+    wavelength_nm : array (C,) [nm] or None
+        Wavelengths of the channels.
+    channels : int
+        Number of channels, C.
+    turned : bool
+        True if the light comes from several azimuths, so that two widths can be told apart.
+    entry : str, optional
+        Refractive index of models with n and k; without one they are searched.
+
+    Attributes
+    ----------
+    terms : list of Term
+        The terms.
+    shape : list of Variable
+        Numbers that all channels share; `owners` are the terms that they belong to, None for n and k.
+    coefficients : list of Coefficient
+        Numbers with a value for each channel.
+
+    Raises
+    ------
+    ParameterError
+        If a model is unknown.
+    NotDescribedError
+        If it cannot describe such samples.
+    """
+
+    def __init__(
+        self, name: str, wavelength_nm: Array | None, channels: int, *, turned: bool, entry: str | None = None
+    ) -> None:
+        names = _parsed(name)
+        alone, flat = len(names) == 1, flat_model()
+        repeated, seen = Counter(names), Counter[str]()
+        self.name, self.channels, self.entry = name, channels, entry
+        self.terms: list[Term] = []
+        for model in names:
+            seen[model] += 1
+            number = f" {seen[model]}" if repeated[model] > 1 else ""
+            label = "" if alone else f"{model}{number} "
+            spec = MODELS[model]
+            beside = not alone and flat in names
+            self.terms.append(Term(spec, label, alone=alone, beside_flat=beside, turned=turned))
+        self.indexed = any(term.spec.spectral for term in self.terms)
+        self.searched_index = self.indexed and entry is None
+        self._refuse(turned)
+        self.shape = [variable(p) for term in self.terms for p in term.free]
+        self.owners: list[int | None] = [number for number, term in enumerate(self.terms) for _ in term.free]
+        if self.searched_index:
+            self.shape += index_variables()
+            self.owners += [None, None]
+        self.coefficients = [one for number, term in enumerate(self.terms) for one in term.coefficients(number)]
+        self.wavelength_nm = np.full(channels, ASSUMED_NM) if wavelength_nm is None else wavelength_nm
+        self.indices = refractive_index(entry, self.wavelength_nm) if self.indexed and entry else None
+
+    def _refuse(self, turned: bool) -> None:
+        for term in self.terms:
+            spec = term.spec
+            if spec.anisotropic is not None and not turned:
+                raise NotDescribedError(
+                    "model", f"{spec.name} changes when the surface is turned, and the light is in one azimuth alone"
+                )
+            if self.channels > 1 and len(self.terms) == 1 and any(p.reflectance for p in term.free):
+                raise NotDescribedError(
+                    "model",
+                    f"{spec.name}: f_r is no polynomial in its reflectances, so that spectra of them are not searched; "
+                    "choose one channel",
+                )
+        if self.searched_index and self.channels > 1:
+            raise NotDescribedError(
+                "model",
+                f"{self.name} takes n and k, which are searched at one wavelength alone, and there are {self.channels} "
+                "channels; give a refractive index, or choose one channel",
+            )
+
+    @property
+    def labels(self) -> list[str]:
+        """Return the names of the numbers in `shape`."""
+        return [
+            one.name if owner is None else f"{self.terms[owner].label}{one.name}"
+            for one, owner in zip(self.shape, self.owners, strict=True)
+        ]
+
+    def numbers(self, x: Array) -> list[dict[str, float]]:
+        """Return the shared parameters of each term at a point of the unit cube, with n and k if they are searched."""
+        numbers: list[dict[str, float]] = [dict(term.fixed) for term in self.terms]
+        index: dict[str, float] = {}
+        for one, owner, u in zip(self.shape, self.owners, x.tolist(), strict=True):
+            (index if owner is None else numbers[owner])[one.name] = one.value(u)
+        if index:
+            n, k = index_of(index[NORMAL], index[EDGE])
+            index = {"n": n, "k": k if k > _LEAST_K else 0.0}
+        for term, given in zip(self.terms, numbers, strict=True):
+            if term.tied:
+                given[term.tied[1]] = given[term.tied[0]]
+            if term.spec.spectral:
+                given |= index
+        return numbers
+
+    def arguments(self, number: int, given: Mapping[str, float], channel: int) -> dict[str, float]:
+        """Return the shared arguments of a term in a channel."""
+        if not self.terms[number].spec.spectral:
+            return dict(given)
+        of_channel = {"wavelength_nm": float(self.wavelength_nm[channel])}
+        if self.indices is not None:
+            n, k = self.indices
+            of_channel |= {"n": float(n[channel]), "k": float(k[channel])}
+        return {**given, **of_channel}
+
+    def in_channel(self, x: Array, values: Array, number: int, channel: int) -> tuple[dict[str, float], float]:
+        """Return all arguments of a term in a channel, and its scale."""
+        given = self.arguments(number, self.numbers(x)[number], channel)
+        own = {one.name: float(values[row, channel]) for row, one in enumerate(self.coefficients) if one.term == number}
+        return given | {name: value for name, value in own.items() if name != SCALE}, own.get(SCALE, 1.0)
+
+    def basis(self, x: Array, wi: Floats, wr: Floats) -> Floats:
+        """Return the factors (M, N, C) [1/sr] of all monomials; (M, N, 1) if they are the same in each channel."""
+        parts = []
+        several = self.channels if self.indexed else 1
+        for number, (term, given) in enumerate(zip(self.terms, self.numbers(x), strict=True)):
+            own = several if term.spec.spectral else 1
+            with np.errstate(all="ignore"):  # extreme parameters may raise flags
+                columns = [term.basis(wi, wr, self.arguments(number, given, c)) for c in range(own)]
+            part = np.stack(columns, axis=-1)
+            parts.append(np.broadcast_to(part, (*part.shape[:2], several)))
+        basis = np.concatenate(parts)
+        return basis if np.all(np.isfinite(basis)) else np.nan_to_num(basis, nan=0.0, posinf=0.0, neginf=0.0)
+
+    def monomials(self, values: Floats) -> Floats:
+        """Return the monomials (M, C) of coefficients (K, C)."""
+        parts, at = [], 0
+        for term in self.terms:
+            count = term.polynomial.exponents.shape[1]
+            parts.append(term.polynomial.monomials(self._in_units(values, at, count)))
+            at += count
+        return np.concatenate(parts)
+
+    def slopes(self, values: Floats) -> Floats:
+        """Return the derivatives (K, M, C) of the monomials by each coefficient."""
+        sizes = [term.polynomial.exponents.shape for term in self.terms]
+        slopes = np.zeros((sum(k for _, k in sizes), sum(m for m, _ in sizes), values.shape[1]))
+        row = column = 0
+        for term, (m, k) in zip(self.terms, sizes, strict=True):
+            units = np.array([one.unit for one in self.coefficients[row : row + k]])
+            of_term = term.polynomial.slopes(self._in_units(values, row, k))
+            slopes[row : row + k, column : column + m] = of_term / units[:, np.newaxis, np.newaxis]
+            row, column = row + k, column + m
+        return slopes
+
+    def _in_units(self, values: Floats, at: int, count: int) -> Floats:
+        units = np.array([one.unit for one in self.coefficients[at : at + count]])
+        return np.asarray(values[at : at + count] / units[:, np.newaxis])
+
+    def f_r(self, x: Array, values: Floats, wi: Floats, wr: Floats) -> Floats:
+        """Return f_r (N, C) [1/sr] at unit vectors (N, 3), with coefficients (K, C)."""
+        return total(self.basis(x, wi, wr), self.monomials(values))
+
+
+def total(basis: Floats, monomials: Floats) -> Floats:
+    """Return the sum (N, C) over monomials (M, C) times their factors (M, N, C) or (M, N, 1)."""
+    if basis.shape[2] == 1:
+        return np.asarray(np.einsum("mn,mc->nc", basis[:, :, 0], monomials))
+    return np.asarray(np.einsum("mnc,mc->nc", basis, monomials))
+
+
+def flat_model() -> str:
+    """Return the model of a uniform f_r: a reflectance, of degree 1, and nothing else."""
+    return next(
+        name
+        for name, spec in MODELS.items()
+        if spec.lobe is None and len(spec.parameters) == 1 and spec.degree == 1 and not spec.grazing_pole
+    )
+
+
+def _parsed(name: str) -> list[str]:
+    """Return the models of a sum."""
+    names: list[str] = []
+    for part in name.split("+"):
+        match = re.fullmatch(r"\s*(?:(\d+)\s+)?([\w-]+)\s*", part)
+        if match is None:
+            raise ParameterError(
+                "model", f"{name!r} is no model and no sum of models, such as 'A + 2 B'", name, tuple(MODELS)
+            )
+        model = match[2]
+        if model not in MODELS:
+            raise ParameterError("model", f"{model!r} is unknown{closest(model, MODELS)}", model, tuple(MODELS))
+        names += [model] * int(match[1] or 1)
+    if not 1 <= len(names) <= _MOST_LOBES:
+        raise ParameterError("model", f"{name!r} has {len(names)} terms; 1 to {_MOST_LOBES} are allowed", name)
+    return names
+
+
+def _is_simple(name: str) -> bool:
+    """Return True if a term of a sum with this model has a shape of few numbers."""
+    term = Term(MODELS[name], "", alone=False, beside_flat=True, turned=False)
+    return len(term.free) <= _MOST_SHAPE
+
+
+def candidates(*, sums: bool = True) -> list[str]:
+    """Return the surfaces that are fitted unless others are named: every model, and sums with a uniform f_r.
+
+    Models whose values are integrals are left out. Sums have one or two lobes of a model without a uniform part.
+    """
+    alone = [name for name, spec in MODELS.items() if not spec.slow]
+    if not sums:
+        return alone
+    flat = flat_model()
+    lobes = [name for name in alone if MODELS[name].lobe is not None and _is_simple(name)]
+    one = [f"{flat} + {name}" for name in lobes if MODELS[name].uniform is None]
+    return [*alone, *one, *(f"{flat} + 2 {name}" for name in lobes)]

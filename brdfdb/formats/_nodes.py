@@ -1,0 +1,133 @@
+"""The values of a file at their own directions: samples above the horizon, each of them once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.formats._angles import System
+from brdfdb.geometry import check_phi, check_theta, spherical_angles
+from brdfdb.measurements.samples import ANGLES, Instrument, Samples
+from brdfdb.parameters import Floats
+
+_HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
+_SAME = 1e-6  # difference of coordinates within which directions are the same: angles of files may have 32 bits
+_MIXED = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)  # odd: a hash of rows
+
+
+def samples_at_vectors(wi: Floats, wr: Floats, values: Floats, *arguments: Any, **keywords: Any) -> Samples:
+    """Return samples at unit vectors (N, 3); all other arguments are those of `samples_at_angles`."""
+    angles = [angle for w in (wi, wr) for angle in _angles(w)]
+    return samples_at_angles(np.stack(angles, axis=1), values, *arguments, **keywords)
+
+
+def samples_at_angles(
+    angles: Floats,
+    values: Floats,
+    name: str,
+    channels: Sequence[str],
+    wavelength_nm: NDArray[np.float64] | None,
+    record: Mapping[str, Any],
+    *,
+    uncertainty: Floats | None = None,
+    instrument: Instrument | None = None,
+    provenance: str = "",
+) -> Samples:
+    """Return samples without those below the horizon, and without repetitions.
+
+    Parameters
+    ----------
+    angles : array (N, 4) [rad]
+        theta_i, phi_i, theta_r, phi_r. Polar angles above pi/2 are below the horizon.
+    values : array (N, C) [1/sr]
+        f_r; nan where there is none.
+    name, channels, wavelength_nm, record, uncertainty, instrument, provenance
+        As of `Samples`.
+
+    Returns
+    -------
+    Samples
+        In the order of the rows. Its record counts the rows ``below_the_horizon`` and those ``repeated``: with the same
+        directions and the same values, as at all azimuths of the normal.
+
+    Raises
+    ------
+    FileFormatError
+        If no row is above the horizon.
+    ParameterError
+        If an angle is outside its range, or nan.
+    """
+    for axis, column in zip(ANGLES, angles.T, strict=True):
+        (check_theta if axis.startswith("theta") else check_phi)(axis, column)
+        if np.any(np.isnan(column)):
+            raise ParameterError(axis, "nan is not an angle", np.nan)
+    above = np.flatnonzero((angles[:, 0] <= _HORIZON) & (angles[:, 2] <= _HORIZON))
+    kept = above[_first_of_each(angles[above], values[above])]
+    if not len(kept):
+        raise FileFormatError(f"{name}: none of its {len(angles)} values is above the horizon")
+    counts = {"below_the_horizon": len(angles) - len(above), "repeated": len(above) - len(kept)}
+    theta_i, phi_i, theta_r, phi_r = np.minimum(angles[kept], [_HORIZON, np.inf, _HORIZON, np.inf]).T
+    return Samples(
+        name,
+        theta_i,
+        phi_i,
+        theta_r,
+        phi_r,
+        tuple(channels),
+        wavelength_nm,
+        values[kept],
+        uncertainty=None if uncertainty is None else uncertainty[kept],
+        instrument=instrument or Instrument(),
+        provenance=provenance,
+        record={**record, **{key: count for key, count in counts.items() if count}},
+    )
+
+
+def samples_of_grid(
+    system: System, nodes: Sequence[Floats], values: Floats, *arguments: Any, **keywords: Any
+) -> Samples:
+    """Return samples at all nodes [rad] of the angles of a system, the last angle fastest.
+
+    Parameters
+    ----------
+    system : System
+        The angles; of an isotropic one four angles may be given, too.
+    nodes : sequence of array (n,) [rad]
+        Nodes of each angle.
+    values : array (n, ..., C) [1/sr]
+        f_r, an axis for each angle and last the channels.
+    *arguments, **keywords
+        Those of `samples_at_angles` after the values.
+    """
+    angles = np.stack([grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij")], axis=1)
+    flat = np.asarray(values, dtype=np.float64).reshape(len(angles), -1)
+    return samples_at_vectors(*system.vectors(angles), flat, *arguments, **keywords)
+
+
+def _angles(w: Floats) -> tuple[Floats, Floats]:
+    """Return polar angles and azimuths [rad] of unit vectors (N, 3); azimuths of the normal are 0."""
+    theta, phi = spherical_angles(w)
+    return theta, np.where(np.sin(theta) < _SAME, 0.0, phi)
+
+
+def _first_of_each(angles: Floats, values: Floats) -> NDArray[np.intp]:
+    """Return the numbers of the rows without those whose directions and values another row before them has."""
+    theta_i, phi_i, theta_r, phi_r = angles.T
+    parts = [np.sin(theta_i) * np.cos(phi_i), np.sin(theta_i) * np.sin(phi_i)]
+    parts += [np.sin(theta_r) * np.cos(phi_r), np.sin(theta_r) * np.sin(phi_r)]
+    code = np.zeros(len(angles), dtype=np.uint64)
+    for part in parts:
+        code = _mixed(code, np.rint(part / _SAME).astype(np.int64).view(np.uint64))
+    for column in (values + 0.0).T:  # -0 is 0
+        code = _mixed(code, np.ascontiguousarray(column, dtype=np.float64).view(np.uint64))
+    return np.sort(np.unique(code, return_index=True)[1])
+
+
+def _mixed(code: NDArray[np.uint64], part: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return 64 bits that tell the values of `part` apart as well as those of `code`."""
+    mixed = (code ^ part * _MIXED[0]) * _MIXED[1]
+    return np.asarray((mixed ^ (mixed >> np.uint64(29))) * _MIXED[2])

@@ -1,0 +1,131 @@
+"""Pictures of Ward's imaging gonioreflectometer as OpenEXR files: counts of the camera, and the settings of instrument.
+
+A file is one direction of the light. Its channels are counts as 32-bit floats, an array each exposure: ``sample.0``,
+``standard.0``, ``background.0``, and the same with 1, 2, ... for shorter exposures. The attribute
+``brdf:gonioreflectometer`` is JSON: ``theta_i_deg`` and ``phi_i_deg`` of the light, ``name``, ``provenance``, and
+``settings``, the attributes of `brdfdb.measurements.gonioreflectometer.Gonioreflectometer`. A measured picture needs
+nothing else. Reading gives samples; the tables of a store are not written in this form.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brdfdb.errors import FileFormatError, ParameterError, WriteError
+from brdfdb.formats._written import whole
+from brdfdb.geometry import degrees, radians
+
+if TYPE_CHECKING:
+    from brdfdb.measurements.gonioreflectometer import Picture
+    from brdfdb.measurements.samples import Samples
+
+suffix = ".exr"
+
+_KEY = "brdf:gonioreflectometer"
+_MAGIC = b"\x76\x2f\x31\x01"
+_PARTS = ("sample", "standard", "background")
+_MOST_BYTES = 2**30
+
+
+def write_picture(picture: Picture, path: str | os.PathLike[str]) -> None:
+    """Write a picture of the instrument, ZIP compressed: whole, or not at all.
+
+    Parameters
+    ----------
+    picture : Picture
+        A picture, simulated or measured.
+    path : path
+        The file; one that is there is replaced.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written.
+    """
+    import OpenEXR
+
+    document = {
+        "name": picture.name,
+        "provenance": picture.provenance,
+        "theta_i_deg": float(degrees(picture.theta_i)),
+        "phi_i_deg": float(degrees(picture.phi_i)),
+        "settings": picture.settings.settings(),
+    }
+    channels = {
+        f"{part}.{number}": np.ascontiguousarray(counts)
+        for part in _PARTS
+        for number, counts in enumerate(getattr(picture, part))
+    }
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, _KEY: json.dumps(document)}
+    with whole(path) as (temporary,):
+        try:
+            OpenEXR.File(header, channels).write(str(temporary))
+        except RuntimeError as error:  # OpenEXR's word for a missing directory and for a full disk alike
+            raise WriteError(f"cannot write {path}: {error}") from error
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of an OpenEXR file with the attribute of the instrument."""
+    return head.startswith(_MAGIC) and _KEY.encode() in head
+
+
+def read_picture(path: str | os.PathLike[str]) -> Picture:
+    """Return the picture of a file.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is no such picture, or damaged.
+    OSError
+        If it cannot be read.
+    """
+    import OpenEXR
+
+    from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture
+
+    path = Path(path)
+    if path.stat().st_size > _MOST_BYTES:
+        raise FileFormatError(f"{path}: it is larger than {_MOST_BYTES >> 20} MiB")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            document: Any = json.loads(file.header().get(_KEY, "null"))
+            counts = {name: np.array(channel.pixels, dtype=np.float32) for name, channel in file.channels().items()}
+    except (RuntimeError, ValueError, RecursionError) as error:
+        raise FileFormatError(f"{path}: it cannot be read as OpenEXR ({error})") from None
+    try:
+        known = dict(document["settings"])
+        settings = Gonioreflectometer(**known | {"exposures": tuple(known["exposures"])})
+        stacks = {
+            part: np.stack([counts[f"{part}.{number}"] for number in range(len(settings.exposures))]) for part in _PARTS
+        }
+        theta_i, phi_i = (float(radians(document[name])) for name in ("theta_i_deg", "phi_i_deg"))
+        name, provenance = (str(document.get(key, "")) for key in ("name", "provenance"))
+        sample, standard, background = (stacks[part] for part in _PARTS)
+        return Picture(settings, theta_i, phi_i, sample, standard, background, name, provenance)
+    except KeyError as error:
+        raise FileFormatError(f"{path}: it has no {error}") from None
+    except (ParameterError, TypeError, ValueError) as error:
+        raise FileFormatError(f"{path}: {error}") from None
+
+
+def read(path: str | os.PathLike[str]) -> Samples:
+    """Return the samples of a picture, as `brdfdb.measurements.gonioreflectometer.reduced` gives them.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is no such picture, is damaged, or no pixel of it can be used.
+    OSError
+        If it cannot be read.
+    """
+    from brdfdb.measurements.gonioreflectometer import reduced
+
+    try:
+        return reduced(read_picture(path))
+    except ParameterError as error:
+        raise FileFormatError(f"{path}: {error}") from None

@@ -1,0 +1,137 @@
+"""LightTools BSDF files: f_r about the normal as text, a block a direction of the light.
+
+After a list of azimuths and polar angles of the viewer each block has an angle of incidence, a side, a wavelength or a
+tristimulus value, the total integrated scatter and f_r in 1/sr. Azimuths are those of the viewer, with the light at 90
+degrees (libbsdf, ``LightToolsBsdfReader.cpp``). Blocks of the front with the type BRDF are read.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import FileFormatError
+from brdfdb.formats._channels import XYZ
+from brdfdb.formats._nodes import samples_of_grid
+from brdfdb.formats._record import of_lines
+from brdfdb.formats._words import Words
+
+if TYPE_CHECKING:
+    from brdfdb.measurements.samples import Samples
+
+suffix = ".bsdf"
+_SYMMETRY, _LIGHT_DEG = "Asymmetric", 90.0
+_ENTRIES = ("AOI", "POI", "Side", "Wavelength", "ScatterType", "TristimulusValue")
+_TRISTIMULUS = ("TrisX", "TrisY", "TrisZ")
+
+
+def recognises(head: bytes) -> bool:
+    """Return True for the first bytes of a LightTools file, whose symmetry no Zemax file has."""
+    lines = (line.split() for line in head.split(b"\n") if not line.lstrip().startswith(b"#"))
+    return any(words[:2] == [b"Symmetry", _SYMMETRY.encode()] for words in lines)
+
+
+def read(path: str | os.PathLike[str]) -> Samples:
+    """Return the samples of the front of a LightTools file.
+
+    The record has the total integrated scatter as "tis", with its angles of incidence as "theta_i_deg".
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, has no block of the front with the type BRDF, or has planes of incidence that differ:
+        what POI counts from is not published.
+    OSError
+        If it cannot be read.
+    """
+    from brdfdb.formats._angles import Spherical
+
+    path = Path(path)
+    words = Words(path)
+    lists = _lists(words)
+    blocks = _blocks(words, lists["ScatterAzimuth"].size * lists["ScatterRadial"].size)
+    kept = [block for block in blocks if block["Side"] == "Front" and block["ScatterType"] == "BRDF"]
+    if not kept or len({block["POI"] for block in kept}) > 1:
+        raise FileFormatError(f"{path}: it has no block of Side Front, ScatterType BRDF; or they differ in POI")
+    incidences = sorted({float(block["AOI"]) for block in kept})
+    keys = [key for key in _TRISTIMULUS if any(block["TristimulusValue"] == key for block in kept)]
+    keys = keys or sorted({block["Wavelength"] for block in kept}, key=float)
+    grid: dict[tuple[float, str], dict[str, Any]] = {}
+    for block in kept:
+        key = float(block["AOI"]), block["TristimulusValue"] or block["Wavelength"]
+        if key in grid:
+            raise FileFormatError(
+                f"{path}: line {block['line']}, field AOI: {key[0]:g} degrees stand twice for {key[1]}"
+            )
+        grid[key] = block
+    if len(grid) != len(incidences) * len(keys):
+        raise FileFormatError(f"{path}: not each angle of incidence has blocks of {', '.join(keys)}")
+    shape = (lists["ScatterAzimuth"].size, lists["ScatterRadial"].size)
+    values = np.stack([[grid[aoi, key]["values"].reshape(shape) for key in keys] for aoi in incidences])
+    at, channels = _channels(keys)
+    record = of_lines(words.comments) | {
+        "theta_i_deg": incidences,
+        "tis": [[[grid[aoi, key]["tis"] for key in keys] for aoi in incidences]],
+    }
+    nodes = (np.array(incidences), np.zeros(1), lists["ScatterRadial"], lists["ScatterAzimuth"] - _LIGHT_DEG)
+    return samples_of_grid(
+        Spherical(anisotropic=True, mirrored=False),
+        [np.deg2rad(axis) for axis in nodes],
+        values.transpose(0, 3, 2, 1)[:, np.newaxis],
+        path.stem,
+        channels,
+        at,
+        record,
+    )
+
+
+def _lists(words: Words) -> dict[str, NDArray[np.float64]]:
+    """Return the lists of angles [degree] in the header."""
+    lists: dict[str, NDArray[np.float64]] = {}
+    for word in words:
+        if word in ("ScatterAzimuth", "ScatterRadial"):
+            lists[word] = words.numbers(words.count(word), word)
+        elif word == "DataBegin":
+            break
+    for name in ("ScatterAzimuth", "ScatterRadial"):
+        if name not in lists or not lists[name].size:
+            raise words.error(name, "it does not stand before DataBegin")
+    return lists
+
+
+def _blocks(words: Words, count: int) -> list[dict[str, Any]]:
+    """Return the blocks of a file: their entries, their total integrated scatter and their values."""
+    blocks: list[dict[str, Any]] = []
+    empty = {"POI": "0", "Side": "Front", "Wavelength": "0", "ScatterType": "BRDF", "TristimulusValue": ""}
+    block: dict[str, Any] = dict(empty)
+    for word in words:
+        if word in _ENTRIES:
+            block[word] = words.next(word)
+        elif word == "TIS":
+            block |= {"line": words.line, "tis": float(words.numbers(1, word)[0])}
+            for name in ("AOI", "Wavelength"):
+                try:
+                    float(block.get(name, ""))
+                except ValueError:
+                    raise words.error(name, f"{block.get(name, '')!r} is not a number") from None
+            block["values"] = words.numbers(count, f"TIS of block {len(blocks) + 1}")
+            blocks.append(block)
+            block = dict(empty)
+        elif word == "DataEnd":
+            return blocks
+    raise words.error("DataEnd", f"the text ends without it, after {len(blocks)} blocks")
+
+
+def _channels(keys: list[str]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
+    """Return wavelengths [nm], and names of channels, of the blocks of an angle of incidence."""
+    if keys[0] in _TRISTIMULUS:
+        return None, tuple(XYZ[_TRISTIMULUS.index(key)] for key in keys)
+    lengths = np.array([float(key) for key in keys])
+    if np.any(lengths <= 0.0):
+        return None, ("grey",)
+    lengths = lengths * (1e3 if lengths.max() < 100.0 else 1.0)
+    return lengths, tuple(f"{nm:g}nm" for nm in lengths)

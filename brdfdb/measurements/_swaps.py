@@ -1,0 +1,66 @@
+"""Reciprocity of samples: the difference between those that are each other's swap of light and viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.geometry import degrees
+from brdfdb.measurements.samples import Samples
+
+_SAME_DEG = 0.01  # directions closer than this are one
+_FAINT = 1e-3  # share of the median of abs(f_r) below which pairs do not count
+
+
+@dataclass(frozen=True)
+class Reciprocity:
+    """Difference between samples that are each other's swap of light and viewer, abs(a - b) / mean [1].
+
+    Attributes
+    ----------
+    pairs : int
+        Number of pairs.
+    median, largest : float [1]
+        Median and largest difference over pairs and channels.
+    """
+
+    pairs: int
+    median: float
+    largest: float
+
+
+def reciprocity_of(samples: Samples, one_side: bool) -> Reciprocity | None:
+    """Return the differences between samples that are each other's swap."""
+    angles = [degrees(angle) for angle in (samples.theta_i, samples.phi_i, samples.theta_r, samples.phi_r)]
+    theta_i, phi_i, theta_r, phi_r = (np.rint(angle / _SAME_DEG).astype(np.int64) for angle in angles)
+    turn = round(360.0 / _SAME_DEG)
+    if samples.turned:
+        here = theta_i, np.where(theta_i == 0, 0, phi_i % turn), theta_r, np.where(theta_r == 0, 0, phi_r % turn)
+        swapped = here[2], here[3], here[0], here[1]
+    else:
+        delta = np.where((theta_i == 0) | (theta_r == 0), 0, (phi_r - phi_i) % turn)
+        other = np.where(delta == 0, 0, turn - delta)
+        delta, other = (np.minimum(delta, other),) * 2 if one_side else (delta, other)
+        here, swapped = (theta_i, theta_r, delta, 0 * delta), (theta_r, theta_i, other, 0 * delta)
+    code, code_swapped = (((a * turn + b) * turn + c) * turn + d for a, b, c, d in (_wide(here), _wide(swapped)))
+    order = np.argsort(code, kind="stable")
+    place = np.clip(np.searchsorted(code[order], code_swapped), 0, len(order) - 1)
+    partner = order[place]
+    first = np.flatnonzero((code[partner] == code_swapped) & (code < code_swapped))
+    a, b = samples.values[first], samples.values[partner[first]]
+    mean = 0.5 * (np.abs(a) + np.abs(b))
+    faint = _FAINT * np.nanmedian(np.abs(samples.values)) if samples.known.any() else 0.0
+    counts = np.isfinite(mean) & (mean > faint)
+    pairs = int(np.sum(counts.any(axis=1)))
+    if not pairs:
+        return None
+    differences = np.abs(a - b)[counts] / mean[counts]
+    return Reciprocity(pairs, float(np.median(differences)), float(differences.max()))
+
+
+def _wide(parts: Sequence[NDArray[np.int64]]) -> list[NDArray[np.uint64]]:
+    """Return four whole numbers of 16 bits as unsigned numbers of 64, whose products do not overflow together."""
+    return [part.astype(np.uint64) for part in parts]

@@ -1,0 +1,61 @@
+"""The command `brdfdb fit`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "Fit models to measured samples: their parameters with intervals, ranked by the error at incidences left out."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the file, the models, the residual, and the forms of the answer."""
+    parser.add_argument("data", type=Path, metavar="DATA", help="a file of samples, or a table of another program")
+    parser.add_argument(
+        "--model",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a model, or a sum such as 'A + 2 B'; may be repeated (default: every model, and sums with a uniform f_r)",
+    )
+    parser.add_argument(
+        "--residual",
+        choices=("log", "relative", "cosine", "uncertainty"),
+        default="log",
+        help="what is made small (default: log, the difference of logarithms)",
+    )
+    parser.add_argument("--channel", metavar="NAME", help="the channel that is fitted (default: all together)")
+    parser.add_argument(
+        "--wavelength-nm", type=float, metavar="NM", help="wavelength of samples of one channel that state none"
+    )
+    parser.add_argument(
+        "--refractive-index",
+        metavar="ENTRY",
+        help="shelf/book/page of models with n and k (default: n and k are searched)",
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all fits as JSON")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="write a page with figures, FILE.html")
+    parser.add_argument("--recipe", type=Path, metavar="FILE", help="write the best model as a recipe, FILE.toml")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fit, and print the ranking."""
+    from brdfdb.errors import import_extra
+    from brdfdb_pipelines import fit
+
+    import_extra("scipy")
+    if options.page is not None:
+        import_extra("matplotlib")  # before the time is spent
+        import_extra("jinja2")
+    fit.run(
+        options.data,
+        options.model or None,
+        residual=options.residual,
+        channel=options.channel,
+        wavelength_nm=options.wavelength_nm,
+        refractive_index=options.refractive_index,
+        json=options.json,
+        page=options.page,
+        recipe=options.recipe,
+    )
+    return 0

@@ -1,0 +1,190 @@
+"""The fit job: fits models to the samples of a file, prints their ranking, and writes JSON, a page and a recipe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from brdfdb import formats
+from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.fitting.document import Estimate, Fit, Fits
+from brdfdb.fitting.figure import figure_of
+from brdfdb.fitting.fit import fits
+from brdfdb.fitting.residuals import Kind
+from brdfdb.fitting.surface import candidates
+from brdfdb.measurements import Samples
+from brdfdb.parameters import closest
+from brdfdb.store.files import write_file
+from brdfdb_pipelines import terminal
+
+_SHOWN = 12  # channels of a number that are printed
+TOLERANCE = 0.05  # of the recipe that is written
+
+
+def run(
+    data: Path,
+    models: Sequence[str] | None = None,
+    *,
+    residual: Kind = "log",
+    channel: str | None = None,
+    wavelength_nm: float | None = None,
+    refractive_index: str | None = None,
+    json: Path | None = None,
+    page: Path | None = None,
+    recipe: Path | None = None,
+) -> Fits:
+    """Fit models to the samples of a file and print the result.
+
+    Parameters
+    ----------
+    data : Path
+        A file that `brdfdb.formats.samples` reads.
+    models : sequence of str, optional
+        Models and sums, by default all.
+    residual, refractive_index
+        As of `brdfdb.fitting.fit.fits`.
+    channel : str, optional
+        The one channel that is fitted.
+    wavelength_nm : float [nm], optional
+        Wavelength of samples of one channel that state none.
+    json, page, recipe : Path, optional
+        Files to write: all fits, figures, and the best model of the registry as a recipe.
+
+    Returns
+    -------
+    Fits
+        The document.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, or no model can describe the samples.
+    BrdfdbError
+        If a recipe is asked for and no fit is one model of the registry.
+    """
+    samples = _selected(formats.samples(data), channel, wavelength_nm)
+    count = len(models or candidates()) + 1
+    with terminal.progress(transient=True) as bar:
+        task = bar.add_task("fit", total=count)
+
+        def tick(name: str) -> None:
+            bar.update(task, advance=1, description=name)
+
+        document, fitted = fits(samples, models, residual=residual, refractive_index=refractive_index, tick=tick)
+    if json is not None:
+        _write(json, document.model_dump_json(indent=1) + "\n")
+    if page is not None:
+        from brdfdb_pipelines import fit_page
+
+        _write(page, fit_page.render(document, figure_of(document, fitted[0])))
+    print(terminal.plain("\n".join(lines(document))))
+    if recipe is not None:
+        _write(recipe, recipe_of(document))
+    return document
+
+
+def _selected(samples: Samples, channel: str | None, wavelength_nm: float | None) -> Samples:
+    """Return the samples of one channel, with the wavelength that the user states."""
+    if channel is not None:
+        if channel not in samples.channels:
+            hint = closest(channel, samples.channels)
+            raise ParameterError(
+                "channel", f"{channel!r} is not one of {', '.join(samples.channels)}{hint}", channel, samples.channels
+            )
+        column = [samples.channels.index(channel)]
+        samples = replace(
+            samples,
+            channels=(channel,),
+            values=samples.values[:, column],
+            wavelength_nm=None if samples.wavelength_nm is None else samples.wavelength_nm[column],
+            uncertainty=None if samples.uncertainty is None else samples.uncertainty[:, column],
+            bandwidth_nm=None if samples.bandwidth_nm is None else samples.bandwidth_nm[column],
+        )
+    if wavelength_nm is None:
+        return samples
+    if samples.wavelength_nm is not None or len(samples.channels) > 1:
+        raise ParameterError("wavelength_nm", f"{samples.name} states its channels; leave it out", wavelength_nm)
+    if not 0.0 < wavelength_nm < np.inf:
+        raise ParameterError("wavelength_nm", f"{wavelength_nm:g} is not a positive number", wavelength_nm)
+    return replace(samples, channels=(f"{wavelength_nm:g}nm",), wavelength_nm=np.array([wavelength_nm]))
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, text.encode(), path.parent)
+
+
+def recipe_of(document: Fits) -> str:
+    """Return a recipe of the best fit that is one model; BrdfdbError if none is."""
+    best = next((one for one in document.fits if one.recipe is not None), None)
+    if best is None or best.material is None or best.recipe is None:
+        raise BrdfdbError(
+            f"{document.name}: no fit is one model of the registry with wavelengths, so that there is no recipe"
+        )
+    return f'materials = ["{best.material.name}"]\ntolerance = {TOLERANCE:g}\n\n{best.recipe}'
+
+
+def lines(document: Fits) -> list[str]:
+    """Return the lines that the command prints: the ranking, then the best fit."""
+    left = document.left_out
+    text = [f"{document.name}: {document.samples} values at {document.incidences} incidences, {document.residual}"]
+    reasons = [
+        f"{count} {reason}"
+        for count, reason in (
+            (left.holes, "holes"),
+            (left.at_horizon, "at the horizon"),
+            (left.unusable, "not positive" if document.residual in ("log", "relative") else "without uncertainty"),
+        )
+        if count
+    ]
+    if reasons:
+        text.append(f"  left out: {', '.join(reasons)}")
+    width = max(len(one.model) for one in document.fits)
+    text.append(f"  {'model':<{width}}  held out    all   numbers      BIC  albedo")
+    for one in document.fits:
+        held = "      -" if one.held_out is None else f"{one.held_out.rms:7.3f}"
+        alone = "      -" if one.rms_ln is None else f"{one.rms_ln:6.3f}"
+        light = "" if one.albedo.conserves else "  reflects more than arrives"
+        text.append(
+            f"  {one.model:<{width}}  {held} {alone}   {one.numbers:7d} {one.bic:8.0f}  {one.albedo.value:6.3f}{light}"
+        )
+    text.append("  held out, all: rms of ln(model / sample), at incidences left out of the fit, and of all")
+    text += [
+        f"  not fitted: {name}, {reason.partition(': ')[2] or reason}" for name, reason in document.skipped.items()
+    ]
+    best = document.fits[0]
+    text += ["", f"best: {best.model}", *_numbers(best.estimates)]
+    text += [f"  note  {sentence}" for sentence in best.remarks]
+    if document.outlier_count:
+        farthest = document.outliers[0]
+        text.append(
+            f"  {document.outlier_count} taken for outliers; the farthest: f_r {farthest.value:.3g} against "
+            f"{farthest.model:.3g} /sr at theta_i {farthest.theta_i_deg:g}°, theta_r {farthest.theta_r_deg:g}°, "
+            f"phi_r {farthest.phi_r_deg:g}°"
+        )
+    if best.recipe is None:
+        return [*text, *_alternative(document.fits)]
+    return [*text, "", *best.recipe.splitlines()]
+
+
+def _alternative(ranked: Sequence[Fit]) -> list[str]:
+    single = next((one for one in ranked if one.recipe is not None), None)
+    if single is None or single.recipe is None:
+        return []
+    return ["", f"best model of the registry alone: {single.model}", "", *single.recipe.splitlines()]
+
+
+def _numbers(estimates: Sequence[Estimate]) -> list[str]:
+    """Return a line for each number: value, standard error and 95 % interval."""
+    text = []
+    for one in estimates[:_SHOWN]:
+        name = one.name if one.channel is None else f"{one.name} ({one.channel})"
+        error = "" if one.standard_error is None else f" ± {one.standard_error:.2g}"
+        unit = "" if one.unit == "1" else f" {one.unit}"
+        text.append(f"  {name:<34}{one.value:.5g}{error}{unit}  95 %: {one.low:.5g} to {one.high:.5g} ({one.method})")
+    if len(estimates) > _SHOWN:
+        text.append(f"  and {len(estimates) - _SHOWN} more; --json has them")
+    return text

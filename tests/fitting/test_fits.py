@@ -1,0 +1,216 @@
+"""Fits against synthetic samples, whose parameters are known, and against the models themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.fitting.estimates import estimates_of
+from brdfdb.fitting.fit import fit, fits
+from brdfdb.fitting.problem import Problem
+from brdfdb.fitting.residuals import Residual
+from brdfdb.fitting.surface import NotDescribedError, Surface, candidates
+from brdfdb.fitting.uncertainty import NORMAL_95
+from brdfdb.geometry import unit_vector
+from brdfdb.measurements import Samples
+from brdfdb.models import MODELS
+
+NOISE = 0.03
+ROUNDING = 1e-9  # measured: 4e-13, of the polynomials of all models
+GRADIENT = 1e-4  # measured: 8e-6, of differences of the cost with a step of 1e-5
+
+Array = NDArray[np.float64]
+
+
+def directions(turned: bool = False) -> tuple[Array, Array, Array, Array]:
+    """Return directions of four lights, the mirror half plane denser than the rest."""
+    lights, azimuths = np.deg2rad([10.0, 30.0, 50.0, 65.0]), np.deg2rad([0.0, 45.0, 90.0] if turned else [0.0])
+    viewers, delta = np.deg2rad(np.arange(0.0, 81.0, 5.0)), np.deg2rad([0.0, 60.0, 120.0, 170.0, 175.0, 180.0])
+    theta_i, phi_i, theta_r, turn = (
+        axis.ravel() for axis in np.meshgrid(lights, azimuths, viewers, delta, indexing="ij")
+    )
+    return theta_i, phi_i, theta_r, phi_i + turn
+
+
+def samples(values: Array, at: Array | None = None, turned: bool = False) -> Samples:
+    """Return samples of f_r (N, C) at `directions`."""
+    channels = ("grey",) if at is None else tuple(f"{nm:g}nm" for nm in at)
+    return Samples("synthetic", *directions(turned), channels, at, values)
+
+
+def truth(model: str, turned: bool = False, **parameters: float) -> Array:
+    """Return f_r (N, 1) of a model at `directions`."""
+    theta_i, phi_i, theta_r, phi_r = directions(turned)
+    wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+    return np.asarray(MODELS[model].vectors(wi, wr, **parameters))[:, np.newaxis]
+
+
+def noisy(values: Array, seed: int = 1) -> Array:
+    """Return values with relative noise."""
+    return values * (1.0 + NOISE * np.random.default_rng(seed).standard_normal(values.shape))
+
+
+WARD = {"rho_d": 0.2, "rho_s": 0.1, "alpha_x": 0.15, "alpha_y": 0.15}
+
+
+@pytest.mark.parametrize("name", candidates())
+def test_polynomial_of_a_surface_is_the_model(name: str) -> None:
+    surface = Surface(name, None, 1, turned=True)
+    theta_i, phi_i, theta_r, phi_r = directions()
+    wi, wr = unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r)
+    rng = np.random.default_rng(3)
+    x = rng.uniform(0.3, 0.7, len(surface.shape))
+    values = np.array([[rng.uniform(0.1, 0.9) * one.unit] for one in surface.coefficients]).reshape(-1, 1)
+    expected = np.zeros(len(wi))
+    for number, term in enumerate(surface.terms):
+        given, scale = surface.in_channel(x, values, number, 0)
+        expected += scale * term.spec.vectors(wi, wr, **given)
+    found = surface.f_r(x, values, wi, wr)[:, 0]
+    assert np.max(np.abs(found - expected)) <= ROUNDING * np.max(expected)
+
+
+def test_errors_are_as_large_as_the_standard_errors_say() -> None:
+    scores = []
+    for seed in range(12):
+        fitted = fit(samples(noisy(truth("ward", **WARD), seed)), "ward")
+        estimates = estimates_of(fitted, profiles=False)
+        assert [one.name for one in estimates] == ["alpha_x", "rho_d", "rho_s"]
+        for one in estimates:
+            assert one.standard_error is not None
+            scores.append((one.value - WARD[one.name]) / one.standard_error)
+    assert 0.75 < np.std(scores) < 1.33  # of 36 normal numbers, with 98 %; measured 1.1
+    assert np.mean(np.abs(scores) < NORMAL_95) >= 0.85
+
+
+def test_noise_is_measured_and_the_right_model_wins() -> None:
+    document, _ = fits(samples(noisy(truth("ward", **WARD))), ["lambert", "beckmann_schlick", "ward", "ggx_schlick"])
+    best = document.fits[0]
+    assert best.model == "ward"
+    assert best.rms_ln == pytest.approx(NOISE, rel=0.1)
+    assert best.held_out is not None
+    assert best.held_out.rms == pytest.approx(NOISE, rel=0.1)
+    assert abs(best.pattern) < 0.2 < 0.8 < document.fits[-1].pattern
+    assert best.material is not None
+    assert best.recipe is not None
+
+
+def test_two_widths_need_azimuths_of_the_light() -> None:
+    parameters = WARD | {"alpha_y": 0.3}
+    found = fit(samples(noisy(truth("ward", turned=True, **parameters)), turned=True), "ward")
+    widths = found.surface.numbers(found.point.x)[0]
+    assert widths["alpha_x"] == pytest.approx(0.15, rel=0.02)
+    assert widths["alpha_y"] == pytest.approx(0.3, rel=0.02)
+    tied = fit(samples(noisy(truth("ward", **WARD))), "ward").surface.numbers(found.point.x[:1])[0]
+    assert tied["alpha_x"] == tied["alpha_y"]
+
+
+def test_a_spike_is_an_outlier() -> None:
+    values = noisy(truth("ward", **WARD))
+    values[37] = 5e4
+    document, fitted = fits(samples(values), ["ward"])
+    assert fitted[0].surface.numbers(fitted[0].point.x)[0]["alpha_x"] == pytest.approx(0.15, rel=0.01)
+    assert document.outliers[0].value == 5e4
+    assert document.outlier_count == 1
+
+
+def test_holes_and_negatives_are_counted() -> None:
+    values = noisy(truth("oren_nayar", rho=0.5, sigma=0.6))
+    values[3], values[5], values[7] = np.nan, -0.01, 0.0
+    document, _ = fits(samples(values), ["oren_nayar"], profiles=False)
+    assert (document.left_out.holes, document.left_out.unusable) == (1, 2)
+    weighted, _ = fits(samples(values), ["oren_nayar"], residual="cosine", profiles=False)
+    assert (weighted.left_out.holes, weighted.left_out.unusable) == (1, 0)
+    assert weighted.samples == document.samples + 2
+
+
+@pytest.mark.parametrize("residual", ["log", "relative", "cosine"])
+def test_every_residual_finds_the_truth(residual: str) -> None:
+    found = fit(samples(noisy(truth("oren_nayar", rho=0.5, sigma=0.6))), "oren_nayar", residual=residual)  # type: ignore[arg-type]
+    assert found.point.values[0, 0] == pytest.approx(0.5, rel=0.02)
+
+
+def test_spectra_share_the_shape() -> None:
+    at = np.array([450.0, 550.0, 650.0])
+    rho_d, rho_s = [0.1, 0.3, 0.6], [0.1, 0.1, 0.2]
+    values = np.concatenate(
+        [truth("ward", **(WARD | {"rho_d": d, "rho_s": s})) for d, s in zip(rho_d, rho_s, strict=True)], axis=1
+    )
+    document, fitted = fits(samples(noisy(values), at), ["ward"])
+    assert fitted[0].point.values == pytest.approx(np.array([rho_d, rho_s]), rel=0.03)
+    assert len(fitted[0].point.x) == 1
+    material = document.fits[0].material
+    assert material is not None
+    assert material.wavelengths_nm == (450.0, 550.0, 650.0)
+
+
+def test_spectra_of_a_square_are_solved_for() -> None:
+    at, rho = np.array([450.0, 650.0]), [0.3, 0.8]
+    values = np.concatenate([truth("oren_nayar", rho=one, sigma=0.6) for one in rho], axis=1)
+    found = fit(samples(noisy(values), at), "oren_nayar")
+    assert found.point.values[0] == pytest.approx(rho, rel=0.02)
+
+
+def test_sum_of_two_lobes() -> None:
+    none = {"rho_d": 0.0}
+    values = truth("lambert", rho=0.1) + truth("ward", **(WARD | none))
+    values += truth("ward", **(WARD | none | {"alpha_x": 0.5, "alpha_y": 0.5, "rho_s": 0.2}))
+    document, fitted = fits(samples(noisy(values)), ["ward", "lambert + 2 ward"])
+    assert document.fits[0].model == "lambert + 2 ward"
+    widths = sorted(given["alpha_x"] for given in fitted[0].surface.numbers(fitted[0].point.x)[1:])
+    assert widths == pytest.approx([0.15, 0.5], rel=0.05)
+    assert document.fits[0].recipe is None
+
+
+def test_light_from_nothing_is_flagged() -> None:
+    bright = WARD | {"rho_d": 0.8, "rho_s": 0.6, "alpha_x": 0.2, "alpha_y": 0.2}
+    document, _ = fits(samples(noisy(truth("ward", **bright))), ["ward"], profiles=False)
+    assert not document.fits[0].albedo.conserves
+    assert any("more than arrives" in sentence for sentence in document.fits[0].remarks)
+
+
+def test_only_the_ratio_of_two_lengths_is_measured() -> None:
+    parameters = {"sigma_0_um": 2.0, "tau_um": 12.0, "a": 0.3, "wavelength_nm": 500.0, "n": 1.7, "k": 0.0}
+    values = noisy(truth("he_torrance", **parameters))
+    document, fitted = fits(
+        samples(values, np.array([500.0])), ["he_torrance"], refractive_index="constant/1.7/0.0", profiles=False
+    )
+    numbers = fitted[0].surface.numbers(fitted[0].point.x)[0]
+    assert numbers["sigma_0_um"] / numbers["tau_um"] == pytest.approx(2.0 / 12.0, rel=0.01)
+    (pair,) = document.fits[0].correlations
+    assert pair.coefficient > 0.99
+    assert "only their ratio is measured" in pair.sentence
+
+
+def test_gradient_of_the_projected_problem() -> None:
+    made = samples(noisy(truth("ward", **WARD)))
+    problem = Problem(Surface("ward", None, 1, turned=False), made.w_i, made.w_r, Residual(made, "log"))
+    problem.scale = 0.1
+    x, step = np.array([0.8]), 1e-5
+    point = problem.at(x)
+    weights = 1.0 / np.sqrt(1.0 + (point.residuals / problem.scale) ** 2)
+    gradient = np.sum(problem.shape_jacobian(point)[0] * weights * point.residuals)
+    expected = (problem.at(x + step).cost - problem.at(x - step).cost) / (2.0 * step)
+    assert gradient == pytest.approx(expected, rel=GRADIENT)
+
+
+def test_what_cannot_be_fitted_is_refused_in_a_sentence() -> None:
+    made = samples(noisy(truth("ward", **WARD)))
+    with pytest.raises(ParameterError, match="'wrad' is unknown; closest: ward"):
+        fit(made, "wrad")
+    with pytest.raises(ParameterError, match="no model and no sum"):
+        fit(made, "ward + ")
+    with pytest.raises(NotDescribedError, match="one azimuth alone"):
+        fit(made, "oren_nayar_unidirectional")
+    with pytest.raises(ParameterError, match="has no uncertainties"):
+        fit(made, "ward", residual="uncertainty")
+    spectral = samples(np.repeat(made.values, 2, axis=1), np.array([450.0, 650.0]))
+    document, _ = fits(spectral, ["ward", "ggx"], profiles=False)
+    assert list(document.skipped) == ["ggx"]
+
+
+def test_a_profile_sets_a_limit_at_an_end_of_a_range() -> None:
+    document, _ = fits(samples(noisy(truth("ward", **(WARD | {"rho_d": 0.0})))), ["ward"])
+    (uniform,) = (one for one in document.fits[0].estimates if one.name == "rho_d")
+    assert uniform.low == 0.0 < uniform.high < 1e-3

@@ -1,0 +1,151 @@
+"""Text of other programs: columns by their names or by the caller's, units, quantities, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.formats._columns import role_of, wavelength_of
+from brdfdb.measurements import Samples
+
+
+def samples(tmp_path: Path, text: str, **keywords: Any) -> Samples:
+    path = tmp_path / "sheet.txt"
+    path.write_text(text, encoding="utf-8")
+    return formats.samples(path, **keywords)
+
+
+@pytest.mark.parametrize(
+    ("name", "role"),
+    [
+        *(
+            (name, "theta_i")
+            for name in ("theta_i", "sza", "src_z", "ThetaIn [deg]", "Incident zenith (°)", "AOI", "θi")
+        ),
+        *((name, "theta_r") for name in ("theta_o", "vza", "view_z", "theta_v", "Receiver Zenith", "theta_r_deg")),
+        *((name, "phi_i") for name in ("phi_i", "saa", "src_a", "solar azimuth")),
+        *((name, "phi_r") for name in ("phi_o", "vaa", "view_a", "phi_out")),
+        *((name, "delta_phi") for name in ("raa", "relative azimuth", "delta_phi")),
+        *((name, "values") for name in ("brdf", "f_r [1/sr]", "550nm", "BRF_1.6um", "550", "DSF")),
+        *((name, "") for name in ("row", "temperature", "12", "date")),
+    ],
+)
+def test_names_of_other_programs_are_known(name: str, role: str) -> None:
+    assert role_of(name) == role
+
+
+def test_a_wavelength_may_be_in_micrometres() -> None:
+    assert wavelength_of("BRF_1.6um") == 1600.0
+    assert wavelength_of("pixel_550nm") is None
+
+
+def test_titles_stand_before_the_names_and_say_that_values_are_reflectance_factors(tmp_path: Path) -> None:
+    names = "src_z\tsrc_a\tview_z\tview_a\t2133.4nm\t1243.5nm"
+    text = f"BRF Values\nTile 7, by 2 people\n{names}\n 10.0\t 0\t 20\t180\t0.5\t1\n"
+    tile = samples(tmp_path, text)
+    assert tile.channels == ("1243.5nm", "2133.4nm")
+    assert tile.values[0] == pytest.approx([1.0 / np.pi, 0.5 / np.pi])
+    assert np.degrees([tile.theta_i[0], tile.theta_r[0], tile.phi_r[0]]) == pytest.approx([10.0, 20.0, 180.0])
+    assert tile.record["quantity"] == "reflectance_factor"
+    assert tile.record["titles"] == ["BRF Values", "Tile 7, by 2 people"]
+
+
+def test_the_caller_names_columns_and_the_quantity(tmp_path: Path) -> None:
+    text = "a;b;c;d;e\n0,5;60;180;0,25;9\n"  # a decimal comma
+    keywords = {
+        "theta_i": "a",
+        "theta_r": "b",
+        "delta_phi": "c",
+        "values": ["d"],
+        "quantity": "f_r_cos",
+        "angles": "deg",
+    }
+    sheet = samples(tmp_path, text, **keywords)
+    assert np.degrees(sheet.theta_i) == pytest.approx([0.5])
+    assert sheet.values[:, 0] == pytest.approx([0.5])
+    assert sheet.record["columns_left_out"] == ["e"]
+    without = samples(tmp_path, "10 20 180 0.3\n", theta_i="1", theta_r="2", delta_phi="3", values="4")
+    assert without.values.tolist() == [[0.3]]
+
+
+@pytest.mark.parametrize(
+    ("header", "row"),
+    [
+        ("theta_i,theta_r,raa,brdf", "0.5,1.25,3.1415927,0.3"),  # none exceeds 2 pi
+        ("theta_i [rad],theta_r [rad],raa [rad],brdf", "0.5,1.25,3.1415927,0.3"),
+        ("theta_i [deg],theta_r [deg],raa [deg],brdf", "0.5,1.25,3.1415927,0.3"),
+    ],
+)
+def test_the_unit_of_angles_is_that_of_the_names(header: str, row: str, tmp_path: Path) -> None:
+    sheet = samples(tmp_path, f"{header}\n{row}\n")
+    expected = np.radians(0.5) if "deg" in header else 0.5
+    assert sheet.theta_i == pytest.approx([expected])
+
+
+def test_a_negative_polar_angle_is_at_the_opposite_azimuth(tmp_path: Path) -> None:
+    sheet = samples(tmp_path, "theta_i theta_r raa brdf\n30 -40 0 0.3\n-30 40 0 0.3\n")
+    assert np.degrees(sheet.theta_r) == pytest.approx([40.0, 40.0])
+    assert np.degrees(sheet.phi_r - sheet.phi_i) % 360.0 == pytest.approx([180.0, 180.0])
+
+
+def test_theta_and_phi_that_are_exchanged_are_noticed(tmp_path: Path) -> None:
+    text = "# at 532 nm\n# phi_i theta_i phi_o theta_o brdf\n75 -180 60 0 2.5\n75 -180 -60 0 0.5\n"
+    chassis = samples(tmp_path, text)
+    assert np.degrees(chassis.theta_i) == pytest.approx([75.0, 75.0])
+    assert np.degrees(chassis.theta_r) == pytest.approx([60.0, 60.0])
+    assert np.degrees(chassis.phi_r - chassis.phi_i) % 360.0 == pytest.approx([180.0, 0.0])
+    assert "phi was read as the polar angle" in chassis.record["exchanged"]
+    assert chassis.channels == ("532nm",)
+
+
+def test_a_column_of_wavelengths_becomes_channels(tmp_path: Path) -> None:
+    rows = ("10,20,0,0.65,2,0.2", "10,20,0,0.45,1,0.1", "30,20,0,0.45,3,0.3", "10,20,0,0.65,4,0.4")
+    text = "\n".join(("theta_i,theta_r,raa,lambda,brdf,u", *rows, ""))
+    sheet = samples(tmp_path, text)
+    assert sheet.channels == ("450nm", "650nm")
+    expected = [[1.0, 2.0], [3.0, np.nan], [np.nan, 4.0]]  # the last row measures the first direction again
+    np.testing.assert_array_equal(sheet.values, expected)
+    assert sheet.uncertainty is not None
+    np.testing.assert_allclose(sheet.uncertainty, 0.1 * np.array(expected))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+def test_other_encodings_are_read(encoding: str, tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_bytes("sza (°),vza (°),raa (°),brdf\r\n10,20,180,\r\n10,30,180,0.2\r\n".encode(encoding))
+    sheet = formats.samples(path)
+    assert sheet.known[:, 0].tolist() == [False, True]  # an empty field is a hole
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,2,3\n", "line 3 has 3 fields, and the first row 4"),
+        ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,2,x,4\n", "line 3, field raa: 'x' is not a number"),
+        ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,2,3,inf\n", "line 3, field brdf: 'inf' is not a number"),
+        ("theta_i,theta_r,raa,brdf\n1,2,3,4\n1,,3,4\n", "line 1, field theta_r: an angle is missing"),
+        ("theta_i,theta_r,raa,brdf\n1,200,3,4\n", "line 1: theta_r of 200 degrees is no polar angle"),
+        ("theta_i,theta_r,raa,brdf\n1,100,3,4\n", "none of its 1 values is above the horizon"),
+        ("theta_i,theta_r,raa,550nm,550nm\n1,2,3,4,5\n", "line 1: a wavelength stands twice"),
+        ("theta_i,sza,theta_r,raa,brdf\n1,2,3,4,5\n", "line 1: theta_i and sza are both theta_i; name one"),
+        ("a,b,c,d\n1,2,3,4\n", "among the columns a, b, c, d is none of theta_i, theta_r, values, phi_r or delta_phi"),
+        ("no numbers at all\n", "line 1: none of the first 1000 lines is a row of four numbers"),
+        ("theta_i,theta_r,raa,brdf\n1,2,3,4\n" + "5" * 1_100_000 + "\n", "line 3 has more than 1048576 characters"),
+    ],
+)
+def test_a_damaged_text_is_refused_with_line_and_field(text: str, sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=sentence):
+        samples(tmp_path, text, angles="deg")
+
+
+def test_columns_that_do_not_exist_are_refused(tmp_path: Path) -> None:
+    text = "sza,vza,raa,brdf\n1,2,3,4\n"
+    with pytest.raises(ParameterError, match=r"theta_i: 'src' is not a column of .* which has sza, vza, raa, brdf"):
+        samples(tmp_path, text, theta_i="src")
+    with pytest.raises(ParameterError, match="quantity: 'percent' is not one of auto, f_r"):
+        samples(tmp_path, text, quantity="percent")

@@ -1,0 +1,109 @@
+"""Ward's instrument: pictures, their reduction, and the parameters that a fit to them finds again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brdfdb import formats, presets
+from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.formats.gonioreflectometer import read_picture, write_picture
+from brdfdb.measurements.aperture import averaged
+from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture, eq_3, photograph, reduced, traced
+
+Array = NDArray[np.float64]
+SMALL = Gonioreflectometer(width=324, height=240)
+PARAMETERS = ("rho_d", "rho_s", "alpha_x", "alpha_y")
+# Lights [degrees] of the pictures: the grain of an anisotropic sample is seen from both sides
+LIGHTS = ((15.0, 0.0), (30.0, 45.0), (45.0, 90.0), (60.0, 20.0))
+WARDS = [name for name, material in presets().items() if material.model == "ward"]
+
+
+def brdf_of(name: str) -> Any:
+    return presets()[name].brdf_at(None)
+
+
+def taken(name: str, settings: Gonioreflectometer = SMALL, theta_i: float = 30.0, phi_i: float = 40.0) -> Picture:
+    return photograph(brdf_of(name), settings, np.radians(theta_i), np.radians(phi_i), 7, name)
+
+
+@pytest.mark.parametrize("name", ["rolled-brass", "wall-plaster"])
+def test_a_reduced_picture_is_f_r_within_its_uncertainty(name: str) -> None:
+    picture = taken(name)
+    assert (picture.sample[0].max() == SMALL.saturation) == (name == "rolled-brass")  # the peak needs a short exposure
+    for thin in (False, True):
+        samples = reduced(picture, thin=thin)
+        assert samples.uncertainty is not None
+        expected = averaged(brdf_of(name), SMALL.instrument)(samples.w_i, samples.w_r)
+        deviation = (samples.values - expected) / samples.uncertainty
+        assert abs(deviation.mean()) < 0.1
+        assert 0.9 < deviation.std() < 1.1
+        assert np.degrees(samples.theta_r.max()) < SMALL.largest_theta_r_deg
+
+
+def test_thinning_leaves_many_pixels_at_the_peak_and_few_elsewhere() -> None:
+    picture = taken("rolled-brass")
+    dense, thin = reduced(picture, thin=False), reduced(picture)
+    assert len(thin) < 0.25 * len(dense)
+    kept = {
+        bright: [np.count_nonzero((s.values > 0.3 * dense.values.max()) == bright) for s in (dense, thin)]
+        for bright in (True, False)
+    }
+    assert kept[True][1] > 0.4 * kept[True][0] > 0.0
+    assert kept[False][1] < 0.2 * kept[False][0]
+
+
+def test_eq_3_alone_would_be_off_where_traced_rays_are_not() -> None:
+    theta, phi = np.radians([10.0, 40.0, 70.0]), np.radians([20.0, 100.0, 250.0])
+    apart = np.degrees(np.arccos(np.sum(eq_3(theta, phi, 0.1) * traced(theta, phi, 0.1), axis=-1)))
+    assert np.all(apart < 1.0)
+    assert np.all(apart > 0.01)
+
+
+def test_a_picture_through_a_file_is_the_same(tmp_path: Path) -> None:
+    picture = taken("rolled-brass")
+    write_picture(picture, tmp_path / "brass.exr")
+    again = read_picture(tmp_path / "brass.exr")
+    for part in ("sample", "standard", "background"):
+        np.testing.assert_array_equal(getattr(again, part), getattr(picture, part))
+    assert (again.settings, again.name, again.provenance) == (SMALL, "rolled-brass", "simulated")
+    np.testing.assert_allclose([again.theta_i, again.phi_i], [picture.theta_i, picture.phi_i], rtol=1e-14)
+
+
+def test_files_that_are_no_picture_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "brass.exr"
+    write_picture(taken("rolled-brass"), path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(FileFormatError, match=r"brass\.exr"):
+        formats.read(path)
+    path.write_bytes(whole.replace(b'"bits": 14', b'"bits": 99'))
+    with pytest.raises(FileFormatError, match="bits: 99 is not in"):
+        formats.read(path)
+    path.write_bytes(whole.replace(b'"theta_i_deg"', b'"theta_x_deg"'))
+    with pytest.raises(FileFormatError, match="it has no 'theta_i_deg'"):
+        formats.read(path)
+
+
+def test_a_picture_without_light_is_refused() -> None:
+    dark = Gonioreflectometer(width=16, height=16, full_well=100.0, read_noise=1000.0)
+    with pytest.raises(ParameterError, match="every pixel is dark"):
+        reduced(taken("wall-plaster", dark))
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"width": 2}, "width: 2 is not in"),
+        ({"exposures": (0.5, 0.1)}, "exposures: "),
+        ({"exposures": (1.0, 1.0)}, "exposures: "),
+        ({"standard_reflectance": 1.5}, "standard_reflectance: 1.5 is not in"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ParameterError, match=sentence):
+        Gonioreflectometer(**changes)

@@ -1,0 +1,83 @@
+"""The command `brdfdb import`: its statements, JSON, columns of texts, and samples as netCDF."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from tests.pipelines.command import Captured, run
+
+
+@pytest.fixture
+def tile(tmp_path: Path) -> Path:
+    """A white tile whose values are reflectance factors under a name that says nothing."""
+    rows = [f"20 {theta} {turn} 0.8" for theta in range(0, 81, 10) for turn in range(0, 360, 30)]
+    path = tmp_path / "tile.dat"
+    path.write_text("\n".join(["sun view turn number", *rows, ""]), encoding="utf-8")
+    return path
+
+
+COLUMNS = ("theta_i=sun", "theta_r=view", "delta_phi=turn", "values=number")
+OPTIONS = [part for column in COLUMNS for part in ("--column", column)]
+
+
+def test_units_that_are_wrong_are_noticed_and_can_be_said(tile: Path, capsys: Captured) -> None:
+    assert run("import", tile, *OPTIONS) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"{tile}: tile\n  97 samples of 1 channel: 1 direction of the light, from one azimuth")
+    assert "Albedo at theta_i 20: 2.5133;" in printed
+    assert "Units? An albedo above 1: the values integrate to 2.513. The values may be reflectance factors" in printed
+    assert run("import", tile, *OPTIONS, "--quantity", "reflectance_factor") == 0
+    printed = capsys.readouterr().out
+    assert "Albedo at theta_i 20: 0.8000;" in printed
+    assert "Units?" not in printed
+
+
+def test_several_files_are_a_list_of_json(tile: Path, capsys: Captured) -> None:
+    assert run("import", tile, tile, *OPTIONS, "--angles", "deg", "--json") == 0
+    documents = json.loads(capsys.readouterr().out)
+    assert [document["file"] for document in documents] == [str(tile)] * 2
+    assert documents[0]["incidences"][0]["albedo"] == pytest.approx([0.8 * np.pi])
+    assert documents[0]["hints"] == [documents[0]["sentences"][-1]]
+
+
+def test_samples_are_written_as_netcdf_that_is_imported_again(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "tile.nc"
+    assert run("import", tile, *OPTIONS, "--quantity", "reflectance_factor", "--out", out) == 0
+    first = capsys.readouterr().out.splitlines()
+    assert first[-1] == f"  written: {out}"
+    assert formats.samples(out).values == pytest.approx(0.8 / np.pi)
+    assert run("import", out) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == first[1:-1]
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--column", "theta_i"], "--column: 'theta_i' is not NAME=HEADER"),
+        (["--column", "theta_q=sun"], "theta_q: no format takes it; there are angles, delta_phi"),
+        ([*OPTIONS, "--out", "tile.txt"], "--out: 'tile.txt' does not end in .nc"),
+        (["--format", "paper"], "file_format: 'paper' is not one of astm,"),
+        (["--member", "white"], "no format recognises it"),
+        ([], "no format recognises it"),
+    ],
+)
+def test_mistakes_are_one_sentence(options: list[str], sentence: str, tile: Path, capsys: Captured) -> None:
+    assert run("import", tile, *options) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("brdfdb: ")
+    assert sentence in error
+    assert error.count("\n") == 1
+
+
+def test_one_file_is_written_at_a_time(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "two.nc"
+    assert run("import", tile, tile, *OPTIONS, "--out", out) == 2
+    assert "--out: it takes the samples of one file, and there are 2" in capsys.readouterr().err
+    assert not out.exists()
+    assert run("import", tmp_path / "missing.csv") == 2
+    assert "missing.csv: No such file or directory" in capsys.readouterr().err

@@ -1,0 +1,44 @@
+"""The command `brdfdb photograph`: pictures that are read as samples, and what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brdfdb import formats
+from brdfdb.measurements import Samples
+from brdfdb_pipelines.cli import main
+
+
+def test_pictures_are_written_and_read_as_samples(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "new" / "pictures"
+    small = ["--set", "width=108", "--set", "height=80"]
+    assert main(["photograph", "rolled-brass", "--light", "30", "90", *small, "--out", str(out)]) == 0
+    path = out / "rolled-brass_30_90.exr"
+    assert capsys.readouterr().out.strip() == str(path)
+    samples = formats.read(path)
+    assert isinstance(samples, Samples)
+    assert samples.name == "rolled-brass"
+    np.testing.assert_allclose(np.degrees([samples.theta_i[0], samples.phi_i[0]]), [30.0, 90.0])
+    mirror = np.argmin(np.hypot(np.degrees(samples.theta_r) - 30.0, np.degrees(samples.phi_r) % 360.0 - 270.0))
+    assert samples.values[mirror, 0] > 0.5 * samples.values.max()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["no-such"], "no such material"),
+        (["rolled-brass", "--light", "95", "0"], "--light: 95 degrees is not in [0, 90)"),
+        (["rolled-brass", "--set", "blur=1"], "--set blur=1: the settings are width"),
+        (["rolled-brass", "--set", "blur_px=x"], "'x' is no number"),
+        (["rolled-brass", "--set", "bits=99"], "bits: 99 is not in [4, 24]"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_nothing_is_written(
+    arguments: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["photograph", *arguments, "--out", str(tmp_path / "pictures")]) == 2
+    assert sentence in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "pictures").exists()
