@@ -6,13 +6,14 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
 from brdfdb import formats
 from brdfdb.errors import BrdfdbError, ParameterError, sentence_of
+from brdfdb.formats import neural
 from brdfdb.materials.provenance import Text
 from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.store.lock import Lock, writing
@@ -25,6 +26,9 @@ from brdfdb.tables.layout import TABLE_VERSION
 from brdfdb.tables.measured_layout import layout_of
 from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
+
 MEASURED_VERSION = 1  # of the way from a file to the values of its table
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
 
@@ -36,6 +40,7 @@ class MeasuredTable(BaseModel):
 
     samples: str = Field(min_length=1, description="path of the file, of any format that is read")
     format: str = Field(default="", description="format of the file; by default the one that recognises it")
+    member: str = Field(default="", description="file of an archive of networks; by default it is no archive")
     title: Text | None = Field(default=None, description="a line for people; by default the name in the file")
     source: Text | None = Field(default=None, description="who measured, where it is published; by default the file's")
     reciprocal: bool = Field(default=False, description="tabulate the nearest values that are reciprocal")
@@ -74,7 +79,10 @@ class MeasuredJob:
         FileFormatError, ParameterError, OSError
             If the file cannot be read, or is not what a table needs.
         """
-        read = formats.read(self.path, self.table.format)
+        if self.table.member:
+            read: FileTable | Samples = neural.read(self.path, self.table.member)
+        else:
+            read = formats.read(self.path, self.table.format)
         title = self.table.title or read.name
         if isinstance(read, Samples):
             provenance = self.table.source or read.provenance or f"the file {self.path.name}"
