@@ -216,6 +216,8 @@ class Subject:
         """The reason why a table is audited without a source, or without a model."""
         if self.source is not None:
             return f"the source of this table, {self.source.title}, is a function"
+        if self.table.metadata.measured is not None:
+            return "the table is of measured data, which the store does not hold"
         if isinstance(self.table.source, FunctionRecord):
             return f"the source of this table, {self.table.source.title}, is a function, which the store does not hold"
         return "the table does not say what its source is, or this program does not have its model"

@@ -35,10 +35,19 @@ class Asymmetry(BaseModel):
     pairs: int
     min: float
     mean: float
+    median: float
+    p99: float
     max: float
     tolerance: float | None = Field(
-        description="largest allowed max; null: not judged, because f and f' are interpolated from different nodes"
+        description="largest allowed max, or p99 of measured data; null: not judged, because f and f' are interpolated "
+        "from different nodes, or the uncertainty of measured data is not known"
     )
+    measured: bool = Field(default=False, description="true: p99 is judged, within the uncertainty of measured data")
+
+    @property
+    def kept(self) -> bool:
+        """Return True if the asymmetry is allowed, or not judged."""
+        return self.tolerance is None or (self.p99 if self.measured else self.max) <= self.tolerance
 
 
 class Reciprocity(Finding):
@@ -51,7 +60,8 @@ class Reciprocity(Finding):
     order = 2
     explanation = (
         "Asymmetry is |f − f′| / (|f| + |f′|), where f′ has light and viewer exchanged. 0 is reciprocal "
-        "(Helmholtz), 1 is the largest possible asymmetry."
+        "(Helmholtz), 1 is the largest possible asymmetry. Measured data have noise: 99 of 100 of their "
+        "asymmetries are judged by the uncertainty that they state."
     )
 
     model_random: Asymmetry | None = Field(description="viewers over the hemisphere; null: the source is not known")
@@ -69,15 +79,19 @@ class Reciprocity(Finding):
     def judge(cls, subject: Subject) -> Reciprocity:
         """Judge a table and its source; without a source the table alone."""
         both = reciprocity_of(subject.table, subject.pairs)
-        return both if subject.source else both.model_copy(update={"model_random": None, "model_lobe": None}).judged()
+        if subject.source is not None and subject.table.metadata.measured is None:
+            return both
+        return both.model_copy(update={"model_random": None, "model_lobe": None}).judged()
 
     def judged(self) -> Reciprocity:
         """Return the same asymmetries with the verdict that follows from them."""
-        good = all(pairs.tolerance is None or pairs.max <= pairs.tolerance for _, pairs in self.named())
+        good = all(pairs.kept for _, pairs in self.named())
         return self.model_copy(update={"verdict": "passes" if good else "violates"})
 
     def sentences(self) -> list[Sentence]:
         """Return a sentence on the largest asymmetry of those that are judged."""
+        if any(asymmetry.measured for _, asymmetry in self.named()):
+            return [self.sentence(self.verdict, self._of_measured())]
         judged = [
             (asymmetry.max, asymmetry.tolerance) for _, asymmetry in self.named() if asymmetry.tolerance is not None
         ]
@@ -87,6 +101,14 @@ class Reciprocity(Finding):
         most, allowed = max(judged, key=lambda pair: (pair[0] > pair[1], pair[0]))
         text = f"asymmetry up to {number(most)}, of {number(allowed)} allowed"
         return [self.sentence(self.verdict, text if most <= allowed else f"not reciprocal: {text}")]
+
+    def _of_measured(self) -> str:
+        """Return the asymmetry of measured data in words."""
+        worst = max((asymmetry for _, asymmetry in self.named() if asymmetry.measured), key=lambda one: one.p99)
+        text = f"asymmetry of the data: median {number(worst.median, 2)}, 99 of 100 up to {number(worst.p99, 2)}"
+        if worst.tolerance is None:
+            return f"{text}; not judged, because their uncertainty is not known"
+        return f"{text}, of {number(worst.tolerance, 2)} that their uncertainty explains"
 
     def cells(self) -> list[Cell]:
         """Return the largest asymmetry."""
@@ -99,11 +121,14 @@ class Reciprocity(Finding):
             (
                 name,
                 str(asymmetry.pairs),
-                *(number(value, 2) for value in (asymmetry.min, asymmetry.mean, asymmetry.max, asymmetry.tolerance)),
+                *(number(value, 2) for value in (asymmetry.mean, asymmetry.median, asymmetry.p99)),
+                *(number(value, 2) for value in (asymmetry.max, asymmetry.tolerance)),
             )
             for name, asymmetry in self.named()
         ]
-        return [NumberTable("Asymmetry", ("of", "pairs", "smallest", "mean", "largest", "allowed"), rows)]
+        return [
+            NumberTable("Asymmetry", ("of", "pairs", "mean", "median", "99th percentile", "largest", "allowed"), rows)
+        ]
 
     def named(self) -> list[tuple[str, Asymmetry]]:
         """Return the sets of pairs that there are, with their names."""
@@ -123,16 +148,25 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
     interpolation = table.interpolation
     mu = np.maximum(pairs.drawn.wi[:, 2:] * pairs.drawn.wr[:, 2:], COS_HORIZON**2)
     offset = interpolation.offset / mu**interpolation.power  # f_r far below the offset is rounding only
-    looked_up = (pairs.table + offset, pairs.table_exchanged + offset, _interpolant_tolerance(table.grid))
+    allowed = _interpolant_tolerance(table.grid)
+    measured = table.metadata.measured
+    if measured is not None and not (table.grid.reciprocal and measured.reciprocity.assumed):
+        allowed = measured.uncertainty
+    looked_up = (pairs.table + offset, pairs.table_exchanged + offset, allowed)
     model = (pairs.model, pairs.model_exchanged, MODEL_RECIPROCITY_TOLERANCE)
     asymmetries = Reciprocity(
         model_random=_over(above & ~in_lobe, *model),
         model_lobe=_over(above & in_lobe, *model) if in_lobe.any() else None,
         table_random=_over(above & ~in_lobe, *looked_up),
         table_lobe=_over(above & in_lobe, *looked_up) if in_lobe.any() else None,
-        table_nodes=None if table.grid.half_difference else _node_asymmetry(table),
+        table_nodes=None if table.grid.half_difference or measured is not None else _node_asymmetry(table),
         verdict="passes",
     )
+    if measured is not None:
+        as_measured = {"measured": True}
+        of_table = (asymmetries.table_random, asymmetries.table_lobe)
+        random, lobe = (None if one is None else one.model_copy(update=as_measured) for one in of_table)
+        asymmetries = asymmetries.model_copy(update={"table_random": random, "table_lobe": lobe})
     return asymmetries.judged()
 
 
@@ -174,4 +208,7 @@ def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmet
     relative = np.where(np.isfinite(relative), relative, 1.0)
     smallest = float(relative.min(initial=1.0)) if differs.all() else 0.0
     mean, largest = float(relative.sum() / max(differs.size, 1)), float(relative.max(initial=0.0))
-    return Asymmetry(pairs=len(f), min=smallest, mean=mean, max=largest, tolerance=tolerance)
+    whole = np.zeros(max(differs.size, 1))
+    whole[: relative.size] = relative
+    median, p99 = (float(value) for value in np.percentile(whole, [50.0, 99.0]))
+    return Asymmetry(pairs=len(f), min=smallest, mean=mean, median=median, p99=p99, max=largest, tolerance=tolerance)

@@ -80,7 +80,8 @@ class Smoothness(Finding):
     order = 5
     explanation = (
         "The jumps of f_r where the formula of the model changes, and at the seams of the table: its nodes, the poles, "
-        "and both ends of a turn of azimuth. A table may jump by its stated error."
+        "and both ends of a turn of azimuth. A table may jump by its stated error, and one of measured data by "
+        "their uncertainty; where that is not known, jumps are those of the data and are not judged."
     )
 
     model: list[Jump] = Field(description="empty: the source is not known")
@@ -132,7 +133,7 @@ def smoothness_of(table: Table, source: Source | None, pairs: Pairs) -> Smoothne
     floor = error_measurement.floor_of(pairs.model, pairs.drawn) + _TINY
     of_model = [] if source is None else _jumps_of_model(source, wavelengths, np.full_like(floor, _TINY))
     of_table = [
-        _jump(seam, looked_up, wavelengths, floor, partial(_stated, table.error)) for seam in _crossed(_of_table(table))
+        _jump(seam, looked_up, wavelengths, floor, partial(_allowed, table)) for seam in _crossed(_of_table(table))
     ]
     good = all(jump.largest <= jump.tolerance for jump in (*of_model, *of_table))
     return Smoothness(model=of_model, table=of_table, verdict="passes" if good else "violates")
@@ -148,6 +149,15 @@ def _jumps_of_model(source: Source, wavelengths: Array | None, floor: Floats) ->
 
 def _rounding(*_: Array) -> Floats:
     return np.full((1, 1), MODEL_TOLERANCE)
+
+
+def _allowed(table: Table, wi: Array, wr: Array) -> Floats:
+    """Return the jumps [1] that the stated error, or that of measured data, allows at pairs of directions, (N, L)."""
+    measured = table.metadata.measured
+    if measured is None:
+        return _stated(table.error, wi, wr)
+    uncertainty = 1.0 if measured.uncertainty is None else measured.uncertainty
+    return np.asarray(np.maximum(_stated(table.error, wi, wr), uncertainty))
 
 
 def _stated(error: Error | None, wi: Array, wr: Array) -> Floats:

@@ -34,7 +34,7 @@ class Bands(BaseModel):
     theta_i_deg: list[float] = Field(description="edges of the bands")
     stated_error: list[list[float]] = Field(
         description="[band][wavelength], without the specular part: integral of abs(error) cos theta_r over that of "
-        "f_r cos theta_r"
+        "f_r cos theta_r; that at held-out samples comes on top for measured data"
     )
     explained: list[list[float | None]] = Field(
         description="[band][wavelength], largest rise of the mean albedo by that error; null: not finite"
@@ -188,7 +188,9 @@ def _judge(table: Table, theta_i_deg: Axis, diffuse: Floats) -> _Judge:
         identity = np.eye(theta_i_deg.size)
         nothing = np.zeros((theta_i_deg.size, 1))
         return _Judge(identity, identity.astype(bool), nothing, nothing)
-    edges, l1 = np.array(table.error.theta_i_deg), np.minimum(table.error.l1, MOST_ERROR)
+    measured = table.metadata.measured
+    uncertain = 0.0 if measured is None or measured.held_out is None else measured.held_out.l1
+    edges, l1 = np.array(table.error.theta_i_deg), np.minimum(np.add(table.error.l1, uncertain), MOST_ERROR)
     means = _band_means(theta_i_deg, edges)
     covers = (theta_i_deg >= edges[:-1, np.newaxis]) & (theta_i_deg <= edges[1:, np.newaxis])
     return _Judge(means, covers, l1, (means @ diffuse) / (1.0 - l1))

@@ -50,6 +50,8 @@ class FunctionRecord(BaseModel):
     elliptical : bool
         True if an anisotropic f_r has the symmetry of an ellipse with axes along x and y. Its tables are a quarter as
         large.
+    reciprocal : bool
+        True if f_r is the same with light and viewer exchanged. Tables of others hold both ways.
     grazing_pole : bool
         True if f_r grows without bound as a direction reaches 90 degrees.
     alpha : (float, float) or None
@@ -65,6 +67,7 @@ class FunctionRecord(BaseModel):
     wavelengths_nm: tuple[float, ...] | None = Field(default=None, min_length=1)
     anisotropic: bool = False
     elliptical: bool = False
+    reciprocal: bool = True
     grazing_pole: bool = False
     alpha: Annotated[
         tuple[Annotated[float, Field(gt=0.0, le=10.0)], Annotated[float, Field(gt=0.0, le=10.0)]] | None,
@@ -115,8 +118,8 @@ class FunctionSource(FunctionRecord, Lookups):
     ------
     ParameterError
         If a value of the record is not allowed. If the function gives another shape, or a value that is negative or not
-        finite. If it is not reciprocal, or lacks a symmetry that tables use. The function is called at 64 pairs of
-        directions to check this.
+        finite. If it is not reciprocal and does not say so, or lacks a symmetry that tables use. The function is called
+        at 64 pairs of directions to check this.
 
     Examples
     --------
@@ -265,7 +268,9 @@ class FunctionSource(FunctionRecord, Lookups):
             return unit_vector(theta[0], phi_i), unit_vector(theta[1], phi_r)
 
         wi, wr = at(*phi)
-        others = {"is not reciprocal: light and viewer exchanged": (wr, wi)}
+        others = {"is not reciprocal, which it does not say: light and viewer exchanged": (wr, wi)}
+        if not self.reciprocal:
+            others.clear()
         if not self.anisotropic:
             others["is anisotropic, which it does not say: the surface turned"] = at(*(phi + turn))
         if self.elliptical:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,6 +76,7 @@ class Material(BaseModel, Lookups):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+    reciprocal: ClassVar[bool] = True  # of all models that are tabulated; the audit measures it
 
     name: str = Field(pattern=NAME_PATTERN, max_length=MOST_NAME)
     title: Text
@@ -206,8 +207,7 @@ class Material(BaseModel, Lookups):
         """Return True if f_r changes when the surface is turned about its normal."""
         if self.spec.anisotropic is not None:
             return self.spec.anisotropic(self.parameters)
-        axes = self.spec.lobe_axes
-        return axes is not None and self.parameters[axes[0]] != self.parameters[axes[1]]
+        return self.spec.lobe_axes is not None and len({self.parameters[axis] for axis in self.spec.lobe_axes}) > 1
 
     @property
     def elliptical(self) -> bool:

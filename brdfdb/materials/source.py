@@ -128,6 +128,10 @@ class Source(Protocol):
         """Return True if f_r has the symmetry of an ellipse, with axes along x and y."""
 
     @property
+    def reciprocal(self) -> bool:
+        """Return True if f_r is the same with light and viewer exchanged."""
+
+    @property
     def grazing_pole(self) -> bool:
         """Return True if f_r grows without bound as a direction reaches 90 degrees."""
 

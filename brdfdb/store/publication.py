@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,7 @@ from brdfdb.errors import (
     StoreError,
 )
 from brdfdb.materials import Source
+from brdfdb.measurements import MeasuredSource
 from brdfdb.store.decoding import read_metadata, table_of
 from brdfdb.store.files import Entry, sync_directory, write_file
 from brdfdb.store.lock import Lock, writing
@@ -29,7 +30,8 @@ from brdfdb.store.sealed_json import write_sealed
 from brdfdb.tables import error_measurement
 from brdfdb.tables.formula_measurement import first_numbers
 from brdfdb.tables.grids import check_wavelengths
-from brdfdb.tables.layout import Layout
+from brdfdb.tables.layout import Layout, digest
+from brdfdb.tables.measured_layout import layout_of
 from brdfdb.tables.planner import plan
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.tabulation import tabulate
@@ -92,16 +94,24 @@ def publish(
     """
     given = source.wavelengths_nm if wavelengths_nm is None else np.atleast_1d(np.asarray(wavelengths_nm))
     at = None if given is None else check_wavelengths(given)
-    return publish_layout(root, source.name, plan(source, at, tolerance))
+    layout = layout_of(source, at, tolerance) if isinstance(source, MeasuredSource) else plan(source, at, tolerance)
+    return publish_layout(root, source.name, layout)
 
 
-def publish_layout(root: str | os.PathLike[str], name: str, layout: Layout) -> Published:
-    """Tabulate a layout in memory, measure its error, and publish the table under a name; errors as by `publish`."""
+def publish_layout(
+    root: str | os.PathLike[str], name: str, layout: Layout, request: Mapping[str, Any] | None = None
+) -> Published:
+    """Tabulate a layout in memory, measure its error, and publish the table under a name; errors as by `publish`.
+
+    The table keeps the request of a build, if it is given, so that the same request is not built again.
+    """
     dataset = tabulate(layout)
     values = dataset[layout.variable].to_numpy()
     error = error_measurement.measure(layout, lambda rows: values[rows])
     stated = {"error": error, **first_numbers(layout, lambda rows: values[rows])}
     written = {key: value.model_dump(mode="json") for key, value in stated.items()}
+    if request is not None:
+        written |= {"request": dict(request), "request_sha256": digest(request)}
     return Published(*publish_dataset(root, name, dataset.assign_attrs(written)), error)
 
 

@@ -16,14 +16,14 @@ from brdfdb.tables._interpolation import Axes, locate, tricubic, trilinear, weig
 
 Array = NDArray[np.float64]
 
-PI, TURN, HALF_PI = np.pi, 2.0 * np.pi, np.pi / 2.0
-PHI_MAX = 1e15
+PI, TURN, HALF_PI, PHI_MAX = np.pi, 2.0 * np.pi, np.pi / 2.0, 1e15
 
 
 class Rule(NamedTuple):
     """The way from numbers on a grid to f_r.
 
-    `half_difference` is True for the axes of half and difference vectors. `copies` is the number of times that the
+    `half_difference` is True for the axes of half and difference vectors. If `reciprocal` is True, their phi_d stands
+    for light and viewer exchanged, too. `copies` is the number of times that the
     azimuth of an anisotropic grid goes into a full turn: 1, 2 or 4. Numbers are logarithms if `logarithm` is True;
     `offset` was added to values before, which had been multiplied by cos theta_i cos theta_r to the `power`.
     Interpolated values below 0 are set to 0 if `overshoots` is True. Spectra mix f_r of the channels if `mixed` is
@@ -31,6 +31,7 @@ class Rule(NamedTuple):
     """
 
     half_difference: bool
+    reciprocal: bool
     copies: int
     logarithm: bool
     offset: float
@@ -76,16 +77,16 @@ def _turned(phi: float, other: float, copies: int) -> tuple[float, float]:
 
 
 @kernel
-def _halved(phi_h: float, phi_d: float, copies: int) -> tuple[float, float]:
-    """Return the azimuths of half and difference vector after the symmetries of the surface and reciprocity.
+def _halved(phi_h: float, phi_d: float, rule: Rule) -> tuple[float, float]:
+    """Return the azimuths of half and difference vector after the symmetries of the surface, phi_d in its period.
 
     Half a turn of the surface moves phi_h alone, the mirror changes the sign of both.
     """
-    if copies > 1 and phi_h >= PI:
+    if rule.copies > 1 and phi_h >= PI:
         phi_h -= PI
-    if copies == 4 and phi_h > HALF_PI:
+    if rule.copies == 4 and phi_h > HALF_PI:
         phi_h, phi_d = PI - phi_h, -phi_d
-    return phi_h, _folded(phi_d, PI)
+    return phi_h, _folded(phi_d, PI if rule.reciprocal else TURN)
 
 
 @loop
@@ -98,16 +99,13 @@ def points_of_angles(
         for j in range(count):
             d = np.float64(phi_r[j]) - np.float64(phi_i[j])
             d -= np.floor(d * (1.0 / TURN) + 0.5) * TURN
-            light[j] = theta_i[j]
-            viewer[j] = theta_r[j]
+            light[j], viewer[j] = theta_i[j], theta_r[j]
             delta_phi[j] = abs(d)
     else:
         light, light_phi, viewer, viewer_phi = x[0], x[1], x[2], x[3]
         for j in range(count):
             phi, other = _turned(np.float64(phi_i[j]), np.float64(phi_r[j]), rule.copies)
-            light[j] = theta_i[j]
-            light_phi[j] = phi
-            viewer[j] = theta_r[j]
+            light[j], light_phi[j], viewer[j] = theta_i[j], phi, theta_r[j]
             viewer_phi[j] = _folded(other, TURN)
     if rule.power != 0.0:
         for j in range(count):
@@ -122,13 +120,13 @@ def points_of_vectors(rule: Rule, ui: Array, ur: Array, count: int, x: Array, mu
     """
     if rule.half_difference:
         theta_h, theta_d, phi_d = x[0], x[x.shape[0] - 2], x[x.shape[0] - 1]
-        _half_difference(ui, ur, count, theta_h, theta_d, phi_d, scratch)
+        _half_difference(ui, ur, count, theta_h, theta_d, phi_d, scratch, rule.reciprocal)
         if x.shape[0] == 4:
             along, across, x_h, y_h = scratch[0], scratch[1], scratch[2], scratch[3]
             phi_h = x[1]
             for j in range(count):
                 turn = _full_turn(y_h[j], x_h[j])
-                phi_h[j], phi_d[j] = _halved(turn, _full_turn(across[j], along[j]), rule.copies)
+                phi_h[j], phi_d[j] = _halved(turn, _full_turn(across[j], along[j]), rule)
     elif x.shape[0] == 3:
         _light_and_viewer(ui, ur, count, x[0], x[1], x[2], scratch)
     else:
@@ -151,9 +149,9 @@ def _polar(x: float, y: float, z: float) -> float:
 
 @kernel
 def _half_difference(
-    ui: Array, ur: Array, count: int, theta_h: Array, theta_d: Array, phi_d: Array, scratch: Array
+    ui: Array, ur: Array, count: int, theta_h: Array, theta_d: Array, phi_d: Array, scratch: Array, reciprocal: bool
 ) -> None:
-    """Write theta_h, theta_d, and phi_d in the first quadrant.
+    """Write theta_h, theta_d, and phi_d in the first quadrant, or in the first two if not `reciprocal`.
 
     `scratch` gets the difference vector along theta_h and along phi_h, both times one positive number, and the
     horizontal half vector; where that is nothing, the frame is that of phi_h = 0.
@@ -180,7 +178,8 @@ def _half_difference(
         h_z = np.float64(ui[3 * j + 2]) + np.float64(ur[3 * j + 2])
         theta_h[j] = angle(theta_h[j], abs(h_z))
     for j in range(count):
-        phi_d[j] = angle(abs(across[j]), abs(along[j]))
+        a = angle(abs(across[j]), abs(along[j]))
+        phi_d[j] = a if reciprocal or along[j] >= 0.0 else PI - a
 
 
 @kernel

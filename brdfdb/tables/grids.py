@@ -29,11 +29,11 @@ KINDS: tuple[tuple[str, ...], ...] = (
 _AZIMUTHS: dict[tuple[str, ...], dict[str, tuple[float, ...]]] = {
     ISOTROPIC_AXES: {"delta_phi": (180.0,)},
     ANISOTROPIC_AXES: {"phi_i": (360.0, 180.0, 90.0), "phi_r": (360.0,)},
-    HALF_DIFFERENCE_AXES: {"phi_d": (90.0,)},
-    ANISOTROPIC_HALF_DIFFERENCE_AXES: {"phi_h": (360.0, 180.0, 90.0), "phi_d": (180.0,)},
+    HALF_DIFFERENCE_AXES: {"phi_d": (90.0, 180.0)},
+    ANISOTROPIC_HALF_DIFFERENCE_AXES: {"phi_h": (360.0, 180.0, 90.0), "phi_d": (180.0, 360.0)},
 }
 
-_RECIPROCITY = "brdf(theta_i, theta_r) = brdf(theta_r, theta_i)"
+RECIPROCITY = "brdf(theta_i, theta_r) = brdf(theta_r, theta_i)"
 _HALF_TURN = "brdf(phi_i + 180, phi_r + 180) = brdf(phi_i, phi_r)"
 _MIRROR = "brdf(-phi_i, -phi_r) = brdf(phi_i, phi_r)"
 
@@ -45,7 +45,8 @@ class Grid:
     Grids of light and viewer have the axes theta_i, theta_r and delta_phi (0 to 180 degrees, the rest by mirror
     symmetry), anisotropic ones theta_i, phi_i, theta_r and phi_r. Grids of half and difference vectors (Rusinkiewicz
     1998, ``rusinkiewicz1998``) have theta_h, theta_d and phi_d (0 to 90, the rest by mirror symmetry and reciprocity),
-    anisotropic ones theta_h, phi_h, theta_d and phi_d (0 to 180, the rest by reciprocity). phi_i and phi_h end at 360,
+    anisotropic ones theta_h, phi_h, theta_d and phi_d (0 to 180, the rest by reciprocity). Where light and viewer may
+    not be exchanged, phi_d ends at 180 or, of anisotropic grids, at 360. phi_i and phi_h end at 360,
     at 180 for surfaces that half a turn leaves the same, or at 90 for those that are also their own mirror image in x.
     Both ends of an axis are nodes; nodes need not be uniform.
 
@@ -105,7 +106,13 @@ class Grid:
 
     @property
     def reciprocal(self) -> bool:
-        """True if a table is its own transpose: theta_i, theta_r, delta_phi with the same nodes for both thetas."""
+        """True if the grid may stand for light and viewer exchanged.
+
+        Half and difference vectors leave half of phi_d out then. A table over theta_i, theta_r and delta_phi, with the
+        same nodes for both thetas, is its own transpose then.
+        """
+        if self.half_difference:
+            return bool(self.axes["phi_d"][-1] == (180.0 if self.anisotropic else 90.0))
         return self.names == ISOTROPIC_AXES and np.array_equal(self.axes["theta_i"], self.axes["theta_r"])
 
     @property
@@ -114,7 +121,7 @@ class Grid:
         known = [] if self.anisotropic else ["brdf(delta_phi) = brdf(-delta_phi)"]
         known += [_HALF_TURN] if self.copies > 1 else []
         known += [_MIRROR] if self.copies == 4 else []
-        return known + ([_RECIPROCITY] if self.reciprocal or self.half_difference else [])
+        return known + ([RECIPROCITY] if self.reciprocal else [])
 
     @property
     def ends(self) -> list[tuple[str, str]]:
@@ -127,7 +134,7 @@ class Grid:
             "phi_h": ("periodic", "periodic") if self.copies < 4 else ("open", "open"),
             "phi_d": ("periodic", "periodic") if self.anisotropic else ("even", "even"),
             "theta_h": (even_pole, "open"),  # past the pole the half vector, and the light about it, are turned by 180
-            "theta_d": ("even", "open"),  # past the pole light and viewer are exchanged
+            "theta_d": ("even" if self.reciprocal else "open", "open"),  # past the pole light and viewer are exchanged
         }
         return [known.get(name, ("open", "open")) for name in self.axes]
 

@@ -136,6 +136,9 @@ class Layout:
             )
         if source.anisotropic and not source.elliptical and self.grid.copies > 1:
             raise ParameterError("grid", f"{source.name} has no symmetry of an ellipse; phi must end at 360 degrees")
+        if self.grid.half_difference and self.grid.reciprocal and not source.reciprocal:
+            end = 360 if source.anisotropic else 180
+            raise ParameterError("grid", f"{source.name} is not reciprocal; phi_d must end at {end} degrees")
         if source.grazing_pole and self.interpolation.plain and self.grid.reaches_horizon:
             raise ParameterError("grid", f"theta of 90 degrees is a pole of {source.name}; end the axis below 90")
         if self.wavelength_nm is not None:

@@ -10,6 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSeriali
 from brdfdb.errors import ParameterError, sentence_of
 from brdfdb.materials.provenance import Assumption, KnownExcess
 from brdfdb.materials.spectrum import Spectrum
+from brdfdb.measurements.record import Measured
 from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 from brdfdb.tables.layout import Interpolation
 from brdfdb.tables.stated_error import Error
@@ -73,6 +74,9 @@ class TableMetadata(BaseModel):
     source_record: dict[str, Any] | None = Field(
         default=None,
         description="the source complete: a material in the units of its model, or what is known of a function",
+    )
+    measured: Measured | None = Field(
+        default=None, description="origin, symmetries and errors of measured data; null: the values are a model's"
     )
     conventions: str | None = Field(default=None, description="the meaning of the angles and of f_r, in words")
     anisotropic: bool | None = Field(default=None, description="true if the azimuth of the light counts")

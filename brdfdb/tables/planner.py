@@ -229,8 +229,8 @@ def _end(source: Source, name: str) -> float:
     """Return the end of an axis [degree]; symmetry leaves out what it may."""
     if name in ("phi_i", "phi_h"):
         return 90.0 if source.elliptical else 360.0
-    if name == "phi_d" and source.anisotropic:
-        return 180.0
+    if name == "phi_d":
+        return 90.0 * (1 + source.anisotropic) * (2 - source.reciprocal)
     return LINE[name][0]
 
 
@@ -259,8 +259,8 @@ def _table_kinds(task: _Task) -> Iterator[_TableKind]:
                     needs: dict[str, Need] = {}
                     size = 1.0
                     for axis, name in enumerate(names):
-                        if name == "theta_r" and not source.anisotropic:
-                            needs[name] = needs["theta_i"]  # reciprocity
+                        if name == "theta_r" and not source.anisotropic and source.reciprocal:
+                            needs[name] = needs["theta_i"]
                         else:
                             if name not in lines:
                                 lines[name] = axis_needs.lines(layout, axis, task.drawn, floor)

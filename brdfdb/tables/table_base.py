@@ -60,7 +60,8 @@ class Stated(NamedTuple):
         Values as by `Table.lookup`.
     error : array [1/sr]
         In the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
-        source. Between wavelengths, and in the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
+        source, or of what was measured if it is a measurement, whose uncertainty is added. Between wavelengths, and in
+        the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
     """
 
     brdf: Floats
@@ -207,6 +208,9 @@ class BaseTable(Lookups):
             )
         values = brdf if at.tail else np.asarray(brdf)[..., np.newaxis]
         errors = stated(error, directions, values, at.column)
+        measured = self.metadata.measured
+        if measured is not None and measured.uncertainty is not None:
+            errors = errors + measured.uncertainty * np.maximum(values, error.floors[at.column])
         return np.asarray(errors if at.tail else errors[..., 0])[()]
 
     @functools.cached_property

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import directions_from_half_difference, radians, unit_vector
+from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
-from brdfdb.tables.grids import Axis
+from brdfdb.tables.grids import RECIPROCITY, Axis
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.metadata import TableMetadata
 
@@ -108,7 +109,7 @@ def _evaluated(layout: Layout, rows: slice, wavelength_nm: float | None) -> Floa
     def evaluate(theta_i: Floats, phi_i: Floats, theta_r: Floats, phi_r: Floats) -> Floats:
         return layout.tabulated.lookup(theta_i, phi_i, theta_r, phi_r, wavelength_nm)
 
-    if not layout.grid.reciprocal:
+    if not (layout.grid.reciprocal and layout.source.reciprocal):
         return evaluate(*layout.grid.directions(rows))
     theta, _, delta_phi = (radians(nodes) for nodes in layout.grid.axes.values())
     some, right, left = theta[rows], theta[rows.start :], theta[: rows.stop]
@@ -263,12 +264,13 @@ def metadata_of(layout: Layout) -> TableMetadata:
         table_version=TABLE_VERSION,
         **source.attributes(),
         source_record=source.document(),
+        measured=source.measured if isinstance(source, MeasuredSource) else None,
         conventions=(
             "directions point away from the surface; delta_phi = phi_r - phi_i, 0 is back towards the light, "
             "180 degrees the mirror half plane; f_r without cosine; isotropic tables are even in delta_phi"
         ),
         anisotropic=layout.grid.anisotropic,
-        symmetries=layout.grid.symmetries,
+        symmetries=[s for s in layout.grid.symmetries if source.reciprocal or s != RECIPROCITY],
         wavelength_range_nm=[] if wavelength_nm is None else [float(wavelength_nm[0]), float(wavelength_nm[-1])],
         interpolation=layout.interpolation,
         part_wavelengths_nm=[] if layout.part_nm is None else layout.part_nm.tolist(),

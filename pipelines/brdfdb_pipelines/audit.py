@@ -163,6 +163,8 @@ def _drawn(key: str) -> Section:
 
 def _why(store: Store, name: str) -> str:
     """Return the reason why the source of a table cannot be evaluated."""
+    if store.metadata(name).measured is not None:
+        return "it is measured, and a table does not hold the data"
     model = store.metadata(name).model
     if model is None or model in MODELS:
         return "its source cannot be evaluated"

@@ -24,6 +24,7 @@ from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_bl
 from brdfdb_pipelines import build_resources, workers
 from brdfdb_pipelines.build_progress import Event, Tally
 from brdfdb_pipelines.build_survey import Survey, head_of, survey
+from brdfdb_pipelines.measured_job import MeasuredJob, build_measured
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
@@ -53,7 +54,7 @@ class Built:
         Number of wavelengths for which it holds; 0 if it is grey.
     """
 
-    job: Job
+    job: Job | MeasuredJob
     state: str
     revision: str
     stored_bytes: int
@@ -76,7 +77,7 @@ class _Table:
 
     @property
     def name(self) -> str:
-        return self.job.material.name
+        return self.job.name
 
 
 def build(
@@ -119,13 +120,14 @@ def build(
         recipe resumes from them. Any other error of a table is raised after the other tables are built.
     """
     jobs = recipe.jobs()
+    measured = recipe.measured_jobs()
     sweeps = recipe.sweeps(jobs)
     root = root.absolute()  # workers may be in another directory
     existed = root.exists()
     made = make_store(root)
     try:
         return _Builder(
-            jobs, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory
+            jobs, measured, sweeps, root, at if isinstance(at, Workers) else Workers(at, lambda: 1), report, memory
         ).run()
     except ParameterError:
         if made:
@@ -139,13 +141,15 @@ class _Builder:
     def __init__(
         self,
         jobs: list[Job],
+        measured: list[MeasuredJob],
         sweeps: list[Sweep],
         root: Path,
         at: Workers,
         report: Callable[[Event], None],
         memory: int | None,
     ) -> None:
-        self.jobs, self.sweeps, self.root, self.at, self.report, self.memory = jobs, sweeps, root, at, report, memory
+        self.jobs, self.measured, self.sweeps, self.root = jobs, measured, sweeps, root
+        self.at, self.report, self.memory = at, report, memory
         self.task_bytes = 1
         self.running: dict[Future[Any], Callable[[Future[Any]], None]] = {}
         self.surveys: dict[str, Survey] = {}
@@ -160,16 +164,18 @@ class _Builder:
     def run(self) -> list[Built]:
         """Survey, tabulate and publish; return the result of each job in the order of the recipe."""
         start = time.perf_counter()
-        self.report({"event": "start", "tables": len(self.jobs), "store": str(self.root)})
+        self.report({"event": "start", "tables": len(self.jobs) + len(self.measured), "store": str(self.root)})
         try:
             self._survey()
             self._tabulate()
+            self._build_measured()
             self._measure_families()
         finally:
             self._leave()
         if self.error is not None:
             raise self.error
-        built = [self.built[job.material.name] for job in self.jobs]
+        names = [job.name for job in self.jobs] + [job.name for job in self.measured]
+        built = [self.built[name] for name in names]
         states = [b.state for b in built]
         self.report(
             {
@@ -359,6 +365,26 @@ class _Builder:
                 {"event": "published", "material": table.name, "revision": revision, "bytes": stored, "why": why}
             )
         self._close(table)
+
+    # Measured tables, each by one task
+
+    def _build_measured(self) -> None:
+        jobs = deque(self.measured)
+        while jobs or self.running:
+            while jobs and self._room:
+                job = jobs.popleft()
+
+                def then(future: Future[tuple[str, str, int, str]], job: MeasuredJob = job) -> None:
+                    if (result := self._result(job.name, future)) is not None:
+                        state, revision, stored, why = result
+                        self.built[job.name] = Built(job, state, revision, stored, why)
+                        event = {"event": state, "material": job.name, "revision": revision}
+                        self.report(event if state == "unchanged" else {**event, "bytes": stored, "why": why})
+
+                self.report({"event": "measuring", "material": job.name})
+                self._submit(then, build_measured, str(self.root), job)
+            if self.running:
+                self._wait()
 
     # Families
 

@@ -97,6 +97,9 @@ class Bars:
                 self._block(event)
             case "family":
                 self._family(event)
+            case "measuring":
+                name = event["material"]
+                self._tables[name] = self._progress.add_task(f"  {name}, measured", total=None, rate="")
             case "published" | "adopted" | "unchanged":
                 if (task := self._tables.pop(event["material"], None)) is not None:
                     self._progress.remove_task(task)

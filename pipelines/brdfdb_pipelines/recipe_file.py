@@ -25,10 +25,12 @@ from brdfdb.errors import MaterialError, ParameterError, sentence_of
 from brdfdb.materials import PAPERS, Material, exact_material, presets, written_name
 from brdfdb.models import MODELS
 from brdfdb.store.family import Sweep
+from brdfdb.store.paths import NAME
 from brdfdb.tables.grids import Axis, Grid, check_wavelengths
 from brdfdb.tables.layout import TABLE_VERSION, Interpolation, Layout, digest
 from brdfdb.tables.planner import PLAN_VERSION, coarsest, offset_of, plan
 from brdfdb_pipelines import preset_names, toml_file
+from brdfdb_pipelines.measured_job import MeasuredJob, measured_job
 from brdfdb_pipelines.recipe_grids import LIST, STRICT, Grids, Nodes, Range, RecipeError, nodes_of
 
 _MOST_VALUES = 1 << 36  # of a table: 275 GB
@@ -69,6 +71,16 @@ class Job:
         if layout.size > _MOST_VALUES:
             shape = " x ".join(map(str, layout.shape))
             raise RecipeError("", f"{shape} are {layout.size:.3g} values, more than the {_MOST_VALUES:.3g} of a table")
+
+    @property
+    def name(self) -> str:
+        """Name of the table."""
+        return self.material.name
+
+    @property
+    def model(self) -> str:
+        """Name of the model."""
+        return self.material.model
 
     @property
     def request(self) -> dict[str, Any]:
@@ -112,25 +124,34 @@ class Recipe(BaseModel):
         default="paper",
         description="exact: tabulate the integral that a formula approximates, if there is one, except of families",
     )
-    define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
+    define: dict[str, dict[str, Any]] = Field(
+        default={},
+        description="materials of your own, as in the preset files; with samples, a file, they are measured",
+    )
     sweep: dict[str, dict[str, Any]] = Field(
         default={}, description="families of materials: written like a material, with lists as values of parameters"
     )
 
     _folder: Path | None = PrivateAttr(default=None)  # that relative paths of CSV files begin at
-    _checked: list[Job] = PrivateAttr(default=[])  # jobs of this recipe, which does not change once it is read
+    _measured: list[MeasuredJob] = PrivateAttr(default=[])
+    _checked: list[Job] | None = PrivateAttr(default=None)  # jobs of this recipe, which does not change once it is read
 
     def jobs(self) -> list[Job]:
-        """Return a job for each table that the recipe asks for.
+        """Return a job for each table of a model that the recipe asks for.
 
         Raises
         ------
         RecipeError
             If a name matches nothing, or a material, grid or wavelength is not what it must be.
         """
-        if not self._checked:
+        if self._checked is None:
             self._checked = self._jobs()
         return [*self._checked]
+
+    def measured_jobs(self) -> list[MeasuredJob]:
+        """Return a job for each table of measured data that the recipe asks for; errors as by `jobs`."""
+        self.jobs()
+        return [*self._measured]
 
     def _jobs(self) -> list[Job]:
         if (self.tolerance is None) == (self.grids is None):
@@ -211,6 +232,10 @@ class Recipe(BaseModel):
         for name, table in self.define.items():
             if name in known:
                 raise RecipeError(f"define.{name}", "is the name of a preset; give yours another")
+            if "samples" in table:
+                if not NAME.fullmatch(name):
+                    raise RecipeError(f"define.{name}", "is not made of lower-case letters, digits and single hyphens")
+                continue
             try:
                 known[name] = Material.from_table(name, table, self._folder), None
             except MaterialError as error:
@@ -233,15 +258,20 @@ class Recipe(BaseModel):
             known |= members
             families[name] = list(members)
         chosen: dict[str, tuple[Material, dict[str, Any] | None]] = {}
+        measured = {name: table for name, table in self.define.items() if "samples" in table}
+        files: dict[str, MeasuredJob] = {}
         for pattern in self.materials:
             matches = fnmatch.filter(known, pattern)
+            named = fnmatch.filter(measured, pattern)
+            files |= {x: measured_job(x, measured[x], self._folder, self.tolerance) for x in named if x not in files}
             for family in fnmatch.filter(families, pattern):
                 matches += families[family]
-            if not matches:
+            if not matches and not named:
                 raise RecipeError(
-                    "materials", preset_names.sentence_without(pattern, [*known, *families], self.library)
+                    "materials", preset_names.sentence_without(pattern, [*known, *measured, *families], self.library)
                 )
             chosen |= {name: known[name] for name in matches}
+        self._measured = list(files.values())
         return list(chosen.values())
 
 

@@ -55,7 +55,7 @@ def test_a_spectral_function_is_called_with_the_wavelengths_and_has_them_last() 
         ({"elliptical": True}, "elliptical: an isotropic function has more symmetry than an ellipse; leave it out"),
         ({"wavelengths_nm": (700.0, 400.0)}, "wavelengths_nm: [700.0, 400.0] must be positive and increasing"),
         ({"colour": "red"}, "colour: unknown key"),
-        ({"brdf": lambda wi, wr, _: wi[:, 2] * 2.0 + wr[:, 2]}, "brdf: made-up is not reciprocal: "),
+        ({"brdf": lambda wi, wr, _: wi[:, 2] * 2.0 + wr[:, 2]}, "brdf: made-up is not reciprocal, which it"),
         ({"brdf": lambda wi, wr, _: 2.0 + wi[:, 0] * wr[:, 0]}, "brdf: made-up is anisotropic, which it does not say"),
         (
             {"brdf": lambda wi, wr, _: 2.0 + wi[:, 0] * wr[:, 1] + wi[:, 1] * wr[:, 0], "anisotropic": True}

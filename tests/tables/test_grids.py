@@ -124,7 +124,9 @@ def test_grids_of_half_and_difference_vectors_say_what_they_are() -> None:
     isotropic, anisotropic = Grid(HALF), Grid(TURNED_HALF)
     assert (isotropic.half_difference, isotropic.anisotropic, isotropic.copies) == (True, False, 1)
     assert (anisotropic.half_difference, anisotropic.anisotropic, anisotropic.copies) == (True, True, 4)
-    assert not isotropic.reciprocal  # not its own transpose: reciprocity is in the angles
+    assert isotropic.reciprocal
+    assert not Grid({**HALF, "phi_d": [0, 90, 180]}).reciprocal  # both ways of a pair have nodes
+    assert not Grid({**TURNED_HALF, "phi_d": [0, 180, 360]}).reciprocal
     assert isotropic.symmetries[-1] == anisotropic.symmetries[-1] == "brdf(theta_i, theta_r) = brdf(theta_r, theta_i)"
     assert len(anisotropic.symmetries) == 3
     assert not Grid(HALF).reaches_horizon
@@ -133,7 +135,7 @@ def test_grids_of_half_and_difference_vectors_say_what_they_are() -> None:
     assert Grid(ANISOTROPIC).copies == 1
 
 
-@pytest.mark.parametrize(("name", "nodes"), [("phi_d", [0, 180]), ("phi_d", [0, 45]), ("theta_h", [1, 90])])
+@pytest.mark.parametrize(("name", "nodes"), [("phi_d", [0, 360]), ("phi_d", [0, 45]), ("theta_h", [1, 90])])
 def test_an_axis_of_half_and_difference_vectors_ends_where_symmetry_takes_over(name: str, nodes: list[float]) -> None:
     with pytest.raises(ValueError, match=rf"^{name}: (starts|ends) at \d+ degrees, must"):
         Grid(HALF | {name: nodes})

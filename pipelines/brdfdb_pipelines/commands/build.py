@@ -107,8 +107,8 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
             ("material", "model", "shape", "revision", "stored", "why"),
             [
                 (
-                    one.job.material.name,
-                    one.job.material.model,
+                    one.job.name,
+                    one.job.model,
                     shape_in_words(one.shape, one.wavelengths),
                     one.revision,
                     terminal.size(one.stored_bytes),
@@ -121,10 +121,10 @@ def _print(built: list[Built], root: Path, seconds: float) -> None:
     if len(changed) < len(built):
         print(f"{counted(len(built) - len(changed), 'table')} unchanged")
     print(f"{terminal.size(sum(one.stored_bytes for one in built))} in {root}")
-    for material in (one.job.material for one in changed):
-        excess = summary_words.excess(store.summary(material.name))
-        if excess and material.known_excess is None:
-            print(f"{material.name} reflects more than it receives: {excess}")
+    for name in (one.job.name for one in changed):
+        excess = summary_words.excess(store.summary(name))
+        if excess and store.metadata(name).known_excess is None:
+            print(f"{name} reflects more than it receives: {excess}")
 
 
 def shape_in_words(shape: tuple[int, ...], wavelengths: int) -> str:

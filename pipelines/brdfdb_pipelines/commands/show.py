@@ -56,9 +56,11 @@ def _print_material(table: Table, path: Path, audited: Audited | None) -> None:
     if metadata.gaps:
         print(terminal.plain(f"  incomplete  the table {metadata.gaps}"))
     _print_grid(table)
-    _print_error(table.error, "its source" if metadata.model is None else "its formula")
-    _print_formula_error(metadata.formula_error)
-    _print_answers(audited, table.name)
+    truth = "its formula" if metadata.model is not None else "its source" if metadata.measured is None else "the data"
+    _print_error(table.error, truth)
+    if metadata.measured is None:
+        _print_formula_error(metadata.formula_error)
+    _print_answers(audited, table.name, measured=metadata.measured is not None)
     _print_validity(table)
     _print_albedo(table)
     print(f"  files       {path} (zarr v3, {terminal.size(_stored(path))})")
@@ -104,6 +106,8 @@ def _origin(metadata: TableMetadata) -> list[str]:
         lines.append(f"    {parameter:<16}{text:<{_VALUE_WIDTH}}{note}".rstrip())
     if metadata.source is not None:
         lines.append(f"  source      {metadata.source}")
+    if metadata.measured is not None:
+        lines += [f"  {'measured' if not n else '':<12}{line}" for n, line in enumerate(metadata.measured.in_words())]
     if metadata.refractive_index:
         lines.append(f"  n, k        {metadata.refractive_index} of refractiveindex.info")
     if metadata.note:
@@ -238,13 +242,13 @@ def _print_formula_error(error: FormulaError | None) -> None:
         _print_worst(error.worst)
 
 
-def _print_answers(audited: Audited | None, name: str) -> None:
+def _print_answers(audited: Audited | None, name: str, *, measured: bool) -> None:
     """Print the answers of the last audit of this revision to its two questions."""
     from brdfdb.materials import presets
     from brdfdb.store.summary_words import NOT_AUDITED
 
     both = (NOT_AUDITED, NOT_AUDITED) if audited is None else audited
-    says = "the paper" if name in presets() else "its model"
+    says = "the paper" if name in presets() else "its source" if measured else "its model"
     print(f"  audit       is it what {says} says? {both[0]}")
     print(f"              does the published model conserve energy? {both[1]}")
 

@@ -1,0 +1,329 @@
+"""Interpolation of scattered samples: a simple base, and radial functions of the logarithm of f_r over the base."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.measurements.coordinates import Hull, features, half_angles
+from brdfdb.measurements.record import HeldOut
+from brdfdb.measurements.samples import Samples
+from brdfdb.parameters import Floats
+
+Base = Callable[[Floats, Floats], Floats]  # f_r [1/sr] (N, C) at unit vectors (N, 3)
+
+FLOOR = 1e-3  # floor of relative errors, as a share of the mean f_r times cosine
+_CENTRES = 700  # largest number of radial functions
+_SEARCHED = 300  # samples among which scales are chosen
+_ALPHAS = np.geomspace(0.01, 2.0, 24)  # widths of the lobe of the base that are tried
+_SEEN = 5  # samples within the width of a lobe that are needed to see its height
+_SCALES = (0.5, 1.0, 2.0, 4.0)  # of the coordinates, tried against each other
+_ROUGHNESS = (0.01, 0.1)  # noise that no uncertainty states, relative to the spread of the logarithm, tried
+_PARTS = 10  # parts of samples without a pattern, held out one at a time
+_REGULAR = 8  # samples of an incidence, and more, make a scan
+_MOST_ROUNDS = 24  # incidences that are held out one by one; more of them are held out in groups
+_JITTER = 1e-9  # added to the diagonal of a matrix, relative to it, so that rounding leaves it positive
+_SEED = 1998
+
+
+class _Scales(NamedTuple):
+    half: float
+    difference: float
+    exchange: float
+    noise: float
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolation:
+    """f_r of samples everywhere: a base times a smooth ratio.
+
+    The logarithm is asinh(f_r / (2 noise)), which is linear where f_r is less than its noise: values below 0 count.
+
+    Attributes
+    ----------
+    base : callable
+        f_r [1/sr] that the ratio is taken to.
+    alpha : float
+        Width [1] of the lobe that the coordinates crowd in.
+    level : array (C,) [1/sr]
+        Noise of small values: their uncertainty, or the root mean square of the values below 0.
+    scales : tuple
+        Scales of the coordinates, and the noise of the logarithm that no uncertainty states, relative to its spread.
+    turned : bool
+        True if the samples can tell the azimuth of the light.
+    mean : array (C,)
+        Mean of the logarithm of the ratio.
+    lowest : float
+        Smallest cosine of a light or a viewer that was measured. Directions closer to the horizon have the values
+        there, as in tables: a lobe that is continued may reflect any amount.
+    centres, weights : array (M, D), (M, C)
+        Centres of the radial functions in the coordinates, and their weights.
+    """
+
+    base: Base
+    alpha: float
+    level: Floats
+    scales: _Scales
+    turned: bool
+    mean: Floats
+    lowest: float
+    centres: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    weights: Floats = field(default_factory=lambda: np.empty((0, 0)))
+
+    def __call__(self, wi: Floats, wr: Floats) -> Floats:
+        """Return f_r [1/sr] (N, C), at least 0, at unit vectors (N, 3)."""
+        wi, wr = (_raised(w, self.lowest) for w in (wi, wr))
+        values = np.empty((len(wi), self.level.size))
+        for start in range(0, len(wi), 1 << 13):
+            some = slice(start, start + (1 << 13))
+            x = features(wi[some], wr[some], self.alpha, self.scales[:3], turned=self.turned)
+            number = _logarithm(self.base(wi[some], wr[some]), self.level) + self.mean
+            values[some] = 2.0 * self.level * np.sinh(number + _radial(x, self.centres) @ self.weights)
+        return np.maximum(values, 0.0)
+
+
+def _raised(w: Floats, lowest: float) -> Floats:
+    """Return unit vectors (N, 3) with cosines of at least `lowest`, at the same azimuths."""
+    sine = np.sqrt((1.0 - lowest**2) / np.maximum(1.0 - w[:, 2] ** 2, 1e-12))
+    raised = np.stack([w[:, 0] * sine, w[:, 1] * sine, np.full(len(w), lowest)], axis=1)
+    return np.where((w[:, 2] < lowest)[:, np.newaxis], raised, w)
+
+
+def _logarithm(f_r: Floats, level: Floats) -> Floats:
+    return np.asarray(np.arcsinh(f_r / (2.0 * level)))
+
+
+def _radial(x: Floats, centres: Floats) -> Floats:
+    """Return (1 + r) exp(-r) of the distances r between points (N, D) and centres (M, D)."""
+    square = np.sum(x**2, axis=1)[:, np.newaxis] + np.sum(centres**2, axis=1) - 2.0 * x @ centres.T
+    r = np.sqrt(np.maximum(square, 0.0))
+    return np.asarray((1.0 + r) * np.exp(-r))
+
+
+def lambert_and_lobe(samples: Samples) -> tuple[Base, float, str]:
+    """Return the base that fits samples best, the width of its lobe [1], and its name in words.
+
+    It is Lambert and one lobe in tan theta_h, Gaussian or with a tail, alone and with Schlick's fifth power, over a
+    denominator that is never 0; coefficients are not negative. A lobe that a few samples do not lie within could
+    have any height, and is not tried.
+    """
+    from scipy.optimize import nnls
+
+    wi, wr, values, _ = _listed(samples)
+    some = np.random.default_rng(_SEED).permutation(len(wi))[: 4 * _SEARCHED]
+    wi, wr, values = wi[some], wr[some], values[some]
+    weight = 1.0 / (np.abs(values) + FLOOR * np.nanmean(np.abs(values), axis=0))
+    best: tuple[float, float, str, Floats] | None = None
+    tan2 = np.sort(half_angles(wi, wr)[0])
+    narrowest = np.sqrt(tan2[min(_SEEN, tan2.size) - 1])
+    for alpha, tail in itertools.product(np.append(_ALPHAS[narrowest <= _ALPHAS], _ALPHAS[-1]), (False, True)):
+        columns = _columns(wi, wr, alpha, tail=tail)
+        fits = [
+            nnls(columns[good] * weight[good, c, np.newaxis], values[good, c] * weight[good, c])
+            for c in range(values.shape[1])
+            for good in [np.isfinite(values[:, c])]
+        ]
+        left = sum(residual for _, residual in fits)
+        if best is None or left < best[0]:
+            best = left, float(alpha), "with a tail" if tail else "Gaussian", np.stack([fit for fit, _ in fits], axis=1)
+    assert best is not None
+    _, width, kind, coefficients = best
+
+    def base(wi: Floats, wr: Floats) -> Floats:
+        return np.asarray(_columns(wi, wr, width, tail=kind != "Gaussian") @ coefficients)
+
+    return base, width, f"Lambert and one {kind} lobe of width {width:.2g}"
+
+
+def _columns(wi: Floats, wr: Floats, alpha: float, *, tail: bool) -> Floats:
+    tan2, theta_d = half_angles(wi, wr)
+    slope = tan2 / alpha**2
+    lobe = (1.0 + slope) ** -2.0 if tail else np.exp(-slope)
+    lobe = lobe / (wi[:, 2] + wr[:, 2] - wi[:, 2] * wr[:, 2])
+    return np.stack([np.full(len(wi), 1.0 / np.pi), lobe, lobe * (1.0 - np.cos(theta_d)) ** 5], axis=1)
+
+
+def _listed(samples: Samples) -> tuple[Floats, Floats, Floats, Floats | None]:
+    """Return directions and values of the samples with a value in any channel; ParameterError for fewer than ten."""
+    rows = np.flatnonzero(samples.known.any(axis=1))
+    if rows.size < _PARTS:
+        raise ParameterError("samples", f"{rows.size} values are too few; a table needs {_PARTS} or more", rows.size)
+    uncertainty = None if samples.uncertainty is None else samples.uncertainty[rows]
+    return samples.w_i[rows], samples.w_r[rows], samples.values[rows], uncertainty
+
+
+def floor_of(samples: Samples) -> Floats:
+    """Return the floor [1/sr] (C,) of relative errors: `FLOOR` of the mean f_r of the samples, above 0."""
+    mean = np.nanmean(np.abs(samples.values), axis=0)
+    return np.asarray(np.maximum(FLOOR * mean, 1e-12))
+
+
+class _Problem(NamedTuple):
+    """Samples as the least-squares problem reads them.
+
+    Attributes
+    ----------
+    wi, wr : array (N, 3)
+        Directions.
+    values : array (N, C) [1/sr]
+        f_r; nan in holes.
+    of_base, y : array (N, C)
+        Logarithm of the base, and the number to interpolate: the logarithm of f_r less that of the base.
+    noise : array (N,)
+        Noise of y, relative to its spread.
+    group : array (N,)
+        Groups that are held out together.
+    """
+
+    wi: Floats
+    wr: Floats
+    values: Floats
+    of_base: Floats
+    y: Floats
+    noise: Floats
+    group: NDArray[np.int64]
+
+    def some(self, rows: NDArray[Any]) -> _Problem:
+        return _Problem(*(part[rows] for part in self))
+
+
+class Fitted(NamedTuple):
+    """The interpolation of samples, its error at samples that were held out, and its base in words."""
+
+    f_r: Interpolation
+    held_out: HeldOut
+    base: str
+
+
+def fit(samples: Samples, base: Base | None = None) -> Fitted:
+    """Fit the interpolation of samples.
+
+    Parameters
+    ----------
+    samples : Samples
+        Ten or more.
+    base : callable, optional
+        f_r that the ratio is taken to; by default `lambert_and_lobe`, of the same samples.
+
+    Notes
+    -----
+    The radial functions (1 + r) exp(-r) are those of a smooth random function with noise, of which the result is the
+    most likely one. Their scales are those with the smallest error at samples that are held out. Of scans, which have
+    many viewers for one light, all samples of a light are held out together: neighbours in a scan would tell too much.
+    The gap is then twice that of the samples, and the stated error is rather too large between incidences than too
+    small. Samples without such a pattern are held out in ten parts, by chance.
+    """
+    own, alpha, words = lambert_and_lobe(samples)
+    f_base = own if base is None else base
+    problem, level, scheme = _problem(samples, f_base)
+    mean, lowest = problem.y.mean(axis=0), float(min(problem.wi[:, 2].min(), problem.wr[:, 2].min()))
+    order = np.random.default_rng(_SEED).permutation(len(problem.wi))
+    few = problem.some(order[:_SEARCHED])
+    tried = [
+        Interpolation(f_base, alpha, level, _Scales(half * both, both, both, noise), samples.turned, mean, lowest)
+        for half, both, noise in itertools.product((1.0, 2.0), _SCALES, _ROUGHNESS)
+    ]
+    scores = [np.mean(np.minimum(np.abs(_held_out(one, few, few) - few.y), 3.0)) for one in tried]
+    chosen = tried[int(np.argmin(scores))]
+    centres = problem.some(order[:_CENTRES])
+    held_out = _stated(samples, problem, _held_out(chosen, problem, centres), chosen, scheme)
+    at = _x(chosen, centres)
+    weights = _solved(*_normal(chosen, problem, at), at)
+    return Fitted(replace(chosen, centres=at, weights=weights), held_out, words if base is None else "the given base")
+
+
+def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
+    """Return the problem, the noise (C,) [1/sr] of small values, and the scheme by which groups are held out."""
+    wi, wr, values, uncertainty = _listed(samples)
+    below = np.where(values < 0.0, values, 0.0)
+    level = np.maximum(
+        np.sqrt(np.sum(below**2, axis=0) / np.maximum(np.sum(below < 0.0, axis=0), 1)), floor_of(samples)
+    )
+    if uncertainty is not None:
+        level = np.maximum(np.nanmedian(uncertainty, axis=0), level)
+    of_base = _logarithm(base(wi, wr), level)
+    y = _logarithm(values, level) - of_base
+    y = np.where(np.isfinite(y), y, np.nanmean(y, axis=1, keepdims=True))  # a hole of one channel is like the others
+    noise = np.zeros(len(wi))
+    if uncertainty is not None:
+        slope = np.sqrt(values**2 + 4.0 * level**2)
+        noise = np.nan_to_num(np.nanmean(uncertainty / slope, axis=1)) / max(float(np.std(y)), 1e-3)
+    incidence = np.unique(samples.incidence[samples.known.any(axis=1)], return_inverse=True)[1].reshape(-1)
+    lights = int(incidence.max()) + 1
+    scans = lights > 2 and np.median(np.bincount(incidence)) >= _REGULAR
+    rng = np.random.default_rng(_SEED)
+    if scans:
+        group = (np.arange(lights) if lights <= _MOST_ROUNDS else rng.permutation(lights) % _MOST_ROUNDS)[incidence]
+    else:
+        group = rng.permutation(len(wi)) % _PARTS
+    return _Problem(wi, wr, values, of_base, y, noise, group), level, "incidences" if scans else "folds"
+
+
+def _x(how: Interpolation, problem: _Problem) -> Floats:
+    return features(problem.wi, problem.wr, how.alpha, how.scales[:3], turned=how.turned)
+
+
+def _normal(how: Interpolation, problem: _Problem, at: Floats) -> tuple[Floats, Floats]:
+    """Return the matrix and the right sides of the normal equations of some samples."""
+    phi = _radial(_x(how, problem), at)
+    weighted = phi / (problem.noise**2 + how.scales.noise**2)[:, np.newaxis]
+    return weighted.T @ phi, weighted.T @ (problem.y - how.mean)
+
+
+def _solved(matrix: Floats, right: Floats, at: Floats) -> Floats:
+    """Return the weights of radial functions at some centres, smooth where samples do not tell."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    whole = matrix + _radial(at, at)
+    whole[np.diag_indices_from(whole)] *= 1.0 + _JITTER
+    return np.asarray(cho_solve(cho_factor(whole), right))
+
+
+def _held_out(how: Interpolation, problem: _Problem, centres: _Problem) -> Floats:
+    """Return the numbers (N, C) that the interpolation gives at each group of samples from those of the others.
+
+    The centres of radial functions stay: only values tell, not places.
+    """
+    at = _x(how, centres)
+    matrix, right = _normal(how, problem, at)
+    predicted = np.empty_like(problem.y)
+    for group in np.unique(problem.group):
+        own = problem.some(problem.group == group)
+        own_matrix, own_right = _normal(how, own, at)
+        weights = _solved(matrix - own_matrix, right - own_right, at)
+        predicted[problem.group == group] = _radial(_x(how, own), at) @ weights + how.mean
+    return predicted
+
+
+def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: Interpolation, scheme: str) -> HeldOut:
+    """Return the error at samples that were held out and lie within the directions of the others."""
+    inside = np.ones(len(problem.wi), dtype=bool)
+    for group in np.unique(problem.group):
+        own = problem.group == group
+        hull = Hull(problem.wi[~own], problem.wr[~own], turned=samples.turned)
+        inside[own] = ~hull.outside(problem.wi[own], problem.wr[own])
+    counted = inside if inside.any() else ~inside
+    f_r = np.maximum(2.0 * how.level * np.sinh(problem.of_base + predicted), 0.0)[counted]
+    values, floor = problem.values[counted], floor_of(samples)
+    known = np.isfinite(values)
+    off = np.abs(f_r - values)
+    error = (off / np.maximum(f_r, floor))[known]
+    median, p95, p99, largest = (float(f"{x:.3g}") for x in np.percentile(error, [50.0, 95.0, 99.0, 100.0]))
+    return HeldOut(
+        scheme="incidences" if scheme == "incidences" else "folds",
+        rounds=int(np.unique(problem.group).size),
+        samples=int(np.count_nonzero(counted)),
+        outside=int(np.count_nonzero(~inside)),
+        floor=[float(f"{x:.3g}") for x in floor],
+        l1=float(f"{off[known].sum() / max(np.abs(values[known]).sum(), 1e-300):.3g}"),
+        median=median,
+        p95=p95,
+        p99=p99,
+        max=largest,
+    )

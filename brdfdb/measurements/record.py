@@ -1,0 +1,136 @@
+"""The record of measured data that their table keeps: origin, symmetries, errors, and what was changed."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class Spread(BaseModel):
+    """Percentiles of some relative differences [1]."""
+
+    model_config = _STRICT
+
+    median: float
+    p99: float
+    max: float
+
+
+class Symmetry(BaseModel):
+    """A symmetry of f_r, and how far the data keep to it: abs(f - f') / (abs(f) + abs(f'))."""
+
+    model_config = _STRICT
+
+    assumed: bool = Field(description="true if the table makes use of it")
+    asymmetry: Spread | None = Field(description="of the data; null: they cannot tell")
+    allowed: float | None = Field(description="largest asymmetry that their noise explains; null: not known")
+
+
+class HeldOut(BaseModel):
+    """Error of the interpolation at samples that it did not get, abs(f - sample) / max(f, floor); noise included."""
+
+    model_config = _STRICT
+
+    scheme: Literal["incidences", "folds"] = Field(
+        description="incidences: all samples of one direction of the light at a time; folds: samples at random"
+    )
+    rounds: int = Field(description="how often samples were left out")
+    samples: int = Field(description="samples that were left out, within the directions of the others")
+    outside: int = Field(description="samples that were left out, outside of the directions of the others: not counted")
+    floor: list[float] = Field(description="1/sr, for each channel: a thousandth of the mean f_r times cosine")
+    l1: float = Field(description="sum of abs(error) over the sum of f_r")
+    median: float
+    p95: float
+    p99: float
+    max: float
+
+
+class Noise(BaseModel):
+    """Standard uncertainty of the samples as their file states it, relative to f_r or the floor."""
+
+    model_config = _STRICT
+
+    median: float
+    p95: float
+
+
+class Change(BaseModel):
+    """A change that makes measured values keep a law, relative to the values before or to the floor."""
+
+    model_config = _STRICT
+
+    law: Literal["reciprocal", "conserving"]
+    changed: Spread
+
+
+class Measured(BaseModel):
+    """The record of measured data in their table."""
+
+    model_config = _STRICT
+
+    by: str = Field(default="", description="who measured, and with which instrument; empty: the file does not say")
+    file: str = Field(default="", description="name of the file")
+    file_sha256: str = Field(default="", description="sha256 of the file")
+    channels: list[str] = Field(description="channels of the data")
+    samples: int = Field(description="number of samples; 0: f_r is known everywhere")
+    incidences: int = Field(default=0, description="number of directions of the light")
+    holes: int = Field(default=0, description="number of values that are missing")
+    negative: float = Field(description="share of the values below 0; f_r is 0 there")
+    interpolation: str = Field(description="the way from samples to f_r everywhere, in words")
+    reciprocity: Symmetry
+    mirror: Symmetry | None = Field(
+        description="f_r of an isotropic surface and of its mirror image; null: anisotropic"
+    )
+    extrapolated: float | None = Field(
+        default=None, description="share of the nodes above the horizon that lie outside of the samples"
+    )
+    held_out: HeldOut | None = Field(default=None, description="null: f_r is known everywhere")
+    noise: Noise | None = Field(default=None, description="null: not known")
+    changes: list[Change] = Field(default_factory=list)
+
+    @property
+    def uncertainty(self) -> float | None:
+        """Return the relative uncertainty [1] that 99 of 100 values keep to; None if nothing is known of it.
+
+        Errors at samples that were held out have the noise of the samples in them.
+        """
+        if self.held_out is not None:
+            return self.held_out.p99
+        return None if self.noise is None else 2.6 * self.noise.p95
+
+    def in_words(self) -> list[str]:
+        """Return sentences on origin, errors, symmetries and changes."""
+        of = f"{self.samples} samples of {self.incidences} incidences" if self.samples else "f_r of a file, everywhere"
+        lines = [f"{of}, channels {', '.join(self.channels)}{f'; {self.by}' if self.by else ''}"]
+        if self.held_out is not None:
+            held = self.held_out
+            left = "one incidence" if held.scheme == "incidences" else f"one of {held.rounds} parts"
+            lines.append(
+                f"error at samples held out, {left} at a time: median {held.median:.2g}, 95 of 100 within "
+                f"{held.p95:.2g}, 99 within {held.p99:.2g}, of f_r"
+            )
+        noise = "not stated" if self.noise is None else f"median {self.noise.median:.2g}, p95 {self.noise.p95:.2g}"
+        lines.append(f"noise of the samples: {noise}")
+        for name, symmetry in (("reciprocity", self.reciprocity), ("mirror symmetry", self.mirror)):
+            if symmetry is not None:
+                seen = symmetry.asymmetry
+                how = (
+                    "the data cannot tell"
+                    if seen is None
+                    else f"asymmetry median {seen.median:.2g}, p99 {seen.p99:.2g}"
+                )
+                lines.append(f"{name} {'assumed' if symmetry.assumed else 'not assumed'}: {how}")
+        if self.extrapolated is not None:
+            lines.append(f"{100.0 * self.extrapolated:.3g} % of the nodes lie outside of the samples: extrapolated")
+        if self.negative > 0.0:
+            lines.append(f"{100.0 * self.negative:.3g} % of the values are below 0: f_r is 0 there")
+        for change in self.changes:
+            spread = change.changed
+            lines.append(
+                f"made {change.law}: changed by a median of {spread.median:.2g}, p99 {spread.p99:.2g}, "
+                f"largest {spread.max:.2g}"
+            )
+        return lines

@@ -1,0 +1,171 @@
+"""The job that builds one table of measured data, from a file of any format that is read."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import BaseModel, Field, ValidationError
+
+from brdfdb import formats
+from brdfdb.errors import BrdfdbError, ParameterError, sentence_of
+from brdfdb.formats import neural
+from brdfdb.materials.provenance import Text
+from brdfdb.measurements import MeasuredSource, Samples
+from brdfdb.store.lock import Lock, writing
+from brdfdb.store.manifest import read_manifest
+from brdfdb.store.paths import material_path, revision_path
+from brdfdb.store.pointer import point_to
+from brdfdb.store.publication import publish_layout
+from brdfdb.store.revisions import standing
+from brdfdb.tables.layout import TABLE_VERSION
+from brdfdb.tables.measured_layout import layout_of
+from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
+
+if TYPE_CHECKING:
+    from brdfdb.formats._readings import FileTable
+
+MEASURED_VERSION = 1  # of the way from a file to the values of its table
+_MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
+
+
+class MeasuredTable(BaseModel):
+    """A material of a recipe that is measured."""
+
+    model_config = STRICT
+
+    samples: str = Field(min_length=1, description="path of the file, of any format that is read")
+    format: str = Field(default="", description="format of the file; by default the one that recognises it")
+    member: str = Field(default="", description="file of an archive of networks; by default it is no archive")
+    title: Text | None = Field(default=None, description="a line for people; by default the name in the file")
+    source: Text | None = Field(default=None, description="who measured, where it is published; by default the file's")
+    reciprocal: bool = Field(default=False, description="tabulate the nearest values that are reciprocal")
+    conserving: bool = Field(default=False, description="tabulate the nearest values with no albedo above 1")
+
+
+@dataclass(frozen=True)
+class MeasuredJob:
+    """One table of measured data to build, to a tolerance."""
+
+    name: str
+    path: Path
+    sha256: str
+    table: MeasuredTable
+    tolerance: float
+
+    model = "measured"
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """Everything that decides the table, ready for JSON: the same request makes the same table."""
+        return {
+            "table_version": TABLE_VERSION,
+            "measured_version": MEASURED_VERSION,
+            "measured_name": self.name,
+            "file_sha256": self.sha256,
+            "tolerance": self.tolerance,
+            **self.table.model_dump(mode="json", exclude={"samples"}),
+        }
+
+    def source(self) -> MeasuredSource:
+        """Read the file as a source, without the laws that it is to be made to keep.
+
+        Raises
+        ------
+        FileFormatError, ParameterError, OSError
+            If the file cannot be read, or is not what a table needs.
+        """
+        if self.table.member:
+            read: FileTable | Samples = neural.read(self.path, self.table.member)
+        else:
+            read = formats.read(self.path, self.table.format)
+        title = self.table.title or read.name
+        if isinstance(read, Samples):
+            provenance = self.table.source or read.provenance or f"the file {self.path.name}"
+            source = MeasuredSource.of_samples(read, name=self.name, title=title, provenance=provenance)
+        else:
+            source = MeasuredSource.of_function(
+                read.evaluate,
+                read.channels,
+                read.wavelength_nm,
+                name=self.name,
+                title=title,
+                provenance=self.table.source or f"the file {self.path.name}",
+            )
+        return source.recorded(file=self.path.name, file_sha256=self.sha256)
+
+
+def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tolerance: float | None) -> MeasuredJob:
+    """Return the job of a measured material of a recipe; RecipeError if it cannot be built."""
+    where = f"define.{name}"
+    if tolerance is None:
+        raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are for models")
+    try:
+        table = MeasuredTable.model_validate(dict(fields))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise RecipeError(".".join([where, *map(str, first["loc"])]), sentence_of(first)) from None
+    path = (folder or Path()) / table.samples
+    try:
+        sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise RecipeError(f"{where}.samples", f"{path}: {error.strerror}") from None
+    return MeasuredJob(name, path.absolute(), sha256, table, tolerance)
+
+
+def build_measured(root: str, job: MeasuredJob) -> tuple[str, str, int, str]:
+    """Build the table of a job unless the store has it: a task for a worker.
+
+    Returns
+    -------
+    state, revision, bytes, why
+        As `brdfdb_pipelines.build.Built` has them.
+    """
+    store, request = Path(root), job.request
+    status = standing(store, job.name, request)
+    if status.state == "adoptable":
+        with Lock(store, job.name), writing(store, job.name):
+            point_to(material_path(store, job.name), status.revision)
+    if status.state != "missing":
+        stored = read_manifest(revision_path(store, job.name, status.revision), None)[0]["summary"]["bytes"]
+        return {"current": "unchanged"}.get(status.state, "adopted"), status.revision, stored, status.why
+    try:
+        published = _published(store, job, request)
+    except BrdfdbError as error:
+        raise ParameterError(job.name, f"{job.path.name}: {error}") from None
+    return "published", published[0], published[1], status.why
+
+
+def _published(store: Path, job: MeasuredJob, request: Mapping[str, Any]) -> tuple[str, int]:
+    source = job.source()
+    if job.table.reciprocal:
+        source = source.made("reciprocal")
+    layout = None
+    if job.table.conserving:
+        source, layout = _conserving(source, job.tolerance)
+    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
+    published = publish_layout(store, job.name, layout or layout_of(source, at, job.tolerance), request)
+    return published.revision, published.bytes
+
+
+def _conserving(source: MeasuredSource, tolerance: float) -> Any:
+    """Return a source that conserves energy, and the layout of a table that does, too."""
+    from brdfdb.tables.albedo import largest_albedo
+    from brdfdb.tables.table import Table
+    from brdfdb.tables.tabulation import block
+
+    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
+    margin = 0.0
+    for _ in range(_MARGINS):
+        made = source.made("conserving", margin)
+        layout = layout_of(made, at, tolerance)
+        values = np.concatenate([block(layout, rows) for rows in layout.blocks])
+        largest = largest_albedo(Table.of(layout, values), made)
+        if not largest.above_1:
+            break
+        margin += 1.1 * ((largest.albedo or 2.0) - 1.0)
+    return made, layout

@@ -1,0 +1,95 @@
+"""Interpolation of samples: its stated error against samples that were held out from the very beginning."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.materials import presets
+from brdfdb.measurements import Samples
+from brdfdb.measurements.coordinates import Hull
+from brdfdb.measurements.interpolation import fit, floor_of
+from brdfdb.measurements.record import HeldOut
+from brdfdb.parameters import Floats
+from tests.measurements.made_up import scans, scattered
+
+RIGHT = 1.3  # factor within which the stated 95th percentile is right; measured 0.95 to 1.25
+
+
+@pytest.mark.parametrize("name", ["clay-vase", "blue-plastic", "latex-gloss-sprayed-metal"])
+def test_stated_error_is_that_of_scattered_samples_held_out_from_the_beginning(name: str) -> None:
+    samples = scattered(presets()[name].brdf_at(None), 1000, 0.03)
+    held = np.random.default_rng(1).random(len(samples)) < 0.25
+    stated, error = _held_out_from_the_beginning(samples, held)
+    assert stated.scheme == "folds"
+    assert 1.0 / RIGHT < stated.p95 / np.percentile(error, 95) < RIGHT
+
+
+@pytest.mark.parametrize("name", ["clay-vase", "latex-gloss-sprayed-metal"])
+def test_stated_error_is_that_of_incidences_held_out_from_the_beginning(name: str) -> None:
+    samples = scans(presets()[name].brdf_at(None), np.arange(5.0, 76.0, 10.0), 0.03)
+    errors, p95 = [], []
+    for theta_i_deg in (25.0, 35.0, 45.0):  # one alone differs more: a factor of 1.35 was seen
+        held = np.abs(samples.theta_i - radians(theta_i_deg)) < 1e-9
+        stated, error = _held_out_from_the_beginning(samples, held)
+        assert stated.scheme == "incidences"
+        errors.append(error)
+        p95.append(stated.p95)
+    assert 1.0 / RIGHT < np.mean(p95) / np.percentile(np.concatenate(errors), 95) < RIGHT
+
+
+def _held_out_from_the_beginning(samples: Samples, held: NDArray[np.bool_]) -> tuple[HeldOut, Floats]:
+    kept, fresh = samples.selected(~held), samples.selected(held)
+    fitted = fit(kept)
+    values = fitted.f_r(fresh.w_i, fresh.w_r)
+    return fitted.held_out, np.abs(values - fresh.values) / np.maximum(values, floor_of(kept))
+
+
+def test_interpolation_is_closer_to_the_truth_than_the_noise() -> None:
+    f_r = presets()["clay-vase"].brdf_at(None)
+    fitted = fit(scattered(f_r, 1000, 0.05))
+    fresh = scattered(f_r, 300, 0.0, seed=9)
+    off = np.abs(fitted.f_r(fresh.w_i, fresh.w_r) / fresh.values - 1.0)
+    assert np.percentile(off, 90) < 0.025  # measured 0.017
+
+
+def test_values_below_zero_count_and_do_not_bias_the_mean() -> None:
+    rng = np.random.default_rng(3)
+    dark = scattered(lambda wi, _: np.full((len(wi), 1), 0.01), 800, 0.0)
+    noisy = dark.values + 0.01 * rng.standard_normal(dark.values.shape)
+    samples = scattered(lambda *_: noisy, 800, 0.0)
+    assert np.mean(samples.values < 0.0) > 0.1
+    values = fit(samples).f_r(dark.w_i, dark.w_r)
+    assert values.mean() == pytest.approx(0.01, rel=0.35)  # clipped at 0 the samples have a mean of 0.0108
+
+
+def test_noise_makes_no_lobe_where_there_are_no_samples() -> None:
+    fitted = fit(scattered(lambda wi, _: np.full((len(wi), 1), 0.3), 300, 0.1))
+    theta = radians(np.linspace(0.0, 75.0, 60))
+    values = fitted.f_r(unit_vector(theta, np.zeros(60)), unit_vector(theta, np.full(60, np.pi)))
+    assert 0.2 < values.min() < values.max() < 0.45
+
+
+def test_too_few_samples_are_refused_with_their_number() -> None:
+    with pytest.raises(ParameterError, match="6 values are too few"):
+        fit(scattered(lambda wi, _: np.full((len(wi), 1), 0.1), 6, 0.0))
+
+
+def test_hull_has_what_lies_between_samples_and_nothing_else() -> None:
+    samples = scans(lambda wi, _: np.ones((len(wi), 1)), np.array([10.0, 30.0, 50.0]), 0.0)
+    hull = Hull(samples.w_i, samples.w_r, turned=False)
+    light = unit_vector(radians(np.array([20.0, 5.0, 60.0, 20.0])), np.full(4, 1.0))
+    viewer = unit_vector(radians(np.array([40.0, 40.0, 40.0, 80.0])), np.full(4, 2.0))
+    assert hull.outside(light, viewer).tolist() == [False, True, True, True]
+
+
+def test_hull_of_one_plane_has_that_plane_alone() -> None:
+    theta = radians(np.array([0.0, 30.0, 60.0, 0.0, 30.0, 60.0]))
+    lights = unit_vector(np.repeat(radians(np.array([10.0, 50.0])), 3), np.zeros(6))
+    hull = Hull(lights, unit_vector(theta, np.full(6, np.pi)), turned=False)
+    light, theta_r = unit_vector(radians(30.0), 0.0)[np.newaxis], radians(20.0)
+    assert not hull.outside(light, unit_vector(theta_r, np.pi)[np.newaxis])[0]
+    assert hull.outside(light, unit_vector(theta_r, 3.0)[np.newaxis])[0]

@@ -1,0 +1,120 @@
+"""Measured data as a source: taken as they are, with what they say of symmetries, and made to keep a law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import unit_vector
+from brdfdb.materials import presets
+from brdfdb.measurements import MeasuredSource
+from brdfdb.measurements.colours import spectra_of_colours
+from brdfdb.parameters import Floats
+from brdfdb.spectra import PICTURE_NM, linear_srgb
+from tests.measurements.made_up import scans, scattered
+
+WI, WR = unit_vector(0.9, 0.2)[np.newaxis], unit_vector(0.4, 2.0)[np.newaxis]
+
+
+def _of(f_r: object, channels: tuple[str, ...] = ("grey",)) -> MeasuredSource:
+    return MeasuredSource.of_function(f_r, channels, None, name="Made up_1", title="Made up", provenance="this test")  # type: ignore[arg-type]
+
+
+def test_function_is_taken_as_it_is_though_it_breaks_reciprocity_and_energy() -> None:
+    source = _of(lambda wi, _: 3.0 * wi[:, 2:])
+    assert source.name == "made-up-1"
+    assert not source.reciprocal
+    assert source.brdf_at(None)(WI, WR) == pytest.approx(3.0 * WI[:, 2:])
+
+
+def test_values_below_zero_become_zero_and_their_share_is_stated() -> None:
+    source = _of(lambda wi, _: wi[:, :1] * 0.0 + np.where(wi[:, 2:] > 0.6, 0.1, -0.1))
+    assert 0.3 < source.measured.negative < 0.7
+    assert source.brdf_at(None)(unit_vector(1.2, 0.0)[np.newaxis], WR) == 0.0
+
+
+def test_value_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(ParameterError, match="values that are not finite"):
+        _of(lambda wi, _: wi[:, 2:] * np.nan)
+
+
+@pytest.mark.parametrize("channels", [("R", "G", "B"), ("X", "Y", "Z")])
+def test_colours_come_back_from_the_spectrum(channels: tuple[str, ...]) -> None:
+    given = np.array([0.3, 0.25, 0.2])
+    source = _of(lambda wi, _: np.broadcast_to(given, (len(wi), 3)), channels)
+    spectrum = source.brdf_at(PICTURE_NM)(WI, WR)[0]
+    rgb = np.asarray(linear_srgb(PICTURE_NM, spectrum))
+    assert np.all(spectrum >= 0.0)
+    if channels == ("R", "G", "B"):
+        assert rgb == pytest.approx(given, abs=1e-6)
+    else:  # of XYZ the luminance is Y
+        assert rgb @ [0.2126, 0.7152, 0.0722] == pytest.approx(0.25, rel=0.01)
+
+
+def test_spectra_of_colours_make_white() -> None:
+    assert spectra_of_colours().sum(axis=0) == pytest.approx(1.0, abs=1e-6)
+    assert spectra_of_colours().min() >= 0.0
+
+
+def test_isotropic_data_that_turn_are_anisotropic() -> None:
+    brushed = _of(lambda wi, wr: 0.1 + 0.3 * ((wi + wr)[:, :1] / np.linalg.norm(wi + wr, axis=1, keepdims=True)) ** 2)
+    assert brushed.anisotropic
+    assert brushed.reciprocal
+
+
+def test_mean_of_mirror_images_is_taken_and_its_asymmetry_stated() -> None:
+    def skewed(wi: Floats, wr: Floats) -> Floats:
+        return np.asarray(0.1 + 0.005 * (wi[:, :1] * wr[:, 1:2] - wi[:, 1:2] * wr[:, :1]))
+
+    source = _of(skewed)
+    assert source.measured.mirror is not None
+    assert source.measured.mirror.asymmetry is not None
+    assert source.measured.mirror.asymmetry.median > 0.005
+    assert not source.anisotropic
+    assert source.brdf_at(None)(WI, WR) == pytest.approx(0.1)
+
+
+def test_reciprocal_samples_are_seen_to_be_reciprocal_and_others_not() -> None:
+    clay = presets()["clay-vase"].brdf_at(None)
+    assert MeasuredSource.of_samples(scattered(clay, 600, 0.03)).reciprocal
+    other = MeasuredSource.of_samples(scattered(lambda wi, wr: clay(wi, wr) * (0.3 + wi[:, 2:] ** 2), 600, 0.03))
+    assert not other.reciprocal
+    assert other.measured.reciprocity.asymmetry is not None
+    assert other.measured.reciprocity.asymmetry.p99 > 0.2
+
+
+def test_record_of_samples_has_noise_instrument_and_incidences() -> None:
+    source = MeasuredSource.of_samples(scans(presets()["clay-vase"].brdf_at(None), np.array([10.0, 30.0, 50.0]), 0.05))
+    measured = source.measured
+    assert (measured.by, measured.incidences, measured.holes) == ("a made-up goniophotometer", 3, 0)
+    assert measured.noise is not None
+    assert measured.noise.median == pytest.approx(0.05, rel=0.1)
+    assert source.extrapolated(unit_vector(1.3, 0.0)[np.newaxis], WR)[0]
+
+
+@pytest.mark.parametrize("of_light", [True, False])
+def test_conserving_source_has_no_albedo_above_1(of_light: bool) -> None:
+    bright = _of(lambda wi, wr: 0.5 / (wi[:, 2:] + 0.3) if of_light else 0.5 / (wi[:, 2:] + wr[:, 2:]))
+    made = bright.made("conserving")
+    x, weight = np.polynomial.legendre.leggauss(200)
+    cosine = 0.5 * (x + 1.0)
+    viewers = np.concatenate([unit_vector(np.arccos(cosine), phi) for phi in (0.3, 1.3)])
+    weights = np.tile(0.5 * np.pi * weight * cosine, 2)
+    for theta in (0.0, 0.5, 1.0, 1.5):
+        light = np.broadcast_to(unit_vector(theta, 0.0), viewers.shape)
+        before, after = (weights @ source.brdf_at(None)(light, viewers)[:, 0] for source in (bright, made))
+        assert after < 1.002
+        assert after == pytest.approx(min(before, 1.0), rel=0.002) or not of_light
+    change = made.measured.changes[-1]
+    assert change.law == "conserving"
+    assert 0.0 < change.changed.p99 <= change.changed.max < 1.0
+
+
+def test_reciprocal_source_is_the_mean_of_both_ways() -> None:
+    made = _of(lambda wi, _: wi[:, 2:]).made("reciprocal")
+    assert made.reciprocal
+    assert made.brdf_at(None)(WI, WR) == pytest.approx(0.5 * (WI + WR)[:, 2:])
+    assert made.measured.changes[0].changed.median > 0.1
+    with pytest.raises(ParameterError, match="neither reciprocal nor conserving"):
+        made.made("pretty")

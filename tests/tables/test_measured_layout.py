@@ -1,0 +1,107 @@
+"""Tables of measured data: as little reciprocal as the data, with a record and their uncertainty."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import unit_vector
+from brdfdb.materials import FunctionSource, presets
+from brdfdb.measurements import MeasuredSource
+from brdfdb.parameters import Floats
+from brdfdb.store.publication import publish
+from brdfdb.tables.grids import Grid
+from brdfdb.tables.layout import Interpolation, Layout
+from brdfdb.tables.measured_layout import layout_of
+from brdfdb.tables.table import Table
+from brdfdb.tables.tabulation import block, metadata_of
+from tests.measurements.made_up import scattered
+
+RNG = np.random.default_rng(8)
+WI, WR = (unit_vector(RNG.uniform(0.0, 1.2, 500), RNG.uniform(0.0, 6.0, 500)) for _ in range(2))
+
+
+def _lopsided(wi: Floats, wr: Floats) -> Floats:
+    """Return f_r with a lobe that depends on light and viewer in different ways."""
+    half = (wi + wr) / np.linalg.norm(wi + wr, axis=1, keepdims=True)
+    return np.asarray(((0.1 + 2.0 * np.exp((half[:, 2] ** 2 - 1.0) * 30.0)) * (1.0 + wi[:, 2]))[:, np.newaxis])
+
+
+def _brushed(wi: Floats, wr: Floats) -> Floats:
+    half = (wi + wr) / np.linalg.norm(wi + wr, axis=1, keepdims=True)
+    return np.asarray(_lopsided(wi, wr) * (1.0 + 0.5 * half[:, :1] ** 2))
+
+
+@pytest.mark.parametrize("anisotropic", [False, True])
+def test_half_difference_grid_holds_both_ways_of_a_pair(anisotropic: bool) -> None:
+    f_r = _brushed if anisotropic else _lopsided
+    source = FunctionSource(
+        brdf=lambda wi, wr, _: f_r(wi, wr), name="lopsided", title="Lopsided", provenance="this test",
+        anisotropic=anisotropic, elliptical=anisotropic, reciprocal=False, alpha=0.2,
+    )  # fmt: skip
+    axes = {"theta_h": np.linspace(0.0, 90.0, 31)}
+    axes |= {"phi_h": np.linspace(0.0, 90.0, 7)} if anisotropic else {}
+    axes |= {"theta_d": np.linspace(0.0, 90.0, 19), "phi_d": np.linspace(0.0, 360.0 if anisotropic else 180.0, 19)}
+    layout = Layout(source, Grid(axes), interpolation=Interpolation("cubic", True, 1e-4))
+    table = Table.of(layout, np.concatenate([block(layout, rows) for rows in layout.blocks]))
+    for wi, wr in ((WI, WR), (WR, WI)):
+        off = np.abs(table.lookup_vectors(wi, wr) / f_r(wi, wr)[:, 0] - 1.0)
+        assert np.percentile(off, 95) < 0.02  # measured 0.005; the exchanged pair differs by 0.2
+    assert not any("theta_r, theta_i" in symmetry for symmetry in metadata_of(layout).symmetries)
+
+
+def test_half_of_phi_d_is_refused_for_a_source_that_is_not_reciprocal() -> None:
+    source = MeasuredSource.of_function(_lopsided, ("grey",), None, name="x", title="x", provenance="x")
+    grid = Grid({"theta_h": [0.0, 90.0], "theta_d": [0.0, 90.0], "phi_d": [0.0, 90.0]})
+    with pytest.raises(ParameterError, match="not reciprocal; phi_d must end at 180"):
+        Layout(source, grid)
+
+
+def test_same_nodes_of_light_and_viewer_do_not_make_data_reciprocal() -> None:
+    source = MeasuredSource.of_function(lambda wi, _: wi[:, 2:], ("grey",), None, name="x", title="x", provenance="x")
+    theta = np.linspace(0.0, 90.0, 10)
+    layout = Layout(source, Grid({"theta_i": theta, "theta_r": theta, "delta_phi": [0.0, 90.0, 180.0]}))
+    values = block(layout, slice(0, 10))
+    assert values[3, 7] == pytest.approx(np.cos(np.deg2rad(30.0)))
+    assert values[7, 3] == pytest.approx(np.cos(np.deg2rad(70.0)))
+
+
+def test_finest_grid_is_taken_and_says_so_where_steps_keep_no_tolerance() -> None:
+    def steps(wi: Floats, wr: Floats) -> Floats:
+        return np.asarray(1.0 + (np.floor(17.0 * (wi[:, 2:] + wr[:, 2:])) % 2.0))
+
+    source = MeasuredSource.of_function(steps, ("grey",), None, name="x", title="x", provenance="x")
+    assert "does not keep to a tolerance of 0.001" in layout_of(source, None, 0.001).reason
+
+
+def test_published_table_has_the_record_and_its_errors_the_uncertainty(tmp_path: Path) -> None:
+    source = MeasuredSource.of_samples(scattered(presets()["clay-vase"].brdf_at(None), 300, 0.05), name="clay")
+    publish(tmp_path, source, tolerance=0.05)
+    table = brdfdb.open(tmp_path)["clay"]
+    measured = table.metadata.measured
+    assert measured is not None
+    assert measured.held_out is not None
+    assert measured.by == "a made-up goniophotometer"
+    assert 0.05 < (measured.extrapolated or 0.0) < 0.9
+    assert not table.metadata.missing
+    both = table.lookup_vectors_with_error(WI, WR)
+    assert np.all(both.error >= measured.held_out.p99 * both.brdf)
+    fresh = scattered(presets()["clay-vase"].brdf_at(None), 400, 0.05, seed=11)
+    looked_up = table.lookup_vectors_with_error(fresh.w_i, fresh.w_r)
+    assert np.mean(np.abs(looked_up.brdf - fresh.values[:, 0]) <= looked_up.error) > 0.97
+
+
+def test_colours_take_three_parts(tmp_path: Path) -> None:
+    def red(wi: Floats, wr: Floats) -> Floats:
+        return np.asarray([0.3, 0.1, 0.05] + [0.1, 0.2, 0.3] * wi[:, 2:] * wr[:, 2:] + [0.0, 0.0, 0.1] * wr[:, 2:] ** 2)
+
+    source = MeasuredSource.of_function(red, ("R", "G", "B"), None, name="red", title="Red", provenance="x")
+    publish(tmp_path, source, tolerance=0.02)
+    table = brdfdb.open(tmp_path)["red"]
+    assert table.values.shape[-1] == 3
+    spectrum = table.lookup_vectors(WI[:5], WR[:5])
+    assert brdfdb.spectra.linear_srgb(table.wavelength_nm, spectrum) == pytest.approx(red(WI[:5], WR[:5]), rel=0.02)
