@@ -10,7 +10,7 @@ from brdfdb.parameters import Floats
 
 _LIGHTS_DEG = np.append(np.arange(0.0, 85.0, 5.0), np.arange(85.0, 90.0, 1.0))
 _AZIMUTHS, _RINGS = 48, 64  # of the viewers over which an albedo is summed
-_ROUNDS = 12  # of the factors of a reciprocal f_r, each of which counts for light and viewer
+_ROUNDS = 40  # of the factors of a reciprocal f_r, each of which counts for light and viewer
 
 
 def reciprocal(f_r: Evaluate) -> Evaluate:
@@ -22,7 +22,8 @@ def conserving(f_r: Evaluate, *, reciprocal: bool, turned: bool, margin: float) 
     """Return f_r scaled so that no light has an albedo above 1 - margin: one factor for each polar angle and channel.
 
     The factor is the largest up to 1, so that the relative change of a light is as small as it can be. Of a reciprocal
-    f_r it is a product of a factor for the light and one for the viewer.
+    f_r it is a product of a factor for the light and one for the viewer, each of which is 1 or makes the albedo of its
+    light 1 - margin.
     """
     theta = radians(_LIGHTS_DEG)
     viewers, weight = _hemisphere()
@@ -30,13 +31,19 @@ def conserving(f_r: Evaluate, *, reciprocal: bool, turned: bool, margin: float) 
     values = [f_r(np.broadcast_to(light, viewers.shape), viewers) for light in lights]
     theta_r = np.arccos(viewers[:, 2])
     limit = 1.0 - margin
-    factors = np.ones((theta.size, values[0].shape[1]))
-    for _ in range(_ROUNDS if reciprocal else 1):
-        of_viewer = _at(factors, theta, theta_r) if reciprocal else 1.0
-        albedo = (
-            np.stack([weight @ (f * of_viewer) for f in values]).reshape(theta.size, -1, factors.shape[1]).max(axis=1)
-        )
-        factors = np.minimum(factors, limit / np.maximum(albedo, limit))
+    channels = values[0].shape[1]
+
+    def reflected(of_viewer: Floats | float) -> Floats:
+        albedo = np.stack([weight @ (f * of_viewer) for f in values])
+        return np.asarray(albedo.reshape(theta.size, -1, channels).max(axis=1))
+
+    factors = np.minimum(1.0, limit / np.maximum(reflected(1.0), limit))
+    if reciprocal:
+        for _ in range(_ROUNDS):  # the mean of the old and the new factor, in the logarithm: they would swing otherwise
+            albedo = np.maximum(reflected(_at(factors, theta, theta_r)), 1e-12)
+            factors = np.minimum(1.0, np.sqrt(factors * limit / albedo))
+        albedo = factors * reflected(_at(factors, theta, theta_r))
+        factors *= np.sqrt(np.minimum(1.0, limit / np.maximum(albedo.max(axis=0), 1e-12)))
 
     def scaled(wi: Floats, wr: Floats) -> Floats:
         light = _at(factors, theta, np.arccos(np.clip(wi[:, 2], -1.0, 1.0)))

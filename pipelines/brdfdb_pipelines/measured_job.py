@@ -16,6 +16,7 @@ from brdfdb.errors import BrdfdbError, ParameterError, sentence_of
 from brdfdb.formats import neural
 from brdfdb.materials.provenance import Text
 from brdfdb.measurements import MeasuredSource, Samples
+from brdfdb.measurements.measured_source import MARGIN
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.manifest import read_manifest
 from brdfdb.store.paths import material_path, revision_path
@@ -159,7 +160,7 @@ def _conserving(source: MeasuredSource, tolerance: float) -> Any:
     from brdfdb.tables.tabulation import block
 
     at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
-    margin = 0.0
+    margin = MARGIN
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
         layout = layout_of(made, at, tolerance)

@@ -53,7 +53,10 @@ def test_laws_are_kept_by_tables_that_are_made_to_keep_them(tmp_path: Path) -> N
     audited = _audited(tmp_path, source.made("reciprocal").made("conserving"))
     assert audited.verdict == "passes"
     assert _reciprocity(audited).table_random.max < 1e-6
-    assert (_energy(audited).table.max_albedo or 2.0) < 1.01
+    # each light reflects too much before, and nearly all of it afterwards
+    albedo = np.array(_energy(audited).table.albedo, dtype=np.float64)
+    assert albedo.min() > 0.985  # measured 0.993
+    assert albedo.max() <= 1.0
     metadata = brdfdb.open(tmp_path).metadata("bright")
     assert metadata.measured is not None
     assert [change.law for change in metadata.measured.changes] == ["reciprocal", "conserving"]

@@ -10,6 +10,7 @@ from brdfdb.geometry import unit_vector
 from brdfdb.materials import presets
 from brdfdb.measurements import MeasuredSource
 from brdfdb.measurements.colours import spectra_of_colours
+from brdfdb.measurements.measured_source import MARGIN
 from brdfdb.parameters import Floats
 from brdfdb.spectra import PICTURE_NM, linear_srgb
 from tests.measurements.made_up import scans, scattered
@@ -101,11 +102,15 @@ def test_conserving_source_has_no_albedo_above_1(of_light: bool) -> None:
     cosine = 0.5 * (x + 1.0)
     viewers = np.concatenate([unit_vector(np.arccos(cosine), phi) for phi in (0.3, 1.3)])
     weights = np.tile(0.5 * np.pi * weight * cosine, 2)
+    albedos = []
     for theta in (0.0, 0.5, 1.0, 1.5):
         light = np.broadcast_to(unit_vector(theta, 0.0), viewers.shape)
         before, after = (weights @ source.brdf_at(None)(light, viewers)[:, 0] for source in (bright, made))
-        assert after < 1.002
-        assert after == pytest.approx(min(before, 1.0), rel=0.002) or not of_light
+        assert after <= 1.0
+        if of_light:
+            assert after == pytest.approx(min(before, 1.0 - MARGIN), rel=0.002)
+        albedos.append(after)
+    assert max(albedos) > 0.99  # no darker than the law asks for
     change = made.measured.changes[-1]
     assert change.law == "conserving"
     assert 0.0 < change.changed.p99 <= change.changed.max < 1.0
