@@ -35,8 +35,8 @@ class Asymmetry(BaseModel):
     pairs: int
     min: float
     mean: float
-    median: float
-    p99: float
+    median: float | None = None  # reports written earlier do not have both
+    p99: float | None = None
     max: float
     tolerance: float | None = Field(
         description="largest allowed max, or p99 of measured data; null: not judged, because f and f' are interpolated "
@@ -47,7 +47,10 @@ class Asymmetry(BaseModel):
     @property
     def kept(self) -> bool:
         """Return True if the asymmetry is allowed, or not judged."""
-        return self.tolerance is None or (self.p99 if self.measured else self.max) <= self.tolerance
+        return (
+            self.tolerance is None
+            or (self.p99 if self.measured and self.p99 is not None else self.max) <= self.tolerance
+        )
 
 
 class Reciprocity(Finding):
@@ -104,8 +107,8 @@ class Reciprocity(Finding):
 
     def _of_measured(self) -> str:
         """Return the asymmetry of measured data in words."""
-        worst = max((asymmetry for _, asymmetry in self.named() if asymmetry.measured), key=lambda one: one.p99)
-        text = f"asymmetry of the data: median {number(worst.median, 2)}, 99 of 100 up to {number(worst.p99, 2)}"
+        worst = max((asymmetry for _, asymmetry in self.named() if asymmetry.measured), key=lambda one: one.p99 or 0.0)
+        text = f"asymmetry of the data: median {_shown(worst.median)}, 99 of 100 up to {_shown(worst.p99)}"
         if worst.tolerance is None:
             return f"{text}; not judged, because their uncertainty is not known"
         return f"{text}, of {number(worst.tolerance, 2)} that their uncertainty explains"
@@ -121,7 +124,7 @@ class Reciprocity(Finding):
             (
                 name,
                 str(asymmetry.pairs),
-                *(number(value, 2) for value in (asymmetry.mean, asymmetry.median, asymmetry.p99)),
+                *(_shown(value) for value in (asymmetry.mean, asymmetry.median, asymmetry.p99)),
                 *(number(value, 2) for value in (asymmetry.max, asymmetry.tolerance)),
             )
             for name, asymmetry in self.named()
@@ -212,3 +215,8 @@ def _asymmetry(f: Floats, exchanged: Floats, tolerance: float | None) -> Asymmet
     whole[: relative.size] = relative
     median, p99 = (float(value) for value in np.percentile(whole, [50.0, 99.0]))
     return Asymmetry(pairs=len(f), min=smallest, mean=mean, median=median, p99=p99, max=largest, tolerance=tolerance)
+
+
+def _shown(value: float | None) -> str:
+    """Return a number with two digits, or a hyphen if there is none."""
+    return "-" if value is None else number(value, 2)

@@ -18,13 +18,13 @@ from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import degrees_of
 from brdfdb.formats._nodes import samples_at_angles
-from brdfdb.formats._readings import FileTable
 from brdfdb.formats._record import CONVENTION, record, specular_remark
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from brdfdb.formats._dense_grid import DenseTable
+    from brdfdb.formats._readings import FileTable
     from brdfdb.measurements.samples import Samples
     from brdfdb.tables.table import Table
 
@@ -209,6 +209,8 @@ def file_table(
     if np.any(np.isnan(values)):
         return nodes()
     table = interpolated(grid, stored, at)
+    from brdfdb.formats._readings import FileTable
+
     return FileTable(
         name=name,
         channels=channels,

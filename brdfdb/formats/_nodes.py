@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._angles import System
-from brdfdb.geometry import check_phi, check_theta, spherical_angles
-from brdfdb.measurements.samples import ANGLES, Instrument, Samples
 from brdfdb.parameters import Floats
+
+if TYPE_CHECKING:
+    from brdfdb.measurements.samples import Instrument, Samples
 
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
 _SAME = 1e-6  # difference of coordinates within which directions are the same: angles of files may have 32 bits
@@ -61,6 +62,9 @@ def samples_at_angles(
     ParameterError
         If an angle is outside its range, or nan.
     """
+    from brdfdb.geometry import check_phi, check_theta
+    from brdfdb.measurements.samples import ANGLES, Instrument, Samples
+
     for axis, column in zip(ANGLES, angles.T, strict=True):
         (check_theta if axis.startswith("theta") else check_phi)(axis, column)
         if np.any(np.isnan(column)):
@@ -110,6 +114,8 @@ def samples_of_grid(
 
 def _angles(w: Floats) -> tuple[Floats, Floats]:
     """Return polar angles and azimuths [rad] of unit vectors (N, 3); azimuths of the normal are 0."""
+    from brdfdb.geometry import spherical_angles
+
     theta, phi = spherical_angles(w)
     return theta, np.where(np.sin(theta) < _SAME, 0.0, phi)
 

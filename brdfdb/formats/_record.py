@@ -8,10 +8,9 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from brdfdb.measurements.samples import Instrument
-
 if TYPE_CHECKING:
     from brdfdb.formats._stated_error import FileError
+    from brdfdb.measurements.samples import Instrument
     from brdfdb.tables.table import Table
 
 NOT_STATED = "not stated"
@@ -121,4 +120,6 @@ def of_comments(document: Mapping[str, Any]) -> tuple[Instrument, float | None]:
     lengths, spots = set(_NM.findall(text)), set(_SPOT.findall(text))
     name = next((str(document[key]) for key in _INSTRUMENTS if key in document), "")
     spot = float(spots.pop()) if len(spots) == 1 else None
+    from brdfdb.measurements.samples import Instrument
+
     return Instrument(name, spot_mm=spot or None), float(lengths.pop()) if len(lengths) == 1 else None

@@ -18,7 +18,6 @@ import numpy as np
 
 from brdfdb.errors import FileFormatError, ParameterError, WriteError
 from brdfdb.formats._written import whole
-from brdfdb.geometry import degrees, radians
 
 if TYPE_CHECKING:
     from brdfdb.measurements.gonioreflectometer import Picture
@@ -48,6 +47,8 @@ def write_picture(picture: Picture, path: str | os.PathLike[str]) -> None:
         If the file cannot be written.
     """
     import OpenEXR
+
+    from brdfdb.geometry import degrees
 
     document = {
         "name": picture.name,
@@ -86,6 +87,7 @@ def read_picture(path: str | os.PathLike[str]) -> Picture:
     """
     import OpenEXR
 
+    from brdfdb.geometry import radians
     from brdfdb.measurements.gonioreflectometer import Gonioreflectometer, Picture
 
     path = Path(path)

@@ -27,7 +27,6 @@ from brdfdb.formats._interface import TOLERANCE, Option
 from brdfdb.formats._json_tables import MOST_BYTES, degrees_of, parsed, title_of
 from brdfdb.formats._record import specular_remark
 from brdfdb.formats._written import Written, whole
-from brdfdb.measurements.samples import Instrument
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
@@ -135,6 +134,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     FileFormatError
         If the file is no JSON, or its rows are not five numbers each, or its wavelengths have different directions.
     """
+    from brdfdb.measurements.samples import Instrument
+
     path = Path(path)
     document = parsed(path)
     brdf, metadata = document.get("brdf"), document.get("metadata")
