@@ -261,6 +261,8 @@ def reading_of_rows(
     if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, of_axes):
         ordered = values.reshape(*shape, -1)
         table = file_table(path, of_axes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
+        from brdfdb.formats._readings import FileTable
+
         return replace(table, nodes=nodes) if isinstance(table, FileTable) and nodes is not None else table
     if nodes is None:
         raise FileFormatError(f"{path}: rows over {', '.join(angles)} are not those of a grid")
