@@ -182,6 +182,7 @@ def file_table(
         If the axes, the wavelengths or the shape are not those of a table, or a value is infinite.
     """
     from brdfdb.formats._dense_grid import interpolated
+    from brdfdb.formats._readings import FileTable
     from brdfdb.tables.grids import Grid, check_wavelengths
 
     try:
@@ -209,8 +210,6 @@ def file_table(
     if np.any(np.isnan(values)):
         return nodes()
     table = interpolated(grid, stored, at)
-    from brdfdb.formats._readings import FileTable
-
     return FileTable(
         name=name,
         channels=channels,
@@ -251,6 +250,8 @@ def reading_of_rows(
     FileFormatError
         If the rows are over half and difference vectors and no grid, or there are more values than wavelengths.
     """
+    from brdfdb.formats._readings import FileTable
+
     if values.shape[1] != (1 if wavelength_nm is None else wavelength_nm.size):
         raise FileFormatError(f"{path}: {values.shape[1]} columns of values are neither one nor wavelengths")
     of_axes = {name: np.unique(column) for name, column in angles.items()}
@@ -261,8 +262,6 @@ def reading_of_rows(
     if np.prod(shape, dtype=object) == len(values) and _is_grid(angles, of_axes):
         ordered = values.reshape(*shape, -1)
         table = file_table(path, of_axes, ordered[..., 0] if wavelength_nm is None else ordered, wavelength_nm, known)
-        from brdfdb.formats._readings import FileTable
-
         return replace(table, nodes=nodes) if isinstance(table, FileTable) and nodes is not None else table
     if nodes is None:
         raise FileFormatError(f"{path}: rows over {', '.join(angles)} are not those of a grid")

@@ -121,13 +121,12 @@ def read(path: str | os.PathLike[str]) -> Samples:
     Raises
     ------
     FileFormatError
-        If the file is no such picture, is damaged, or no pixel of it can be used.
+        If the file is no such picture, or is damaged.
+    ParameterError
+        If no pixel of it can be used.
     OSError
         If it cannot be read.
     """
     from brdfdb.measurements.gonioreflectometer import reduced
 
-    try:
-        return reduced(read_picture(path))
-    except ParameterError as error:
-        raise FileFormatError(f"{path}: {error}") from None
+    return reduced(read_picture(path))

@@ -170,7 +170,7 @@ class Gonioreflectometer:
 
     @property
     def instrument(self) -> Instrument:
-        """What samples say of the instrument: solid angles are those of disks that blur as much."""
+        """The instrument as samples record it: solid angles are those of disks that blur as much."""
         variance = (self.blur_px**2 + 1.0 / 12.0) * self.pitch**2  # along an axis; a disk of radius a has a^2 / 4
         light = radians(self.light_half_angle_deg)
         return Instrument(

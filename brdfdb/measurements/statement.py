@@ -33,7 +33,7 @@ _SHOWN = 6  # incidences in sentences
 
 @dataclass(frozen=True)
 class Incidence:
-    """What the samples of one direction of the light integrate to.
+    """Albedo of one direction of the light: the integral of its samples.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Statement:
-    """What samples cover and hold.
+    """Statement on samples: the angles that they cover, the values that they hold, and what contradicts.
 
     Attributes
     ----------

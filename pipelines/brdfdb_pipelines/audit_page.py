@@ -7,15 +7,13 @@ from collections.abc import Mapping
 from itertools import groupby
 from typing import NamedTuple
 
-import jinja2
-
 from brdfdb.audit import FINDINGS, AuditReport, MaterialAudit
 from brdfdb.audit.answers import AS_PUBLISHED, CONSERVES_ENERGY, NO_PAPER, Answer
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import LAST, LEVELS, RANKS, Cell, Finding, NotJudged, NumberTable, Word
 from brdfdb.audit.validity import Validity
 from brdfdb.figure import Figure
-from brdfdb_pipelines import figure_svg
+from brdfdb_pipelines import figure_svg, html_page
 
 PAPERS = {
     "ward1992": "Ward 1992: Measuring and modeling anisotropic reflection",
@@ -91,13 +89,7 @@ def render(report: AuditReport, plots: Mapping[str, list[Plot]] | None = None) -
     str
         An HTML document.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("brdfdb_pipelines", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = html_page.environment()
     environment.filters |= {"level": LEVELS.__getitem__, "mark": _MARKS.__getitem__, "sentence": _sentence}
     environment.globals |= {"anchor": anchor, "key_of": key_of, "rank": RANKS.__getitem__}
     energy = {a.material: a.findings[Energy.key].verdict for a in report.materials}
