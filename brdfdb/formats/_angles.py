@@ -27,11 +27,16 @@ class System(Protocol):
 
     Attributes
     ----------
+    anisotropic : bool
+        True if there are four angles.
     axes : tuple of str
         Names of the angles.
     ends : tuple of float [rad]
         Largest value of each.
     """
+
+    @property
+    def anisotropic(self) -> bool: ...
 
     @property
     def axes(self) -> tuple[str, ...]: ...

@@ -22,8 +22,7 @@ _MIXED = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], 
 
 def samples_at_vectors(wi: Floats, wr: Floats, values: Floats, *arguments: Any, **keywords: Any) -> Samples:
     """Return samples at unit vectors (N, 3); all other arguments are those of `samples_at_angles`."""
-    angles = [angle for w in (wi, wr) for angle in _angles(w)]
-    return samples_at_angles(np.stack(angles, axis=1), values, *arguments, **keywords)
+    return samples_at_angles(_angles_of(wi, wr), values, *arguments, **keywords)
 
 
 def samples_at_angles(
@@ -99,7 +98,7 @@ def samples_of_grid(
     Parameters
     ----------
     system : System
-        The angles; of an isotropic one four angles may be given, too.
+        The angles; of an isotropic one four angles may be given, too. Its lights have an azimuth of 0.
     nodes : sequence of array (n,) [rad]
         Nodes of each angle.
     values : array (n, ..., C) [1/sr]
@@ -109,7 +108,15 @@ def samples_of_grid(
     """
     angles = np.stack([grid.reshape(-1) for grid in np.meshgrid(*nodes, indexing="ij")], axis=1)
     flat = np.asarray(values, dtype=np.float64).reshape(len(angles), -1)
-    return samples_at_vectors(*system.vectors(angles), flat, *arguments, **keywords)
+    turned = _angles_of(*system.vectors(angles))
+    if not system.anisotropic:
+        turned[:, 3], turned[:, 1] = turned[:, 3] - turned[:, 1], 0.0
+    return samples_at_angles(turned, flat, *arguments, **keywords)
+
+
+def _angles_of(wi: Floats, wr: Floats) -> Floats:
+    """Return theta_i, phi_i, theta_r, phi_r [rad] of unit vectors (N, 3), shape (N, 4)."""
+    return np.stack([*_angles(wi), *_angles(wr)], axis=1)
 
 
 def _angles(w: Floats) -> tuple[Floats, Floats]:

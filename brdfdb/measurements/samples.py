@@ -151,9 +151,10 @@ class Samples:
     def incidence(self) -> NDArray[np.int64]:
         """Number of the incidence of each sample, shape (N,): the same number, the same direction of the light."""
         theta, phi = degrees(self.theta_i), degrees(self.phi_i) % 360.0
-        rows = np.stack([np.round(theta / _SAME_LIGHT_DEG), np.round(phi / _SAME_LIGHT_DEG)], axis=1)
-        rows[rows[:, 0] == 0.0, 1] = 0.0  # at the normal every azimuth is the same direction
-        return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+        rings, turns = np.round(theta / _SAME_LIGHT_DEG), np.round(phi / _SAME_LIGHT_DEG)
+        turns[rings == 0.0] = 0.0  # at the normal every azimuth is the same direction
+        code = rings * (1.0 + np.round(360.0 / _SAME_LIGHT_DEG)) + turns
+        return np.unique(code, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
     @cached_property
     def turned(self) -> bool:

@@ -192,16 +192,20 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     delta = degrees(samples.phi_r - samples.phi_i) % 360.0
     known = samples.known
     one_side = not samples.turned and bool(np.all((delta < 180.01) | (delta > 359.99) | (theta_r == 0.0)))
-    in_bands, groups = _groups(samples, theta_i)
     zeros = samples.values == 0.0
     zeros = zeros if 0 < zeros.sum() < 0.5 * zeros.size else np.zeros_like(zeros)
     full = replace(samples, values=np.where(zeros, np.nan, samples.values)) if zeros.any() else samples
-    incidences = []
-    for number, rows in enumerate(groups):
-        incidences.append(_incidence(full, rows, delta, one_side, in_bands))
-        if progress is not None:
-            progress((number + 1) / len(groups))
-    integrated = tuple(some for some in incidences if some is not None)
+    integrated: tuple[Incidence, ...] = ()
+    in_bands = False
+    for in_bands, groups in ((False, _lights(samples, theta_i)), (True, _bands(theta_i))):
+        incidences = []
+        for number, rows in enumerate(groups):
+            incidences.append(_incidence(full, rows, delta, one_side, in_bands))
+            if progress is not None:
+                progress((number + 1) / len(groups))
+        integrated = tuple(some for some in incidences if some is not None)
+        if integrated:
+            break
     peak = np.unravel_index(int(np.argmax(np.where(known, samples.values, -np.inf))), samples.values.shape)[0]
     return Statement(
         name=samples.name,
@@ -217,7 +221,7 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         zeros=int(np.sum(zeros)),
         largest=float(np.nanmax(samples.values)) if known.any() else np.nan,
         largest_at_deg=(float(theta_i[peak]), float(theta_r[peak]), float(delta[peak])),
-        in_bands=in_bands,
+        in_bands=in_bands and bool(integrated),
         incidences=integrated,
         reciprocity=reciprocity_of(full, one_side),
         claims=_claims(samples, integrated),
@@ -226,20 +230,25 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     )
 
 
-def _groups(samples: Samples, theta_i: Floats) -> tuple[bool, list[NDArray[np.intp]]]:
-    """Return the rows of the directions of the light that are integrated, and whether they are bands of theta_i."""
+def _lights(samples: Samples, theta_i: Floats) -> list[NDArray[np.intp]]:
+    """Return the rows of each direction of the light that has viewers enough, by theta_i."""
     number = samples.incidence
     counts = np.bincount(number)
     enough = np.flatnonzero(counts >= _FEWEST_VIEWERS)
-    if enough.size:
-        some = enough[np.unique(np.linspace(0, enough.size - 1, _MOST_INCIDENCES).astype(int))]
-        order = np.argsort(number, kind="stable")
-        ends = np.cumsum(counts)
-        groups = [order[ends[k] - counts[k] : ends[k]] for k in some]
-        return False, sorted(groups, key=lambda rows: float(theta_i[rows[0]]))
+    if not enough.size:
+        return []
+    some = enough[np.unique(np.linspace(0, enough.size - 1, _MOST_INCIDENCES).astype(int))]
+    order = np.argsort(number, kind="stable")
+    ends = np.cumsum(counts)
+    groups = [order[ends[k] - counts[k] : ends[k]] for k in some]
+    return sorted(groups, key=lambda rows: float(theta_i[rows[0]]))
+
+
+def _bands(theta_i: Floats) -> list[NDArray[np.intp]]:
+    """Return the rows of bands of theta_i, for directions of the light that are scattered."""
     bands = [np.flatnonzero(np.abs(theta_i - middle) <= _BAND_DEG) for middle in _BANDS_DEG]
     thinned = [rows[:: max(1, -(-rows.size // _MOST_IN_BAND))] for rows in bands]
-    return True, [rows for rows in thinned if rows.size >= _FEWEST_VIEWERS]
+    return [rows for rows in thinned if rows.size >= _FEWEST_VIEWERS]
 
 
 def _incidence(
