@@ -11,9 +11,9 @@ NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
 # What the two errors of a list are, for the line below it
 ERRORS_EXPLAINED = (
-    "table error: the table against its formula, or the data if it is measured; formula error: the formula against "
+    "table error: the table against its formula; formula error: the formula against "
     "the highest rung, which is the form of the same model without an approximation; 0, exact form: the formula is "
-    "that form"
+    "that form; of measured tables, the table against the data"
 )
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
