@@ -156,8 +156,8 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
     allowed = _interpolant_tolerance(table.grid)
     measured = table.metadata.measured
     if measured is not None and not (table.grid.reciprocal and measured.reciprocity.assumed):
-        of_table = 0.0 if table.error is None else table.error.overall.p99
-        allowed = None if measured.uncertainty is None else measured.uncertainty + of_table
+        stated = 0.0 if table.error is None else table.error.overall.p99
+        allowed = None if measured.uncertainty is None else measured.uncertainty + stated
     looked_up = (pairs.table + offset, pairs.table_exchanged + offset, allowed)
     model = (pairs.model, pairs.model_exchanged, MODEL_RECIPROCITY_TOLERANCE)
     asymmetries = Reciprocity(

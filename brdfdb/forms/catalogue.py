@@ -179,8 +179,10 @@ def _tables(
     for tolerance in dict.fromkeys(tolerances):
         percent = f"{100.0 * tolerance:g}"
         key = f"table-{percent.replace('.', '-')}"
-        measured = isinstance(planned, MeasuredSource)
-        layout = replace((layout_of if measured else plan)(planned, wavelength_nm, tolerance), source=held)
+        if isinstance(planned, MeasuredSource):
+            layout = layout_of(planned, wavelength_nm, tolerance)
+        else:
+            layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
         yield _table(layout, key, f"{table}, planned for {percent} %")
         if layout.spectra is not None and tolerance == _UNFACTORED:
             whole = replace(layout, spectra=None, part_nm=None)

@@ -236,7 +236,7 @@ def extrapolated(source: MeasuredSource, grid: Grid) -> NDArray[np.bool_]:
     """Return which nodes of a grid lie outside of the directions that were measured, or below the horizon."""
     theta_i, phi_i, theta_r, phi_r = (angle.ravel() for angle in np.broadcast_arrays(*grid.directions()))
     outside = source.extrapolated(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
-    return (outside | (np.maximum(theta_i, theta_r) > HALF_PI)).reshape(grid.shape)
+    return np.asarray(outside | (np.maximum(theta_i, theta_r) > HALF_PI)).reshape(grid.shape)
 
 
 def specular_nodes(layout: Layout) -> Axis:
