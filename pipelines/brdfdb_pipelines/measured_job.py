@@ -6,13 +6,14 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 
 from brdfdb import formats
-from brdfdb.errors import BrdfdbError, FileFormatError, ParameterError, sentence_of
+from brdfdb.errors import BrdfdbError, FileFormatError, ParameterError, StoreError, sentence_of
 from brdfdb.formats._input import check_file
 from brdfdb.materials.provenance import Text
 from brdfdb.measurements import MeasuredSource, Samples, joined
@@ -23,8 +24,10 @@ from brdfdb.store.paths import material_path, revision_path
 from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_layout
 from brdfdb.store.revisions import standing
-from brdfdb.tables.layout import TABLE_VERSION
-from brdfdb.tables.measured_layout import layout_of
+from brdfdb.tables.albedo import largest_albedo
+from brdfdb.tables.layout import TABLE_VERSION, Layout
+from brdfdb.tables.measured_layout import tabulated
+from brdfdb.tables.table import Table
 from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 
 if TYPE_CHECKING:
@@ -172,14 +175,19 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def build_measured(root: str, job: MeasuredJob) -> tuple[str, str, int, str]:
-    """Build the table of a job unless the store has it: a task for a worker.
+class Tabulated(NamedTuple):
+    """The result of one job, as `brdfdb_pipelines.build.Built` has it."""
 
-    Returns
-    -------
-    state, revision, bytes, why
-        As `brdfdb_pipelines.build.Built` has them.
-    """
+    state: str
+    revision: str
+    bytes: int
+    why: str
+    shape: tuple[int, ...] = ()
+    wavelengths: int = 0
+
+
+def build_measured(root: str, job: MeasuredJob) -> Tabulated:
+    """Build the table of a job unless the store has it: a task for a worker."""
     store, request = Path(root), job.request
     status = standing(store, job.name, request)
     if status.state == "adoptable":
@@ -187,40 +195,38 @@ def build_measured(root: str, job: MeasuredJob) -> tuple[str, str, int, str]:
             point_to(material_path(store, job.name), status.revision)
     if status.state != "missing":
         stored = read_manifest(revision_path(store, job.name, status.revision), None)[0]["summary"]["bytes"]
-        return {"current": "unchanged"}.get(status.state, "adopted"), status.revision, stored, status.why
+        state = "unchanged" if status.state == "current" else "adopted"
+        return Tabulated(state, status.revision, stored, status.why)
     try:
-        published = _published(store, job, request)
+        layout, values = _tabulated(job)
+        published = publish_layout(store, job.name, layout, request, values=values)
+    except StoreError:
+        raise
     except BrdfdbError as error:
         raise ParameterError(job.name, f"{job.files}: {error}") from None
-    return "published", published[0], published[1], status.why
+    wavelengths = 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
+    return Tabulated("published", published.revision, published.bytes, status.why, tuple(layout.shape), wavelengths)
 
 
-def _published(store: Path, job: MeasuredJob, request: Mapping[str, Any]) -> tuple[str, int]:
+def _tabulated(job: MeasuredJob) -> tuple[Layout, NDArray[np.float32]]:
+    """Return the layout of a table, and its values, made to keep the laws that are asked for."""
     source = job.source()
+    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
     if job.table.reciprocal:
         source = source.made("reciprocal")
-    layout = None
-    if job.table.conserving:
-        source, layout = _conserving(source, job.tolerance)
-    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
-    published = publish_layout(store, job.name, layout or layout_of(source, at, job.tolerance), request)
-    return published.revision, published.bytes
+    return _conserving(source, at, job.tolerance) if job.table.conserving else tabulated(source, at, job.tolerance)
 
 
-def _conserving(source: MeasuredSource, tolerance: float) -> Any:
-    """Return a source that conserves energy, and the layout of a table that does, too."""
-    from brdfdb.tables.albedo import largest_albedo
-    from brdfdb.tables.table import Table
-    from brdfdb.tables.tabulation import block
-
-    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
+def _conserving(
+    source: MeasuredSource, at: NDArray[np.float64] | None, tolerance: float
+) -> tuple[Layout, NDArray[np.float32]]:
+    """Return the layout of a table that conserves energy, and its values."""
     margin = MARGIN
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
-        layout = layout_of(made, at, tolerance)
-        values = np.concatenate([block(layout, rows) for rows in layout.blocks])
+        layout, values = tabulated(made, at, tolerance)
         largest = largest_albedo(Table.of(layout, values), made)
         if not largest.above_1:
             break
         margin += 1.1 * ((largest.albedo or 2.0) - 1.0)
-    return made, layout
+    return layout, values

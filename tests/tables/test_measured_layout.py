@@ -16,7 +16,7 @@ from brdfdb.parameters import Floats
 from brdfdb.store.publication import publish
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
-from brdfdb.tables.measured_layout import layout_of
+from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import block, metadata_of
 from tests.measurements.made_up import scattered
@@ -75,7 +75,7 @@ def test_finest_grid_is_taken_and_says_so_where_steps_keep_no_tolerance() -> Non
         return np.asarray(1.0 + (np.floor(17.0 * (wi[:, 2:] + wr[:, 2:])) % 2.0))
 
     source = MeasuredSource.of_function(steps, ("grey",), None, name="x", title="x", provenance="x")
-    assert "does not keep to a tolerance of 0.001" in layout_of(source, None, 0.001).reason
+    assert "does not keep to a tolerance of 0.001" in tabulated(source, None, 0.001)[0].reason
 
 
 def test_published_table_has_the_record_and_its_errors_the_uncertainty(tmp_path: Path) -> None:
