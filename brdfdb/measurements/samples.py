@@ -270,7 +270,9 @@ def joined(parts: Sequence[Samples]) -> Samples:
     uncertainty = np.concatenate(noises) if len(noises) == len(parts) else None
     instrument = first.instrument
     if any(part.instrument != instrument for part in parts):
-        instrument = Instrument("; ".join(dict.fromkeys(part.instrument.name for part in parts if part.instrument.name)))
+        instrument = Instrument(
+            "; ".join(dict.fromkeys(part.instrument.name for part in parts if part.instrument.name))
+        )
     provenance = "; ".join(dict.fromkeys(part.provenance for part in parts if part.provenance))
     return replace(first, **arrays, uncertainty=uncertainty, instrument=instrument, provenance=provenance)
 

@@ -377,7 +377,13 @@ class _Builder:
                 def then(future: Future[Tabulated], job: MeasuredJob = job) -> None:
                     if (result := self._result(job.name, future)) is not None:
                         self.built[job.name] = Built(
-                            job, result.state, result.revision, result.bytes, result.why, result.shape, result.wavelengths
+                            job,
+                            result.state,
+                            result.revision,
+                            result.bytes,
+                            result.why,
+                            result.shape,
+                            result.wavelengths,
                         )
                         event = {"event": result.state, "material": job.name, "revision": result.revision}
                         more = {} if result.state == "unchanged" else {"bytes": result.bytes, "why": result.why}

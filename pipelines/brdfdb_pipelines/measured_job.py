@@ -51,7 +51,9 @@ class MeasuredTable(BaseModel):
 
     model_config = STRICT
 
-    samples: Texts = Field(description="path of the file, of any format that is read, or paths of files that are joined")
+    samples: Texts = Field(
+        description="path of the file, of any format that is read, or paths of files that are joined"
+    )
     format: str = Field(default="", description="format of the file; by default the one that recognises it")
     member: str = Field(default="", description="file of an archive of networks; by default it is no archive")
     columns: dict[str, Texts] = Field(
@@ -60,7 +62,9 @@ class MeasuredTable(BaseModel):
     quantity: Literal["", "f_r", "reflectance_factor", "f_r_cos"] = Field(
         default="", description="quantity of the values of a text; by default by names and titles"
     )
-    angles: Literal["", "deg", "rad"] = Field(default="", description="unit of the angles of a text; by default by names")
+    angles: Literal["", "deg", "rad"] = Field(
+        default="", description="unit of the angles of a text; by default by names"
+    )
     side: Literal["", "back", "front"] = Field(default="", description="side of a Klems matrix; by default back")
     title: Text | None = Field(default=None, description="a line for people; by default the name in the file")
     source: Text | None = Field(default=None, description="who measured, where it is published; by default the file's")
@@ -74,15 +78,17 @@ class MeasuredTable(BaseModel):
         return {**self.columns, **{name: value for name, value in others.items() if value}}
 
     def read(self, paths: Sequence[Path]) -> FileTable | Samples:
-        """Return f_r of the one file, or the samples of several that are joined.
+        """Return f_r of the one file, or the samples of several that are joined; errors as by `joined`."""
+        return formats.read(paths[0], self.format, **self.keywords) if len(paths) == 1 else self.joined(paths)
+
+    def joined(self, paths: Sequence[Path]) -> Samples:
+        """Return the samples of files as one.
 
         Raises
         ------
         FileFormatError, ParameterError, OSError
             If a file cannot be read, or files cannot be joined.
         """
-        if len(paths) == 1:
-            return formats.read(paths[0], self.format, **self.keywords)
         return joined([formats.samples(path, self.format, **self.keywords) for path in paths])
 
 
@@ -142,16 +148,20 @@ class MeasuredJob:
         return source.recorded(file=self.files, file_sha256=self.sha256)
 
 
-def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tolerance: float | None) -> MeasuredJob:
-    """Return the job of a measured material of a recipe; RecipeError if it cannot be built."""
-    where = f"define.{name}"
-    if tolerance is None:
-        raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are for models")
+def measured_table(name: str, fields: Mapping[str, Any]) -> MeasuredTable:
+    """Return the keys of a measured material of a recipe; RecipeError if one is not what it must be."""
     try:
-        table = MeasuredTable.model_validate(dict(fields))
+        return MeasuredTable.model_validate(dict(fields))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise RecipeError(".".join([where, *map(str, first["loc"])]), sentence_of(first)) from None
+        raise RecipeError(".".join(["define", name, *map(str, first["loc"])]), sentence_of(first)) from None
+
+
+def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tolerance: float | None) -> MeasuredJob:
+    """Return the job of a measured material of a recipe; RecipeError if it cannot be built."""
+    if tolerance is None:
+        raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are for models")
+    table = measured_table(name, fields)
     paths = tuple((folder or Path()) / sample for sample in table.samples)
     digests = []
     for path in paths:
@@ -159,9 +169,9 @@ def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tole
             check_file(path)
             digests.append(_sha256(path))
         except FileFormatError as error:
-            raise RecipeError(f"{where}.samples", str(error)) from None
+            raise RecipeError(f"define.{name}.samples", str(error)) from None
         except OSError as error:
-            raise RecipeError(f"{where}.samples", f"{path}: {error.strerror}") from None
+            raise RecipeError(f"define.{name}.samples", f"{path}: {error.strerror}") from None
     return MeasuredJob(name, tuple(path.absolute() for path in paths), ", ".join(digests), table, tolerance)
 
 
