@@ -12,7 +12,7 @@ from typing import Any
 
 from brdfdb import formats
 from brdfdb.audit import AuditReport
-from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.measurements.samples import Samples
 from brdfdb.measurements.statement import Statement, statement
@@ -94,7 +94,7 @@ def run(
             if out is not None:
                 write_samples(samples, out)
         except (BrdfdbError, OSError) as error:
-            _refuse(result, error)
+            _refuse(result, target, error)
             continue
         result.statements.append((target, known))
         if not json:
@@ -136,17 +136,19 @@ def _targets(files: Sequence[Path], keys: dict[str, Any], join: bool, result: Im
         try:
             members = formats.members(file, one.table.format, **one.table.keywords)
         except (BrdfdbError, OSError) as error:
-            _refuse(result, error)
+            _refuse(result, one, error)
             continue
         targets += [replace(one, keys={**keys, "member": member}) for member in members] or [one]
     return targets
 
 
-def _refuse(result: Imported, error: BrdfdbError | OSError) -> None:
-    """Record and print the sentence of an error, unless it was printed before."""
+def _refuse(result: Imported, target: Target, error: BrdfdbError | OSError) -> None:
+    """Record and print the sentence of an error with the name of its file, unless it was printed before."""
     sentence = str(error)
     if isinstance(error, OSError) and not isinstance(error, BrdfdbError) and error.filename:
         sentence = f"{error.filename}: {error.strerror}"
+    if not isinstance(error, MissingExtraError) and not any(file.name in sentence for file in target.files):
+        sentence = f"{target.label}: {sentence}"
     if sentence not in result.refused:
         result.refused.append(sentence)
         terminal.say(sentence)

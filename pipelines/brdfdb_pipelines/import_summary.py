@@ -116,6 +116,7 @@ def show(lines: Sequence[Line], report: AuditReport) -> None:
         ],
         numbers=numbers,
     )
+    print("asymmetry: |f - f'| / (|f| + |f'|) of the data up to 80 degrees, f' with light and viewer exchanged")
     for audited in report.materials:
         for problem in audited.problems():
             print(f"{audited.material}: {problem}")
@@ -150,4 +151,6 @@ def _named(names: Sequence[str]) -> str:
 
 def _percent(value: float | np.floating[Any] | None) -> str:
     """Return a share as text in percent with two digits, a hyphen if it is not known."""
-    return "-" if value is None else f"{100.0 * value:.2g} %"
+    if value is None:
+        return "-"
+    return f"{100.0 * value:.2g} %" if value < 0.995 else "100 %"

@@ -16,6 +16,7 @@ from brdfdb.materials import presets
 from brdfdb.materials.recipe_text import toml_of
 from brdfdb.measurements.measured_source import slug
 from brdfdb.store.files import write_file
+from brdfdb.store.paths import NAME
 from brdfdb.tables.planner import check_tolerance
 from brdfdb_pipelines import audit, build_resources, workers
 from brdfdb_pipelines.build import build
@@ -97,7 +98,7 @@ def named(targets: Sequence[Target], tables: Tables, count: int) -> list[Target]
     Raises
     ------
     ParameterError
-        If a name is given to several materials, is that of another one or of a preset, or has no letters or digits.
+        If a name is given to several materials, is that of another one or of a preset, or is not made of words.
     """
     for option, text in (("--name", tables.name), ("--title", tables.title)):
         if text is not None and count != 1:
@@ -106,8 +107,12 @@ def named(targets: Sequence[Target], tables: Tables, count: int) -> list[Target]
     for target in targets:
         first = target.files[0]
         name = tables.name or slug(target.keys.get("member", "").removesuffix(".h5") or first.stem)
+        if not NAME.fullmatch(name):
+            raise ParameterError(
+                "--name", f"{name!r} is not made of lower-case letters, digits and single hyphens, 128 at most", name
+            )
         if name in presets():
-            raise ParameterError("--name", f"{name!r}, of {first}, is the name of a preset; name it otherwise", name)
+            raise ParameterError("--name", f"{name!r} is the name of a preset; give {first} another", name)
         if name in materials:
             raise ParameterError(
                 "--name",
