@@ -76,12 +76,8 @@ def run(
     for name in (*names, *allow):
         store.head(name)
     if unused := [name for name in allow if name not in materials]:
-        raise ParameterError(
-            "--allow",
-            f"{unused[0]} is not among the materials to audit, {', '.join(materials)}",
-            unused[0],
-            tuple(materials),
-        )
+        sentence = f"{unused[0]} is not among the materials to audit, {', '.join(materials)}"
+        raise ParameterError("--allow", sentence, unused[0], tuple(materials))
     _check_path(report_path)
     tasks: dict[str, Task] = {name: partial(_audited, root, name, name in allow) for name in materials}
     drawn = [*ATLAS, *GALLERY] if figures else []
