@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import os
 import pkgutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ __all__ = [
     "Exporter",
     "Importer",
     "Option",
+    "members",
     "options_of",
     "parsed_options",
     "read",
@@ -106,7 +108,7 @@ def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Samples:
+def read(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -> FileTable | Samples:
     """Return f_r of a file of another format as the tools of the format see it, or the samples that the file lists.
 
     Parameters
@@ -115,11 +117,14 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
         The file.
     file_format : str
         One of `IMPORTERS`; by default the one that recognises the first bytes of the file, those with its suffix first.
+    **keywords
+        Of a text its columns, quantity and angles, as of `brdfdb.formats.text.read`: with one of them any file is read
+        as text. Of an archive the `member`, as of `brdfdb.formats.neural.read`. Of a Klems matrix its `side`.
 
     Raises
     ------
     ParameterError
-        If there is no such format, or its files are only written.
+        If there is no such format, keyword, column or member, or files of the format are only written.
     FileFormatError
         If no format recognises the file, its format is only written, it is damaged, or it is no regular file of at most
         2 GiB.
@@ -134,12 +139,7 @@ def read(path: str | os.PathLike[str], file_format: str = "") -> FileTable | Sam
     FileNotFoundError: [Errno 2] No such file or directory: 'brass.exr'
     """
     path = Path(path)
-    check_file(path)
-    return _read(path, _importer(path, file_format))
-
-
-def _read(path: Path, importer: Importer, **keywords: Any) -> FileTable | Samples:
-    """Return what an importer reads; FileFormatError if directions or wavelengths cannot be."""
+    importer = _importer(path, file_format, keywords)
     try:
         reading: FileTable | Samples = importer.read(path, **keywords)
     except FileFormatError:
@@ -165,8 +165,7 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
     file_format : str
         As of `read`.
     **keywords
-        Of a text its columns, quantity and angles, as of `brdfdb.formats.text.read`: with one of them any file is read
-        as text. Of an archive the `member`, as of `brdfdb.formats.neural.read`.
+        As of `read`.
 
     Returns
     -------
@@ -192,18 +191,7 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
     """
     from brdfdb.measurements.samples import Samples
 
-    path = Path(path)
-    every = {key for some in IMPORTERS.values() for key in getattr(some, "keywords", ())}
-    for name, value in keywords.items():
-        if name not in every:
-            allowed = ", ".join(sorted(every))
-            raise ParameterError(name, f"no format takes it; there are {allowed}", value, tuple(sorted(every)))
-    text = bool(keywords) and set(keywords) <= set(_MODULES[_TEXT].keywords)
-    importer = _importer(path, file_format or (_TEXT if text else ""))
-    for name, value in keywords.items():
-        if name not in getattr(importer, "keywords", ()):
-            raise ParameterError(name, f"the format of {path} does not take it", value)
-    reading = _read(path, importer, **keywords)
+    reading = read(path, file_format, **keywords)
     if isinstance(reading, Samples):
         return reading
     if reading.nodes is None:
@@ -211,7 +199,33 @@ def samples(path: str | os.PathLike[str], file_format: str = "", **keywords: Any
     return reading.nodes()
 
 
-def _importer(path: Path, file_format: str) -> Importer:
+def members(path: str | os.PathLike[str], file_format: str = "", **keywords: Any) -> list[str]:
+    """Return the names of the materials in an archive, for the keyword `member` of `read`; empty of any other file.
+
+    Parameters and errors are those of `read`.
+    """
+    path = Path(path)
+    importer = _importer(path, file_format, keywords)
+    return importer.members(path) if hasattr(importer, "members") else []
+
+
+def _importer(path: Path, file_format: str, keywords: Mapping[str, Any]) -> Importer:
+    """Return the importer of a file with keywords that it takes."""
+    check_file(path)
+    every = {key for some in IMPORTERS.values() for key in getattr(some, "keywords", ())}
+    for name, value in keywords.items():
+        if name not in every:
+            allowed = ", ".join(sorted(every))
+            raise ParameterError(name, f"no format takes it; there are {allowed}", value, tuple(sorted(every)))
+    text = bool(keywords) and set(keywords) <= set(_MODULES[_TEXT].keywords)
+    importer = _chosen(path, file_format or (_TEXT if text else ""))
+    for name, value in keywords.items():
+        if name not in getattr(importer, "keywords", ()):
+            raise ParameterError(name, f"the format of {path} does not take it", value)
+    return importer
+
+
+def _chosen(path: Path, file_format: str) -> Importer:
     """Return the importer of a format by its name, or the one that recognises a file."""
     only_written = {name: exporter for name, exporter in EXPORTERS.items() if name not in IMPORTERS}
     if file_format:

@@ -285,8 +285,12 @@ def samples_of_rows(
     **keywords
         Those of `samples_at_angles`.
     """
+    from brdfdb.measurements.samples import RELATIVE
+
     zero = np.zeros(len(values))
     phi_i = angles.get("phi_i", zero)
+    if "delta_phi" in angles and "phi_i" not in angles:
+        known = {**known, "azimuths": RELATIVE}
     phi_r = phi_i + angles["delta_phi"] if "delta_phi" in angles else angles.get("phi_r", zero)
     rows = np.deg2rad(np.stack([angles["theta_i"], phi_i, angles["theta_r"], phi_r], axis=1))
     channels = ("grey",) if wavelength_nm is None else tuple(f"{value:g}nm" for value in wavelength_nm)

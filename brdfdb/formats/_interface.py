@@ -139,7 +139,8 @@ class Importer(Protocol):
         ``recognises(head)`` is true if the first bytes of a file, 4096 of them or all, are those of this format.
     read : callable
         ``read(path)`` gives f_r as the tools of the format see it, or the samples that the file lists. A module whose
-        `read` takes more has a tuple ``keywords`` with their names.
+        `read` takes more has a tuple ``keywords`` with their names. One whose files may hold several materials has
+        ``members(path)``, which gives the names that its keyword ``member`` takes, none of a file with one material.
     """
 
     suffix: str

@@ -7,11 +7,13 @@ turned to an azimuth of 0, and the difference vector. The output y stands for f_
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import io
 import os
 import zipfile
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,26 +105,56 @@ def _content(path: Path, member: str) -> tuple[str, bytes]:
         if magic != _HDF5 or path.stat().st_size > _MOST_BYTES:
             raise FileFormatError(f"{path}: it is no HDF5 file of up to {_MOST_BYTES} bytes")
         return path.stem, path.read_bytes()
+    with _opened(path) as archive:
+        entries = _entries(archive)
+        names = {entry.filename: Path(entry.filename).stem for entry in entries}
+        wanted = [
+            entry for entry in entries if member in (entry.filename, Path(entry.filename).name, names[entry.filename])
+        ]
+        wanted = entries if not member and len(entries) == 1 else wanted
+        if len(wanted) != 1:
+            shown = ", ".join(sorted(names.values())[:60])
+            some = f"{member!r} is not one of the members" if member else "name one of the members"
+            raise ParameterError("member", f"{some} of {path}: {shown}", member, tuple(names.values()))
+        if wanted[0].file_size > _MOST_BYTES:
+            raise FileFormatError(f"{path}: {wanted[0].filename} has {wanted[0].file_size} bytes")
+        with archive.open(wanted[0]) as stream:
+            return names[wanted[0].filename], stream.read(_MOST_BYTES)
+
+
+def members(path: str | os.PathLike[str]) -> list[str]:
+    """Return the names of the networks of an archive, without folders where that tells them apart; none of a network.
+
+    Raises
+    ------
+    FileFormatError
+        If the archive is damaged, or holds no network.
+    """
+    path = Path(path)
+    with path.open("rb") as file:
+        if file.read(len(_ZIP)) != _ZIP:
+            return []
+    with _opened(path) as archive:
+        names = sorted(entry.filename for entry in _entries(archive))
+    if not names:
+        raise FileFormatError(f"{path}: none of the files in the archive ends in {suffix}")
+    stems = [Path(name).stem for name in names]
+    return stems if len(set(stems)) == len(stems) else names
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open an archive; FileFormatError if it is damaged."""
     try:
         with zipfile.ZipFile(path) as archive:
-            entries = [entry for entry in archive.infolist()[:_MOST_MEMBERS] if entry.filename.endswith(suffix)]
-            names = {entry.filename: Path(entry.filename).stem for entry in entries}
-            wanted = [
-                entry
-                for entry in entries
-                if member in (entry.filename, Path(entry.filename).name, names[entry.filename])
-            ]
-            wanted = entries if not member and len(entries) == 1 else wanted
-            if len(wanted) != 1:
-                shown = ", ".join(sorted(names.values())[:60])
-                some = f"{member!r} is not one of the members" if member else "name one of the members"
-                raise ParameterError("member", f"{some} of {path}: {shown}", member, tuple(names.values()))
-            if wanted[0].file_size > _MOST_BYTES:
-                raise FileFormatError(f"{path}: {wanted[0].filename} has {wanted[0].file_size} bytes")
-            with archive.open(wanted[0]) as stream:
-                return names[wanted[0].filename], stream.read(_MOST_BYTES)
+            yield archive
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, zlib.error) as error:
         raise FileFormatError(f"{path}: it is no archive, or is damaged ({error})") from error
+
+
+def _entries(archive: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
+    """Return the networks of an archive."""
+    return [entry for entry in archive.infolist()[:_MOST_MEMBERS] if entry.filename.endswith(suffix)]
 
 
 def _layers(path: Path, content: bytes) -> list[tuple[Floats, Floats]]:

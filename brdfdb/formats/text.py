@@ -196,6 +196,8 @@ def _angles(
     path: Path, rows: Array, roles: Mapping[str, list[int]], layout: Layout, unit: str, record: dict[str, Any]
 ) -> Array:
     """Return theta_i, phi_i, theta_r, phi_r [rad] of rows, shape (N, 4)."""
+    from brdfdb.measurements.samples import RELATIVE
+
     given = {name: rows[:, roles[name][0]] for name in ANGLES if name in roles}
     for name, column in given.items():
         if np.any(np.isnan(column)):
@@ -207,7 +209,9 @@ def _angles(
         unit = "rad" if 0.0 < largest <= 2.0 * np.pi + 1e-3 else "deg"
     record["angles"] = {"deg": "degrees", "rad": "radians"}[unit]
     given = {name: np.deg2rad(column) if unit == "deg" else column for name, column in given.items()}
-    given.setdefault("phi_i", np.zeros(len(rows)))
+    if "phi_i" not in given:
+        record["azimuths"] = RELATIVE
+        given["phi_i"] = np.zeros(len(rows))
     _exchange(given, record)
     for side in ("i", "r"):
         theta, phi = given[f"theta_{side}"], f"phi_{side}" if f"phi_{side}" in given else "delta_phi"

@@ -22,7 +22,7 @@ from brdfdb.tables.grids import (
     Grid,
 )
 from brdfdb.tables.layout import Layout
-from brdfdb.tables.measured_layout import layout_of
+from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
 from brdfdb.tables.table_source import TableSource
@@ -180,7 +180,7 @@ def _tables(
         percent = f"{100.0 * tolerance:g}"
         key = f"table-{percent.replace('.', '-')}"
         if isinstance(planned, MeasuredSource):
-            layout = layout_of(planned, wavelength_nm, tolerance)
+            layout, _ = tabulated(planned, wavelength_nm, tolerance)
         else:
             layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
         yield _table(layout, key, f"{table}, planned for {percent} %")

@@ -74,8 +74,8 @@ class Measured(BaseModel):
     model_config = _STRICT
 
     by: str = Field(default="", description="who measured, and with which instrument; empty: the file does not say")
-    file: str = Field(default="", description="name of the file")
-    file_sha256: str = Field(default="", description="sha256 of the file")
+    file: str = Field(default="", description="name of the file; of joined files all, with commas between them")
+    file_sha256: str = Field(default="", description="sha256 of the file, or of each of the files")
     channels: list[str] = Field(description="channels of the data")
     samples: int = Field(description="number of samples; 0: f_r is known everywhere")
     incidences: int = Field(default=0, description="number of directions of the light")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.errors import (
     ParameterError,
@@ -31,7 +31,7 @@ from brdfdb.tables import error_measurement
 from brdfdb.tables.formula_measurement import first_numbers
 from brdfdb.tables.grids import check_wavelengths
 from brdfdb.tables.layout import Layout, digest
-from brdfdb.tables.measured_layout import layout_of
+from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.planner import plan
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.tabulation import tabulate
@@ -94,18 +94,26 @@ def publish(
     """
     given = source.wavelengths_nm if wavelengths_nm is None else np.atleast_1d(np.asarray(wavelengths_nm))
     at = None if given is None else check_wavelengths(given)
-    layout = layout_of(source, at, tolerance) if isinstance(source, MeasuredSource) else plan(source, at, tolerance)
-    return publish_layout(root, source.name, layout)
+    if isinstance(source, MeasuredSource):
+        layout, values = tabulated(source, at, tolerance)
+        return publish_layout(root, source.name, layout, values=values)
+    return publish_layout(root, source.name, plan(source, at, tolerance))
 
 
 def publish_layout(
-    root: str | os.PathLike[str], name: str, layout: Layout, request: Mapping[str, Any] | None = None
+    root: str | os.PathLike[str],
+    name: str,
+    layout: Layout,
+    request: Mapping[str, Any] | None = None,
+    *,
+    values: NDArray[np.float32] | None = None,
 ) -> Published:
     """Tabulate a layout in memory, measure its error, and publish the table under a name; errors as by `publish`.
 
-    The table keeps the request of a build, if it is given, so that the same request is not built again.
+    The table keeps the request of a build, if it is given, so that the same request is not built again. `values` are
+    those of all blocks of the layout, where they are known.
     """
-    dataset = tabulate(layout)
+    dataset = tabulate(layout, values)
     values = dataset[layout.variable].to_numpy()
     error = error_measurement.measure(layout, lambda rows: values[rows])
     stated = {"error": error, **first_numbers(layout, lambda rows: values[rows])}

@@ -36,8 +36,10 @@ _BITS = 14  # rounds a logarithm by less than measured data are uncertain
 _SHARES = {"theta_d": 0.6, "phi_d": 0.7, "theta_r": 1.0, "delta_phi": 1.0, "phi_h": 1.2, "phi_i": 1.2, "phi_r": 1.6}
 
 
-def layout_of(source: MeasuredSource, wavelength_nm: NDArray[np.float64] | None, tolerance: float) -> Layout:
-    """Return the layout of a table of measured data.
+def tabulated(
+    source: MeasuredSource, wavelength_nm: NDArray[np.float64] | None, tolerance: float
+) -> tuple[Layout, NDArray[np.float32]]:
+    """Return the layout of a table of measured data, and its values, which were tabulated to choose it.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ def layout_of(source: MeasuredSource, wavelength_nm: NDArray[np.float64] | None,
     drawn = error_measurement.draw(source, wavelength_nm, _DRAWS, _SEED)
     truth = error_measurement.model_values(source, wavelength_nm, drawn.wi, drawn.wr)
     floor = error_measurement.floor_of(truth, drawn)
-    layout, reached = None, math.inf
+    layout, values, reached = None, np.empty(0, np.float32), math.inf
     for count in _ANISOTROPIC_LADDER if source.anisotropic else _LADDER:
         layout = Layout(
             source,
@@ -88,7 +90,8 @@ def layout_of(source: MeasuredSource, wavelength_nm: NDArray[np.float64] | None,
     assert layout is not None
     kept = "keeps" if reached <= tolerance else "is the finest grid of measured data, and does not keep"
     reason = f"{math.prod(layout.grid.shape)} nodes; {kept} to a tolerance of {tolerance:g} against the data"
-    return replace(layout, source=source.recorded(extrapolated=_extrapolated(source, layout.grid)), reason=reason)
+    recorded = source.recorded(extrapolated=_extrapolated(source, layout.grid))
+    return replace(layout, source=recorded, reason=reason), values
 
 
 def _extrapolated(source: MeasuredSource, grid: Grid) -> float | None:

@@ -46,8 +46,8 @@ class Frame(NamedTuple):
     attrs: Mapping[str, Any]
 
 
-def tabulate(layout: Layout) -> xr.Dataset:
-    """Tabulate the BRDF of a source: all blocks of a layout, in memory.
+def tabulate(layout: Layout, values: NDArray[np.float32] | None = None) -> xr.Dataset:
+    """Tabulate the BRDF of a source: all blocks of a layout, in memory, or those values of them that are known.
 
     Returns
     -------
@@ -60,7 +60,8 @@ def tabulate(layout: Layout) -> xr.Dataset:
     """
     import xarray as xr
 
-    values = np.concatenate([block(layout, rows) for rows in layout.blocks])
+    if values is None:
+        values = np.concatenate([block(layout, rows) for rows in layout.blocks])
     dataset = xr.Dataset(*frame(layout))
     return dataset.assign({layout.variable: (layout.dims, values, VARIABLES[layout.variable])})
 

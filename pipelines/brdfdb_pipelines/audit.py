@@ -41,6 +41,7 @@ def run(
     jobs: int,
     figures: bool = True,
     allow: Sequence[str] = (),
+    shown: bool = True,
 ) -> AuditReport:
     """Audit the named materials of a store, or all of them.
 
@@ -59,6 +60,8 @@ def run(
         Compute the atlas and the gallery, too.
     allow : sequence of str
         Materials whose models may reflect more than they receive. The report records that this was accepted.
+    shown : bool
+        Print the findings.
 
     Raises
     ------
@@ -73,19 +76,15 @@ def run(
     for name in (*names, *allow):
         store.head(name)
     if unused := [name for name in allow if name not in materials]:
-        raise ParameterError(
-            "--allow",
-            f"{unused[0]} is not among the materials to audit, {', '.join(materials)}",
-            unused[0],
-            tuple(materials),
-        )
+        sentence = f"{unused[0]} is not among the materials to audit, {', '.join(materials)}"
+        raise ParameterError("--allow", sentence, unused[0], tuple(materials))
     _check_path(report_path)
     tasks: dict[str, Task] = {name: partial(_audited, root, name, name in allow) for name in materials}
     drawn = [*ATLAS, *GALLERY] if figures else []
     tasks |= {f"figure {key}": partial(_drawn, key) for key in drawn}
     done: dict[str, Any] = {}
     with terminal.progress() as bar:
-        task = bar.add_task("auditing tables, computing figures", total=len(tasks))
+        task = bar.add_task("auditing tables, computing figures" if drawn else "auditing tables", total=len(tasks))
         for name, outcome in _outcomes(tasks, jobs):
             done[name] = outcome
             bar.advance(task)
@@ -107,7 +106,8 @@ def run(
     }
     page_path = report_path.with_suffix(".html")
     page_path.write_text(audit_page.render(audit_report, plots), encoding="utf-8")
-    _print(root, audit_report, report_path)
+    if shown:
+        _print(root, audit_report, report_path)
     if damaged:
         raise StoreError("; ".join(damaged))
     return audit_report

@@ -20,13 +20,11 @@ from brdfdb.store.marker import make_store
 from brdfdb.store.paths import material_path, revision_path
 from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_staged
-from brdfdb.store.reader import Store
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
-from brdfdb.tables.table import Table
 from brdfdb_pipelines import build_resources, workers
 from brdfdb_pipelines.build_progress import Event, Tally
 from brdfdb_pipelines.build_survey import Survey, head_of, survey
-from brdfdb_pipelines.measured_job import MeasuredJob, build_measured
+from brdfdb_pipelines.measured_job import MeasuredJob, Tabulated, build_measured
 from brdfdb_pipelines.recipe_file import Job, Recipe
 from brdfdb_pipelines.workers import Workers, WorkersError
 
@@ -376,15 +374,22 @@ class _Builder:
             while jobs and self._room:
                 job = jobs.popleft()
 
-                def then(future: Future[tuple[str, str, int, str]], job: MeasuredJob = job) -> None:
+                def then(future: Future[Tabulated], job: MeasuredJob = job) -> None:
                     if (result := self._result(job.name, future)) is not None:
-                        state, revision, stored, why = result
-                        about = _size(Store(self.root).table(job.name, revision)) if state == "published" else ()
-                        self.built[job.name] = Built(job, state, revision, stored, why, *about)
-                        event = {"event": state, "material": job.name, "revision": revision}
-                        self.report(event if state == "unchanged" else {**event, "bytes": stored, "why": why})
+                        self.built[job.name] = Built(
+                            job,
+                            result.state,
+                            result.revision,
+                            result.bytes,
+                            result.why,
+                            result.shape,
+                            result.wavelengths,
+                        )
+                        event = {"event": result.state, "material": job.name, "revision": result.revision}
+                        more = {} if result.state == "unchanged" else {"bytes": result.bytes, "why": result.why}
+                        self.report({**event, **more})
 
-                self.report({"event": "measuring", "material": job.name})
+                self.report({"event": "measuring", "material": job.name, "tables": len(self.measured)})
                 self._submit(then, build_measured, str(self.root), job)
             if self.running:
                 self._wait()
@@ -437,8 +442,3 @@ class _Builder:
         self.error = self.error or error
         self.report({"event": "failed", "material": name, "error": str(error)})
         return None
-
-
-def _size(table: Table) -> tuple[tuple[int, ...], int]:
-    """Return the shape of a table, and the number of its wavelengths; 0 if it is grey."""
-    return table.values.shape, 0 if table.wavelength_nm is None else table.wavelength_nm.size

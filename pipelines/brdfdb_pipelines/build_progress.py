@@ -58,6 +58,8 @@ class Bars:
         self._progress = terminal.progress(counted=False, text="{task.fields[rate]}")
         self._kernels: TaskID | None = None
         self._overall: TaskID | None = None
+        self._measured: TaskID | None = None
+        self._measuring: set[str] = set()
         self._tables: dict[str, TaskID] = {}
 
     def __enter__(self) -> Bars:
@@ -92,17 +94,30 @@ class Bars:
             case "idle":
                 self._progress.console.print("the cluster has no workers; waiting for one, Ctrl-C keeps what is whole")
             case "failed":
-                self._progress.console.print(f"{event['material']} failed: {event['error']}", markup=False)
+                self._progress.console.print(
+                    f"{event['material']} failed: {event['error']}", markup=False, soft_wrap=True
+                )
+                self._ended(event["material"])
             case "block":
                 self._block(event)
             case "family":
                 self._family(event)
             case "measuring":
                 name = event["material"]
+                if self._measured is None:
+                    self._measured = self._begun("tabulating measured data", event["tables"], "tables")
+                self._measuring.add(name)
                 self._tables[name] = self._progress.add_task(f"  {name}, measured", total=None, rate="")
             case "published" | "adopted" | "unchanged":
-                if (task := self._tables.pop(event["material"], None)) is not None:
-                    self._progress.remove_task(task)
+                self._ended(event["material"])
+
+    def _ended(self, name: str) -> None:
+        """Remove the bar of a table, and advance that of all measured ones if it is measured."""
+        if (task := self._tables.pop(name, None)) is not None:
+            self._progress.remove_task(task)
+        if name in self._measuring and self._measured is not None:
+            self._measuring.remove(name)
+            self._advance(self._measured)
 
     def _begun(self, description: str, total: int, unit: str) -> TaskID:
         return self._progress.add_task(description, total=total, unit=unit, rate=f"0/{total} {unit}")

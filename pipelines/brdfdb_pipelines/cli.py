@@ -22,7 +22,6 @@ from brdfdb.errors import BrdfdbError, UnknownMaterialError, missing_extra
 from brdfdb_pipelines.commands import commands
 from brdfdb_pipelines.exit_codes import BUG, INTERRUPTED, REFUSED, TERMINATED, VIOLATED
 
-_LONGEST = 1000  # characters of a sentence: what a recipe gives may be a megabyte
 # Errors of the operating system that concern the machine, also where they name no file
 _MACHINE = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO),
@@ -34,7 +33,7 @@ _MODELS = "files of models"  # begins the names under which parsers keep --model
 _EPILOG = f"""\
 exit codes:
   0    done
-  {VIOLATED}    brdfdb audit found a violation that is neither known nor allowed, or export --strict wrote a far file
+  {VIOLATED}    an audit found a violation that is neither known nor allowed, or export --strict wrote a far file
   {REFUSED}    refused or impossible, for the reason on stderr: bad input, a damaged store, a full disk, a missing extra
   {BUG}   a bug of brdfdb; stderr names the file with the traceback
   {INTERRUPTED}  interrupted by Ctrl-C
@@ -135,10 +134,12 @@ def _run(options: argparse.Namespace, arguments: Sequence[str]) -> int:
         if "debug" in options:
             traceback.print_exc()
         sentence = _refusal(error)
+        from brdfdb_pipelines.terminal import say
+
         if sentence is None:
-            _say(_bug(error, arguments))
+            say(_bug(error, arguments))
             return BUG
-        _say(sentence)
+        say(sentence)
         return REFUSED
 
 
@@ -214,16 +215,6 @@ def _bug(error: Exception, arguments: Sequence[str]) -> str:
         print(text, end="", file=sys.stderr)
         return f"{what}; its traceback stands above ({type(error).__name__})"
     return f"{what}; its traceback is in {path} ({type(error).__name__}: {error})"
-
-
-def _say(sentence: str) -> None:
-    """Print one line to stderr."""
-    from brdfdb_pipelines.terminal import plain
-
-    line = plain(sentence).replace("\n", " ")
-    if len(line) > _LONGEST:  # its middle is what the user gave
-        line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
-    print(f"brdfdb: {line}", file=sys.stderr)
 
 
 if __name__ == "__main__":

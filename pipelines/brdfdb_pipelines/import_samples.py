@@ -1,94 +1,167 @@
-"""The import job: reads files of measurements, states what they hold, and writes their samples as netCDF."""
+"""The import job: reads files of measurements, states what they hold, and makes audited tables of them."""
 
 from __future__ import annotations
 
 import json as _json
 import threading
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from brdfdb import formats
-from brdfdb.errors import ParameterError
+from brdfdb.audit import AuditReport
+from brdfdb.errors import BrdfdbError, MissingExtraError, ParameterError
 from brdfdb.formats.netcdf import write_samples
 from brdfdb.measurements.samples import Samples
 from brdfdb.measurements.statement import Statement, statement
-from brdfdb_pipelines import terminal
+from brdfdb_pipelines import import_summary, import_tables, terminal
+from brdfdb_pipelines.import_tables import Tables, Target
 
 PATIENCE_S = 2.0  # time [s] after which the bar of progress appears
 
 
+@dataclass
+class Imported:
+    """The result of an import.
+
+    Attributes
+    ----------
+    statements : list of (Target, Statement)
+        The materials that were read.
+    refused : list of str
+        A sentence on each file or table that was refused.
+    report : AuditReport or None
+        Audit of the tables; None if no table was built.
+    """
+
+    statements: list[tuple[Target, Statement]] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+    report: AuditReport | None = None
+
+
 def run(
     files: Sequence[Path],
+    keys: dict[str, Any],
     *,
-    file_format: str = "",
-    columns: Sequence[str] = (),
-    more: Mapping[str, str | None] | None = None,
+    join: bool = False,
     json: bool = False,
     out: Path | None = None,
-) -> list[Statement]:
-    """Read files, and print a statement on each.
+    tables: Tables | None = None,
+) -> Imported:
+    """Read files, print a statement on each, and build and audit tables of them if that is asked for.
+
+    A file that is refused is one sentence on stderr; the others are imported.
 
     Parameters
     ----------
     files : sequence of Path
         Files of measurements.
-    file_format : str
-        One of `brdfdb.formats.IMPORTERS`; by default recognised by content.
-    columns : sequence of str
-        Columns of a text, ``NAME=HEADER``. A name may stand more than once.
-    more : mapping, optional
-        Other keywords of `brdfdb.formats.samples`; None of what is not given.
+    keys : dict
+        Keys of `brdfdb_pipelines.measured_job.MeasuredTable`, `samples` apart. All materials of an archive are
+        imported unless a `member` is named.
+    join : bool
+        Take all files as one set of samples.
     json : bool
-        Print a list of JSON objects.
+        Print one JSON object.
     out : Path, optional
-        The netCDF file to write the samples of the one file to.
+        The netCDF file to write the samples of the one material to.
+    tables : Tables, optional
+        What to make of the samples beside statements.
 
     Raises
     ------
     ParameterError
-        If `out` is given with several files, or a column is not written as NAME=HEADER.
+        If options do not go together; before anything is read, unless a file is an archive.
+    StoreError
+        If the store cannot be written.
     """
-    if out is not None and len(files) != 1:
-        raise ParameterError("--out", f"it takes the samples of one file, and there are {len(files)}", len(files), 1)
     if out is not None and out.suffix != ".nc":
         raise ParameterError("--out", f"{str(out)!r} does not end in .nc", str(out), "FILE.nc")
-    keywords: dict[str, Any] = {**_columns(columns), **{key: value for key, value in (more or {}).items() if value}}
-    statements: list[Statement] = []
-    for file in files:
-        samples, known = _read(file, file_format, keywords)
-        statements.append(known)
-        if out is not None:
-            write_samples(samples, out)
+    result = Imported()
+    targets = _targets(files, keys, join, result)
+    count = len(targets) + len(result.refused)
+    if out is not None and count != 1:
+        raise ParameterError("--out", f"it takes the samples of one file, and there are {count}", count, 1)
+    if tables is not None:
+        targets = import_tables.named(targets, tables, count)
+    start = time.monotonic()
+    for number, target in enumerate(targets, 1):
+        label = f"{target.label}, {number} of {len(targets)}" if len(targets) > 1 else target.label
+        try:
+            samples, known = _read(target, label, PATIENCE_S - (time.monotonic() - start))
+            if out is not None:
+                write_samples(samples, out)
+        except (BrdfdbError, OSError) as error:
+            _refuse(result, target, error)
+            continue
+        result.statements.append((target, known))
         if not json:
-            lines = [f"{file}: {known.name}", *(f"  {sentence}" for sentence in known.sentences)]
+            lines = [f"{target.label}: {known.name}", *(f"  {sentence}" for sentence in known.sentences)]
             lines += [f"  written: {out}"] if out is not None else []
-            print(terminal.plain("\n".join(lines)))
+            print(terminal.plain("\n".join(lines)), flush=True)
+    audited: list[import_summary.Line] = []
+    if tables is not None and result.statements:
+        made = import_tables.make([target for target, _ in result.statements], tables)
+        result.refused += made.refused
+        result.report = made.report
+        audited = import_summary.lines_of(tables.store, made.report) if made.report and tables.store else []
     if json:
-        documents = [{"file": str(file), **known.document()} for file, known in zip(files, statements, strict=True)]
-        print(_json.dumps(documents, indent=1, ensure_ascii=False, allow_nan=False))
-    return statements
+        print(_json.dumps(_document(result, audited), indent=1, ensure_ascii=False, allow_nan=False))
+    elif result.report is not None:
+        import_summary.show(audited, result.report)
+    return result
 
 
-def _columns(texts: Sequence[str]) -> dict[str, list[str]]:
-    """Return the headers of each column from texts NAME=HEADER."""
-    columns: dict[str, list[str]] = {}
-    for text in texts:
-        name, sign, header = text.partition("=")
-        if not (name and sign and header):
-            raise ParameterError("--column", f"{text!r} is not NAME=HEADER", text, "NAME=HEADER")
-        columns.setdefault(name, []).append(header)
-    return columns
+def _document(result: Imported, audited: Sequence[import_summary.Line]) -> dict[str, Any]:
+    """Return the result as JSON."""
+    document: dict[str, Any] = {
+        "statements": [{"file": target.label, **known.document()} for target, known in result.statements],
+        "refused": result.refused,
+    }
+    if result.report is not None:
+        document |= import_summary.document(audited, result.report)
+    return document
 
 
-def _read(file: Path, file_format: str, keywords: Mapping[str, Any]) -> tuple[Samples, Statement]:
-    """Return the samples of a file and the statement on them; a bar appears after some time."""
+def _targets(files: Sequence[Path], keys: dict[str, Any], join: bool, result: Imported) -> list[Target]:
+    """Return the materials of files, all members of archives; files that cannot be opened are refused."""
+    target = Target(tuple(files), keys)
+    if join or keys.get("member"):
+        return [target] if join else [replace(target, files=(file,)) for file in files]
+    targets = []
+    for file in files:
+        one = replace(target, files=(file,))
+        try:
+            members = formats.members(file, one.table.format, **one.table.keywords)
+        except (BrdfdbError, OSError) as error:
+            _refuse(result, one, error)
+            continue
+        targets += [replace(one, keys={**keys, "member": member}) for member in members] or [one]
+    return targets
+
+
+def _refuse(result: Imported, target: Target, error: BrdfdbError | OSError) -> None:
+    """Record and print the sentence of an error with the name of its file, unless it was printed before."""
+    sentence = str(error)
+    if isinstance(error, OSError) and not isinstance(error, BrdfdbError) and error.filename:
+        sentence = f"{error.filename}: {error.strerror}"
+    if not isinstance(error, MissingExtraError) and not any(file.name in sentence for file in target.files):
+        sentence = f"{target.label}: {sentence}"
+    if sentence not in result.refused:
+        result.refused.append(sentence)
+        terminal.say(sentence)
+
+
+def _read(target: Target, label: str, patience_s: float) -> tuple[Samples, Statement]:
+    """Return the samples of a material and the statement on them; a bar appears after some time."""
     with terminal.progress(counted=False, transient=True) as bar:
-        task = bar.add_task(file.name, total=1.0, visible=False)
-        shown = threading.Timer(PATIENCE_S, lambda: bar.update(task, visible=True))
+        task = bar.add_task(label, total=1.0, visible=patience_s <= 0.0)
+        shown = threading.Timer(max(patience_s, 0.0), lambda: bar.update(task, visible=True))
         shown.start()
         try:
-            samples = formats.samples(file, file_format, **keywords)
+            samples = target.table.joined(target.files)
             return samples, statement(samples, lambda share: bar.update(task, completed=share))
         finally:
             shown.cancel()

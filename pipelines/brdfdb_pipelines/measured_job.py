@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError
+from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 
 from brdfdb import formats
-from brdfdb.errors import BrdfdbError, ParameterError, sentence_of
-from brdfdb.formats import neural
+from brdfdb.errors import BrdfdbError, FileFormatError, ParameterError, StoreError, sentence_of
+from brdfdb.formats._input import check_file
 from brdfdb.materials.provenance import Text
-from brdfdb.measurements import MeasuredSource, Samples
+from brdfdb.measurements import MeasuredSource, Samples, joined
 from brdfdb.measurements.measured_source import MARGIN
 from brdfdb.store.lock import Lock, writing
 from brdfdb.store.manifest import read_manifest
@@ -23,15 +24,26 @@ from brdfdb.store.paths import material_path, revision_path
 from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_layout
 from brdfdb.store.revisions import standing
-from brdfdb.tables.layout import TABLE_VERSION
-from brdfdb.tables.measured_layout import layout_of
+from brdfdb.tables.albedo import largest_albedo
+from brdfdb.tables.layout import TABLE_VERSION, Layout
+from brdfdb.tables.measured_layout import tabulated
+from brdfdb.tables.table import Table
 from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
 
-MEASURED_VERSION = 1  # of the way from a file to the values of its table
+MEASURED_VERSION = 2  # of the way from a file to the values of its table
+_ADDED = {"columns", "quantity", "angles", "side"}  # keys of a request that are left out where they are empty
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
+
+
+def _listed(value: Any) -> Any:
+    """Return a list of the one text that may stand for it."""
+    return [value] if isinstance(value, str) else value
+
+
+Texts = Annotated[list[Annotated[str, Field(min_length=1)]], BeforeValidator(_listed), Field(min_length=1)]
 
 
 class MeasuredTable(BaseModel):
@@ -39,13 +51,45 @@ class MeasuredTable(BaseModel):
 
     model_config = STRICT
 
-    samples: str = Field(min_length=1, description="path of the file, of any format that is read")
+    samples: Texts = Field(
+        description="path of the file, of any format that is read, or paths of files that are joined"
+    )
     format: str = Field(default="", description="format of the file; by default the one that recognises it")
     member: str = Field(default="", description="file of an archive of networks; by default it is no archive")
+    columns: dict[str, Texts] = Field(
+        default={}, description="headers of the columns of a text, by role, such as theta_i; by default by their names"
+    )
+    quantity: Literal["", "f_r", "reflectance_factor", "f_r_cos"] = Field(
+        default="", description="quantity of the values of a text; by default by names and titles"
+    )
+    angles: Literal["", "deg", "rad"] = Field(
+        default="", description="unit of the angles of a text; by default by names"
+    )
+    side: Literal["", "back", "front"] = Field(default="", description="side of a Klems matrix; by default back")
     title: Text | None = Field(default=None, description="a line for people; by default the name in the file")
     source: Text | None = Field(default=None, description="who measured, where it is published; by default the file's")
     reciprocal: bool = Field(default=False, description="tabulate the nearest values that are reciprocal")
     conserving: bool = Field(default=False, description="tabulate the nearest values with no albedo above 1")
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Return the keywords of `brdfdb.formats.read`."""
+        others = {name: getattr(self, name) for name in ("member", "quantity", "angles", "side")}
+        return {**self.columns, **{name: value for name, value in others.items() if value}}
+
+    def read(self, paths: Sequence[Path]) -> FileTable | Samples:
+        """Return f_r of the one file, or the samples of several that are joined; errors as by `joined`."""
+        return formats.read(paths[0], self.format, **self.keywords) if len(paths) == 1 else self.joined(paths)
+
+    def joined(self, paths: Sequence[Path]) -> Samples:
+        """Return the samples of files as one.
+
+        Raises
+        ------
+        FileFormatError, ParameterError, OSError
+            If a file cannot be read, or files cannot be joined.
+        """
+        return joined([formats.samples(path, self.format, **self.keywords) for path in paths])
 
 
 @dataclass(frozen=True)
@@ -53,7 +97,7 @@ class MeasuredJob:
     """One table of measured data to build, to a tolerance."""
 
     name: str
-    path: Path
+    paths: tuple[Path, ...]
     sha256: str
     table: MeasuredTable
     tolerance: float
@@ -61,15 +105,21 @@ class MeasuredJob:
     model = "measured"
 
     @property
+    def files(self) -> str:
+        """Return the names of the files."""
+        return ", ".join(path.name for path in self.paths)
+
+    @property
     def request(self) -> dict[str, Any]:
         """Everything that decides the table, ready for JSON: the same request makes the same table."""
+        table = self.table.model_dump(mode="json", exclude={"samples"})
         return {
             "table_version": TABLE_VERSION,
             "measured_version": MEASURED_VERSION,
             "measured_name": self.name,
             "file_sha256": self.sha256,
             "tolerance": self.tolerance,
-            **self.table.model_dump(mode="json", exclude={"samples"}),
+            **{key: value for key, value in table.items() if value or key not in _ADDED},
         }
 
     def source(self) -> MeasuredSource:
@@ -80,13 +130,11 @@ class MeasuredJob:
         FileFormatError, ParameterError, OSError
             If the file cannot be read, or is not what a table needs.
         """
-        if self.table.member:
-            read: FileTable | Samples = neural.read(self.path, self.table.member)
-        else:
-            read = formats.read(self.path, self.table.format)
+        read = self.table.read(self.paths)
         title = self.table.title or read.name
+        file = f"the file {self.files}" if len(self.paths) == 1 else f"the files {self.files}"
         if isinstance(read, Samples):
-            provenance = self.table.source or read.provenance or f"the file {self.path.name}"
+            provenance = self.table.source or read.provenance or file
             source = MeasuredSource.of_samples(read, name=self.name, title=title, provenance=provenance)
         else:
             source = MeasuredSource.of_function(
@@ -95,37 +143,61 @@ class MeasuredJob:
                 read.wavelength_nm,
                 name=self.name,
                 title=title,
-                provenance=self.table.source or f"the file {self.path.name}",
+                provenance=self.table.source or file,
             )
-        return source.recorded(file=self.path.name, file_sha256=self.sha256)
+        return source.recorded(file=self.files, file_sha256=self.sha256)
+
+
+def measured_table(name: str, fields: Mapping[str, Any]) -> MeasuredTable:
+    """Return the keys of a measured material of a recipe; RecipeError if one is not what it must be."""
+    try:
+        return MeasuredTable.model_validate(dict(fields))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise RecipeError(".".join(["define", name, *map(str, first["loc"])]), sentence_of(first)) from None
 
 
 def measured_job(name: str, fields: Mapping[str, Any], folder: Path | None, tolerance: float | None) -> MeasuredJob:
     """Return the job of a measured material of a recipe; RecipeError if it cannot be built."""
-    where = f"define.{name}"
     if tolerance is None:
         raise RecipeError("tolerance", f"is missing; {name} is measured, and grids are for models")
-    try:
-        table = MeasuredTable.model_validate(dict(fields))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise RecipeError(".".join([where, *map(str, first["loc"])]), sentence_of(first)) from None
-    path = (folder or Path()) / table.samples
-    try:
-        sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise RecipeError(f"{where}.samples", f"{path}: {error.strerror}") from None
-    return MeasuredJob(name, path.absolute(), sha256, table, tolerance)
+    table = measured_table(name, fields)
+    paths = tuple((folder or Path()) / sample for sample in table.samples)
+    digests = []
+    for path in paths:
+        try:
+            check_file(path)
+            digests.append(_sha256(path))
+        except FileFormatError as error:
+            raise RecipeError(f"define.{name}.samples", str(error)) from None
+        except OSError as error:
+            raise RecipeError(f"define.{name}.samples", f"{path}: {error.strerror}") from None
+    return MeasuredJob(name, tuple(path.absolute() for path in paths), ", ".join(digests), table, tolerance)
 
 
-def build_measured(root: str, job: MeasuredJob) -> tuple[str, str, int, str]:
-    """Build the table of a job unless the store has it: a task for a worker.
+def _sha256(path: Path) -> str:
+    """Return the sha256 of a file, or of the names and digests of the files in the directory of a zarr group."""
+    if path.is_dir():
+        files = sorted(part for part in path.rglob("*") if part.is_file())
+        listing = "\n".join(f"{file.relative_to(path).as_posix()} {_sha256(file)}" for file in files)
+        return hashlib.sha256(listing.encode()).hexdigest()
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
-    Returns
-    -------
-    state, revision, bytes, why
-        As `brdfdb_pipelines.build.Built` has them.
-    """
+
+class Tabulated(NamedTuple):
+    """The result of one job, as `brdfdb_pipelines.build.Built` has it."""
+
+    state: str
+    revision: str
+    bytes: int
+    why: str
+    shape: tuple[int, ...] = ()
+    wavelengths: int = 0
+
+
+def build_measured(root: str, job: MeasuredJob) -> Tabulated:
+    """Build the table of a job unless the store has it: a task for a worker."""
     store, request = Path(root), job.request
     status = standing(store, job.name, request)
     if status.state == "adoptable":
@@ -133,40 +205,38 @@ def build_measured(root: str, job: MeasuredJob) -> tuple[str, str, int, str]:
             point_to(material_path(store, job.name), status.revision)
     if status.state != "missing":
         stored = read_manifest(revision_path(store, job.name, status.revision), None)[0]["summary"]["bytes"]
-        return {"current": "unchanged"}.get(status.state, "adopted"), status.revision, stored, status.why
+        state = "unchanged" if status.state == "current" else "adopted"
+        return Tabulated(state, status.revision, stored, status.why)
     try:
-        published = _published(store, job, request)
+        layout, values = _tabulated(job)
+        published = publish_layout(store, job.name, layout, request, values=values)
+    except StoreError:
+        raise
     except BrdfdbError as error:
-        raise ParameterError(job.name, f"{job.path.name}: {error}") from None
-    return "published", published[0], published[1], status.why
+        raise ParameterError(job.name, f"{job.files}: {error}") from None
+    wavelengths = 0 if layout.wavelength_nm is None else layout.wavelength_nm.size
+    return Tabulated("published", published.revision, published.bytes, status.why, tuple(layout.shape), wavelengths)
 
 
-def _published(store: Path, job: MeasuredJob, request: Mapping[str, Any]) -> tuple[str, int]:
+def _tabulated(job: MeasuredJob) -> tuple[Layout, NDArray[np.float32]]:
+    """Return the layout of a table, and its values, made to keep the laws that are asked for."""
     source = job.source()
+    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
     if job.table.reciprocal:
         source = source.made("reciprocal")
-    layout = None
-    if job.table.conserving:
-        source, layout = _conserving(source, job.tolerance)
-    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
-    published = publish_layout(store, job.name, layout or layout_of(source, at, job.tolerance), request)
-    return published.revision, published.bytes
+    return _conserving(source, at, job.tolerance) if job.table.conserving else tabulated(source, at, job.tolerance)
 
 
-def _conserving(source: MeasuredSource, tolerance: float) -> Any:
-    """Return a source that conserves energy, and the layout of a table that does, too."""
-    from brdfdb.tables.albedo import largest_albedo
-    from brdfdb.tables.table import Table
-    from brdfdb.tables.tabulation import block
-
-    at = None if source.wavelengths_nm is None else np.array(source.wavelengths_nm)
+def _conserving(
+    source: MeasuredSource, at: NDArray[np.float64] | None, tolerance: float
+) -> tuple[Layout, NDArray[np.float32]]:
+    """Return the layout of a table that conserves energy, and its values."""
     margin = MARGIN
     for _ in range(_MARGINS):
         made = source.made("conserving", margin)
-        layout = layout_of(made, at, tolerance)
-        values = np.concatenate([block(layout, rows) for rows in layout.blocks])
+        layout, values = tabulated(made, at, tolerance)
         largest = largest_albedo(Table.of(layout, values), made)
         if not largest.above_1:
             break
         margin += 1.1 * ((largest.albedo or 2.0) - 1.0)
-    return made, layout
+    return layout, values

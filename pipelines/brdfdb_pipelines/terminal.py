@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 import unicodedata
 from collections.abc import Sequence
 
@@ -12,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+_LONGEST = 1000  # characters of a sentence: what a recipe gives may be a megabyte
 _FOLDED = 8  # width of a column of text below which a table is wider than the terminal instead
 _NARROW = 16  # width of a column of text below which a less important column is left out, if there is one
 _MANY = 200  # rows that rich lays out in a tenth of a second; longer tables are printed plainly
@@ -23,6 +25,14 @@ def plain(text: str) -> str:
         letter if letter == "\n" or unicodedata.category(letter)[0] != "C" else letter.encode("unicode_escape").decode()
         for letter in text
     )
+
+
+def say(sentence: str) -> None:
+    """Print one line to stderr, of a bounded length."""
+    line = plain(sentence).replace("\n", " ")
+    if len(line) > _LONGEST:  # its middle is what the user gave
+        line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
+    print(f"brdfdb: {line}", file=sys.stderr)
 
 
 def progress(counted: bool = True, text: str = "", transient: bool = False) -> Progress:

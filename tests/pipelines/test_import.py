@@ -37,9 +37,11 @@ def test_units_that_are_wrong_are_noticed_and_can_be_said(tile: Path, capsys: Ca
     assert "Units?" not in printed
 
 
-def test_several_files_are_a_list_of_json(tile: Path, capsys: Captured) -> None:
+def test_several_files_are_one_object_of_json(tile: Path, capsys: Captured) -> None:
     assert run("import", tile, tile, *OPTIONS, "--angles", "deg", "--json") == 0
-    documents = json.loads(capsys.readouterr().out)
+    printed = json.loads(capsys.readouterr().out)
+    documents = printed["statements"]
+    assert printed["refused"] == []
     assert [document["file"] for document in documents] == [str(tile)] * 2
     assert documents[0]["incidences"][0]["albedo"] == pytest.approx([0.8 * np.pi])
     assert documents[0]["hints"] == [documents[0]["sentences"][-1]]

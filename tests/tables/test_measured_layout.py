@@ -16,7 +16,7 @@ from brdfdb.parameters import Floats
 from brdfdb.store.publication import publish
 from brdfdb.tables.grids import Grid
 from brdfdb.tables.layout import Interpolation, Layout
-from brdfdb.tables.measured_layout import layout_of
+from brdfdb.tables.measured_layout import tabulated
 from brdfdb.tables.table import Table
 from brdfdb.tables.tabulation import block, metadata_of
 from tests.measurements.made_up import scattered
@@ -75,7 +75,7 @@ def test_finest_grid_is_taken_and_says_so_where_steps_keep_no_tolerance() -> Non
         return np.asarray(1.0 + (np.floor(17.0 * (wi[:, 2:] + wr[:, 2:])) % 2.0))
 
     source = MeasuredSource.of_function(steps, ("grey",), None, name="x", title="x", provenance="x")
-    assert "does not keep to a tolerance of 0.001" in layout_of(source, None, 0.001).reason
+    assert "does not keep to a tolerance of 0.001" in tabulated(source, None, 0.001)[0].reason
 
 
 def test_published_table_has_the_record_and_its_errors_the_uncertainty(tmp_path: Path) -> None:
@@ -89,10 +89,14 @@ def test_published_table_has_the_record_and_its_errors_the_uncertainty(tmp_path:
     assert 0.05 < (measured.extrapolated or 0.0) < 0.9
     assert not table.metadata.missing
     both = table.lookup_vectors_with_error(WI, WR)
-    assert np.all(both.error >= measured.held_out.p99 * both.brdf)
+    outside = source.extrapolated(WI, WR)
+    assert 0 < np.count_nonzero(outside) < len(outside)
+    np.testing.assert_array_equal(np.isnan(both.error), outside)  # nothing is known there
+    assert np.all(both.error[~outside] >= measured.held_out.p99 * both.brdf[~outside])
     fresh = scattered(presets()["clay-vase"].brdf_at(None), 400, 0.05, seed=11)
     looked_up = table.lookup_vectors_with_error(fresh.w_i, fresh.w_r)
-    assert np.mean(np.abs(looked_up.brdf - fresh.values[:, 0]) <= looked_up.error) > 0.97
+    inside = ~source.extrapolated(fresh.w_i, fresh.w_r)
+    assert np.mean((np.abs(looked_up.brdf - fresh.values[:, 0]) <= looked_up.error)[inside]) > 0.97
 
 
 def test_colours_take_three_parts(tmp_path: Path) -> None:

@@ -1,0 +1,156 @@
+"""The summary of imported tables: asymmetry, albedos and verdicts of all of them, on screen and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from brdfdb.audit import AuditReport
+from brdfdb.audit.energy import Energy
+from brdfdb.audit.reciprocity import Reciprocity
+from brdfdb.errors import counted
+from brdfdb.store.reader import Store
+from brdfdb_pipelines import terminal
+
+_NAMED = 12  # materials that a sentence names
+
+
+@dataclass(frozen=True)
+class Line:
+    """Figures of one imported table.
+
+    Attributes
+    ----------
+    material, revision : str
+        Name and revision.
+    asymmetry_median, asymmetry_p99 : float [1] or None
+        abs(f - f') / (abs(f) + abs(f')) of the data, f' with light and viewer exchanged; None: the data cannot tell.
+    uncertainty : float [1] or None
+        Relative uncertainty that 99 of 100 values keep to; None if nothing is known of it.
+    asymmetric : bool or None
+        True if the asymmetry of the table is larger than the uncertainty explains; None without an uncertainty.
+    albedo : float [1] or None
+        Largest directional albedo of the table; None: not finite.
+    at_theta_i_deg : float [degree]
+        Polar angle of the light there.
+    above_1 : bool
+        True if an albedo is above 1.
+    verdict : str
+        Verdict of the audit.
+    """
+
+    material: str
+    revision: str
+    asymmetry_median: float | None
+    asymmetry_p99: float | None
+    uncertainty: float | None
+    asymmetric: bool | None
+    albedo: float | None
+    at_theta_i_deg: float
+    above_1: bool
+    verdict: str
+
+
+def lines_of(root: Path, report: AuditReport) -> list[Line]:
+    """Return the figures of the audited tables of a store."""
+    store = Store(root)
+    lines = []
+    for audited in report.materials:
+        measured = store.metadata(audited.material).measured
+        assert measured is not None
+        seen, uncertainty = measured.reciprocity.asymmetry, measured.uncertainty
+        energy, reciprocity = audited.of(Energy).table, audited.of(Reciprocity)
+        lines.append(
+            Line(
+                audited.material,
+                audited.revision,
+                None if seen is None else seen.median,
+                None if seen is None else seen.p99,
+                uncertainty,
+                None if uncertainty is None else reciprocity.verdict == "violates",
+                energy.max_albedo,
+                energy.max_at_theta_i_deg,
+                energy.exceeds_1_from_theta_i_deg is not None,
+                audited.verdict,
+            )
+        )
+    return lines
+
+
+def document(lines: Sequence[Line], report: AuditReport) -> dict[str, Any]:
+    """Return figures of all tables, and the summary, as JSON."""
+    medians = [line.asymmetry_median for line in lines if line.asymmetry_median is not None]
+    return {
+        "tables": [asdict(line) for line in lines],
+        "summary": {
+            "materials": len(lines),
+            "asymmetry_median": float(np.median(medians)) if medians else None,
+            "asymmetric": [line.material for line in lines if line.asymmetric],
+            "without_uncertainty": sum(line.uncertainty is None for line in lines),
+            "above_1": [line.material for line in lines if line.above_1],
+            "passes": len(lines) - len(report.violations),
+            "violates": report.violations,
+        },
+    }
+
+
+def show(lines: Sequence[Line], report: AuditReport) -> None:
+    """Print a line for each table, the problems of tables, and the summary."""
+    print()
+    numbers = ("asymmetry, median", "99 of 100", "uncertainty", "albedo up to")
+    terminal.print_table(
+        f"Measured tables in {report.store}",
+        ("material", *numbers, "audit"),
+        [
+            (
+                line.material,
+                *map(_percent, (line.asymmetry_median, line.asymmetry_p99, line.uncertainty)),
+                "not finite" if line.albedo is None else f"{line.albedo:.4f} at {line.at_theta_i_deg:g}°",
+                line.verdict,
+            )
+            for line in lines
+        ],
+        numbers=numbers,
+    )
+    print("asymmetry: |f - f'| / (|f| + |f'|) of the data up to 80 degrees, f' with light and viewer exchanged")
+    for audited in report.materials:
+        for problem in audited.problems():
+            print(f"{audited.material}: {problem}")
+    for sentence in sentences(lines):
+        print(sentence)
+    violating = len(report.violations)
+    print(f"{counted(len(lines), 'table')} audited: passes {len(lines) - violating}, violates {violating}")
+
+
+def sentences(lines: Sequence[Line]) -> list[str]:
+    """Return the summary of asymmetries and albedos in sentences."""
+    medians = [line.asymmetry_median for line in lines if line.asymmetry_median is not None]
+    asymmetry = "reciprocity asymmetry: the data cannot tell"
+    if medians:
+        spread = f", from {_percent(min(medians))} to {_percent(max(medians))}" if len(medians) > 1 else ""
+        asymmetry = f"reciprocity asymmetry of the data: median over materials {_percent(np.median(medians))}{spread}"
+    beyond = [line.material for line in lines if line.asymmetric]
+    unknown = sum(line.uncertainty is None for line in lines)
+    judged = f"asymmetric beyond their uncertainty: {_named(beyond)}"
+    if unknown:
+        judged += f"; {unknown} of {len(lines)} state no uncertainty, and are not judged"
+    return [asymmetry, judged, f"albedo above 1: {_named([line.material for line in lines if line.above_1])}"]
+
+
+def _named(names: Sequence[str]) -> str:
+    """Return the number of names, and the first of them."""
+    if not names:
+        return "none"
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"{len(names)} ({', '.join(names[:_NAMED])}{more})"
+
+
+def _percent(value: float | np.floating[Any] | None) -> str:
+    """Return a share as text in percent with two digits, a hyphen if it is not known."""
+    if value is None:
+        return "-"
+    return f"{100.0 * value:.2g} %" if value < 0.995 else "100 %"

@@ -1,0 +1,198 @@
+"""Tables of imported measurements: the recipe that builds them, the build and the audit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from brdfdb.audit import AuditReport
+from brdfdb.errors import BrdfdbError, ParameterError, StoreError
+from brdfdb.materials import presets
+from brdfdb.materials.recipe_text import toml_of
+from brdfdb.measurements.measured_source import slug
+from brdfdb.store.files import write_file
+from brdfdb.store.paths import NAME
+from brdfdb.tables.planner import check_tolerance
+from brdfdb_pipelines import audit, build_resources, workers
+from brdfdb_pipelines.build import build
+from brdfdb_pipelines.build_progress import Bars, Event
+from brdfdb_pipelines.measured_job import MeasuredTable, measured_table
+from brdfdb_pipelines.recipe_file import Recipe
+from brdfdb_pipelines.workers import Workers, WorkersError
+
+TOLERANCE = 0.05  # of tables, by default
+
+
+@dataclass(frozen=True)
+class Target:
+    """One material to import: its files, the keys of a recipe that say how to read them, and its name in the store."""
+
+    files: tuple[Path, ...]
+    keys: dict[str, Any]
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """Return the paths of the files."""
+        return ", ".join(map(str, self.files))
+
+    @cached_property
+    def table(self) -> MeasuredTable:
+        """Return the keys, checked."""
+        return measured_table(self.name or "material", {**self.keys, "samples": list(map(str, self.files))})
+
+    def define(self, folder: Path) -> dict[str, Any]:
+        """Return the keys of the material in a recipe in a folder."""
+        paths = [_relative(file, folder) for file in self.files]
+        given = {key: value for key, value in self.keys.items() if value}
+        return {"samples": paths[0] if len(paths) == 1 else paths, **given}
+
+
+@dataclass(frozen=True)
+class Tables:
+    """What to make of imported samples.
+
+    Attributes
+    ----------
+    store : Path or None
+        Directory of the store in which tables are built; None: none is built.
+    recipe : Path or None
+        File of the recipe that builds the same tables.
+    name, title : str or None
+        Of the one material; by default those of the file.
+    tolerance : float
+        Of the tables, in [1e-4, 0.5].
+    jobs : int
+        Number of processes.
+    """
+
+    store: Path | None
+    recipe: Path | None = None
+    name: str | None = None
+    title: str | None = None
+    tolerance: float = TOLERANCE
+    jobs: int = 1
+
+    def __post_init__(self) -> None:
+        check_tolerance(self.tolerance)
+        if self.recipe is not None and self.recipe.suffix != ".toml":
+            raise ParameterError("--recipe", f"{str(self.recipe)!r} does not end in .toml", str(self.recipe))
+
+
+@dataclass
+class Made:
+    """The tables that were made: sentences on those that failed, and the audit of the others."""
+
+    refused: list[str] = field(default_factory=list)
+    report: AuditReport | None = None
+
+
+def named(targets: Sequence[Target], tables: Tables, count: int) -> list[Target]:
+    """Return materials with their names: that of the command line, or those of files and members, as words.
+
+    Raises
+    ------
+    ParameterError
+        If a name is given to several materials, is that of another one or of a preset, or is not made of words.
+    """
+    for option, text in (("--name", tables.name), ("--title", tables.title)):
+        if text is not None and count != 1:
+            raise ParameterError(option, f"it is for one material, and there are {count}", text)
+    materials: dict[str, Target] = {}
+    for target in targets:
+        first = target.files[0]
+        name = tables.name or slug(target.keys.get("member", "").removesuffix(".h5") or first.stem)
+        if not NAME.fullmatch(name):
+            raise ParameterError(
+                "--name", f"{name!r} is not made of lower-case letters, digits and single hyphens, 128 at most", name
+            )
+        if name in presets():
+            raise ParameterError("--name", f"{name!r} is the name of a preset; give {first} another", name)
+        if name in materials:
+            raise ParameterError(
+                "--name",
+                f"{target.label} and {materials[name].label} would both be {name!r}; import one alone, with a name",
+                name,
+            )
+        title = {} if tables.title is None else {"title": tables.title}
+        materials[name] = replace(target, name=name, keys={**target.keys, **title})
+        assert materials[name].table  # checked before anything is read
+    return list(materials.values())
+
+
+def make(targets: Sequence[Target], tables: Tables) -> Made:
+    """Write the recipe of materials, build its tables, and audit them, where that is asked for.
+
+    Raises
+    ------
+    RecipeError
+        If a file has changed, or a name is none of a material.
+    StoreError, WorkersError, OSError
+        If the store or the recipe cannot be written. A table that fails is recorded, and the others are built.
+    """
+    recipe = Recipe.model_validate(_content(targets, tables.tolerance, Path()))
+    recipe.jobs()
+    if tables.recipe is not None:
+        folder = tables.recipe.parent
+        content = _content(targets, tables.tolerance, folder)
+        names = ", ".join(f'"{name}"' for name in content["materials"])
+        parts = [f"materials = [{names}]\ntolerance = {tables.tolerance:g}\n"]
+        parts += [toml_of(name, keys) for name, keys in content["define"].items()]
+        write_file(tables.recipe, "\n".join(parts).encode(), folder)
+    made = Made()
+    if tables.store is None:
+        return made
+    kept = _build(recipe, tables.store, min(tables.jobs, len(targets)), made)
+    if kept:
+        made.report = audit.run(
+            tables.store,
+            kept,
+            tables.store / "audit-part.json",
+            jobs=min(tables.jobs, len(kept)),
+            figures=False,
+            shown=False,
+        )
+    return made
+
+
+def _content(targets: Sequence[Target], tolerance: float, folder: Path) -> dict[str, Any]:
+    """Return the recipe of materials, in a folder."""
+    define = {target.name: target.define(folder) for target in targets}
+    return {"materials": list(define), "tolerance": tolerance, "define": define}
+
+
+def _build(recipe: Recipe, store: Path, jobs: int, made: Made) -> list[str]:
+    """Build tables; return the names of those that the store has."""
+    kept: list[str] = []
+    at: AbstractContextManager[Workers] = workers.processes(jobs) if jobs > 1 else workers.threads(1)
+    with at as opened, Bars() as bars:
+
+        def report(event: Event) -> None:
+            if event["event"] == "failed":
+                made.refused.append(event["error"])
+            elif event["event"] in ("published", "adopted", "unchanged"):
+                kept.append(event["material"])
+            bars(event)
+
+        try:
+            build(recipe, store, opened, report, memory=build_resources.machine_memory())
+        except (StoreError, WorkersError):
+            raise
+        except BrdfdbError:
+            if not made.refused:
+                raise
+    names = [job.name for job in recipe.measured_jobs()]
+    return sorted(kept, key=names.index)
+
+
+def _relative(file: Path, folder: Path) -> str:
+    """Return the path of a file from a folder, with slashes; the absolute one from another drive."""
+    try:
+        return Path(os.path.relpath(file.absolute(), folder.absolute())).as_posix()
+    except ValueError:
+        return file.absolute().as_posix()

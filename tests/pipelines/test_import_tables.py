@@ -1,0 +1,260 @@
+"""`brdfdb import --store`: statements, tables and their audit in one command, and what is refused of it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import brdfdb
+from brdfdb import formats
+from brdfdb.geometry import degrees, unit_vector
+from brdfdb.materials import presets
+from brdfdb.measurements import Samples
+from brdfdb_pipelines import recipe_file
+from tests.formats.test_neural import network
+from tests.measurements.made_up import scattered
+from tests.pipelines.command import Captured, run
+
+ONE_JOB = ("--jobs", "1", "--tolerance", "0.2")
+
+
+def _csv(path: Path, samples: Samples, names: str = "theta_i,theta_r,delta_phi,brdf") -> Path:
+    columns = [degrees(a) for a in (samples.theta_i, samples.theta_r, samples.phi_r)] + [samples.values[:, 0]]
+    rows = "\n".join(",".join(f"{x:.9g}" for x in row) for row in np.stack(columns, axis=1))
+    path.write_text(f"{names}\n{rows}\n")
+    return path
+
+
+@pytest.fixture
+def clay() -> Samples:
+    return scattered(presets()["clay-vase"].brdf_at(None), 240, 0.03)
+
+
+def _network(darkest: float, slope: float) -> bytes:
+    """Return a network with f_r = (1 + darkest) exp(slope (1 + d_x)) - 1, where d_x changes sign with the exchange."""
+    first, second, third = (np.zeros(shape, np.float32) for shape in ((6, 21), (21, 21), (21, 3)))
+    first[3, 0], second[0, 0], third[0] = 1.0, 1.0, slope
+    bias = np.zeros(21, np.float32)
+    bias[0] = 1.0
+    weights = {"dense_1": (first, bias), "dense_2": (second, np.zeros(21, np.float32))}
+    weights["dense_3"] = third, np.full(3, np.log1p(darkest), np.float32)
+    return network(
+        {
+            f"{layer}/{layer}/{part}:0": values
+            for layer, both in weights.items()
+            for part, values in zip(("kernel", "bias"), both, strict=True)
+        }
+    )
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Path:
+    """Two networks: one that is not reciprocal, and one with an albedo of pi / 2."""
+    path = tmp_path / "networks.zip"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("nets/too_bright.h5", _network(0.5, 0.0))
+        file.writestr("nets/dark_grey.h5", _network(0.1, 0.05))
+        file.writestr("nets/dark_grey.json", b"{}")
+    return path
+
+
+def test_an_archive_is_imported_and_audited_whole(archive: Path, tmp_path: Path, capsys: Captured) -> None:
+    store = tmp_path / "store"
+    assert run("import", archive, "--store", store, *ONE_JOB) == 1  # one of them reflects more than it receives
+    printed = capsys.readouterr().out
+    assert f"{archive}: dark_grey\n" in printed
+    assert f"{archive}: too_bright\n" in printed
+    assert "albedo above 1: 1 (too-bright)" in printed
+    assert "2 of 2 state no uncertainty, and are not judged" in printed
+    assert printed.endswith("2 tables audited: passes 1, violates 1\n")
+    assert set(brdfdb.open(store)) == {"dark-grey", "too-bright"}
+    directions = unit_vector([0.3, 0.5], [0.0, 0.0]), unit_vector([0.9, 0.1], [2.0, 0.5])
+    expected = formats.read(archive, member="dark_grey").lookup_vectors(*directions)[:, 1]
+    looked_up = brdfdb.open(store)["dark-grey"].lookup_vectors(*directions, 550.0)
+    assert np.ravel(looked_up) == pytest.approx(expected, rel=0.02)
+    assert (store / "audit-part.json").exists()
+
+
+def test_json_has_statements_tables_and_summary(archive: Path, tmp_path: Path, capsys: Captured) -> None:
+    assert run("import", archive, "--store", tmp_path / "store", "--conserving", "--json", *ONE_JOB) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [statement["name"] for statement in document["statements"]] == ["dark_grey", "too_bright"]
+    assert document["refused"] == []
+    assert document["summary"]["materials"] == document["summary"]["passes"] == 2
+    assert document["summary"]["violates"] == document["summary"]["above_1"] == []
+    dark, bright = document["tables"]
+    assert 0.01 < dark["asymmetry_median"] < 0.1
+    assert document["summary"]["asymmetry_median"] == pytest.approx(dark["asymmetry_median"] / 2.0)
+    assert bright["asymmetry_median"] == 0.0
+    assert bright["albedo"] <= 1.0
+    assert bright["uncertainty"] is bright["asymmetric"] is None
+
+
+def test_the_recipe_builds_the_same_tables_and_nothing_anew(
+    tmp_path: Path, clay: Samples, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _csv(Path("run12.csv"), clay, "sun,view,turn,number")
+    (tmp_path / "recipes").mkdir()
+    columns = [f"--column={role}={name}" for role, name in zip(
+        ("theta_i", "theta_r", "delta_phi", "values"), ("sun", "view", "turn", "number"), strict=True
+    )]  # fmt: skip
+    options = ["--angles", "deg", "--quantity", "reflectance_factor", "--reciprocal", "--name", "clay-12"]
+    options += [
+        "--title",
+        'Clay, "measured"',
+        "--source",
+        "run 12",
+        "--store",
+        "store",
+        "--recipe",
+        "recipes/clay.toml",
+    ]
+    assert run("import", "run12.csv", *columns, *options, *ONE_JOB) in (0, 1)
+    capsys.readouterr()
+    recipe = tomllib.loads(Path("recipes/clay.toml").read_text())
+    assert recipe["define"]["clay-12"]["samples"] == "../run12.csv"
+    assert recipe["define"]["clay-12"]["columns"]["theta_i"] == ["sun"]
+    assert run("build", "recipes/clay.toml", "--store", "store") == 0
+    assert "1 table unchanged" in capsys.readouterr().out
+    metadata = brdfdb.open("store").metadata("clay-12")
+    assert metadata.title == 'Clay, "measured"'
+    assert metadata.measured is not None
+    assert [change.law for change in metadata.measured.changes] == ["reciprocal"]
+
+
+def test_a_recipe_alone_builds_nothing(tmp_path: Path, clay: Samples, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    _csv(Path("clay.csv"), clay)
+    assert run("import", "clay.csv", "--recipe", "clay.toml") == 0
+    assert [job.name for job in recipe_file.load(Path("clay.toml")).measured_jobs()] == ["clay"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["clay.csv", "clay.toml"]
+
+
+def test_joined_files_are_one_table(tmp_path: Path, clay: Samples, capsys: Captured) -> None:
+    rows = np.arange(len(clay))
+    first = _csv(tmp_path / "first.csv", clay.selected(rows[:100]))
+    second = _csv(tmp_path / "second.csv", clay.selected(rows[100:]))
+    assert run("import", first, second, "--join", "--name", "clay", "--store", tmp_path / "store", *ONE_JOB) in (0, 1)
+    assert f"{first}, {second}: first\n  240 samples" in capsys.readouterr().out
+    measured = brdfdb.open(tmp_path / "store").metadata("clay").measured
+    assert measured is not None
+    assert (measured.samples, measured.file) == (240, "first.csv, second.csv")
+    assert len(measured.file_sha256.split(", ")) == 2
+    whole = _csv(tmp_path / "whole.csv", clay)
+    joined, alone = (formats.samples(path) for path in (whole, first))
+    assert np.array_equal(joined.values[:100], alone.values)
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "sentence"),
+    [
+        ("theta_i,theta_r,delta_phi,550nm", "30,40,50,0.1", "other has the channels 550nm, and clay has grey"),
+        (
+            "theta_i,phi_i,theta_r,phi_r,brdf",
+            "30,20,40,50,0.1",
+            "azimuths of clay are relative to the light, and those of other to the surface",
+        ),
+    ],
+)
+def test_files_that_do_not_fit_are_not_joined(
+    tmp_path: Path, clay: Samples, capsys: Captured, header: str, row: str, sentence: str
+) -> None:
+    other = tmp_path / "other.csv"
+    other.write_text(f"{header}\n{row}\n")
+    assert run("import", _csv(tmp_path / "clay.csv", clay), other, "--join", "--store", tmp_path / "store") == 2
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "store").exists()
+
+
+def _hostile(folder: Path, good: Path) -> list[Path]:
+    """Return files that are refused: truncated, empty, not finite, of a wrong count, and a gigabyte of zeros."""
+    lines = good.read_text().splitlines()
+    texts = {"count": [*lines[:9], "1,2,3", *lines[9:]], "infinite": [*lines, "10,20,30,inf"], "empty": []}
+    texts |= {"below": [lines[0], "100,20,30,0.1"], "few": lines[:4], "holes": [lines[0], *["10,20,30,nan"] * 12]}
+    paths = []
+    for name, some in texts.items():
+        paths.append(folder / f"{name}.csv")
+        paths[-1].write_text("\n".join(some))
+    for name, content in (("cut", network()[:9000]), ("nan", network({"dense_1/dense_1/bias:0": np.full(21, np.nan)}))):
+        paths.append(folder / f"{name}.h5")
+        paths[-1].write_bytes(content)
+    paths += [folder / "zeros.csv", folder / "missing.csv"]
+    with paths[-2].open("wb") as file:
+        file.truncate(1 << 30)
+    return paths
+
+
+def test_hostile_files_are_a_sentence_each_and_the_others_are_imported(
+    tmp_path: Path, clay: Samples, capsys: Captured
+) -> None:
+    good = _csv(tmp_path / "clay.csv", clay)
+    hostile = _hostile(tmp_path, good)
+    store = tmp_path / "store"
+    assert run("import", *hostile, good, "--store", store, *ONE_JOB, "--json") == 2
+    captured = capsys.readouterr()
+    document = json.loads(captured.out)
+    for path in hostile:
+        assert sum(path.name in sentence for sentence in document["refused"]) == 1, path
+    assert len(document["refused"]) == len(hostile)
+    assert "Traceback" not in captured.err
+    assert [path.name for path in (store / "materials").iterdir()] == ["clay"]
+    assert not [*(store / ".staging").glob("*/*/table")]
+    assert document["summary"]["materials"] == 1
+
+
+def test_a_store_is_not_begun_for_files_that_are_all_refused(tmp_path: Path, clay: Samples, capsys: Captured) -> None:
+    few = _csv(tmp_path / "few.csv", clay.selected(np.arange(4)))
+    (tmp_path / "broken.csv").write_text("theta_i,theta_r,delta_phi,brdf\n1,2,3\n")
+    assert run("import", tmp_path / "broken.csv", few, "--store", tmp_path / "store", *ONE_JOB) == 2
+    assert "few" in capsys.readouterr().err
+    assert not (tmp_path / "store").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--reciprocal"], "--reciprocal: it goes with --store or --recipe"),
+        (["--store", "s", "--tolerance", "2"], "tolerance: 2 "),
+        (["--store", "s", "--name", "copper"], "'copper' is the name of a preset"),
+        (["--store", "s", "--title", ""], "title: must not be empty"),
+        (["--recipe", "recipe.json"], "--recipe: 'recipe.json' does not end in .toml"),
+        (["twin/clay.csv", "--store", "s"], "would both be 'clay'"),
+        (["other.csv", "--store", "s", "--name", "x"], "--name: it is for one material, and there are 2"),
+        (["--store", "s", "--name", "Clay 1"], "'Clay 1' is not made of lower-case letters, digits"),
+    ],
+)
+def test_options_that_cannot_be_are_refused_before_anything_is_read(
+    tmp_path: Path, clay: Samples, capsys: Captured, monkeypatch: pytest.MonkeyPatch, options: list[str], sentence: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "twin").mkdir()
+    for path in ("clay.csv", "twin/clay.csv", "other.csv"):
+        _csv(Path(path), clay)
+    name = next(iter(presets()))
+    given = [name if option == "copper" else option for option in options]
+    assert run("import", "clay.csv", *given) == 2
+    captured = capsys.readouterr()
+    assert sentence.replace("copper", name) in captured.err
+    assert captured.out == ""
+    assert not Path("s").exists()
+
+
+def test_requests_of_recipes_without_new_keys_are_those_of_before(tmp_path: Path, clay: Samples) -> None:
+    """A table that was built earlier is not built again because a recipe has more keys now."""
+    _csv(tmp_path / "clay.csv", clay)
+    path = tmp_path / "recipe.toml"
+    path.write_text('materials = ["my-clay"]\ntolerance = 0.05\n[define.my-clay]\nsamples = "clay.csv"\n')
+    request: dict[str, Any] = recipe_file.load(path).measured_jobs()[0].request
+    of_table = {"format", "member", "title", "source", "reciprocal", "conserving"}
+    assert set(request) == of_table | {
+        "table_version", "measured_version", "measured_name", "file_sha256", "tolerance",
+    }  # fmt: skip
