@@ -12,6 +12,7 @@ from brdfdb.fitting.projection import COARSE, FINE, cost_of, project, slopes_of
 from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.surface import Surface, total
 from brdfdb.fitting.variables import best_apart, spread
+from brdfdb.measurements.aperture import RESOLVED, View
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
@@ -46,8 +47,8 @@ class Problem:
     ----------
     surface : Surface
         The surface.
-    wi, wr : array (N, 3)
-        Unit vectors of light and viewer.
+    view : View
+        Directions of light and viewer as the instrument sees them.
     residual : Residual
         Of the same N samples.
     fixed : mapping of int to float
@@ -59,13 +60,12 @@ class Problem:
     def __init__(
         self,
         surface: Surface,
-        wi: Floats,
-        wr: Floats,
+        view: View,
         residual: Residual,
         fixed: Mapping[int, float] | None = None,
         held: Mapping[int, float] | None = None,
     ) -> None:
-        self.surface, self.wi, self.wr, self.residual = surface, wi, wr, residual
+        self.surface, self.view, self.residual = surface, view, residual
         self.fixed = dict(fixed or {})
         self.free = [j for j in range(len(surface.shape)) if j not in self.fixed]
         shape = (len(surface.coefficients), surface.channels)
@@ -82,7 +82,7 @@ class Problem:
         """Return the problem of some of the samples."""
         part = Problem.__new__(Problem)
         part.__dict__ |= self.__dict__
-        part.wi, part.wr, part.residual = self.wi[rows], self.wr[rows], self.residual.selected(rows)
+        part.view, part.residual = self.view.selected(rows), self.residual.selected(rows)
         return part
 
     def at(self, free: Array, start: Array | None = None, tolerance: float = FINE) -> Point:
@@ -91,7 +91,7 @@ class Problem:
         x[self.free] = free
         for index, u in self.fixed.items():
             x[index] = u
-        basis = self.surface.basis(x, self.wi, self.wr)
+        basis = self.surface.basis(x, self.view)
         begin = self.begin if start is None else start
         values = project(self.surface, basis, self.residual, self.scale, (self.low, self.high), begin, tolerance)
         f_r = total(basis, self.surface.monomials(values))
@@ -107,7 +107,7 @@ class Problem:
             moved = point.x.copy()
             step = -_STEP if moved[index] > 0.5 else _STEP
             moved[index] += step
-            f_r = total(self.surface.basis(moved, self.wi, self.wr), monomials)
+            f_r = total(self.surface.basis(moved, self.view), monomials)
             columns[number] = slope * (f_r - point.f_r) / step
         return columns
 
@@ -180,18 +180,8 @@ class Problem:
 
     def _shows(self, x: Array) -> bool:
         """Return False if a lobe of the surface is too narrow or too wide to begin with."""
-        middle = {one.name: 0.5 * one.unit for one in self.surface.coefficients}
-        for number, (term, given) in enumerate(zip(self.surface.terms, self.surface.numbers(x), strict=True)):
-            if term.spec.lobe is None:
-                continue
-            linear = {name: middle[name] for name in term.linear}
-            with np.errstate(all="ignore"):
-                arguments = {**self.surface.arguments(number, given, 0), **linear}
-                lobe = term.spec.lobe(np.asarray(1.0), **arguments)
-            width = float(np.min(lobe.alpha_x))
-            if not _NARROWEST <= width <= _WIDEST:
-                return False
-        return True
+        narrowest = max(_NARROWEST, RESOLVED * self.view.half_angle)
+        return all(narrowest <= width <= _WIDEST for width in self.surface.widths(x))
 
     def best(self) -> Point:
         """Return the best end of descents from several beginnings.
@@ -213,7 +203,7 @@ class Problem:
 
     def _some(self) -> NDArray[np.int64]:
         """Return some of the samples: half of them the brightest, half of them any."""
-        count = len(self.wi)
+        count = len(self.view)
         if count <= _SOME:
             return np.arange(count)
         brightness = np.where(self.residual.used, self.residual.truth, -np.inf).max(axis=1)

@@ -143,7 +143,7 @@ class Profile:
         p = self.problem
         fixed = p.fixed if self.shape is None else {**p.fixed, self.shape: at}
         held = None if self.coefficient is None else {self.coefficient: at}
-        one = Problem(p.surface, p.wi, p.wr, p.residual, fixed, held)
+        one = Problem(p.surface, p.view, p.residual, fixed, held)
         one.scale = p.scale
         begin = np.clip(self.point.x + self.along * (at - self.best), 0.0, 1.0)
         cost = one.descend(begin[one.free], _EVALUATIONS).cost
