@@ -102,6 +102,7 @@ class Fit(_Record):
 class Left(_Record):
     """Values of the samples that no fit uses."""
 
+    below_horizon: int = Field(description="values of the file with a direction below the horizon")
     holes: int
     at_horizon: int = Field(description="a direction at 90 degrees, where models are 0")
     unusable: int = Field(description="not positive, where logarithms or relative differences are taken")

@@ -206,7 +206,12 @@ def fits(
         refractive_index=refractive_index,
         source_solid_angle_sr=samples.instrument.source_solid_angle_sr,
         receiver_solid_angle_sr=samples.instrument.receiver_solid_angle_sr,
-        left_out=Left(holes=counting.holes, at_horizon=counting.at_horizon, unusable=counting.left_out),
+        left_out=Left(
+            below_horizon=int(samples.record.get("below_the_horizon", 0)),
+            holes=counting.holes,
+            at_horizon=counting.at_horizon,
+            unusable=counting.left_out,
+        ),
         ranked_by="held-out rms of ln" if by_held_out else "BIC",
         fits=[one for one, _ in made],
         outliers=far,

@@ -156,6 +156,7 @@ def lines(document: Fits) -> list[str]:
     reasons = [
         f"{count} {reason}"
         for count, reason in (
+            (left.below_horizon, "below the horizon"),
             (left.holes, "holes"),
             (left.at_horizon, "at the horizon"),
             (left.unusable, "not positive" if document.residual in ("log", "relative") else "without uncertainty"),
