@@ -38,6 +38,7 @@ _PAGES = {
     "audit": _Text("Audit", "The report that `brdfdb audit` writes as `audit.json`."),
     "chart": _Text("Chart", "The document that `brdfdb chart` writes beside its pictures."),
     "choice": _Text("Choice", "The document that `brdfdb choose` writes beside its pictures."),
+    "fits": _Text("Fits", "The document that `brdfdb fit --json` writes."),
     "conversion": _Text("Conversion", "The document that `brdfdb convert --json` prints."),
 }
 

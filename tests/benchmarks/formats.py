@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,7 +29,8 @@ from tests.formats.round_trip import ROUND_TRIPPED, round_trip
 
 MEASURED = (
     "Size of the files of a table, the error that they state against it, and the time to write and read them, for each "
-    "format and kind of material, at a tolerance of 2 %. The first rows are those of the tables, against their models."
+    "format and kind of material, at a tolerance of 2 %. The first rows are those of the tables, against their models. "
+    "Sizes are compared where a file is within the tolerance: the table is to the model, the file to the table."
 )
 OWN = "brdfdb"
 ROUNDING = 1.02  # of what is read to what is stated: formats keep float32 or decimals
@@ -111,6 +112,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for (name, kind), some in sorted(rows.items()):
             if name == file_format:
                 shown.add(name, kind, *summary(some))
+    compared = run.table(
+        "Size of a file over that of the table of the same material",
+        Column(name="format", width=12),
+        *(Column(name=name) for name in ("materials", "smaller than a table", "smallest", "median", "largest")),
+    )
+    for file_format in formats:
+        compared.add(file_format, *ratios(rows, file_format))
     far = [row.far for some in rows.values() for row in some if row is not None and row.far]
     for sentence in far:
         run.say(sentence)
@@ -128,6 +136,20 @@ def summary(rows: Sequence[Row | None]) -> list[float | int | None]:
     size, p99 = np.array([row.nbytes for row in held]) / 1e3, 100.0 * np.array([row.p99 for row in held])
     times = (float(np.mean([row.write_s for row in held])), float(np.mean([row.read_s for row in held])))
     return [*counts, float(np.median(size)), float(size.max()), float(np.median(p99)), float(p99.max()), *times]
+
+
+def ratios(rows: Mapping[tuple[str, str], Sequence[Row | None]], file_format: str) -> list[float | int | None]:
+    """Return how many files are within 2 %, how many of them are smaller than the table, and their sizes over its."""
+    sizes = [
+        row.nbytes / own.nbytes
+        for (name, kind), some in rows.items()
+        if name == file_format
+        for row, own in zip(some, rows[OWN, kind], strict=True)
+        if row is not None and row.within and own is not None
+    ]
+    if not sizes:
+        return [0, 0, None, None, None]
+    return [len(sizes), sum(size < 1.0 for size in sizes), min(sizes), float(np.median(sizes)), max(sizes)]
 
 
 if __name__ == "__main__":

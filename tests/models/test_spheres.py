@@ -13,7 +13,7 @@ from brdfdb.integrals.quadrature import directional_albedo
 Array = NDArray[np.float64]
 
 NODES, AZIMUTHS = 24, 256
-THINNEST, DOUBLINGS = 2.0**-22, 44  # optical depth of the first layer; the last is 4 million deep
+THINNEST, DOUBLINGS = 2.0**-22, 36  # optical depth of the first layer; the last is 16 000 deep: later, rounding grows
 
 
 class Transport(NamedTuple):
@@ -64,13 +64,13 @@ def modes_of(model: Any, albedo: float) -> tuple[Array, Array]:
 
 def test_a_deep_layer_that_absorbs_nothing_returns_all_light() -> None:
     deep = transport(1.0)
-    np.testing.assert_allclose(2.0 * np.pi * deep.mean @ (deep.weights * deep.cosines), 1.0, atol=1e-3)  # 8.8e-4
+    np.testing.assert_allclose(2.0 * np.pi * deep.mean @ (deep.weights * deep.cosines), 1.0, atol=5e-5)  # 2.6e-5
 
 
 @pytest.mark.parametrize(
     ("albedo", "mean", "first_cosine"),
-    # The worst: 0.00150 and 0.0010, 0.0036 and 0.0043, 0.0096 and 0.0067, 0.0263 and 0.0073
-    [(0.1, 0.0016, 0.0011), (0.5, 0.0037, 0.0044), (0.9, 0.0097, 0.0069), (1.0, 0.027, 0.0074)],
+    # The worst: 0.00150 and 0.0010, 0.0036 and 0.0043, 0.0096 and 0.0069, 0.0273 and 0.0073
+    [(0.1, 0.0016, 0.0011), (0.5, 0.0037, 0.0044), (0.9, 0.0097, 0.0069), (1.0, 0.0274, 0.0074)],
 )
 def test_lambertian_spheres_scatter_as_transport_says(albedo: float, mean: float, first_cosine: float) -> None:
     expected, (f_0, f_1) = transport(albedo), modes_of(models.lambert_sphere, albedo)

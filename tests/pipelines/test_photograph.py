@@ -39,6 +39,7 @@ def test_pictures_are_written_and_read_as_samples(tmp_path: Path, capsys: pytest
 def test_what_cannot_be_is_refused_and_nothing_is_written(
     arguments: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["photograph", *arguments, "--out", str(tmp_path / "pictures")]) == 2
+    folders = ["--store", str(tmp_path / "store"), "--out", str(tmp_path / "pictures")]
+    assert main(["photograph", *arguments, *folders]) == 2
     assert sentence in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "pictures").exists()
