@@ -21,6 +21,7 @@ from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitte
 from brdfdb.geometry import degrees, radians, versine
 from brdfdb.measurements import Samples
 from brdfdb.measurements.aperture import View
+from brdfdb.models import MODELS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -172,20 +173,7 @@ def fits(
         If a name is unknown, a model that was named cannot describe the samples, or no sample counts.
     """
     counting = Residual(samples, residual)
-    made: list[tuple[Fit, Fitted]] = []
-    skipped: dict[str, str] = {}
-    for model in fitted_by_default() if models is None else models:
-        tick(model)
-        try:
-            fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
-        except NotDescribedError as error:
-            if models is not None and len(models) == 1:
-                raise
-            skipped[model] = error.sentence
-            continue
-        made.append((_document(fitted), fitted))
-    if not made:
-        raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
+    made, skipped = _made(samples, models, residual, refractive_index, tick)
     by_held_out = made[0][0].held_out is not None
     made.sort(key=lambda one: _rank(one[0]))
     if profiles:
@@ -219,6 +207,35 @@ def fits(
         skipped=skipped,
     )
     return document, [fitted for _, fitted in made]
+
+
+def _made(
+    samples: Samples,
+    models: Sequence[str] | None,
+    residual: Kind,
+    refractive_index: str | None,
+    tick: Callable[[str], None],
+) -> tuple[list[tuple[Fit, Fitted]], dict[str, str]]:
+    """Return the fits of all models that can describe the samples, and why others are left out."""
+    made: list[tuple[Fit, Fitted]] = []
+    skipped: dict[str, str] = {}
+    tried = fitted_by_default() if models is None else models
+    for model in tried:
+        tick(model)
+        try:
+            fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
+        except NotDescribedError as error:
+            if models is not None and len(models) == 1:
+                raise
+            skipped[model] = error.sentence
+            continue
+        made.append((_document(fitted), fitted))
+    if not made:
+        raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
+    if models is None:
+        slow = "its values are integrals, which take minutes; name it to fit it"
+        skipped |= {name: slow for name in MODELS if name not in tried}
+    return made, skipped
 
 
 def _rank(one: Fit) -> tuple[float, float]:

@@ -259,7 +259,7 @@ def _albedo(model: str, terms: list[Lobe]) -> Albedo:
     """Return the largest directional albedo [1], in the channel whose reflectances add up to most."""
     given = [_parameters(terms, channel) for channel in range(len(CHANNELS))]
     bright = [sum(v for name, v in one.items() if MODELS[model].parameter(name).reflectance) for one in given]
-    one = given[int(np.argmax(bright))]
+    one: dict[str, Any] = dict(given[int(np.argmax(bright))])
     computed = directional_albedo(model, radians(np.array(_ANGLES_DEG)), tolerance=_TOLERANCE, **one)
     index = int(np.argmax(computed.albedo))
     value, error = float(computed.albedo[index]), float(computed.error[index])

@@ -309,7 +309,7 @@ class Surface:
         """Return f_r (N, C) [1/sr] as an instrument sees it, with coefficients (K, C)."""
         return total(self.basis(x, view), self.monomials(values))
 
-    def reflected(self, x: Array, values: Floats, view: View) -> Floats:
+    def reflected(self, x: Array, values: Array, view: View) -> Floats:
         """Return the specular reflectance (N, C) [1] for each direction of the light."""
         sums = np.zeros((len(view), self.channels))
         for number, term in enumerate(self.terms):

@@ -94,13 +94,13 @@ class View:
     @cached_property
     def theta_i(self) -> Floats:
         """Polar angles [rad] of the light, shape (N,)."""
-        return np.arccos(np.clip(self.w_i[:, 2], -1.0, 1.0))
+        return np.asarray(np.arccos(np.clip(self.w_i[:, 2], -1.0, 1.0)))
 
     @cached_property
     def from_mirror(self) -> Floats:
         """Angles [rad] between the viewer and the mirror direction of the light, shape (N,)."""
         mirror = self.w_i * [-1.0, -1.0, 1.0]
-        return 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(self.w_r - mirror, axis=1), 0.0, 1.0))
+        return np.asarray(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(self.w_r - mirror, axis=1), 0.0, 1.0)))
 
     @cached_property
     def mirror(self) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +77,9 @@ def run(
         "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
         "source_solid_angle_sr": ("source-deg", source_deg),
     }
-    known = {name: _solid_angle(option, angle) for name, (option, angle) in cones.items() if angle is not None}
+    known: dict[str, Any] = {
+        name: _solid_angle(option, angle) for name, (option, angle) in cones.items() if angle is not None
+    }
     samples = replace(samples, instrument=replace(samples.instrument, **known))
     count = len(models or fitted_by_default()) + 1
     with terminal.progress(transient=True) as bar:
@@ -177,7 +180,8 @@ def lines(document: Fits) -> list[str]:
         )
     text.append("  held out, all: rms of ln(model / sample), at incidences left out of the fit, and of all")
     text += [
-        f"  not fitted: {name}, {reason.partition(': ')[2] or reason}" for name, reason in document.skipped.items()
+        f"  not fitted: {reason if reason.startswith(name) else f'{name}, {reason}'}"
+        for name, reason in document.skipped.items()
     ]
     best = document.fits[0]
     text += ["", f"best: {best.model}", *_numbers(best.estimates)]
