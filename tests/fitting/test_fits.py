@@ -12,7 +12,7 @@ from brdfdb.fitting.fit import fit, fits
 from brdfdb.fitting.problem import Problem
 from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.surface import NotDescribedError, Surface, fitted_by_default
-from brdfdb.fitting.uncertainty import NORMAL_95
+from brdfdb.fitting.uncertainty import NORMAL_95, _root
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements import Samples
 from brdfdb.measurements.aperture import View
@@ -225,6 +225,14 @@ def test_what_cannot_be_fitted_is_refused_in_a_sentence() -> None:
     spectral = samples(np.repeat(made.values, 2, axis=1), np.array([450.0, 650.0]))
     document, _ = fits(spectral, ["ward", "ggx"], profiles=False)
     assert list(document.skipped) == ["ggx"]
+
+
+def test_an_end_of_an_interval_is_found_along_a_profile_that_is_flat_at_first() -> None:
+    def deviation(u: float) -> float:
+        return 0.01 * u + 300.0 * max(u - 0.8, 0.0) ** 2
+
+    end = _root(deviation, 0.0, 0.0, 1.0, deviation(1.0))
+    assert deviation(end) == pytest.approx(NORMAL_95, rel=0.01)
 
 
 def test_a_profile_sets_a_limit_at_an_end_of_a_range() -> None:
