@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field
 from brdfdb.audit.energy import Energy
 from brdfdb.audit.finding import STRICT, Finding, NotJudged, Word
 from brdfdb.audit.model_energy import LOSS_UP_TO_DEG, Furnace, ModelEnergy
+from brdfdb.audit.reciprocity import Reciprocity
 from brdfdb.audit.registry import FINDINGS
 from brdfdb.audit.table_error import TableError
 
@@ -37,20 +38,45 @@ def as_published(findings: Mapping[str, Finding]) -> Answer:
         failing.insert(0, "energy of the table")
     if failing:
         named = ", ".join(failing)
+        if _is_measured(findings):
+            text = f"the data break a law by more than their uncertainty: {named}"
+            return Answer(word="violates", text=f"no: {named}", reason=text)
         return Answer(word="violates", text=f"no: {named}", reason=f"the table differs from its source in: {named}")
-    if isinstance(findings[TableError.key], NotJudged):
-        return Answer(word="not judged", text="not judged", reason="the source of this table is not known")
+    error = findings[TableError.key]
+    if isinstance(error, NotJudged):
+        return Answer(
+            word="not judged", text="measured" if _is_measured(findings) else "not judged", reason=error.reason
+        )
     reason = "the table keeps to the formulas of its source within the error that it states"
     return Answer(word="passes", text="yes", reason=reason)
 
 
 def conserves_energy(findings: Mapping[str, Finding]) -> Answer:
-    """Return the answer to `CONSERVES_ENERGY`, which the table has no part in."""
+    """Return the answer to `CONSERVES_ENERGY`, which the table has no part in, unless it is measured."""
     energy = findings[Energy.key]
+    if isinstance(energy, Energy) and _is_measured(findings):
+        return _of_data(energy)
     if not isinstance(energy, Energy) or energy.model is None:
-        return Answer(word="not judged", text="not judged", reason="the source of this table is not known")
+        return Answer(word="not judged", text="not judged", reason="no model of this table can be evaluated")
     model = energy.model
     return Answer(word=model.verdict, text=_short(model), reason=model.reason)
+
+
+def _is_measured(findings: Mapping[str, Finding]) -> bool:
+    reciprocity = findings[Reciprocity.key]
+    return isinstance(reciprocity, Reciprocity) and reciprocity.table_random.measured
+
+
+def _of_data(energy: Energy) -> Answer:
+    """Return the answer for measured data, which have no model: that of their table."""
+    table = energy.table
+    most = "not finite" if table.max_albedo is None else f"albedo {table.max_albedo:.3g}"
+    where = f"{most} at {table.max_at_theta_i_deg:.3g}°"
+    if table.verdict == "violates":
+        text = f"the data do not: {where}"
+    else:
+        text = f"the data do{', within their uncertainty' if table.reason else ''}: {where}"
+    return Answer(word=table.verdict, text=text, reason=table.reason or text)
 
 
 def _violates(finding: Finding) -> bool:

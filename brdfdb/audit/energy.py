@@ -76,7 +76,7 @@ class Energy(Finding):
         of_table = table.reason or most
         if model is None:
             return [
-                self.sentence("not judged", "the source of this table is not known", title="Energy of the model"),
+                self.sentence("not judged", "no model of this table can be evaluated", title="Energy of the model"),
                 self.sentence(table.verdict, of_table, title="Energy of the table"),
             ]
         of_table = "as the model" if table.reason and table.reason == model.reason else of_table

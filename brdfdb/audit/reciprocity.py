@@ -10,6 +10,7 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.audit.finding import STRICT, Cell, Finding, NumberTable, Sentence, Subject, Verdict
 from brdfdb.audit.pairs import Pairs
 from brdfdb.figure import number
+from brdfdb.measurements.coordinates import Hull
 from brdfdb.parameters import Floats
 from brdfdb.tables.albedo import wavelengths_of
 from brdfdb.tables.grids import Grid
@@ -64,7 +65,8 @@ class Reciprocity(Finding):
     explanation = (
         "Asymmetry is |f − f′| / (|f| + |f′|), where f′ has light and viewer exchanged. 0 is reciprocal "
         "(Helmholtz), 1 is the largest possible asymmetry. Measured data have noise: 99 of 100 of their "
-        "asymmetries are judged by the uncertainty that they state."
+        "asymmetries are judged by their uncertainty and the stated error of the table, where both directions were "
+        "measured."
     )
 
     model_random: Asymmetry | None = Field(description="viewers over the hemisphere; null: the source is not known")
@@ -111,7 +113,7 @@ class Reciprocity(Finding):
         text = f"asymmetry of the data: median {_shown(worst.median)}, 99 of 100 up to {_shown(worst.p99)}"
         if worst.tolerance is None:
             return f"{text}; not judged, because their uncertainty is not known"
-        return f"{text}, of {number(worst.tolerance, 2)} that their uncertainty explains"
+        return f"{text}, of {number(worst.tolerance, 2)} that their uncertainty and the error of the table explain"
 
     def cells(self) -> list[Cell]:
         """Return the largest asymmetry."""
@@ -147,14 +149,15 @@ class Reciprocity(Finding):
 
 def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
     """Return the asymmetry of random pairs, of pairs in the lobe, and of all pairs of nodes."""
-    above, in_lobe = pairs.drawn.above, pairs.drawn.in_lobe
+    above, in_lobe = pairs.drawn.above & _measured_both_ways(table, pairs), pairs.drawn.in_lobe
     interpolation = table.interpolation
     mu = np.maximum(pairs.drawn.wi[:, 2:] * pairs.drawn.wr[:, 2:], COS_HORIZON**2)
     offset = interpolation.offset / mu**interpolation.power  # f_r far below the offset is rounding only
     allowed = _interpolant_tolerance(table.grid)
     measured = table.metadata.measured
     if measured is not None and not (table.grid.reciprocal and measured.reciprocity.assumed):
-        allowed = measured.uncertainty
+        stated = 0.0 if table.error is None else table.error.overall.p99
+        allowed = None if measured.uncertainty is None else measured.uncertainty + stated
     looked_up = (pairs.table + offset, pairs.table_exchanged + offset, allowed)
     model = (pairs.model, pairs.model_exchanged, MODEL_RECIPROCITY_TOLERANCE)
     asymmetries = Reciprocity(
@@ -171,6 +174,15 @@ def reciprocity_of(table: Table, pairs: Pairs) -> Reciprocity:
         random, lobe = (None if one is None else one.model_copy(update=as_measured) for one in of_table)
         asymmetries = asymmetries.model_copy(update={"table_random": random, "table_lobe": lobe})
     return asymmetries.judged()
+
+
+def _measured_both_ways(table: Table, pairs: Pairs) -> NDArray[np.bool_] | bool:
+    """Return which pairs lie within the directions that were measured, and do so exchanged; True without samples."""
+    measured = table.metadata.measured
+    if measured is None or measured.hull is None:
+        return True
+    hull, (wi, wr) = Hull(measured.hull), (pairs.drawn.wi, pairs.drawn.wr)
+    return ~(hull.outside(wi, wr) | hull.outside(wr, wi))
 
 
 def _interpolant_tolerance(grid: Grid) -> float | None:

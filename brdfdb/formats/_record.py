@@ -46,12 +46,14 @@ def record(
     """
     known = table.metadata
     document = known.model_dump(mode="json", include={"model", "model_version", "parameters", "refractive_index"})
-    licence = f"computed from parameters published in {known.source or 'a source that is not stated'}"
+    origin = known.source or "a source that is not stated"
+    licence = f"measured: {origin}" if known.measured else f"computed from parameters published in {origin}"
     return {
         "name": table.name,
         "title": known.title or "",
         **document,
         "source": known.source or "",
+        "measured": None if known.measured is None else known.measured.model_dump(mode="json", exclude={"hull"}),
         "note": known.note,
         "revision": table.revision,
         "digest": table.digest,
@@ -61,7 +63,10 @@ def record(
         "tolerance": tolerance,
         "error_of_table": None
         if table.error is None
-        else {"against": "the model", **table.error.overall.model_dump(include={"p99", "l1"})},
+        else {
+            "against": "the data" if known.measured else "the model",
+            **table.error.overall.model_dump(include={"p99", "l1"}),
+        },
         "remarks": list(remarks),
         "licence": f"{licence}; {_MEASURED}" if known.refractive_index else licence,
         "program": f"brdfdb {version('brdfdb')}",

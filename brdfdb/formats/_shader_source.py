@@ -144,6 +144,8 @@ def _closed_form(table: Table) -> tuple[str, dict[str, Any], Channels, tuple[str
     from brdfdb.models.shaders import FITS, SHADERS
 
     material = table.source
+    if table.metadata.measured is not None:
+        raise CannotHoldError(f"{table.name}: it is measured, and source code is of models; `brdfdb fit` fits one")
     if not isinstance(material, Material):
         raise CannotHoldError(f"{table.name}: the table does not say of which model it is, so there is no source of it")
     several = has_spectrum(table)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.materials import Material, Source, exact_material
+from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats, FormKind, ModelForm, bytes_of
 from brdfdb.store.family import Family
 from brdfdb.tables import tabulation
@@ -21,6 +22,7 @@ from brdfdb.tables.grids import (
     Grid,
 )
 from brdfdb.tables.layout import Layout
+from brdfdb.tables.measured_layout import layout_of
 from brdfdb.tables.planner import plan
 from brdfdb.tables.table import Table
 from brdfdb.tables.table_source import TableSource
@@ -111,6 +113,8 @@ def forms(source: Source, wavelength_nm: ArrayLike | None, tolerances: Sequence[
         key, title = "function", source.title
         if isinstance(source, TableSource):  # its own source cannot be evaluated
             key, title = "table-itself", f"{source.title}: the stored table itself"
+        elif isinstance(source, MeasuredSource):
+            key, title = "data", f"{source.title}: the data, interpolated"
         itself = Form(key, title, "exact", f"source {source.name}", source.brdf_at(at), 0)
         return [itself, *_tables(source, source, at, tolerances, "table")]
     listed = list(_of_model(source, at))
@@ -175,7 +179,10 @@ def _tables(
     for tolerance in dict.fromkeys(tolerances):
         percent = f"{100.0 * tolerance:g}"
         key = f"table-{percent.replace('.', '-')}"
-        layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
+        if isinstance(planned, MeasuredSource):
+            layout = layout_of(planned, wavelength_nm, tolerance)
+        else:
+            layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
         yield _table(layout, key, f"{table}, planned for {percent} %")
         if layout.spectra is not None and tolerance == _UNFACTORED:
             whole = replace(layout, spectra=None, part_nm=None)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from brdfdb.parameters import Floats
 
 _FLAT = 1e-6  # spread of the samples along an axis of their hull, relative to the largest, that counts as none
 _WITHIN = 1e-6  # distance [rad] outside of the hull that rounding makes
+_DECIMALS = 9  # digits of half-spaces that are kept
+_TURNED = 5  # numbers of a half-space where the azimuth of the light counts
 
 
 def half_angles(wi: Floats, wr: Floats) -> tuple[Floats, Floats]:
@@ -42,34 +44,48 @@ class Hull:
 
     Isotropic pairs are points (theta_i, theta_r cos delta_phi, theta_r sin delta_phi), with their mirror images.
     Others are points theta (cos phi, sin phi) of light and viewer. Directions in one plane make a flat hull.
+
+    Attributes
+    ----------
+    planes : array (P, 4 or 5)
+        Normals of the half-spaces and their offsets [rad]: a point x of 3 or 4 coordinates [rad] lies in the hull if
+        normal . x + offset is at most 0 for each of them.
     """
 
-    def __init__(self, wi: Floats, wr: Floats, *, turned: bool) -> None:
+    def __init__(self, planes: ArrayLike) -> None:
+        self.planes = np.asarray(planes, dtype=np.float64)
+
+    @classmethod
+    def of(cls, wi: Floats, wr: Floats, *, turned: bool) -> Hull:
+        """Return the hull of pairs of unit vectors (N, 3) of light and viewer; `turned` if the azimuth counts."""
         from scipy.spatial import ConvexHull
 
-        self._turned = turned
         x = _places(wi, wr, turned=turned)
         if not turned:
             x = np.concatenate([x, x * [1.0, 1.0, -1.0]])
-        self._centre = x.mean(axis=0)
-        _, spread, axes = np.linalg.svd(x - self._centre, full_matrices=True)
+        centre = x.mean(axis=0)
+        _, spread, axes = np.linalg.svd(x - centre, full_matrices=True)
         spread = np.pad(spread, (0, x.shape[1] - spread.size))
         wide = spread > _FLAT * max(spread[0], 1e-12)
-        self._along, self._across = axes[wide], axes[~wide]
-        inside = (x - self._centre) @ self._along.T
+        along, across = axes[wide], axes[~wide]
+        inside = (x - centre) @ along.T
         if inside.shape[1] > 1:
-            self._planes = ConvexHull(inside).equations
+            planes = ConvexHull(inside).equations
         else:
             low, high = inside.min(initial=0.0), inside.max(initial=0.0)
-            self._planes = np.array([[1.0, -high], [-1.0, low]])[:, 1 - inside.shape[1] :]
+            planes = np.array([[1.0, -high], [-1.0, low]])[:, 1 - inside.shape[1] :]
+        flat = np.zeros((len(across), 1))
+        normals = np.concatenate([planes[:, :-1] @ along, across, -across])
+        offsets = np.concatenate([planes[:, -1:], flat, flat]) - (normals @ centre)[:, np.newaxis]
+        return cls(np.unique(np.round(np.concatenate([normals, offsets], axis=1), _DECIMALS), axis=0))
 
     def outside(self, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
         """Return which pairs of unit vectors (N, 3) lie outside of the hull."""
-        x = _places(wi, wr, turned=self._turned) - self._centre
-        beyond = np.any(np.abs(x @ self._across.T) > _WITHIN, axis=1)
-        return np.asarray(
-            beyond | np.any((x @ self._along.T) @ self._planes[:, :-1].T > _WITHIN - self._planes[:, -1], axis=1)
-        )
+        x = _places(wi, wr, turned=self.planes.shape[1] == _TURNED)
+        beyond = np.zeros(len(x), dtype=bool)
+        for plane in self.planes:  # one at a time: tables have many nodes
+            beyond |= x @ plane[:-1] + plane[-1] > _WITHIN
+        return beyond
 
 
 def _places(wi: Floats, wr: Floats, *, turned: bool) -> Floats:

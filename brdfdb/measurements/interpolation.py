@@ -306,7 +306,7 @@ def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: Interpo
     inside = np.ones(len(problem.wi), dtype=bool)
     for group in np.unique(problem.group):
         own = problem.group == group
-        hull = Hull(problem.wi[~own], problem.wr[~own], turned=samples.turned)
+        hull = Hull.of(problem.wi[~own], problem.wr[~own], turned=samples.turned)
         inside[own] = ~hull.outside(problem.wi[own], problem.wr[own])
     counted = inside if inside.any() else ~inside
     f_r = np.maximum(2.0 * how.level * np.sinh(problem.of_base + predicted), 0.0)[counted]

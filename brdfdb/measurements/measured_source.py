@@ -57,7 +57,6 @@ class MeasuredSource(FunctionSource):
     """
 
     _measured: Measured = PrivateAttr()
-    _hull: Hull | None = PrivateAttr(default=None)
     _channels_at: Evaluate = PrivateAttr()
 
     @property
@@ -91,23 +90,25 @@ class MeasuredSource(FunctionSource):
         if uncertainty is not None:
             relative = (uncertainty / np.maximum(np.abs(samples.values), floor_of(samples)))[samples.known]
             noise = Noise(**_named(("median", "p95"), np.nanpercentile(relative, [50.0, 95.0])))
-        hull = Hull(*(w[samples.known.any(axis=1)] for w in (samples.w_i, samples.w_r)), turned=samples.turned)
+        some = samples.known.any(axis=1)
+        hull = Hull.of(samples.w_i[some], samples.w_r[some], turned=samples.turned)
         known = samples.values[samples.known]
         measured = Measured(
             by=samples.instrument.name,
             channels=list(samples.channels),
-            samples=int(np.count_nonzero(samples.known.any(axis=1))),
+            samples=int(np.count_nonzero(some)),
             incidences=int(np.unique(samples.incidence).size),
             holes=int(np.count_nonzero(~samples.known)),
             negative=float(f"{np.mean(known < 0.0):.3g}"),
             interpolation=f"asinh of f_r over noise, less that of {fitted.base}, by radial functions of directions",
             reciprocity=symmetry.reciprocity(fitted.f_r, hull, fitted.held_out.p99),
             mirror=None if samples.turned else _mirror_of(samples, fitted.held_out.p99),
+            hull=hull.planes.tolist(),
             held_out=fitted.held_out,
             noise=noise,
         )
         return cls._of(
-            fitted.f_r, samples.channels, samples.wavelength_nm, measured, hull, samples.turned,
+            fitted.f_r, samples.channels, samples.wavelength_nm, measured, samples.turned,
             name or samples.name, title or samples.name, provenance or samples.provenance or "a file of samples",
         )  # fmt: skip
 
@@ -166,7 +167,7 @@ class MeasuredSource(FunctionSource):
             noise=noise,
         )
         mirrored = _mirrored(f_r) if seen is not None and seen.assumed and _differs(seen) else f_r
-        return cls._of(mirrored, channels, wavelength_nm, measured, None, turned, name, title, provenance)
+        return cls._of(mirrored, channels, wavelength_nm, measured, turned, name, title, provenance)
 
     @classmethod
     def _of(
@@ -175,7 +176,6 @@ class MeasuredSource(FunctionSource):
         channels: tuple[str, ...],
         wavelength_nm: NDArray[np.float64] | None,
         measured: Measured,
-        hull: Hull | None,
         turned: bool,
         name: str,
         title: str,
@@ -198,12 +198,12 @@ class MeasuredSource(FunctionSource):
             reciprocal=measured.reciprocity.assumed,
             alpha=None if width is None else (width, width),
         )
-        source._measured, source._hull, source._channels_at = measured, hull, f_r
+        source._measured, source._channels_at = measured, f_r
         return source
 
     def extrapolated(self, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
         """Return which pairs of unit vectors (N, 3) lie outside of the directions that were measured."""
-        return np.zeros(len(wi), dtype=bool) if self._hull is None else self._hull.outside(wi, wr)
+        return Hull(self._measured.hull or np.empty((0, 4))).outside(wi, wr)
 
     def recorded(self, **changes: Any) -> Self:
         """Return the source with some entries of its record changed."""
@@ -250,7 +250,7 @@ class MeasuredSource(FunctionSource):
         measured = self._measured.model_copy(update={"changes": [*self._measured.changes, change], "reciprocity": kept})
         at = None if self.wavelengths_nm is None else np.array(self.wavelengths_nm)
         return self._of(
-            after, tuple(measured.channels), at, measured, self._hull, self.anisotropic,
+            after, tuple(measured.channels), at, measured, self.anisotropic,
             self.name, self.title, self.provenance,
         )  # fmt: skip
 

@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+_SHOWN = 12  # digits of a digest
+
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
@@ -87,6 +89,11 @@ class Measured(BaseModel):
     extrapolated: float | None = Field(
         default=None, description="share of the nodes above the horizon that lie outside of the samples"
     )
+    hull: list[list[float]] | None = Field(
+        default=None,
+        description="half-spaces around the directions that were measured, each a normal and an offset [rad], as of "
+        "`brdfdb.measurements.coordinates.Hull`; null: f_r is known everywhere",
+    )
     held_out: HeldOut | None = Field(default=None, description="null: f_r is known everywhere")
     noise: Noise | None = Field(default=None, description="null: not known")
     changes: list[Change] = Field(default_factory=list)
@@ -105,6 +112,8 @@ class Measured(BaseModel):
         """Return sentences on origin, errors, symmetries and changes."""
         of = f"{self.samples} samples of {self.incidences} incidences" if self.samples else "f_r of a file, everywhere"
         lines = [f"{of}, channels {', '.join(self.channels)}{f'; {self.by}' if self.by else ''}"]
+        if self.file:
+            lines.append(f"file {self.file}, sha256 {self.file_sha256[:_SHOWN]}...")
         if self.held_out is not None:
             held = self.held_out
             left = "one incidence" if held.scheme == "incidences" else f"one of {held.rounds} parts"
@@ -124,7 +133,9 @@ class Measured(BaseModel):
                 )
                 lines.append(f"{name} {'assumed' if symmetry.assumed else 'not assumed'}: {how}")
         if self.extrapolated is not None:
-            lines.append(f"{100.0 * self.extrapolated:.3g} % of the nodes lie outside of the samples: extrapolated")
+            lines.append(
+                f"{100.0 * self.extrapolated:.3g} % of the nodes lie outside of the samples: f_r there is extrapolated"
+            )
         if self.negative > 0.0:
             lines.append(f"{100.0 * self.negative:.3g} % of the values are below 0: f_r is 0 there")
         for change in self.changes:

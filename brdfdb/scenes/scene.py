@@ -19,7 +19,7 @@ from brdfdb.scenes.recorded_directions import Recorded
 from brdfdb.scenes.shapes import STRICT, AnyShape, Array, Vector, check_direction, unit
 from brdfdb.spectra import ILLUMINANT, OBSERVER, check_illuminant, check_observer, covers_visible
 from brdfdb.store.reader import Store
-from brdfdb.tables.table_source import source_of_table
+from brdfdb.tables.table_source import TableSource, source_of_table
 
 STORED = "store:"  # prefix of the name of a material that is read from the store of the scene
 WAVELENGTHS_NM = [float(wavelength) for wavelength in range(380, 781, 10)]
@@ -244,6 +244,7 @@ class Scene(BaseModel):
         for name in self.stored:
             assert self.store is not None  # `_materials` has made sure of this
             sources[name] = _stored(self.store, name)
+            _check_range(name, sources[name], self.wavelengths_nm)
         return sources
 
     @property
@@ -269,6 +270,21 @@ def _stored(root: str, name: str) -> Source:
         return source_of_table(Store(root)[name.removeprefix(STORED)])
     except BrdfdbError as error:
         raise ParameterError(f"material {name}", str(error)) from None
+
+
+def _check_range(name: str, source: Source, wavelengths_nm: list[float]) -> None:
+    """Refuse a table that is a source if the wavelengths of the scene go beyond its own."""
+    at = source.wavelengths_nm
+    if not isinstance(source, TableSource) or at is None or len(at) == 1:
+        return
+    outside = [one for one in wavelengths_nm if not at[0] <= one <= at[-1]]
+    if outside:
+        raise ParameterError(
+            "wavelengths_nm",
+            f"{outside[0]:g} is outside [{at[0]:g}, {at[-1]:g}] nm of {name}; give the scene a range within it",
+            outside[0],
+            (at[0], at[-1]),
+        )
 
 
 def _materials(scene: Scene) -> dict[str, Source]:

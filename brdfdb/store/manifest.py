@@ -30,6 +30,7 @@ class Summary(TypedDict):
     wavelength_range_nm: NotRequired[list[float]]  # these are missing from manifests of before version 4 of tables
     formula_error: NotRequired[dict[str, Any] | None]
     largest_albedo: NotRequired[dict[str, Any] | None]
+    measured: NotRequired[bool]
 
 
 class Manifest(TypedDict):
@@ -55,6 +56,7 @@ _LATER: dict[str, Any] = {
     "wavelength_range_nm": list,
     "formula_error": (dict, NoneType),
     "largest_albedo": (dict, NoneType),
+    "measured": bool,
 }
 
 

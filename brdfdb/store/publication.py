@@ -210,6 +210,7 @@ def publish_staged(root: Path, name: str, staging: Path, files: Mapping[str, Ent
             "largest_albedo": None
             if metadata.largest_albedo is None
             else metadata.largest_albedo.model_dump(mode="json"),
+            "measured": metadata.measured is not None,
         }
         for directory, _, _ in os.walk(table, topdown=False):
             sync_directory(Path(directory))

@@ -49,7 +49,7 @@ from brdfdb.store.paths import (
 from brdfdb.store.pointer import Head, check_summary, head_from
 from brdfdb.store.sealed_json import read_sealed
 from brdfdb.store.snapshot_record import Snapshot, read_snapshot
-from brdfdb.store.summary_words import COLUMNS, colours, energy, formula_error, last_audit
+from brdfdb.store.summary_words import COLUMNS, colours, energy, formula_error, kind, last_audit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,7 +108,7 @@ class Store(Mapping[str, "Table"]):
             audited = audits.get((name, head["revision"]))
             rows.append(
                 (
-                    *(name, head["title"], head["model"], colours(head), percent(head.get("error_p99"))),
+                    *(name, head["title"], kind(head), colours(head), percent(head.get("error_p99"))),
                     formula_error(head, percent),
                     "" if audited is None else audited.as_published,
                     energy(head, audited),

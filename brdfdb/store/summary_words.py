@@ -11,8 +11,9 @@ NOT_MEASURED = "not measured"
 NOT_AUDITED = "not audited"
 # What the two errors of a list are, for the line below it
 ERRORS_EXPLAINED = (
-    "table error: the table against its formula; formula error: the formula against the highest rung, which is the "
-    "form of the same model without an approximation; 0, exact form: the formula is that form"
+    "table error: the table against its formula; formula error: the formula against "
+    "the highest rung, which is the form of the same model without an approximation; 0, exact form: the formula is "
+    "that form; of measured tables, the table against the data"
 )
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
@@ -52,8 +53,15 @@ def colours(head: Mapping[str, Any]) -> str:
     return f"{at[0]:g} nm" if at[0] == at[-1] else f"{at[0]:g}-{at[-1]:g} nm"
 
 
+def kind(head: Mapping[str, Any]) -> str:
+    """Return the model of a table, or what it is of without one: measured, or a function."""
+    return head["model"] or ("measured" if head.get("measured") else "function")
+
+
 def formula_error(head: Mapping[str, Any], percent: Callable[[float], str]) -> str:
     """Return the error of a formula against the highest rung of its surface, in words."""
+    if head.get("measured"):
+        return "no formula"
     stated = head.get("formula_error")
     if stated is None:
         return NOT_MEASURED

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.geometry import HALF_PI, degrees, unit_vector
+from brdfdb.geometry import HALF_PI, degrees
 from brdfdb.materials import Source
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
@@ -93,12 +93,11 @@ def layout_of(source: MeasuredSource, wavelength_nm: NDArray[np.float64] | None,
 
 def _extrapolated(source: MeasuredSource, grid: Grid) -> float | None:
     """Return the share of the nodes above the horizon that lie outside of the samples; None without samples."""
-    if not source.measured.samples:
+    if source.measured.hull is None:
         return None
-    theta_i, phi_i, theta_r, phi_r = (angle.ravel() for angle in np.broadcast_arrays(*grid.directions()))
-    above = np.maximum(theta_i, theta_r) <= HALF_PI
-    outside = source.extrapolated(unit_vector(theta_i, phi_i)[above], unit_vector(theta_r, phi_r)[above])
-    return float(f"{np.mean(outside):.3g}")
+    theta_i, _, theta_r, _ = grid.directions()
+    above = np.broadcast_to(np.maximum(theta_i, theta_r) <= HALF_PI, grid.shape)
+    return float(f"{np.mean(tabulation.extrapolated(source, grid)[above]):.3g}")
 
 
 def _grid(source: Source, count: int) -> Grid:

@@ -14,6 +14,7 @@ from brdfdb.errors import BrdfdbError, ParameterError
 from brdfdb.geometry import Directions, checked_angles, checked_vectors
 from brdfdb.materials import FunctionRecord, Material, source_of
 from brdfdb.materials.source import Lookups
+from brdfdb.measurements.coordinates import Hull
 from brdfdb.notebook import card, listed, percent, spectrum
 from brdfdb.parameters import Floats
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -60,7 +61,8 @@ class Stated(NamedTuple):
         Values as by `Table.lookup`.
     error : array [1/sr]
         In the same shape. At a wavelength of the table 99 of 100 values in this band of theta_i are within that of the
-        source, or of what was measured if it is a measurement, whose uncertainty is added. Between wavelengths, and in
+        source, or of what was measured if it is a measurement, whose uncertainty is added; nan outside of the
+        directions that were measured, where nothing is known. Between wavelengths, and in
         the places of `brdfdb.tables.stated_error.Places`, 98 of 100 are.
     """
 
@@ -138,6 +140,28 @@ class BaseTable(Lookups):
         brdf = self.lookup_vectors(wi, wr, wavelength_nm)
         return Stated(brdf, self._stated(checked_vectors(wi, wr), brdf, wavelength_nm))
 
+    def extrapolated(
+        self, theta_i: ArrayLike, phi_i: ArrayLike, theta_r: ArrayLike, phi_r: ArrayLike
+    ) -> NDArray[np.bool_]:
+        """Return which pairs of directions, above the horizon, lie outside of those that were measured.
+
+        f_r is made up there, and its error not known. Tables of models have no such directions. The angles [rad] are
+        those of `lookup`; the result has the shape that they broadcast to.
+        """
+        return self._extrapolated(checked_angles(theta_i, phi_i, theta_r, phi_r))
+
+    def _extrapolated(self, directions: Directions) -> NDArray[np.bool_]:
+        shape = np.broadcast_shapes(*(given.shape for given in directions.given))
+        measured = self.metadata.measured
+        if measured is None or measured.hull is None:
+            return np.zeros(shape, dtype=bool)
+        x_i, y_i, z_i, x_r, y_r, z_r = (
+            np.broadcast_to(getattr(directions, name), shape).ravel()
+            for name in ("x_i", "y_i", "cos_i", "x_r", "y_r", "cos_r")
+        )
+        outside = Hull(measured.hull).outside(np.stack([x_i, y_i, z_i], axis=1), np.stack([x_r, y_r, z_r], axis=1))
+        return outside.reshape(shape) & ~directions.below
+
     @functools.cached_property
     def metadata(self) -> TableMetadata:
         """The attributes as a typed record."""
@@ -211,6 +235,8 @@ class BaseTable(Lookups):
         measured = self.metadata.measured
         if measured is not None and measured.uncertainty is not None:
             errors = errors + measured.uncertainty * np.maximum(values, error.floors[at.column])
+        if measured is not None and measured.hull is not None:
+            errors = np.where(self._extrapolated(directions)[..., np.newaxis], np.nan, errors)
         return np.asarray(errors if at.tail else errors[..., 0])[()]
 
     @functools.cached_property

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb._elementary import COS_HORIZON
-from brdfdb.geometry import directions_from_half_difference, radians, unit_vector
+from brdfdb.geometry import HALF_PI, directions_from_half_difference, radians, unit_vector
 from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
-from brdfdb.tables.grids import RECIPROCITY, Axis
+from brdfdb.tables.grids import RECIPROCITY, Axis, Grid
 from brdfdb.tables.layout import TABLE_VERSION, Layout
 from brdfdb.tables.metadata import TableMetadata
 
@@ -227,7 +227,16 @@ def frame(layout: Layout) -> Frame:
             np.asarray(source.specular_reflectance(radians(theta_i_deg), wavelength_nm)),
             {"units": "1", "long_name": "reflectance of the specular part, in the exact mirror direction"},
         )
+    if isinstance(source, MeasuredSource) and source.measured.hull is not None:
+        variables["extrapolated"] = Variable(grid.names, extrapolated(source, grid), VARIABLES["extrapolated"])
     return Frame(variables, coordinates, metadata_of(layout).attributes())
+
+
+def extrapolated(source: MeasuredSource, grid: Grid) -> NDArray[np.bool_]:
+    """Return which nodes of a grid lie outside of the directions that were measured, or below the horizon."""
+    theta_i, phi_i, theta_r, phi_r = (angle.ravel() for angle in np.broadcast_arrays(*grid.directions()))
+    outside = source.extrapolated(unit_vector(theta_i, phi_i), unit_vector(theta_r, phi_r))
+    return np.asarray(outside | (np.maximum(theta_i, theta_r) > HALF_PI)).reshape(grid.shape)
 
 
 def specular_nodes(layout: Layout) -> Axis:
@@ -298,5 +307,6 @@ VARIABLES = {
     "parts": {"units": "1", "long_name": "what f_r is rebuilt from, as the attribute reconstruction says"},
     "spectra": {"units": "1", "long_name": "how the parts make up each wavelength"},
     "mixture": {"units": "1", "long_name": "how f_r of the parts makes f_r at each wavelength"},
+    "extrapolated": {"long_name": "true: the node lies outside of the directions that were measured"},
     "uniform": {"units": "sr-1", "long_name": "the part of f_r that is the same in all directions"},
 }

@@ -20,7 +20,9 @@ from brdfdb.store.marker import make_store
 from brdfdb.store.paths import material_path, revision_path
 from brdfdb.store.pointer import point_to
 from brdfdb.store.publication import publish_staged
+from brdfdb.store.reader import Store
 from brdfdb.store.staging import Block, discard, prepare, remove_begun, write_block, write_frame
+from brdfdb.tables.table import Table
 from brdfdb_pipelines import build_resources, workers
 from brdfdb_pipelines.build_progress import Event, Tally
 from brdfdb_pipelines.build_survey import Survey, head_of, survey
@@ -377,7 +379,8 @@ class _Builder:
                 def then(future: Future[tuple[str, str, int, str]], job: MeasuredJob = job) -> None:
                     if (result := self._result(job.name, future)) is not None:
                         state, revision, stored, why = result
-                        self.built[job.name] = Built(job, state, revision, stored, why)
+                        about = _size(Store(self.root).table(job.name, revision)) if state == "published" else ()
+                        self.built[job.name] = Built(job, state, revision, stored, why, *about)
                         event = {"event": state, "material": job.name, "revision": revision}
                         self.report(event if state == "unchanged" else {**event, "bytes": stored, "why": why})
 
@@ -434,3 +437,8 @@ class _Builder:
         self.error = self.error or error
         self.report({"event": "failed", "material": name, "error": str(error)})
         return None
+
+
+def _size(table: Table) -> tuple[tuple[int, ...], int]:
+    """Return the shape of a table, and the number of its wavelengths; 0 if it is grey."""
+    return table.values.shape, 0 if table.wavelength_nm is None else table.wavelength_nm.size

@@ -19,6 +19,7 @@ from brdfdb.forms.catalogue import Form, of_table
 from brdfdb.forms.tradeoff import STEPS, TIMED, chart, chart_family
 from brdfdb.forms.tradeoff_document import Chart, Charts, FamilyChart, Point
 from brdfdb.materials import Material, Source
+from brdfdb.measurements import Measured
 from brdfdb.store.family import Family, Sweep
 from brdfdb.store.family_records import recorded
 from brdfdb.store.reader import Store
@@ -26,6 +27,7 @@ from brdfdb.tables.planner import check_tolerance
 from brdfdb.tables.table import Table
 from brdfdb.tables.table_source import source_of_table
 from brdfdb_pipelines import family_plot, recipe_file, terminal, tradeoff_plot
+from brdfdb_pipelines.named_source import measured_source
 from brdfdb_pipelines.plot_panels import percent
 
 
@@ -128,14 +130,26 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
     listed = recipe.jobs()
     jobs, sweeps = {job.material.name: job for job in listed}, {sweep.name: sweep for sweep in recipe.sweeps(listed)}
     store: Store | None = brdfdb.open(root) if root is not None and root.exists() else None
+    measured = {job.name: job for job in recipe.measured_jobs()}
     subjects: list[_Subject | _Family] = []
     for name in dict.fromkeys(names):
         table = store[name] if store is not None and name in store else None
         if name in jobs:
             subject = _Subject(jobs[name].material, jobs[name].wavelength_nm)
+        elif name in measured:
+            data, at = measured_source(measured[name])
+            subject = _Subject(data, at)
+            print(f"{name}: it is measured. Errors are those against the data, interpolated.{_trust(data.measured)}")
         elif table is not None:
             source = source_of_table(table)
             subject = _Subject(source, table.wavelength_nm)
+            if table.metadata.measured is not None:
+                print(
+                    f"{name}: it is measured, and the store does not hold the data. Errors are those against the "
+                    f"stored table itself, --recipe FILE reads the data.{_trust(table.metadata.measured)}"
+                )
+                subjects.append(subject)
+                continue
             if not isinstance(source, Material):
                 print(
                     f"{name}: its source cannot be evaluated here. A function is not in the store, and a model of your "
@@ -163,6 +177,15 @@ def _subjects(names: Sequence[str], root: Path | None, recipe_path: Path | None)
             subject = subject._replace(stored=(of_table(table, "table-stored", title),))
         subjects.append(subject)
     return subjects
+
+
+def _trust(measured: Measured) -> str:
+    """Return how far measured data are to be trusted, in a sentence; empty if nothing is known."""
+    held = measured.held_out
+    if held is not None:
+        return f" The data are within {terminal.error(held.p95)} of 95 of 100 samples that were held out."
+    noise = measured.noise
+    return "" if noise is None else f" The noise of the data is below {terminal.error(noise.p95)} in 95 of 100 values."
 
 
 def _material_of(table: Table) -> Material:

@@ -125,7 +125,7 @@ def _values(model: str, settings: Sequence[str]) -> dict[str, float]:
 
 def lines(conversion: Conversion) -> list[str]:
     """Return the lines that the command prints."""
-    made, was = conversion.material, conversion.source_model or "a function"
+    made, was = conversion.material, conversion.source_model or "no model"
     text = [f"{conversion.source} ({was}) as {conversion.model}", "  parameters"]
     in_file = made.file_parameters()
     fixed = set(conversion.fixed)

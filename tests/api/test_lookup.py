@@ -40,6 +40,7 @@ def test_one_point_in_degrees(client: Client, store: Store) -> None:
         "wavelength_nm": None,
         "brdf": pytest.approx(degrees(store, "grey-felt", 60, 30, 60, 90), rel=1e-15),
         "error": None,
+        "extrapolated": None,
         "specular_reflectance": 0.0,
     }
 

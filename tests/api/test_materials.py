@@ -38,6 +38,7 @@ def test_catalogue(client: Client, store: Store) -> None:
         "model_title": store.metadata("copper-foil").model_title,
         "paper": "he1991",
         "source": "no paper, copper-foil",
+        "measured": False,
         "anisotropic": False,
         "wavelength_range_nm": [400.0, 700.0],
         "spectrum": "spectral",

@@ -80,7 +80,7 @@ def test_too_few_samples_are_refused_with_their_number() -> None:
 
 def test_hull_has_what_lies_between_samples_and_nothing_else() -> None:
     samples = scans(lambda wi, _: np.ones((len(wi), 1)), np.array([10.0, 30.0, 50.0]), 0.0)
-    hull = Hull(samples.w_i, samples.w_r, turned=False)
+    hull = Hull.of(samples.w_i, samples.w_r, turned=False)
     light = unit_vector(radians(np.array([20.0, 5.0, 60.0, 20.0])), np.full(4, 1.0))
     viewer = unit_vector(radians(np.array([40.0, 40.0, 40.0, 80.0])), np.full(4, 2.0))
     assert hull.outside(light, viewer).tolist() == [False, True, True, True]
@@ -89,7 +89,7 @@ def test_hull_has_what_lies_between_samples_and_nothing_else() -> None:
 def test_hull_of_one_plane_has_that_plane_alone() -> None:
     theta = radians(np.array([0.0, 30.0, 60.0, 0.0, 30.0, 60.0]))
     lights = unit_vector(np.repeat(radians(np.array([10.0, 50.0])), 3), np.zeros(6))
-    hull = Hull(lights, unit_vector(theta, np.full(6, np.pi)), turned=False)
+    hull = Hull.of(lights, unit_vector(theta, np.full(6, np.pi)), turned=False)
     light, theta_r = unit_vector(radians(30.0), 0.0)[np.newaxis], radians(20.0)
     assert not hull.outside(light, unit_vector(theta_r, np.pi)[np.newaxis])[0]
     assert hull.outside(light, unit_vector(theta_r, 3.0)[np.newaxis])[0]

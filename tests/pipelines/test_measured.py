@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,10 @@ def folder(tmp_path: Path) -> Path:
 def test_measured_material_is_built_once_shown_audited_and_exported(folder: Path, capsys: Captured) -> None:
     store = folder / "store"
     assert run("build", _recipe(folder), "--store", store) == 0
-    assert "measured" in capsys.readouterr().out
+    built = capsys.readouterr().out
+    values = math.prod(brdfdb.open(store)["my-clay"].values.shape)
+    assert f"1 table, {values} values" in built
+    assert "my-clay   measured" in built
     assert run("build", _recipe(folder), "--store", store) == 0
     assert "1 table unchanged" in capsys.readouterr().out
     assert run("show", "my-clay", "--store", store) == 0

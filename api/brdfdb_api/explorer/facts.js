@@ -11,22 +11,23 @@ export function show(info) {
   aside.replaceChildren(
     element("h3", {}, "Surface"),
     pairs([
-      ["model", `${attributes.model_title ?? info.model}, ${attributes.model_equation ?? ""}`],
+      [info.measured ? "measured" : "model", info.measured ? origin(info.measured)
+        : `${attributes.model_title ?? info.model}, ${attributes.model_equation ?? ""}`],
       ["source", attributes.source],
       ...(attributes.refractive_index ? [["n, k", attributes.refractive_index]] : []),
       ["kind", `${info.anisotropic ? "anisotropic" : "isotropic"}, ${range(info.wavelength_nm)}`],
       ...(attributes.note ? [["note", attributes.note]] : []),
     ]),
-    element("h3", {}, "Parameters"),
+    ...(info.measured ? [element("h3", {}, "Error of the data"), pairs(data(info.measured))] : []),
+    ...(info.parameters.length ? [element("h3", {}, "Parameters")] : []),
     pairs(info.parameters.map((each) => [each.name, value(each), each.meaning,
       each.source === attributes.source ? "" : each.source, assumed(each, attributes)])),
-    element("h3", {}, "Error of the table against its formula"),
+    element("h3", {}, `Error of the table against ${info.measured ? "the data" : "its formula"}`),
     error ? pairs([
       ["99 of 100", `within ${percent(error.overall.p99)}`], ["median", percent(error.overall.median)],
       ["largest", percent(error.overall.max), error.worst?.why ?? ""], ["at this θᵢ", element("span", { id: "band" })],
     ]) : element("p", {}, "not measured"),
-    element("h3", {}, "Error of the formula against the highest rung"),
-    ...formula(info.formula_error),
+    ...(info.measured ? [] : [element("h3", {}, "Error of the formula against the highest rung"), ...formula(info.formula_error)]),
     element("h3", {}, "Audit"),
     pairs(above(info.largest_albedo)),
     ...(audit ? audited(audit) : [element("p", {}, "no audit of it is here; ", element("code", {}, "brdfdb audit"), " makes one")]),
@@ -35,6 +36,19 @@ export function show(info) {
     element("p", { className: "quiet" }, `${info.name}, revision ${info.revision}`),
   );
 }
+
+/** What measured data are of. */
+const origin = ({ by, file, samples, incidences }) => [
+  samples ? `${samples} samples of ${incidences} lights` : "known everywhere", by, file && `file ${file}`].filter(Boolean).join("; ");
+
+/** How far measured data are to be trusted, and where nothing was measured. */
+const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
+  ["held out", left ? `95 of 100 samples within ${percent(left.p95)}` : "no samples", left ? `99 within ${percent(left.p99)}` : ""],
+  ["noise", noise ? `95 of 100 below ${percent(noise.p95)}` : "not stated"],
+  ...(extrapolated === null ? [] : [["extrapolated", `${percent(extrapolated)} of the nodes`]]),
+  ...(negative ? [["below 0", `${percent(negative)} of the values, which are 0 here`]] : []),
+  ...changes.map(({ law, changed }) => [`made ${law}`, `by up to ${percent(changed.max)}`]),
+];
 
 /** How far the formula is from the best that is known of its surface. */
 function formula(of) {

@@ -21,7 +21,7 @@ export async function load(onChoose, onPage, onFail) {
     pages.push({ path, materials: page.materials });
     materials.push(...page.materials);
     list.append(...page.materials.map(option));
-    offer(model, page.materials.map((each) => [each.model, each.model_title]));
+    offer(model, page.materials.map((each) => [modelOf(each), each.measured ? "measured" : each.model_title]));
     offer(paper, page.materials.map((each) => [paperOf(each), paperOf(each)]));
     offer(verdict, page.materials.map((each) => [words(each), words(each)]));
     filter();
@@ -98,6 +98,8 @@ function answers(each) {
 
 const SHORT = { as_published: "as published", conserves_energy: "energy" };
 
+const modelOf = (each) => (each.measured ? "measured" : each.model ?? "");
+
 function option(each) {
   const swatch = element("span", { className: "swatch" });
   swatch.style.background = each.colour ?? "";
@@ -107,15 +109,16 @@ function option(each) {
   made.setAttribute("role", "option");
   made.setAttribute("aria-selected", each.name === chosen);
   Object.assign(made.dataset, {
-    name: each.name, model: each.model ?? "", paper: paperOf(each) ?? "", verdict: words(each),
+    name: each.name, model: modelOf(each), paper: paperOf(each) ?? "", verdict: words(each),
     text: `${each.name} ${each.title} ${each.model_title} ${each.source}`.toLowerCase(),
   });
   return made;
 }
 
 /** The error of the table and that of its formula, in a line. */
-function errors({ damaged, error_p99: table, formula_error: formula }) {
+function errors({ damaged, error_p99: table, formula_error: formula, measured }) {
   if (damaged) return "";
+  if (measured) return `measured, error of the table ${percent(table)}`;
   const rung = !formula ? "not measured" : formula.against === "measured" ? percent(formula.p99)
     : formula.against === "highest rung" ? "0, exact form" : "none known";
   return `error: table ${table === null || table === undefined ? "not measured" : percent(table)}, formula ${rung}`;

@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from starlette.responses import Response
 
 from brdfdb.materials.spectrum import Spectrum
+from brdfdb.measurements.record import Measured
 from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ class Summary(BaseModel):
     model_title: str = ""
     paper: str = Field(default="", description="key of the paper of the model, such as he1991")
     source: str = Field(default="", description="paper and table, figure or section of the parameters")
+    measured: bool = Field(default=False, description="true: the table is of measured data")
     anisotropic: bool | None = None
     wavelength_range_nm: list[float] | None = Field(
         default=None, description="first and last wavelength [nm]; null: grey"
@@ -142,7 +144,12 @@ class Material(BaseModel):
     axes_deg: dict[str, list[float]] = Field(description="the grid of the table [degrees]")
     specular: bool = Field(description="whether there is a specular part: specular_reflectance is not 0 everywhere")
     error: Annotated[dict[str, Any] | None, WithJsonSchema({"type": ["object", "null"]})] = Field(
-        description="the measured error of the table against its model, by bands of theta_i; null: not measured"
+        description="the measured error of the table against its model, or the data, by bands of theta_i; null: not "
+        "measured"
+    )
+    measured: Measured | None = Field(
+        description="origin, symmetries and errors of measured data, the error at samples that were held out among "
+        "them; null: the values are a model's or a function's"
     )
     formula_error: FormulaError | None = Field(
         description="error of the model against the highest rung of its surface; null: not measured"
@@ -176,7 +183,12 @@ class Lookup(BaseModel):
         "colour, then three numbers"
     )
     error: float | list[Any] | None = Field(
-        description="in the shape of brdf, 99 of 100 values are within that of the model; null: not asked for"
+        description="in the shape of brdf, 99 of 100 values are within that of the model, or of what was measured; "
+        "null: not asked for, and in a list: not known, because it is extrapolated"
+    )
+    extrapolated: bool | list[Any] | None = Field(
+        description="shape of the broadcast angles; true: outside of the directions that were measured; null: error "
+        "was not asked for"
     )
     specular_reflectance: float | list[Any] = Field(
         description="specular part, a reflectance without unit that is not in brdf: shape of theta_i, then as brdf"

@@ -109,7 +109,7 @@ def catalogue(
     request: Request,
     cursor: Annotated[str, Query(description="of the page before, its last name")] = "",
     limit: Annotated[int, Query(ge=1, le=MOST, description="materials on a page")] = PAGE,
-    model: Annotated[str, Query(description="only of this model")] = "",
+    model: Annotated[str, Query(description="only of this model; measured: only of measured data")] = "",
     paper: Annotated[str, Query(description="only with this in the key of the paper or in the source")] = "",
     q: Annotated[str, Query(description="only with all of these words in name, title, model or source")] = "",
 ) -> Response:
@@ -138,7 +138,8 @@ def _let_through(line: dict[str, Any], model: str, paper: str, words: list[str])
     """Return True if the filters let a line of the catalogue through."""
     text = " ".join(str(line.get(key, "")) for key in SEARCHED).casefold()
     papers = f"{line.get('paper', '')} {line.get('source', '')}".casefold()
-    return model in ("", line.get("model", "")) and paper in papers and all(word in text for word in words)
+    models = ("", line.get("model", ""), "measured" if line.get("measured") else "")
+    return model in models and paper in papers and all(word in text for word in words)
 
 
 def both(
@@ -186,6 +187,7 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,
         "error": None if table.error is None else table.attrs["error"],
+        "measured": None if metadata.measured is None else metadata.measured.model_dump(exclude={"hull"}),
         "formula_error": table.attrs.get("formula_error"),
         "largest_albedo": table.attrs.get("largest_albedo"),
         "incomplete": metadata.gaps or None,
@@ -378,6 +380,7 @@ def write_answer(points: Points, options: Options, table: Table, kind: str, head
         "wavelength_nm": points.wavelengths(table),
         "brdf": plain(values.brdf),
         "error": None if values.error is None else plain(values.error),
+        "extrapolated": None if values.error is None else plain(table.extrapolated(*points.angles)),
         "specular_reflectance": plain(values.specular_reflectance),
     }
     return EncodedResponse(json_bytes(document), headers)

@@ -224,6 +224,7 @@ def _described(name: str, group: Path, digest: str, head: Mapping[str, Any]) -> 
         "model_title": metadata.model_title or metadata.model or "",
         "paper": metadata.model_reference or "",
         "source": metadata.source or "",
+        "measured": metadata.measured is not None,
         "anisotropic": metadata.anisotropic,
         "wavelength_range_nm": metadata.wavelength_range_nm or None,
         "spectrum": spectrum_of(metadata.wavelength_range_nm),

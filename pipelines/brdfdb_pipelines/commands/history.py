@@ -19,6 +19,7 @@ def run(options: argparse.Namespace) -> int:
     """Print a line for each revision of the material, oldest first."""
     from brdfdb.errors import counted
     from brdfdb.store import revisions
+    from brdfdb.store.summary_words import kind
     from brdfdb_pipelines import terminal
 
     history = revisions.history(options.store, options.name)
@@ -29,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
             (
                 revision.name,
                 revision.summary["created"],
-                revision.summary["model"],
+                kind(revision.summary),
                 str(revision.summary["model_version"]),
                 terminal.size(revision.summary["bytes"]),
                 revision.summary["request_sha256"][:8] or "-",

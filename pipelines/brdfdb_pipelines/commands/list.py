@@ -92,6 +92,7 @@ def _print_materials(store: Store, root: Path) -> list[str]:
         colours,
         energy,
         formula_error,
+        kind,
         last_audit,
     )
     from brdfdb_pipelines import terminal
@@ -110,7 +111,7 @@ def _print_materials(store: Store, root: Path) -> list[str]:
         audited = audits.get((name, head["revision"]))
         rows.append(
             (
-                *(name, head["title"], head["model"] or "function", colours(head)),
+                *(name, head["title"], kind(head), colours(head)),
                 *(terminal.error(head.get("error_p99")), formula_error(head, terminal.error)),
                 *(NOT_AUDITED if audited is None else audited.as_published, energy(head, audited)),
                 head["revision"],

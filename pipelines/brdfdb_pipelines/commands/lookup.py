@@ -42,6 +42,7 @@ def run(options: argparse.Namespace) -> int:
     import numpy as np
 
     from brdfdb.geometry import PHI_MAX, degrees, radians
+    from brdfdb.tables.table import Table
 
     most_deg = float(degrees(PHI_MAX))
     angles_deg = [getattr(options, angle) for angle in _ANGLES]
@@ -70,6 +71,7 @@ def run(options: argparse.Namespace) -> int:
         specular_part = source.specular is not None
     theta_i, phi_i, theta_r, phi_r = radians(angles_deg)
     error = None
+    outside = isinstance(source, Table) and bool(source.extrapolated(theta_i, phi_i, theta_r, phi_r))
     if options.with_error:
         stated = source.lookup_with_error(theta_i, phi_i, theta_r, phi_r, options.wavelength_nm, **point)
         brdf, error = (np.atleast_1d(values) for values in stated)
@@ -83,7 +85,8 @@ def run(options: argparse.Namespace) -> int:
             "unit": "1/sr",
             "wavelength_nm": None if wavelengths is None else list(wavelengths),
             "brdf": brdf.tolist(),
-            **({} if error is None else {"error": error.tolist()}),
+            **({} if error is None else {"error": [None if math.isnan(one) else one for one in error.tolist()]}),
+            **({"extrapolated": outside} if isinstance(source, Table) else {}),
             "specular_reflectance": specular.tolist(),
         }
         print(json.dumps(answer))
@@ -91,8 +94,10 @@ def run(options: argparse.Namespace) -> int:
     for index, value in enumerate(brdf):
         at = "" if wavelengths is None else f"{wavelengths[index]:g} nm  "
         mirrored = f"  and {specular[index]:.6g} of the light in the exact mirror direction" if specular_part else ""
-        within = "" if error is None else f" +- {error[index]:.2g}"
+        within = "" if error is None or outside else f" +- {error[index]:.2g}"
         print(f"{at}{value:.6g}{within} /sr{mirrored}")
+    if outside:
+        print("extrapolated: outside of the directions that were measured, where the error is not known")
     return 0
 
 

@@ -249,8 +249,9 @@ def _print_answers(audited: Audited | None, name: str, *, measured: bool) -> Non
 
     both = (NOT_AUDITED, NOT_AUDITED) if audited is None else audited
     says = "the paper" if name in presets() else "its source" if measured else "its model"
+    whose = "do the data" if measured else "does the published model"
     print(f"  audit       is it what {says} says? {both[0]}")
-    print(f"              does the published model conserve energy? {both[1]}")
+    print(f"              {whose} conserve energy? {both[1]}")
 
 
 def _print_validity(table: Table) -> None:

@@ -1,0 +1,84 @@
+"""A measured table over HTTP: who measured, its errors, and where it is extrapolated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from brdfdb.geometry import radians
+from brdfdb.materials import presets
+from brdfdb.measurements import MeasuredSource
+from brdfdb.store import http_client
+from brdfdb.store.publication import publish
+from brdfdb.store.reader import Store
+from tests.api.a_store import Client, client_of, serving
+from tests.measurements.made_up import scans
+
+INSIDE, OUTSIDE = {"theta_i": 30, "theta_r": 20, "phi_r": 120}, {"theta_i": 80, "theta_r": 20, "phi_r": 120}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Directory of a store with a measured table, lights of 10 to 60 degrees, beside one of a model."""
+    root = tmp_path_factory.mktemp("measured") / "store"
+    clay = presets()["clay-vase"]
+    samples = scans(clay.brdf_at(None), np.array([10.0, 35.0, 60.0]), 0.03, step_deg=15.0)
+    source = MeasuredSource.of_samples(samples, name="my-clay", title="Clay", provenance="run 12")
+    publish(root, source.recorded(file="clay.csv", file_sha256="0" * 64), tolerance=0.1)
+    publish(root, clay, tolerance=0.3)
+    return root
+
+
+@pytest.fixture
+def client(measured: Path) -> Client:
+    return client_of(measured)
+
+
+def test_material_says_by_whom_and_how_well_it_was_measured(client: Client, measured: Path) -> None:
+    known = client.get("/v1/materials/my-clay").json()["measured"]
+    record = Store(measured).metadata("my-clay").measured
+    assert record is not None
+    assert (known["by"], known["file"]) == ("a made-up goniophotometer", "clay.csv")
+    assert known["held_out"] == record.model_dump()["held_out"]
+    assert client.get("/v1/materials/clay-vase").json()["measured"] is None
+
+
+def test_catalogue_tells_measured_tables_apart(client: Client) -> None:
+    lines = client.get("/v1/materials").json()["materials"]
+    assert {line["name"]: line["measured"] for line in lines} == {"clay-vase": False, "my-clay": True}
+    only = client.get("/v1/materials?model=measured").json()["materials"]
+    assert [line["name"] for line in only] == ["my-clay"]
+
+
+def test_lookup_with_its_error_marks_what_is_extrapolated(client: Client) -> None:
+    inside, outside = (
+        client.get("/v1/materials/my-clay/lookup", params={**at, "error": "true"}).json() for at in (INSIDE, OUTSIDE)
+    )
+    assert not inside["extrapolated"]
+    assert 0.0 < inside["error"] < inside["brdf"]
+    assert outside["extrapolated"]
+    assert outside["error"] is None
+    assert outside["brdf"] > 0.0
+    assert client.get("/v1/materials/my-clay/lookup", params=INSIDE).json()["extrapolated"] is None
+    body = {"theta_i": [30, 80], "theta_r": 20, "phi_r": 120}
+    assert client.post("/v1/materials/my-clay/lookup?error=true", json=body).json()["extrapolated"] == [False, True]
+    assert client.post("/v1/materials/clay-vase/lookup?error=true", json=body).json()["extrapolated"] == [False, False]
+
+
+def test_a_model_and_its_source_code_are_refused_in_a_sentence(client: Client) -> None:
+    code = client.get("/v1/materials/my-clay/export/glsl")
+    assert code.status_code == 422
+    assert "it is measured" in code.json()["detail"]
+    model = client.get("/v1/materials/my-clay/lookup", params={**INSIDE, "from": "model"})
+    assert model.status_code == 422
+    assert "keeps no model" in model.json()["detail"]
+
+
+def test_remote_table_knows_where_it_is_extrapolated(measured: Path) -> None:
+    with serving(measured) as address:
+        table = http_client.RemoteStore(address)["my-clay"]
+        angles = radians(np.array([30.0, 80.0])), 0.0, radians(20.0), radians(120.0)
+        assert table.extrapolated(*angles).tolist() == [False, True]
+        assert np.isnan(table.lookup_with_error(*angles).error).tolist() == [False, True]

@@ -1,0 +1,154 @@
+"""Measured tables in the rest of the program: listed, looked up, charted, exported, without the file they are of."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import brdfdb
+from brdfdb import formats
+from brdfdb.forms.catalogue import forms
+from brdfdb.geometry import degrees, radians
+from brdfdb.materials import presets
+from brdfdb.measurements import MeasuredSource, Samples
+from brdfdb.store.publication import publish
+from brdfdb_pipelines.named_source import named_source
+from tests.measurements.made_up import scans
+from tests.pipelines.command import Captured, run
+
+NAME = "my-clay"
+RECIPE = f"""\
+materials = ["{NAME}"]
+tolerance = 0.1
+[define.{NAME}]
+samples = "clay.csv"
+source = "run 12"
+"""
+INSIDE_DEG, OUTSIDE_DEG = (30.0, 0.0, 20.0, 120.0), (80.0, 0.0, 20.0, 120.0)  # lights of 10 to 60 degrees
+
+
+def _write(path: Path, samples: Samples) -> None:
+    columns = [degrees(a) for a in (samples.theta_i, samples.theta_r, samples.phi_r)] + [samples.values[:, 0]]
+    np.savetxt(
+        path, np.stack(columns, axis=1), delimiter=",", header="theta_i,theta_r,delta_phi,brdf", comments="", fmt="%.9g"
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store with a measured table, beside the recipe that it is of; the file of samples is gone."""
+    directory = tmp_path_factory.mktemp("measured")
+    samples = scans(presets()["clay-vase"].brdf_at(None), np.array([10.0, 35.0, 60.0]), 0.03, step_deg=15.0)
+    _write(directory / "clay.csv", samples)
+    (directory / "recipe.toml").write_text(RECIPE)
+    assert run("build", directory / "recipe.toml", "--store", directory / "store") == 0
+    (directory / "clay.csv").rename(directory / "elsewhere.csv")
+    return directory
+
+
+def test_lists_say_measured(folder: Path, capsys: Captured) -> None:
+    assert run("list", "--store", folder / "store") == 0
+    line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith(NAME))
+    assert " measured " in line
+    assert "no formula" in line
+    assert run("history", NAME, "--store", folder / "store") == 0
+    assert " measured " in capsys.readouterr().out
+    assert ">measured</td>" in brdfdb.open(folder / "store")._repr_html_()
+
+
+def test_show_names_file_and_digest(folder: Path, capsys: Captured) -> None:
+    measured = brdfdb.open(folder / "store").metadata(NAME).measured
+    assert measured is not None
+    assert run("show", NAME, "--store", folder / "store") == 0
+    assert f"file clay.csv, sha256 {measured.file_sha256[:12]}" in capsys.readouterr().out
+
+
+def test_lookups_outside_of_the_samples_are_marked_and_have_no_error(folder: Path, capsys: Captured) -> None:
+    table = brdfdb.open(folder / "store")[NAME]
+    angles = radians(np.array([INSIDE_DEG, OUTSIDE_DEG, (95.0, 0.0, 20.0, 120.0)])).T
+    assert table.extrapolated(*angles).tolist() == [False, True, False]  # below the horizon f_r is known to be 0
+    error = table.lookup_with_error(*angles).error
+    assert np.isfinite(error).tolist() == [True, False, True]
+    for at, words in ((INSIDE_DEG, "+- "), (OUTSIDE_DEG, "extrapolated: outside of the directions that were measured")):
+        assert run("lookup", NAME, *at, "--store", folder / "store", "--with-error") == 0
+        assert words in capsys.readouterr().out
+        assert run("lookup", NAME, *at, "--store", folder / "store", "--with-error", "--json") == 0
+        answer = json.loads(capsys.readouterr().out)
+        assert (answer["extrapolated"], answer["error"] == [None]) == (at is OUTSIDE_DEG, at is OUTSIDE_DEG)
+
+
+def test_nodes_outside_of_the_samples_are_marked_in_the_dataset(folder: Path) -> None:
+    dataset = brdfdb.open(folder / "store").dataset(NAME)
+    marked = dataset["extrapolated"]
+    assert marked.dims == dataset["brdf"].dims
+    lights = marked.all(["theta_r", "delta_phi"])
+    expected = (lights["theta_i"] < 10.0) | (lights["theta_i"] > 60.0)
+    xr.testing.assert_equal(lights, expected.rename(None))
+    assert bool(marked.any()) != bool(marked.all())
+
+
+def test_tables_of_functions_and_models_are_nowhere_extrapolated(tmp_path: Path) -> None:
+    publish(tmp_path, presets()["clay-vase"], tolerance=0.3)
+    table = brdfdb.open(tmp_path)["clay-vase"]
+    assert not table.extrapolated(*radians(np.array([OUTSIDE_DEG])).T).any()
+    assert "extrapolated" not in brdfdb.open(tmp_path).dataset("clay-vase")
+
+
+def test_record_of_an_exported_file_says_measured(folder: Path) -> None:
+    table = brdfdb.open(folder / "store")[NAME]
+    path = folder / "clay.json"
+    formats.write(table, path, "bird", tolerance=0.3)
+    text = path.read_text()
+    measured = table.metadata.measured
+    assert measured is not None
+    assert measured.held_out is not None
+    for words in (measured.file_sha256, "clay.csv", "measured: run 12", "the data", str(measured.held_out.p95)):
+        assert words in text
+    assert "computed from parameters" not in text
+
+
+def test_source_code_of_a_measured_table_is_refused_in_a_sentence(folder: Path, capsys: Captured) -> None:
+    assert run("export", "glsl", NAME, "--store", folder / "store", "--out", folder / "out") == 2
+    assert "it is measured, and source code is of models" in capsys.readouterr().err
+
+
+def test_audit_judges_energy_of_the_data_and_pairs_that_were_measured(folder: Path) -> None:
+    assert run("audit", "--store", folder / "store", "--no-figures", "--report", folder / "audit.json") == 0
+    finding = json.loads((folder / "audit.json").read_text())["materials"][0]
+    assert finding["as_published"]["text"] == "measured"
+    assert finding["conserves_energy"]["word"] == "passes"
+    assert finding["conserves_energy"]["text"].startswith("the data do: albedo 0.")
+    pairs = finding["findings"]["reciprocity"]["table_random"]
+    assert pairs["measured"]
+    assert 0 < pairs["pairs"] < 0.5 * 36_000  # half of the lights lie outside of the samples
+
+
+def test_chart_needs_no_file(folder: Path, capsys: Captured) -> None:
+    chart = ("chart", NAME, "--tolerance", "0.3", "--store", folder / "store", "--out", folder / "chart")
+    assert run(*chart) == 0
+    printed = capsys.readouterr().out
+    assert "the store does not hold the data" in printed
+    assert "of 95 of 100 samples that were held out" in printed
+    assert run(*chart, "--recipe", folder / "recipe.toml") == 2
+    assert "clay.csv: No such file" in capsys.readouterr().err
+
+
+def test_data_of_a_recipe_are_what_its_tables_are_compared_with(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "recipe.toml").write_text(RECIPE + "conserving = true\n")
+    (tmp_path / "clay.csv").write_bytes((folder / "elsewhere.csv").read_bytes())
+    source, at = named_source(NAME, folder / "store", tmp_path / "recipe.toml")
+    assert isinstance(source, MeasuredSource)
+    assert (at, [change.law for change in source.measured.changes]) == (None, ["conserving"])
+    data, table, *_ = forms(source, at, (0.3,))
+    assert data.title.endswith("the data, interpolated")
+    assert table.layout is not None
+    assert table.layout.reason.endswith("against the data")
+
+
+def test_a_conversion_takes_the_table_in_place_of_the_data(folder: Path, capsys: Captured) -> None:
+    assert run("convert", NAME, "--to", "oren_nayar", "--store", folder / "store", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["l1"] < 0.1
