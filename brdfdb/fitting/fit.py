@@ -285,7 +285,7 @@ def _pattern(fitted: Fitted) -> float:
     used = problem.residual.used & problem.residual.used[nearest]
     r = np.clip(fitted.point.residuals, -FAR * fitted.sigma, FAR * fitted.sigma)
     size = float(np.sum((r * r)[used]))
-    return float(np.sum((r * r[nearest])[used]) / size) if size > 0.0 else 0.0
+    return min(float(np.sum((r * r[nearest])[used]) / size), 1.0) if size > 0.0 else 0.0
 
 
 def _outliers(fitted: Fitted) -> tuple[list[Outlier], int]:
