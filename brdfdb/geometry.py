@@ -303,3 +303,33 @@ def directions_from_half_difference(
         angles += [theta, phi + np.asarray(phi_h)]
     theta_i, phi_i, theta_r, phi_r = angles
     return theta_i, phi_i, theta_r, phi_r
+
+
+def versine(angle: Floats) -> Floats:
+    """Return 1 - cos(angle) [1], with all digits of small angles [rad]."""
+    return np.asarray(2.0 * np.sin(0.5 * angle) ** 2)
+
+
+def common_solid_angle(first: Floats, second: Floats, apart: Floats) -> Floats:
+    """Return the solid angle [sr] common to two circular cones of half angles `first` and `second`, axes `apart` [rad].
+
+    It is the area of two sectors less twice the triangle of both axes and a point where the circles cross. L'Huilier's
+    formula gives the area of the triangle and half-angle formulas give its angles, so that small cones keep their
+    digits.
+    """
+    half = 0.5 * (first + second + apart)
+    # Half the perimeter less each of the three sides
+    to_first = np.maximum(0.5 * ((second - first) + apart), 0.0)
+    to_second = np.maximum(0.5 * ((first - second) + apart), 0.0)
+    to_apart = np.maximum(0.5 * ((first + second) - apart), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # cones that do not cross are replaced below
+        angle_first = 2.0 * np.arctan(np.sqrt(np.sin(to_first) * np.sin(to_apart) / (np.sin(half) * np.sin(to_second))))
+        angle_second = 2.0 * np.arctan(
+            np.sqrt(np.sin(to_second) * np.sin(to_apart) / (np.sin(half) * np.sin(to_first)))
+        )
+        tangents = np.tan(0.5 * half) * np.tan(0.5 * to_first) * np.tan(0.5 * to_second) * np.tan(0.5 * to_apart)
+        triangle = 4.0 * np.arctan(np.sqrt(np.maximum(tangents, 0.0)))
+        crossing = 2.0 * (angle_first * versine(first) + angle_second * versine(second) - triangle)
+    inside = 2.0 * np.pi * versine(np.minimum(first, second))
+    crossing = np.where(apart <= np.abs(first - second), inside, crossing)
+    return np.where(apart >= first + second, 0.0, crossing)

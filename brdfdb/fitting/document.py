@@ -88,6 +88,10 @@ class Fit(_Record):
         description="correlation of each residual with that of the nearest sample: 0 for noise, 1 for a model that is "
         "wrong in a smooth way"
     )
+    at_mirror: int = Field(
+        description="samples near the mirror direction that are left out: the fit has a specular part there, and the "
+        "instrument states no solid angle"
+    )
     albedo: Albedo
     correlations: list[Correlation]
     remarks: list[str]
@@ -98,6 +102,7 @@ class Fit(_Record):
 class Left(_Record):
     """Values of the samples that no fit uses."""
 
+    below_horizon: int = Field(description="values of the file with a direction below the horizon")
     holes: int
     at_horizon: int = Field(description="a direction at 90 degrees, where models are 0")
     unusable: int = Field(description="not positive, where logarithms or relative differences are taken")
@@ -115,6 +120,8 @@ class Fits(_Record):
     assumed_wavelength_nm: float | None = Field(description="for models with n and k, where the samples state none")
     residual: Literal["log", "relative", "cosine", "uncertainty"]
     refractive_index: str | None
+    source_solid_angle_sr: float | None = Field(description="solid angle of the light; null: not known")
+    receiver_solid_angle_sr: float | None = Field(description="solid angle of the receiver; null: not known")
     left_out: Left
     ranked_by: Literal["held-out rms of ln", "BIC"]
     fits: list[Fit]

@@ -18,10 +18,13 @@ from brdfdb.fitting.problem import Point, Problem
 from brdfdb.fitting.remarks import remarks_of
 from brdfdb.fitting.residuals import Kind, Residual
 from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitted_by_default
-from brdfdb.geometry import degrees
+from brdfdb.geometry import degrees, radians, versine
 from brdfdb.measurements import Samples
+from brdfdb.measurements.aperture import View
+from brdfdb.models import MODELS
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 ROBUST = 3.0  # robust standard deviations of residuals from which on a sample counts less than squared
 FAR = 6.0  # the same, from which on a sample of the best fit is an outlier
@@ -30,6 +33,8 @@ _LISTED = 20  # outliers that are listed
 _SETTLED = 0.05  # relative change of the scale that ends the iterations
 _SCALES, _EVALUATIONS = 4, 60
 _LEAST_SCALE = 1e-9  # of noise-free samples
+_NEAR_MIRROR = float(radians(3.0))  # angle from the mirror direction within which apertures may catch a specular part
+_COUNTS = 0.01  # share of f_r that a specular part adds in an aperture of that half angle, so that it counts
 
 
 def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_index: str | None = None) -> Fitted:
@@ -67,6 +72,10 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
     numbers stay within the ranges of the model. Coefficients in which f_r is a polynomial, such as reflectances, have a
     value for each channel and are solved for at every shape (variable projection); the shape is shared.
 
+    Where the instrument of the samples has solid angles, lobes are averaged over them, and a specular part within them
+    is added (`brdfdb.measurements.aperture.View`). Where it has none, samples near the mirror direction are left out if
+    the specular part of the fit counts there.
+
     References
     ----------
     golubpereyra1973
@@ -86,9 +95,19 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
     surface = Surface(
         model, samples.wavelength_nm, len(samples.channels), turned=samples.turned, entry=refractive_index
     )
+    fitted = _searched(samples, surface, residual, np.zeros(len(samples), dtype=np.bool_))
+    hidden = _hidden(fitted)
+    if hidden.any() and np.any(fitted.problem.residual.used[~hidden[fitted.rows]]):
+        return _searched(samples, surface, residual, hidden)
+    return fitted
+
+
+def _searched(samples: Samples, surface: Surface, residual: Kind, hidden: Mask) -> Fitted:
+    """Return the best point of a surface at the samples that count and are not hidden."""
     counting = Residual(samples, residual)
-    rows = np.flatnonzero(counting.used.any(axis=1))
-    problem = Problem(surface, samples.w_i[rows], samples.w_r[rows], counting.selected(rows))
+    rows = np.flatnonzero(counting.used.any(axis=1) & ~hidden)
+    view = View(samples.w_i[rows], samples.w_r[rows], samples.instrument)
+    problem = Problem(surface, view, counting.selected(rows))
     point = problem.best()
     sigma = _sigma(problem, point)
     for _ in range(_SCALES):
@@ -97,7 +116,21 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
         last, sigma = sigma, _sigma(problem, point)
         if abs(sigma - last) <= _SETTLED * last:
             break
-    return Fitted(samples, problem, point, sigma)
+    return Fitted(samples, problem, point, sigma, rows, hidden)
+
+
+def _hidden(fitted: Fitted) -> Mask:
+    """Return the samples at which the specular part of a fit counts, where the aperture is not known, shape (N,)."""
+    view = fitted.view
+    near = (view.from_mirror < _NEAR_MIRROR) & (view.w_r[:, 2] > 0.0)
+    if view.half_angle or not near.any() or all(term.spec.specular is None for term in fitted.surface.terms):
+        return np.zeros(len(view), dtype=np.bool_)
+    rows = np.flatnonzero(near)
+    some = view.selected(rows)
+    reflected = fitted.surface.reflected(fitted.point.x, fitted.point.values, some)
+    added = reflected / (2.0 * np.pi * versine(np.asarray(_NEAR_MIRROR)) * some.w_r[:, 2:])
+    near[rows] = np.any(added > _COUNTS * fitted.seen(some), axis=1)
+    return near
 
 
 def _sigma(problem: Problem, point: Point) -> float:
@@ -140,20 +173,7 @@ def fits(
         If a name is unknown, a model that was named cannot describe the samples, or no sample counts.
     """
     counting = Residual(samples, residual)
-    made: list[tuple[Fit, Fitted]] = []
-    skipped: dict[str, str] = {}
-    for model in fitted_by_default() if models is None else models:
-        tick(model)
-        try:
-            fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
-        except NotDescribedError as error:
-            if models is not None and len(models) == 1:
-                raise
-            skipped[model] = error.sentence
-            continue
-        made.append((_document(fitted), fitted))
-    if not made:
-        raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
+    made, skipped = _made(samples, models, residual, refractive_index, tick)
     by_held_out = made[0][0].held_out is not None
     made.sort(key=lambda one: _rank(one[0]))
     if profiles:
@@ -172,7 +192,14 @@ def fits(
         assumed_wavelength_nm=ASSUMED_NM if indexed and samples.wavelength_nm is None else None,
         residual=residual,
         refractive_index=refractive_index,
-        left_out=Left(holes=counting.holes, at_horizon=counting.at_horizon, unusable=counting.left_out),
+        source_solid_angle_sr=samples.instrument.source_solid_angle_sr,
+        receiver_solid_angle_sr=samples.instrument.receiver_solid_angle_sr,
+        left_out=Left(
+            below_horizon=int(samples.record.get("below_the_horizon", 0)),
+            holes=counting.holes,
+            at_horizon=counting.at_horizon,
+            unusable=counting.left_out,
+        ),
         ranked_by="held-out rms of ln" if by_held_out else "BIC",
         fits=[one for one, _ in made],
         outliers=far,
@@ -180,6 +207,35 @@ def fits(
         skipped=skipped,
     )
     return document, [fitted for _, fitted in made]
+
+
+def _made(
+    samples: Samples,
+    models: Sequence[str] | None,
+    residual: Kind,
+    refractive_index: str | None,
+    tick: Callable[[str], None],
+) -> tuple[list[tuple[Fit, Fitted]], dict[str, str]]:
+    """Return the fits of all models that can describe the samples, and why others are left out."""
+    made: list[tuple[Fit, Fitted]] = []
+    skipped: dict[str, str] = {}
+    tried = fitted_by_default() if models is None else models
+    for model in tried:
+        tick(model)
+        try:
+            fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
+        except NotDescribedError as error:
+            if models is not None and len(models) == 1:
+                raise
+            skipped[model] = error.sentence
+            continue
+        made.append((_document(fitted), fitted))
+    if not made:
+        raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
+    if models is None:
+        slow = "its values are integrals, which take minutes; name it to fit it"
+        skipped |= {name: slow for name in MODELS if name not in tried}
+    return made, skipped
 
 
 def _rank(one: Fit) -> tuple[float, float]:
@@ -202,18 +258,19 @@ def _document(fitted: Fitted) -> Fit:
         rms_ln=float(np.sqrt(np.mean(logs**2))) if logs.size else None,
         median_ln=float(np.median(np.abs(logs))) if logs.size else None,
         sigma=fitted.sigma,
-        held_out=held_out(fitted.problem, fitted.point, fitted.samples),
+        held_out=held_out(fitted),
         numbers=searched,
         aic=deviance + 2.0 * (searched + 1),
         bic=deviance + (searched + 1) * float(np.log(used)),
         pattern=_pattern(fitted),
+        at_mirror=int(np.sum(fitted.hidden)),
         albedo=albedo,
         correlations=correlations,
         remarks=[],
         material=material,
         recipe=recipe,
     )
-    return record.model_copy(update={"remarks": remarks_of(record, fitted.surface, fitted.samples)})
+    return record.model_copy(update={"remarks": remarks_of(record, fitted)})
 
 
 def _pattern(fitted: Fitted) -> float:
@@ -221,22 +278,23 @@ def _pattern(fitted: Fitted) -> float:
     from scipy.spatial import cKDTree
 
     problem = fitted.problem
-    pairs = np.concatenate([problem.wi, problem.wr], axis=1)
+    pairs = np.concatenate([problem.view.w_i, problem.view.w_r], axis=1)
     if len(pairs) < 3:
         return 0.0
     nearest = cKDTree(pairs).query(pairs, k=2)[1][:, 1]
     used = problem.residual.used & problem.residual.used[nearest]
     r = np.clip(fitted.point.residuals, -FAR * fitted.sigma, FAR * fitted.sigma)
     size = float(np.sum((r * r)[used]))
-    return float(np.sum((r * r[nearest])[used]) / size) if size > 0.0 else 0.0
+    return min(float(np.sum((r * r[nearest])[used]) / size), 1.0) if size > 0.0 else 0.0
 
 
 def _outliers(fitted: Fitted) -> tuple[list[Outlier], int]:
     """Return the samples that are far from a fit, the farthest first, and their number."""
     samples, problem = fitted.samples, fitted.problem
     residual = Residual(samples, problem.residual.kind)
-    f_r = fitted.f_r(samples.w_i, samples.w_r)
-    sigmas = np.where(residual.used, residual.of(f_r) / max(fitted.sigma, _LEAST_SCALE), 0.0)
+    f_r = fitted.seen(fitted.view)
+    counts = residual.used & ~fitted.hidden[:, np.newaxis]
+    sigmas = np.where(counts, residual.of(f_r) / max(fitted.sigma, _LEAST_SCALE), 0.0)
     far = np.argwhere(np.abs(sigmas) > FAR)
     order = np.argsort(-np.abs(sigmas[far[:, 0], far[:, 1]]), kind="stable")[:_LISTED]
     listed = [

@@ -5,12 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from brdfdb.fitting.problem import Point, Problem
 from brdfdb.fitting.residuals import logarithms
 from brdfdb.fitting.surface import Surface
 from brdfdb.fitting.uncertainty import Covariance, covariance
 from brdfdb.measurements import Samples
+from brdfdb.measurements.aperture import View
 from brdfdb.parameters import Floats
+
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -27,12 +33,18 @@ class Fitted:
         The best point.
     sigma : float
         Robust standard deviation of the residuals.
+    rows : array of int
+        Samples that count, those of `problem`.
+    hidden : array (N,) of bool
+        Samples that are left out, because a specular part is seen there through an aperture that is not known.
     """
 
     samples: Samples
     problem: Problem
     point: Point
     sigma: float
+    rows: NDArray[np.int64]
+    hidden: Mask
 
     @property
     def surface(self) -> Surface:
@@ -44,11 +56,21 @@ class Fitted:
         """The covariance of the numbers of the fit."""
         return covariance(self.problem, self.point)
 
+    @cached_property
+    def view(self) -> View:
+        """The directions of all samples, as their instrument sees them."""
+        return View(self.samples.w_i, self.samples.w_r, self.samples.instrument)
+
     def f_r(self, wi: Floats, wr: Floats) -> Floats:
-        """Return f_r (N, C) [1/sr] of the fit at unit vectors (N, 3) of light and viewer."""
-        return self.surface.f_r(self.point.x, self.point.values, wi, wr)
+        """Return f_r (N, C) [1/sr] of the fit at unit vectors (N, 3) of light and viewer, without its specular part."""
+        return self.surface.f_r(self.point.x, self.point.values, View(wi, wr))
+
+    def seen(self, view: View) -> Floats:
+        """Return f_r (N, C) [1/sr] of the fit as an instrument sees it."""
+        return self.surface.f_r(self.point.x, self.point.values, view)
 
     @cached_property
     def logarithms(self) -> Floats:
-        """Return ln(model / sample) (N, C); nan where the sample is not positive."""
-        return logarithms(self.samples, self.f_r(self.samples.w_i, self.samples.w_r))
+        """Return ln(model / sample) (N, C); nan where the sample is not positive, or is left out."""
+        difference = logarithms(self.samples, self.seen(self.view))
+        return np.where(self.hidden[:, np.newaxis], np.nan, difference)

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.fitting.document import HeldOut
-from brdfdb.fitting.problem import Point, Problem
+from brdfdb.fitting.fitted import Fitted
+from brdfdb.fitting.problem import Problem
 from brdfdb.fitting.residuals import Residual, logarithms
 from brdfdb.geometry import degrees
 from brdfdb.measurements import Samples
@@ -15,30 +16,30 @@ GROUPS = 8  # groups of incidences at most; fewer incidences are left out one at
 _EVALUATIONS = 40
 
 
-def held_out(problem: Problem, point: Point, samples: Samples) -> HeldOut | None:
+def held_out(fitted: Fitted) -> HeldOut | None:
     """Return the error at incidences that were left out in turn; None if the light has one direction.
 
     Each search begins where that of all samples ended, and ends at the samples that are left. More than eight
     incidences are left out in groups of neighbours.
     """
+    samples, surface, view = fitted.samples, fitted.surface, fitted.view
     groups = groups_of(samples)
     if len(groups) < 2:
         return None
-    surface = problem.surface
-    whole = Residual(samples, problem.residual.kind)
+    whole = Residual(samples, fitted.problem.residual.kind)
+    counts = whole.used.any(axis=1) & ~fitted.hidden
     angles, errors = [], []
     for rows in groups:
-        seen = np.ones(len(samples), dtype=bool)
-        seen[rows] = False
-        kept = np.flatnonzero(seen & whole.used.any(axis=1))
-        if not kept.size:
+        kept = counts.copy()
+        kept[rows] = False
+        if not kept.any():
             continue
-        part = Problem(surface, samples.w_i[kept], samples.w_r[kept], whole.selected(kept))
-        part.scale = problem.scale
-        end = part.descend(point.x[part.free], _EVALUATIONS)
-        left = samples.selected(rows)
-        difference = logarithms(left, surface.f_r(end.x, end.values, left.w_i, left.w_r))
-        difference = difference[np.isfinite(difference)]
+        some = np.flatnonzero(kept)
+        part = Problem(surface, view.selected(some), whole.selected(some))
+        part.scale = fitted.problem.scale
+        end = part.descend(fitted.point.x[part.free], _EVALUATIONS)
+        difference = logarithms(samples.selected(rows), surface.f_r(end.x, end.values, view.selected(rows)))
+        difference = difference[np.isfinite(difference) & ~fitted.hidden[rows, np.newaxis]]
         if difference.size:
             angles.append(np.unique(np.round(degrees(samples.theta_i[rows]), 3)).tolist())
             errors.append(difference)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 from brdfdb.fitting.problem import Point
@@ -12,6 +11,7 @@ from brdfdb.materials import Material, written_name
 from brdfdb.materials.provenance import MOST_NAME
 from brdfdb.materials.recipe_text import rounded, toml_of
 from brdfdb.measurements import Samples
+from brdfdb.measurements.measured_source import slug
 
 
 def material_of(surface: Surface, point: Point, samples: Samples) -> tuple[Material | None, str | None]:
@@ -44,10 +44,5 @@ def material_of(surface: Surface, point: Point, samples: Samples) -> tuple[Mater
     if spec.spectral or (several and surface.coefficients):
         table["wavelengths_nm"] = surface.wavelength_nm.tolist()
     table["parameters"] = values
-    name = _slug(f"{samples.name}-as-{spec.name}")
+    name = slug(f"{samples.name}-as-{spec.name}")[:MOST_NAME].rstrip("-")
     return Material.from_table(name, table), toml_of(name, table)
-
-
-def _slug(text: str) -> str:
-    """Return lower-case words joined by hyphens."""
-    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:MOST_NAME].rstrip("-")

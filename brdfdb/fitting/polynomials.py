@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from brdfdb.errors import BrdfdbError
 from brdfdb.fitting.variables import spread, switches
 from brdfdb.geometry import unit_vector
 from brdfdb.parameters import Floats, ModelSpec, Parameter
@@ -106,9 +103,3 @@ class Polynomial:
     def parts(self, values: list[Floats]) -> Floats:
         """Return the factors (M, N) of the monomials from the values (N,) of a model at the nodes."""
         return np.asarray(np.einsum("mj,jn->mn", self.inverse, np.stack(values)))
-
-
-def checked(spec: ModelSpec, numbers: Mapping[str, Any], f_r: Floats, summed: Floats) -> None:
-    """Raise a BrdfdbError if the polynomial of a model is not the model."""
-    if not np.max(np.abs(f_r - summed)) <= 1e-6 * max(float(np.max(np.abs(f_r))), 1e-30):
-        raise BrdfdbError(f"{spec.name}: f_r is not a polynomial in its reflectances at {dict(numbers)}")

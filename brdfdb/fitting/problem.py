@@ -12,6 +12,7 @@ from brdfdb.fitting.projection import COARSE, FINE, cost_of, project, slopes_of
 from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.surface import Surface, total
 from brdfdb.fitting.variables import best_apart, spread
+from brdfdb.measurements.aperture import RESOLVED, View
 from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
@@ -19,11 +20,11 @@ Array = NDArray[np.float64]
 POINTS = 128  # points of the unit cube that are tried at some of the samples
 STARTS = 3  # of them from which descents begin
 _SPREAD = 4096  # points among which those with a lobe that samples can show are chosen
-_SOME = 300  # samples at which points are tried: half of them the brightest
+_SOME, _MORE = 300, 1000  # samples at which points are tried, and at which the promising ones go on
 _NARROWEST, _WIDEST = 0.002, 1.5  # widths of lobes that descents begin with
 _STEP = 1e-6  # of differences, in the unit cube
 _INSIDE = 1e-9  # distance of beginnings from the surface of the cube
-_COARSE, _FINE = 20, 60  # evaluations of descents, at some and at all samples
+_COARSE, _FINE = 20, 60  # evaluations of descents, at some samples and at more
 _PROMISING = 1.5  # times the least cost at some samples
 _AT_END = 1e-12  # distance of a coefficient from an end of its range that is the end, in its unit
 
@@ -46,8 +47,8 @@ class Problem:
     ----------
     surface : Surface
         The surface.
-    wi, wr : array (N, 3)
-        Unit vectors of light and viewer.
+    view : View
+        Directions of light and viewer as the instrument sees them.
     residual : Residual
         Of the same N samples.
     fixed : mapping of int to float
@@ -59,13 +60,12 @@ class Problem:
     def __init__(
         self,
         surface: Surface,
-        wi: Floats,
-        wr: Floats,
+        view: View,
         residual: Residual,
         fixed: Mapping[int, float] | None = None,
         held: Mapping[int, float] | None = None,
     ) -> None:
-        self.surface, self.wi, self.wr, self.residual = surface, wi, wr, residual
+        self.surface, self.view, self.residual = surface, view, residual
         self.fixed = dict(fixed or {})
         self.free = [j for j in range(len(surface.shape)) if j not in self.fixed]
         shape = (len(surface.coefficients), surface.channels)
@@ -82,7 +82,7 @@ class Problem:
         """Return the problem of some of the samples."""
         part = Problem.__new__(Problem)
         part.__dict__ |= self.__dict__
-        part.wi, part.wr, part.residual = self.wi[rows], self.wr[rows], self.residual.selected(rows)
+        part.view, part.residual = self.view.selected(rows), self.residual.selected(rows)
         return part
 
     def at(self, free: Array, start: Array | None = None, tolerance: float = FINE) -> Point:
@@ -91,7 +91,7 @@ class Problem:
         x[self.free] = free
         for index, u in self.fixed.items():
             x[index] = u
-        basis = self.surface.basis(x, self.wi, self.wr)
+        basis = self.surface.basis(x, self.view)
         begin = self.begin if start is None else start
         values = project(self.surface, basis, self.residual, self.scale, (self.low, self.high), begin, tolerance)
         f_r = total(basis, self.surface.monomials(values))
@@ -107,7 +107,7 @@ class Problem:
             moved = point.x.copy()
             step = -_STEP if moved[index] > 0.5 else _STEP
             moved[index] += step
-            f_r = total(self.surface.basis(moved, self.wi, self.wr), monomials)
+            f_r = total(self.surface.basis(moved, self.view), monomials)
             columns[number] = slope * (f_r - point.f_r) / step
         return columns
 
@@ -157,8 +157,8 @@ class Problem:
             loss="soft_l1",
             f_scale=self.scale,
             max_nfev=most,
-            xtol=1e-7,
-            ftol=1e-9,
+            xtol=1e-6,
+            ftol=1e-7,
             gtol=1e-10,
         )
         return self.at(end.x, values)
@@ -180,46 +180,37 @@ class Problem:
 
     def _shows(self, x: Array) -> bool:
         """Return False if a lobe of the surface is too narrow or too wide to begin with."""
-        middle = {one.name: 0.5 * one.unit for one in self.surface.coefficients}
-        for number, (term, given) in enumerate(zip(self.surface.terms, self.surface.numbers(x), strict=True)):
-            if term.spec.lobe is None:
-                continue
-            linear = {name: middle[name] for name in term.linear}
-            with np.errstate(all="ignore"):
-                arguments = {**self.surface.arguments(number, given, 0), **linear}
-                lobe = term.spec.lobe(np.asarray(1.0), **arguments)
-            width = float(np.min(lobe.alpha_x))
-            if not _NARROWEST <= width <= _WIDEST:
-                return False
-        return True
+        narrowest = max(_NARROWEST, RESOLVED * self.view.half_angle)
+        return all(narrowest <= width <= _WIDEST for width in self.surface.widths(x))
 
     def best(self) -> Point:
-        """Return the best end of descents from several beginnings.
+        """Return the best end of descents from several beginnings, from which a descent at all samples goes on.
 
         Points are tried at some of the samples. Descents from the best three that are apart end at those samples, and
-        the promising ones go on at all of them.
+        the promising ones go on at more of them.
         """
         if not self.free:
             return self.at(np.zeros(0))
-        rows = self._some()
-        coarse = self.selected(rows)
+        coarse = self.selected(self._brightest_and_others(_SOME))
         points = self.begin_points()
         values = np.array([coarse.at(point, tolerance=COARSE).cost for point in points])
         ends = [coarse.descend(point, _COARSE) for point in best_apart(points, values, STARTS)]
         least = min(end.cost for end in ends)
         good = [end for end in ends if end.cost <= _PROMISING * least]
         apart = best_apart(np.array([end.x for end in good]), np.array([end.cost for end in good]), STARTS)
-        return min((self.descend(x[self.free], _FINE) for x in apart), key=lambda point: point.cost)
+        more = self.selected(self._brightest_and_others(_MORE))
+        best = min((more.descend(x[self.free], _FINE) for x in apart), key=lambda point: point.cost)
+        return self.at(best.x[self.free], best.values)
 
-    def _some(self) -> NDArray[np.int64]:
+    def _brightest_and_others(self, most: int) -> NDArray[np.int64]:
         """Return some of the samples: half of them the brightest, half of them any."""
-        count = len(self.wi)
-        if count <= _SOME:
+        count = len(self.view)
+        if count <= most:
             return np.arange(count)
         brightness = np.where(self.residual.used, self.residual.truth, -np.inf).max(axis=1)
         order = np.argsort(-brightness, kind="stable")
-        others = np.random.default_rng(0).permutation(order[_SOME // 2 :])[: _SOME // 2]
-        return np.sort(np.concatenate([order[: _SOME // 2], others]))
+        others = np.random.default_rng(0).permutation(order[most // 2 :])[: most // 2]
+        return np.sort(np.concatenate([order[: most // 2], others]))
 
 
 def _undone(columns: Floats, inner: Floats, weights: Floats) -> Floats:

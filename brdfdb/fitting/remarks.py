@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from brdfdb.fitting.document import Fit
-from brdfdb.fitting.surface import Surface
-from brdfdb.measurements import Samples
+import math
 
+from brdfdb.fitting.document import Fit
+from brdfdb.fitting.fitted import Fitted
+from brdfdb.geometry import degrees
+from brdfdb.measurements.aperture import RESOLVED
+
+NARROW = 0.05  # width of a lobe, in slopes, below which usual apertures change it
 PATTERN = 0.5  # correlation of neighbouring residuals from which on the rest is a pattern
 
 
-def remarks_of(fit: Fit, surface: Surface, samples: Samples) -> list[str]:
+def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
     """Return sentences on light from nothing, a pattern in the residuals, ends of ranges, and pairs of numbers."""
-    sentences = []
+    surface, samples = fitted.surface, fitted.samples
+    sentences = _of_aperture(fit, fitted)
     if not fit.albedo.conserves:
         sentences.append(
             f"It reflects {100.0 * fit.albedo.value:.3g} % of the light from {fit.albedo.theta_i_deg:g} degrees: more "
@@ -35,4 +40,26 @@ def remarks_of(fit: Fit, surface: Surface, samples: Samples) -> list[str]:
         sentences.append("The samples state no wavelength; lengths are those at 550 nm, and scale with it.")
     if len(surface.terms) > 1:
         sentences.append("A sum is no model of the registry: it takes a source that is a function.")
+    return sentences
+
+
+def _of_aperture(fit: Fit, fitted: Fitted) -> list[str]:
+    """Return sentences on what an aperture hides, or one that is not known."""
+    width, half_angle = min(fitted.surface.widths(fitted.point.x), default=math.inf), fitted.view.half_angle
+    sentences = []
+    if fit.at_mirror:
+        sentences.append(
+            f"{fit.at_mirror} samples near the mirror direction are left out: it has a specular part there, and the "
+            "solid angle of the receiver is not known."
+        )
+    if half_angle and width < RESOLVED * half_angle:
+        sentences.append(
+            f"Its lobe is narrower than an aperture of {2.0 * float(degrees(half_angle)):.3g} degrees resolves: "
+            "the width is an upper limit."
+        )
+    if not half_angle and width < NARROW:
+        sentences.append(
+            f"Its lobe has a width of {width:.2g} in slopes, and no solid angle of the receiver is known: an opening "
+            f"that is not much smaller than {float(degrees(width)):.2g} degrees has widened it."
+        )
     return sentences

@@ -14,6 +14,7 @@ from brdfdb.errors import ParameterError
 from brdfdb.fitting.polynomials import Polynomial, coefficients, unit_of
 from brdfdb.fitting.variables import EDGE, NORMAL, index_of, index_variables, switches, variable
 from brdfdb.geometry import unit_vector
+from brdfdb.measurements.aperture import View
 from brdfdb.models import MODELS
 from brdfdb.parameters import Floats, ModelSpec, closest
 from brdfdb.spectra import refractive_index
@@ -79,7 +80,7 @@ class Term:
         self.polynomial = (
             Polynomial(1, 1, constant=False) if self.scaled else Polynomial(len(names), degree, constant=bright)
         )
-        self.memory: list[tuple[Floats, dict[str, Any], Floats]] = []
+        self.memory: list[tuple[View, dict[str, Any], Floats]] = []
         self.tied = None if turned else spec.lobe_axes
         out = {*self.fixed, *self.linear, *(self.tied or ())[1:]}
         self.free = [p for p in spec.parameters if p.name not in out]
@@ -91,24 +92,51 @@ class Term:
         parameters = [self.spec.parameter(name) for name in self.linear]
         return [Coefficient(number, p.name, f"{self.label}{p.name}", p.low, p.high, unit_of(p)) for p in parameters]
 
-    def basis(self, wi: Floats, wr: Floats, numbers: Mapping[str, Any]) -> Floats:
+    def basis(self, view: View, numbers: Mapping[str, Any]) -> Floats:
         """Return the factors (M, N) [1/sr] of the monomials of this term. The last ones are remembered."""
-        for light, given, part in self.memory:
-            if light is wi and given == numbers:
+        for before, given, part in self.memory:
+            if before is view and given == numbers:
                 return part
-        part = self._computed(wi, wr, numbers)
-        self.memory = [(wi, dict(numbers), part), *self.memory[: _REMEMBERED - 1]]
+        part = self._computed(view, numbers)
+        self.memory = [(view, dict(numbers), part), *self.memory[: _REMEMBERED - 1]]
         return part
 
-    def _computed(self, wi: Floats, wr: Floats, numbers: Mapping[str, Any]) -> Floats:
+    def width(self, numbers: Mapping[str, Any]) -> float | None:
+        """Return the width of the lobe of this term, the smaller of two, in slopes; None for a diffuse model."""
+        if self.spec.lobe is None:
+            return None
+        middle = {name: 0.5 * unit_of(self.spec.parameter(name)) for name in self.linear}
+        with np.errstate(all="ignore"):
+            lobe = self.spec.lobe(np.asarray(1.0), **numbers, **middle)
+            return float(np.min(np.minimum(lobe.alpha_x, lobe.alpha_y)))
+
+    def _computed(self, view: View, numbers: Mapping[str, Any]) -> Floats:
+        width = self.width(numbers) if view.half_angle else None
         if self.scaled:
-            return np.asarray(self.spec.vectors(wi, wr, **numbers))[np.newaxis]
+            return self._seen(view, width, numbers)[np.newaxis]
         units = [unit_of(self.spec.parameter(name)) for name in self.linear]
         values = []
         for node in self.polynomial.nodes.tolist():
             given = {name: u * unit for name, u, unit in zip(self.linear, node, units, strict=True)}
-            values.append(self.spec.vectors(wi, wr, **numbers, **given))
+            values.append(self._seen(view, width, {**numbers, **given}))
         return self.polynomial.parts(values)
+
+    def _seen(self, view: View, width: float | None, given: Mapping[str, Any]) -> Floats:
+        """Return f_r (N,) [1/sr] as an instrument sees it, with the specular part that falls into its aperture."""
+        if not view.half_angle:
+            return np.asarray(self.spec.vectors(view.w_i, view.w_r, **given))
+        f_r = view.mean(lambda wi, wr: self.spec.vectors(wi, wr, **given), np.inf if width is None else width)
+        if self.spec.specular is None:
+            return f_r
+        return f_r + view.mirror * self.reflected(view, given)
+
+    def reflected(self, view: View, given: Mapping[str, Any]) -> Floats:
+        """Return the specular reflectance (N,) [1] for each direction of the light; 0 for models without one."""
+        if self.spec.specular is None:
+            return np.zeros(len(view))
+        return np.asarray(
+            self.spec.specular(view.theta_i, **{name: given[name] for name in self.spec.specular_parameters})
+        )
 
 
 def _is_bright(spec: ModelSpec, names: tuple[str, ...], fixed: Mapping[str, float]) -> bool:
@@ -239,14 +267,14 @@ class Surface:
         own = {one.name: float(values[row, channel]) for row, one in enumerate(self.coefficients) if one.term == number}
         return given | {name: value for name, value in own.items() if name != SCALE}, own.get(SCALE, 1.0)
 
-    def basis(self, x: Array, wi: Floats, wr: Floats) -> Floats:
+    def basis(self, x: Array, view: View) -> Floats:
         """Return the factors (M, N, C) [1/sr] of all monomials; (M, N, 1) if they are the same in each channel."""
         parts = []
         several = self.channels if self.indexed else 1
         for number, (term, given) in enumerate(zip(self.terms, self.numbers(x), strict=True)):
             own = several if term.spec.spectral else 1
             with np.errstate(all="ignore"):  # extreme parameters may raise flags
-                columns = [term.basis(wi, wr, self.arguments(number, given, c)) for c in range(own)]
+                columns = [term.basis(view, self.arguments(number, given, c)) for c in range(own)]
             part = np.stack(columns, axis=-1)
             parts.append(np.broadcast_to(part, (*part.shape[:2], several)))
         basis = np.concatenate(parts)
@@ -277,9 +305,26 @@ class Surface:
         units = np.array([one.unit for one in self.coefficients[at : at + count]])
         return np.asarray(values[at : at + count] / units[:, np.newaxis])
 
-    def f_r(self, x: Array, values: Floats, wi: Floats, wr: Floats) -> Floats:
-        """Return f_r (N, C) [1/sr] at unit vectors (N, 3), with coefficients (K, C)."""
-        return total(self.basis(x, wi, wr), self.monomials(values))
+    def f_r(self, x: Array, values: Floats, view: View) -> Floats:
+        """Return f_r (N, C) [1/sr] as an instrument sees it, with coefficients (K, C)."""
+        return total(self.basis(x, view), self.monomials(values))
+
+    def reflected(self, x: Array, values: Array, view: View) -> Floats:
+        """Return the specular reflectance (N, C) [1] for each direction of the light."""
+        sums = np.zeros((len(view), self.channels))
+        for number, term in enumerate(self.terms):
+            for channel in range(self.channels if term.spec.specular is not None else 0):
+                given, scale = self.in_channel(x, values, number, channel)
+                sums[:, channel] += scale * term.reflected(view, given)
+        return sums
+
+    def widths(self, x: Array) -> list[float]:
+        """Return the widths of the lobes at a point of the unit cube, in slopes."""
+        widths = [
+            term.width(self.arguments(number, given, 0))
+            for number, (term, given) in enumerate(zip(self.terms, self.numbers(x), strict=True))
+        ]
+        return [width for width in widths if width is not None]
 
 
 def total(basis: Floats, monomials: Floats) -> Floats:

@@ -17,7 +17,7 @@ NORMAL_95 = 1.959963984540054  # standard errors to each side of a 95 % interval
 _RIDGE = 1e-13  # added to the normalised matrix, so that a direction without any information has a finite variance
 _END = 1e-4  # distance from an end of the unit cube that is the end
 _UNLIKE = 0.3  # relative difference of sqrt(deviance) from 1.96 at the ends of an interval: a profile is needed
-_SECANTS = 4
+_STEPS = 14  # of the search of an end of an interval
 _FIRST = 0.02  # first step of a profile, of the range, for a number without a standard error
 _EVALUATIONS = 25
 
@@ -143,7 +143,7 @@ class Profile:
         p = self.problem
         fixed = p.fixed if self.shape is None else {**p.fixed, self.shape: at}
         held = None if self.coefficient is None else {self.coefficient: at}
-        one = Problem(p.surface, p.wi, p.wr, p.residual, fixed, held)
+        one = Problem(p.surface, p.view, p.residual, fixed, held)
         one.scale = p.scale
         begin = np.clip(self.point.x + self.along * (at - self.best), 0.0, 1.0)
         cost = one.descend(begin[one.free], _EVALUATIONS).cost
@@ -184,10 +184,14 @@ class Profile:
 
 
 def _root(function: Callable[[float], float], inner: float, below: float, outer: float, above: float) -> float:
-    """Return where a function that is nearly linear reaches 1.96, between two points on either side."""
-    for _ in range(_SECANTS):
-        share = np.clip((NORMAL_95 - below) / (above - below), 0.05, 0.95)
-        middle = inner + float(share) * (outer - inner)
+    """Return where a function is 1.96, between two points on either side.
+
+    Secants, and bisections in turn: a number that the samples set a limit to on one side alone has a flat profile that
+    becomes steep, along which secants hardly move.
+    """
+    for step in range(_STEPS):
+        share = 0.5 if step % 2 else float(np.clip((NORMAL_95 - below) / (above - below), 0.05, 0.95))
+        middle = inner + share * (outer - inner)
         value = function(middle)
         if abs(value / NORMAL_95 - 1.0) < 0.01:
             return middle

@@ -1,78 +1,175 @@
-"""Averages of f_r over the solid angles of light and receiver, which an instrument measures in place of f_r."""
+"""Directions as an instrument sees them: averages of f_r over the solid angles of light and receiver."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from brdfdb.geometry import common_solid_angle, versine
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements.samples import Instrument
 from brdfdb.parameters import Floats
 
-# Points of a disk of radius 1 and their weights: exact for polynomials of degree 5
-_TURNS = np.arange(6) * np.pi / 3.0
-POINTS = np.concatenate([np.zeros((1, 2)), np.sqrt(2.0 / 3.0) * np.stack([np.cos(_TURNS), np.sin(_TURNS)], axis=1)])
-WEIGHTS = np.array([0.25, *[0.125] * 6])
+WIDE = 20.0  # half angles of the aperture, from which on the width of a lobe is not changed by it
+RESOLVED = 0.25  # half angle of the aperture, below which the width of a lobe is not resolved
+_AROUND = (6, 12)  # directions of a ring, of one ring and of more
+_RINGS = 3  # of lobes that are narrower than the half angle
 
 
-def cone(w: Floats, half_angle: float) -> Floats:
-    """Return directions (7, N, 3) in a cone about unit vectors (N, 3); the half angle [rad] is small.
+@cache
+def disk(rings: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return points (Q, 2) of a disk of radius 1, the middle first, and their weights (Q,), which add up to 1.
 
-    A mean over the cone is their sum, weighted by `WEIGHTS`.
+    Radau's rule in the square of the radius, with equal steps around. One ring has 7 points, and is exact for
+    polynomials of degree 5. Three rings have 37, and are exact to degree 11.
+    """
+    legendre = np.polynomial.legendre
+    x = np.sort(legendre.legroots([0.0] * rings + [1.0, 1.0]).real)[1:]  # without the end at -1
+    last = legendre.legval(x, [0.0] * rings + [1.0])
+    weights = 0.5 * (1.0 - x) / ((rings + 1.0) * last) ** 2
+    count = _AROUND[rings > 1]
+    turns = 2.0 * np.pi * np.arange(count) / count
+    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    points = np.sqrt(0.5 * (1.0 + x))[:, np.newaxis, np.newaxis] * circle
+    middle = 1.0 / (rings + 1.0) ** 2
+    return np.concatenate([np.zeros((1, 2)), points.reshape(-1, 2)]), np.array(
+        [middle, *np.repeat(weights / count, count)]
+    )
+
+
+def cone(w: Floats, half_angle: float, rings: int = 1) -> Floats:
+    """Return directions (Q, N, 3) in a cone about unit vectors (N, 3); the half angle [rad] is small.
+
+    A mean over the cone is their sum with the weights of `disk`.
     """
     helper = np.where(np.abs(w[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     u = np.cross(w, helper)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     v = np.cross(w, u)
-    at = np.tan(half_angle) * POINTS
+    at = np.tan(half_angle) * disk(rings)[0]
     spread = w + at[:, 0, np.newaxis, np.newaxis] * u + at[:, 1, np.newaxis, np.newaxis] * v
     return np.asarray(spread / np.linalg.norm(spread, axis=2, keepdims=True))
+
+
+class View:
+    """Pairs of directions as an instrument sees them.
+
+    Parameters
+    ----------
+    w_i, w_r : array (N, 3)
+        Unit vectors of light and viewer, the middles of their solid angles.
+    instrument : Instrument, optional
+        Solid angles that are unknown count as 0. None: f_r at the directions themselves.
+
+    Attributes
+    ----------
+    half_angle : float [rad]
+        Half angle of the disk that light and receiver make together; 0 where neither has a known solid angle.
+
+    Notes
+    -----
+    Light and receiver are disks. A direction counts by its cosine, as light does on the sample and on the receiver. A
+    lobe is a function of the half vector, which light and viewer move by the same amount. Both are replaced by one disk
+    about the viewer, whose solid angle is the sum of theirs: what is left out is of the fourth order in the ratio of
+    aperture and lobe. Directions below the horizon count with the value of the middle.
+    """
+
+    def __init__(self, w_i: Floats, w_r: Floats, instrument: Instrument | None = None) -> None:
+        self.w_i, self.w_r, self.instrument = w_i, w_r, instrument
+        angles = () if instrument is None else (instrument.source_solid_angle_sr, instrument.receiver_solid_angle_sr)
+        self._half_angles = [_half_angle(solid_angle) for solid_angle in angles if solid_angle is not None]
+        self.half_angle = float(np.hypot.reduce(self._half_angles)) if self._half_angles else 0.0
+        self._spread: dict[int, tuple[Floats, Floats, Floats, NDArray[np.bool_]]] = {}
+
+    def __len__(self) -> int:
+        return len(self.w_i)
+
+    def selected(self, rows: NDArray[np.int64]) -> View:
+        """Return the view of some of the pairs."""
+        return View(self.w_i[rows], self.w_r[rows], self.instrument)
+
+    @cached_property
+    def theta_i(self) -> Floats:
+        """Polar angles [rad] of the light, shape (N,)."""
+        return np.asarray(np.arccos(np.clip(self.w_i[:, 2], -1.0, 1.0)))
+
+    @cached_property
+    def from_mirror(self) -> Floats:
+        """Angles [rad] between the viewer and the mirror direction of the light, shape (N,)."""
+        mirror = self.w_i * [-1.0, -1.0, 1.0]
+        return np.asarray(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(self.w_r - mirror, axis=1), 0.0, 1.0)))
+
+    @cached_property
+    def mirror(self) -> Floats:
+        """f_r [1/sr] that a specular reflectance of 1 adds, shape (N,); 0 where no solid angle is known.
+
+        The specular part of the light from the source, within the receiver: the solid angle that the receiver and the
+        mirror image of the light share, over the product of both and the cosine of the viewer.
+        """
+        if not self._half_angles:
+            return np.zeros(len(self))
+        first, last = self._half_angles[0], self._half_angles[-1]
+        shared = common_solid_angle(np.asarray(first), np.asarray(last), self.from_mirror)
+        if len(self._half_angles) == 1:  # the other is a point
+            shared = np.where(self.from_mirror < first, _solid_angle(first), 0.0)
+            return np.asarray(shared / (_solid_angle(first) ** 2 * self.w_r[:, 2]))
+        return np.asarray(shared / (_solid_angle(first) * _solid_angle(last) * self.w_r[:, 2]))
+
+    def mean(self, brdf: Callable[[Floats, Floats], Floats], width: float | None = None) -> Floats:
+        """Return f_r [1/sr] averaged over the aperture.
+
+        Parameters
+        ----------
+        brdf : callable
+            f_r [1/sr], shape (M,) or (M, C), at unit vectors (M, 3) of light and viewer.
+        width : float [1], optional
+            Width of its lobe, in slopes: a narrow one takes more points, and a very wide one the middle alone.
+        """
+        middle = np.asarray(brdf(self.w_i, self.w_r))
+        rings = _rings(self.half_angle, width)
+        if not rings:
+            return middle
+        if rings not in self._spread:
+            self._spread[rings] = self._moved(rings)
+        w_i, w_r, weights, above = self._spread[rings]
+        values = np.asarray(brdf(w_i, w_r)).reshape(*above.shape, *middle.shape[1:])
+        further = (...,) + (np.newaxis,) * (middle.ndim - 1)
+        values = np.where(above[further], values, middle)
+        return np.asarray(disk(rings)[1][0] * middle + np.sum(weights[further] * values, axis=0))
+
+    def _moved(self, rings: int) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+        """Return light and viewers (Q N, 3) of the points besides the middle, their weights and which are above."""
+        spread = cone(self.w_r, self.half_angle, rings)[1:]
+        above = spread[:, :, 2] > 0.0
+        viewers = np.where(above[:, :, np.newaxis], spread, self.w_r)
+        weights = disk(rings)[1][1:, np.newaxis] * viewers[:, :, 2] / self.w_r[:, 2]
+        light = np.broadcast_to(self.w_i, viewers.shape)
+        return np.ascontiguousarray(light).reshape(-1, 3), viewers.reshape(-1, 3), weights, above
 
 
 def averaged(brdf: Evaluate, instrument: Instrument) -> Evaluate:
     """Return f_r averaged over the solid angles of an instrument, a function of unit vectors like `brdf`.
 
-    Parameters
-    ----------
-    brdf : callable
-        f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer.
-    instrument : Instrument
-        Solid angles that are unknown count as 0.
-
-    Notes
-    -----
-    Light and receiver are disks. A direction counts by its cosine, as light does on the sample and on the receiver. The
-    mean over both is that over the light, plus that over the receiver, less f_r itself. What is left out is of the
-    fourth order in the ratio of aperture and lobe. Directions below the horizon count with the value of the middle.
+    `brdf` gives f_r [1/sr], shape (N, C), at unit vectors (N, 3) of light and viewer. `View` says what is averaged.
     """
-    angles = [_half_angle(instrument.source_solid_angle_sr), _half_angle(instrument.receiver_solid_angle_sr)]
-    if not any(angles):
-        return brdf
-
-    def mean(wi: Floats, wr: Floats) -> Floats:
-        middle = np.asarray(brdf(wi, wr))
-        result = middle.copy()
-        for number, half_angle in enumerate(angles):
-            if half_angle:
-                result += _over(brdf, (wi, wr), number, half_angle, middle) - middle
-        return result
-
-    return mean
+    return lambda w_i, w_r: View(w_i, w_r, instrument).mean(brdf)
 
 
-def _half_angle(solid_angle: float | None) -> float:
+def _half_angle(solid_angle: float) -> float:
     """Return half of the angle [rad] of the cone with a solid angle [sr]."""
-    return 0.0 if solid_angle is None else float(np.arccos(max(1.0 - solid_angle / (2.0 * np.pi), 0.0)))
+    return float(np.arccos(max(1.0 - solid_angle / (2.0 * np.pi), 0.0)))
 
 
-def _over(
-    brdf: Evaluate, pair: tuple[Floats, Floats], number: int, half_angle: float, middle: Floats
-) -> NDArray[np.float64]:
-    """Return the mean of f_r (N, C) over a cone about the first or the second direction of a pair."""
-    total = WEIGHTS[0] * middle
-    for weight, w in zip(WEIGHTS[1:], cone(pair[number], half_angle)[1:], strict=True):
-        above = w[:, 2:] > 0.0
-        moved = np.where(above, w, pair[number])
-        values = brdf(moved, pair[1]) if number == 0 else brdf(pair[0], moved)
-        total = total + weight * np.where(above, values * w[:, 2:] / pair[number][:, 2:], middle)
-    return np.asarray(total)
+def _solid_angle(half_angle: float) -> float:
+    """Return the solid angle [sr] of a cone."""
+    return float(2.0 * np.pi * versine(np.asarray(half_angle)))
+
+
+def _rings(half_angle: float, width: float | None) -> int:
+    """Return the rings of points that the mean of a lobe takes; 0 for the middle alone."""
+    if half_angle == 0.0 or (width is not None and width > WIDE * half_angle):
+        return 0
+    return 1 if width is None or width >= half_angle else _RINGS

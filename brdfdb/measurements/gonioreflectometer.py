@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import degrees, radians, spherical_angles, unit_vector
 from brdfdb.materials.source import Evaluate
-from brdfdb.measurements.aperture import WEIGHTS, cone
+from brdfdb.measurements.aperture import cone, disk
 from brdfdb.measurements.samples import Instrument, Samples
 
 Array = NDArray[np.float64]
@@ -253,7 +253,7 @@ def photograph(
     turned = _turned(wr[above], phi_i)
     f_r = np.zeros(len(wr))
     beam = cone(unit_vector(theta_i, phi_i)[np.newaxis], float(radians(settings.light_half_angle_deg)))
-    for w_i, weight in zip(beam, WEIGHTS, strict=True):
+    for w_i, weight in zip(beam, disk(1)[1], strict=True):
         share = weight * w_i[0, 2] / np.cos(theta_i)
         f_r[above] += share * brdf(np.broadcast_to(w_i, turned.shape), turned)[:, 0]
     light = np.zeros((2, *theta_c.shape))

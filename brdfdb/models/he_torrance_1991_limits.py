@@ -9,7 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from brdfdb import fresnel
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import Directions, Vectors, checked_angles, checked_vectors, finished
+from brdfdb.geometry import (
+    Directions,
+    Vectors,
+    checked_angles,
+    checked_vectors,
+    common_solid_angle,
+    finished,
+    versine,
+)
 from brdfdb.models import he_torrance_1991 as full
 from brdfdb.models._he_torrance_kernels import hidden, shadowing, variance
 from brdfdb.models.he_torrance_1991_polarised import unit_azimuth
@@ -356,39 +364,8 @@ def _aperture(directions: Directions, apertures: _Apertures, surface: full.Surfa
     chord2 = full.v_squared(directions)[0] + (directions.cos_i - directions.cos_r) ** 2
     apart = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt(chord2), 1.0))
     incident, received = (np.arcsin(np.sqrt(omega / np.pi)) for omega in apertures[:2])
-    common = _common_area(incident, received, apart) / (apertures.incident * apertures.received)
+    common = common_solid_angle(incident, received, apart) / (apertures.incident * apertures.received)
     return finished(rho_s * common / directions.cos_i + _averaged(directions, apertures, surface, albedo), directions)
-
-
-def _common_area(first: Floats, second: Floats, apart: Floats) -> Floats:
-    """Return the solid angle [sr] common to two circular cones of half angles `first` and `second`, axes `apart` [rad].
-
-    It is the area of two sectors less twice the triangle of both axes and a point where the circles cross. L'Huilier's
-    formula gives the area of the triangle and half-angle formulas give its angles, so that small cones keep their
-    digits.
-    """
-    half = 0.5 * (first + second + apart)
-    # Half the perimeter less each of the three sides
-    to_first = np.maximum(0.5 * ((second - first) + apart), 0.0)
-    to_second = np.maximum(0.5 * ((first - second) + apart), 0.0)
-    to_apart = np.maximum(0.5 * ((first + second) - apart), 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):  # cones that do not cross are replaced below
-        angle_first = 2.0 * np.arctan(np.sqrt(np.sin(to_first) * np.sin(to_apart) / (np.sin(half) * np.sin(to_second))))
-        angle_second = 2.0 * np.arctan(
-            np.sqrt(np.sin(to_second) * np.sin(to_apart) / (np.sin(half) * np.sin(to_first)))
-        )
-        tangents = np.tan(0.5 * half) * np.tan(0.5 * to_first) * np.tan(0.5 * to_second) * np.tan(0.5 * to_apart)
-        triangle = 4.0 * np.arctan(np.sqrt(np.maximum(tangents, 0.0)))
-        crossing = 2.0 * (angle_first * _versine(first) + angle_second * _versine(second) - triangle)
-    inside = 2.0 * np.pi * _versine(np.minimum(first, second))
-    crossing = np.where(apart <= np.abs(first - second), inside, crossing)
-    return np.where(apart >= first + second, 0.0, crossing)
-
-
-def _versine(angle: Floats) -> Floats:
-    """Return 1 - cos(angle) [1]."""
-    versine: Floats = 2.0 * np.sin(0.5 * angle) ** 2
-    return versine
 
 
 def _averaged(directions: Directions, apertures: _Apertures, surface: full.Surface, albedo: Floats) -> Floats:
@@ -436,11 +413,11 @@ def _nodes(frame: tuple[Floats, Floats, Floats], solid_angle: Floats, rings: int
     # Gauss's rule in the versine, in which solid angle is uniform, with equal steps around: exact to degree 4 rings - 1
     x, weight = np.polynomial.legendre.leggauss(rings)
     turn = 2.0 * np.pi * np.arange(4 * rings) / (4 * rings)
-    versine = _versine(np.arcsin(np.sqrt(solid_angle / np.pi)))[..., None] * np.repeat(0.5 * (1.0 + x), turn.size)
-    sin_off = np.sqrt(versine * (2.0 - versine))
+    off = versine(np.arcsin(np.sqrt(solid_angle / np.pi)))[..., None] * np.repeat(0.5 * (1.0 + x), turn.size)
+    sin_off = np.sqrt(off * (2.0 - off))
     turns = np.tile(turn, rings)
     w = (
-        (1.0 - versine)[..., None] * axis
+        (1.0 - off)[..., None] * axis
         + (sin_off * np.cos(turns))[..., None] * along
         + (sin_off * np.sin(turns))[..., None] * across
     )

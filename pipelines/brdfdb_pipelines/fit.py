@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from brdfdb.fitting.figure import figure_of
 from brdfdb.fitting.fit import fits
 from brdfdb.fitting.residuals import Kind
 from brdfdb.fitting.surface import fitted_by_default
+from brdfdb.geometry import degrees, radians, versine
 from brdfdb.measurements import Samples
 from brdfdb.parameters import closest
 from brdfdb.store.files import write_file
@@ -22,6 +24,7 @@ from brdfdb_pipelines import terminal
 
 _SHOWN = 12  # channels of a number that are printed
 TOLERANCE = 0.05  # of the recipe that is written
+_WIDEST_DEG = 30.0  # full angle of a cone: wider ones are no directions
 
 
 def run(
@@ -32,6 +35,8 @@ def run(
     channel: str | None = None,
     wavelength_nm: float | None = None,
     refractive_index: str | None = None,
+    receiver_deg: float | None = None,
+    source_deg: float | None = None,
     json: Path | None = None,
     page: Path | None = None,
     recipe: Path | None = None,
@@ -50,6 +55,8 @@ def run(
         The one channel that is fitted.
     wavelength_nm : float [nm], optional
         Wavelength of samples of one channel that state none.
+    receiver_deg, source_deg : float [degree], optional
+        Full angles of the cones of receiver and light, as the sample sees them, in place of what the file states.
     json, page, recipe : Path, optional
         Files to write: all fits, figures, and the best model of the registry as a recipe.
 
@@ -66,6 +73,14 @@ def run(
         If a recipe is asked for and no fit is one model of the registry.
     """
     samples = _selected(formats.samples(data), channel, wavelength_nm)
+    cones = {
+        "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
+        "source_solid_angle_sr": ("source-deg", source_deg),
+    }
+    known: dict[str, Any] = {
+        name: _solid_angle(option, angle) for name, (option, angle) in cones.items() if angle is not None
+    }
+    samples = replace(samples, instrument=replace(samples.instrument, **known))
     count = len(models or fitted_by_default()) + 1
     with terminal.progress(transient=True) as bar:
         task = bar.add_task("fit", total=count)
@@ -75,14 +90,14 @@ def run(
 
         document, fitted = fits(samples, models, residual=residual, refractive_index=refractive_index, tick=tick)
     if json is not None:
-        _write(json, document.model_dump_json(indent=1) + "\n")
+        write(json, document.model_dump_json(indent=1) + "\n")
     if page is not None:
         from brdfdb_pipelines import fit_page
 
-        _write(page, fit_page.render(document, figure_of(document, fitted[0])))
+        write(page, fit_page.render(document, figure_of(document, fitted[0])))
     print(terminal.plain("\n".join(lines(document))))
     if recipe is not None:
-        _write(recipe, recipe_of(document))
+        write(recipe, recipe_of(document))
     return document
 
 
@@ -112,7 +127,17 @@ def _selected(samples: Samples, channel: str | None, wavelength_nm: float | None
     return replace(samples, channels=(f"{wavelength_nm:g}nm",), wavelength_nm=np.array([wavelength_nm]))
 
 
-def _write(path: Path, text: str) -> None:
+def _solid_angle(option: str, angle_deg: float) -> float:
+    """Return the solid angle [sr] of a cone whose full angle is given."""
+    if not 0.0 < angle_deg <= _WIDEST_DEG:
+        raise ParameterError(
+            option, f"{angle_deg:g} is outside (0, {_WIDEST_DEG:g}] degrees", angle_deg, (0.0, _WIDEST_DEG)
+        )
+    return float(2.0 * np.pi * versine(radians(0.5 * angle_deg)))
+
+
+def write(path: Path, text: str) -> None:
+    """Write a text: whole, or not at all. Folders are made."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, text.encode(), path.parent)
 
@@ -134,6 +159,7 @@ def lines(document: Fits) -> list[str]:
     reasons = [
         f"{count} {reason}"
         for count, reason in (
+            (left.below_horizon, "below the horizon"),
             (left.holes, "holes"),
             (left.at_horizon, "at the horizon"),
             (left.unusable, "not positive" if document.residual in ("log", "relative") else "without uncertainty"),
@@ -142,6 +168,7 @@ def lines(document: Fits) -> list[str]:
     ]
     if reasons:
         text.append(f"  left out: {', '.join(reasons)}")
+    text += _aperture(document)
     width = max(len(one.model) for one in document.fits)
     text.append(f"  {'model':<{width}}  held out    all   numbers      BIC  albedo")
     for one in document.fits:
@@ -153,7 +180,8 @@ def lines(document: Fits) -> list[str]:
         )
     text.append("  held out, all: rms of ln(model / sample), at incidences left out of the fit, and of all")
     text += [
-        f"  not fitted: {name}, {reason.partition(': ')[2] or reason}" for name, reason in document.skipped.items()
+        f"  not fitted: {reason if reason.startswith(name) else f'{name}, {reason}'}"
+        for name, reason in document.skipped.items()
     ]
     best = document.fits[0]
     text += ["", f"best: {best.model}", *_numbers(best.estimates)]
@@ -168,6 +196,17 @@ def lines(document: Fits) -> list[str]:
     if best.recipe is None:
         return [*text, *_alternative(document.fits)]
     return [*text, "", *best.recipe.splitlines()]
+
+
+def _aperture(document: Fits) -> list[str]:
+    """Return a line on the solid angles that lobes were averaged over, if any is known."""
+    solid_angles = {"receiver": document.receiver_solid_angle_sr, "light": document.source_solid_angle_sr}
+    cones = [
+        f"{name} {2.0 * float(degrees(np.arccos(max(1.0 - known / (2.0 * np.pi), 0.0)))):.3g}°"
+        for name, known in solid_angles.items()
+        if known is not None
+    ]
+    return [f"  seen through the aperture: {', '.join(cones)}"] if cones else []
 
 
 def _alternative(ranked: Sequence[Fit]) -> list[str]:

@@ -12,9 +12,10 @@ from brdfdb.fitting.fit import fit, fits
 from brdfdb.fitting.problem import Problem
 from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.surface import NotDescribedError, Surface, fitted_by_default
-from brdfdb.fitting.uncertainty import NORMAL_95
+from brdfdb.fitting.uncertainty import NORMAL_95, _root
 from brdfdb.geometry import unit_vector
 from brdfdb.measurements import Samples
+from brdfdb.measurements.aperture import View
 from brdfdb.models import MODELS
 
 NOISE = 0.03
@@ -67,7 +68,7 @@ def test_polynomial_of_a_surface_is_the_model(name: str) -> None:
     for number, term in enumerate(surface.terms):
         given, scale = surface.in_channel(x, values, number, 0)
         expected += scale * term.spec.vectors(wi, wr, **given)
-    found = surface.f_r(x, values, wi, wr)[:, 0]
+    found = surface.f_r(x, values, View(wi, wr))[:, 0]
     assert np.max(np.abs(found - expected)) <= ROUNDING * np.max(expected)
 
 
@@ -183,9 +184,25 @@ def test_only_the_ratio_of_two_lengths_is_measured() -> None:
     assert "only their ratio is measured" in pair.sentence
 
 
+def test_a_slightly_rough_surface_tells_two_lengths_apart() -> None:
+    parameters = {"sigma_0_um": 0.05, "tau_um": 1.5, "a": 0.3, "wavelength_nm": 500.0, "n": 1.7, "k": 0.0}
+    document, _ = fits(
+        samples(noisy(truth("he_torrance", **parameters)), np.array([500.0])),
+        ["he_torrance"],
+        refractive_index="constant/1.7/0.0",
+        profiles=False,
+    )
+    (best,) = document.fits
+    lengths = {one.name: one.value for one in best.estimates}
+    assert lengths["sigma_0_um"] == pytest.approx(0.05, rel=0.05)
+    assert lengths["tau_um"] == pytest.approx(1.5, rel=0.05)
+    assert best.correlations == []
+    assert not any("only" in sentence for sentence in best.remarks)
+
+
 def test_gradient_of_the_projected_problem() -> None:
     made = samples(noisy(truth("ward", **WARD)))
-    problem = Problem(Surface("ward", None, 1, turned=False), made.w_i, made.w_r, Residual(made, "log"))
+    problem = Problem(Surface("ward", None, 1, turned=False), View(made.w_i, made.w_r), Residual(made, "log"))
     problem.scale = 0.1
     x, step = np.array([0.8]), 1e-5
     point = problem.at(x)
@@ -208,6 +225,14 @@ def test_what_cannot_be_fitted_is_refused_in_a_sentence() -> None:
     spectral = samples(np.repeat(made.values, 2, axis=1), np.array([450.0, 650.0]))
     document, _ = fits(spectral, ["ward", "ggx"], profiles=False)
     assert list(document.skipped) == ["ggx"]
+
+
+def test_an_end_of_an_interval_is_found_along_a_profile_that_is_flat_at_first() -> None:
+    def deviation(u: float) -> float:
+        return 0.01 * u + 300.0 * max(u - 0.8, 0.0) ** 2
+
+    end = _root(deviation, 0.0, 0.0, 1.0, deviation(1.0))
+    assert deviation(end) == pytest.approx(NORMAL_95, rel=0.01)
 
 
 def test_a_profile_sets_a_limit_at_an_end_of_a_range() -> None:

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from brdfdb import models
-from brdfdb.geometry import unit_vector
+from brdfdb.geometry import common_solid_angle, unit_vector
 from brdfdb.models import (
     he_torrance,
     he_torrance_aperture,
     he_torrance_smooth,
     he_torrance_specular,
 )
-from brdfdb.models.he_torrance_1991_limits import _common_area
 from brdfdb.reference import he_torrance_1991, he_torrance_1991_aperture
 from tests.models.he_torrance_surfaces import ALUMINUM, CERAMIC, CONE, CONES, HALF_PI, directions
 
@@ -48,20 +47,22 @@ def area_by_quadrature(first: float, second: float, apart: float) -> float:
 )
 def test_common_area_of_two_cones(first: float, second: float, apart: float) -> None:
     expected = area_by_quadrature(first, second, apart)
-    assert _common_area(first, second, apart) == pytest.approx(expected, rel=AREA)
-    assert _common_area(second, first, apart) == pytest.approx(_common_area(first, second, apart), rel=1e-12)
+    assert common_solid_angle(first, second, apart) == pytest.approx(expected, rel=AREA)
+    assert common_solid_angle(second, first, apart) == pytest.approx(
+        common_solid_angle(first, second, apart), rel=1e-12
+    )
 
 
 def test_common_area_has_its_closed_forms() -> None:
-    assert _common_area(0.3, 0.2, 0.05) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.2)), rel=1e-14)
-    assert _common_area(0.3, 0.3, 0.0) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.3)), rel=1e-14)
-    assert _common_area(0.3, 0.3, 1e-24) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.3)), rel=1e-14)
-    assert _common_area(0.3, 0.2, 0.5) == 0.0
-    assert _common_area(0.3, 0.2, np.pi) == 0.0
+    assert common_solid_angle(0.3, 0.2, 0.05) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.2)), rel=1e-14)
+    assert common_solid_angle(0.3, 0.3, 0.0) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.3)), rel=1e-14)
+    assert common_solid_angle(0.3, 0.3, 1e-24) == pytest.approx(2.0 * np.pi * (1.0 - np.cos(0.3)), rel=1e-14)
+    assert common_solid_angle(0.3, 0.2, 0.5) == 0.0
+    assert common_solid_angle(0.3, 0.2, np.pi) == 0.0
     # small circles of one size lie in a plane
     radius, half = 1e-6, 0.5
     lens = 2.0 * (np.arccos(half) - half * np.sqrt(1.0 - half**2)) * radius**2
-    assert _common_area(radius, radius, 2.0 * half * radius) == pytest.approx(lens, rel=AREA)
+    assert common_solid_angle(radius, radius, 2.0 * half * radius) == pytest.approx(lens, rel=AREA)
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 10.0, 60.0])

@@ -10,7 +10,12 @@ HELP = "Fit models to measured samples: their parameters with intervals, ranked 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the file, the models, the residual, and the forms of the answer."""
-    parser.add_argument("data", type=Path, metavar="DATA", help="a file of samples, or a table of another program")
+    parser.add_argument(
+        "data",
+        type=Path,
+        metavar="DATA",
+        help="a file of samples, a table of another program, or published fits (NAME.fit)",
+    )
     parser.add_argument(
         "--model",
         action="append",
@@ -33,6 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ENTRY",
         help="shelf/book/page of models with n and k (default: n and k are searched)",
     )
+    parser.add_argument(
+        "--receiver-deg",
+        type=float,
+        metavar="DEG",
+        help="full angle of the receiver, as the sample sees it: lobes are averaged over it (default: as DATA states)",
+    )
+    parser.add_argument("--source-deg", type=float, metavar="DEG", help="the same of the light")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all fits as JSON")
     parser.add_argument("--page", type=Path, metavar="FILE", help="write a page with figures, FILE.html")
     parser.add_argument("--recipe", type=Path, metavar="FILE", help="write the best model as a recipe, FILE.toml")
@@ -41,9 +53,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Fit, and print the ranking."""
     from brdfdb.errors import import_extra
+    from brdfdb.fitting.published import SUFFIX
     from brdfdb_pipelines import fit
 
     import_extra("scipy")
+    if options.data.suffix.lower() == SUFFIX:
+        return _published(options)
     if options.page is not None:
         import_extra("matplotlib")  # before the time is spent
         import_extra("jinja2")
@@ -54,8 +69,23 @@ def run(options: argparse.Namespace) -> int:
         channel=options.channel,
         wavelength_nm=options.wavelength_nm,
         refractive_index=options.refractive_index,
+        receiver_deg=options.receiver_deg,
+        source_deg=options.source_deg,
         json=options.json,
         page=options.page,
         recipe=options.recipe,
     )
+    return 0
+
+
+def _published(options: argparse.Namespace) -> int:
+    """List published fits; options of searches are refused."""
+    from brdfdb.errors import ParameterError
+    from brdfdb_pipelines import published_fits
+
+    for name in ("model", "wavelength_nm", "refractive_index", "receiver_deg", "source_deg", "page"):
+        if getattr(options, name):
+            option = f"--{name.replace('_', '-')}"
+            raise ParameterError(option, f"{options.data} holds the fits of others and no samples; leave it out")
+    published_fits.run(options.data, channel=options.channel, json=options.json, recipe=options.recipe)
     return 0

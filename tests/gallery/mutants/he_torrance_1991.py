@@ -213,6 +213,6 @@ MUTANTS = (
     of("the cosine of the viewer in f_r", "f_r is multiplied by cos(theta_r)",
        "intensity, which a photometer on an arm measures, has this cosine", viewer=lambda cos: cos),
     Mutant("one cone", "the specular peak is not averaged over the receiver",
-           "eq. 6 has the solid angle of the light alone", {limits._common_area: one_cone}),
+           "eq. 6 has the solid angle of the light alone", {limits.common_solid_angle: one_cone}),
     *added_figures.HE_TORRANCE,
 )  # fmt: skip

@@ -1,0 +1,266 @@
+"""Published fits: parameters that others fitted to measured materials, read from text, and judged."""
+
+from __future__ import annotations
+
+import ast
+import math
+import os
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from brdfdb.errors import FileFormatError, ParameterError
+from brdfdb.fitting.document import Albedo
+from brdfdb.fitting.surface import flat_model
+from brdfdb.geometry import radians
+from brdfdb.integrals.quadrature import directional_albedo
+from brdfdb.materials import Material
+from brdfdb.materials.provenance import MOST_NAME
+from brdfdb.materials.recipe_text import toml_of
+from brdfdb.measurements.measured_source import slug
+from brdfdb.models import MODELS
+
+SUFFIX = ".fit"
+CHANNELS = ("R", "G", "B")
+_MOST_BYTES, _MOST_LINE = 1 << 24, 4096
+_ANGLES_DEG = (0.0, 30.0, 60.0, 75.0, 85.0)  # theta_i at which the albedo is computed
+_TOLERANCE = 1e-3  # of albedos
+_FLAT = "Lambertian"
+_NAMED = Path(__file__).with_name("published.toml")
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Lobe(_Record):
+    """One term of a published fit."""
+
+    name: str = Field(description="as the file names it")
+    numbers: dict[str, list[float]] = Field(description="its numbers; three are those of R, G and B")
+
+
+class PublishedFit(_Record):
+    """One material of a file of published fits."""
+
+    name: str
+    line: int = Field(description="line of the file")
+    terms: list[Lobe]
+    model: str | None = Field(description="the model of the registry with the same formula; null: none, or not known")
+    albedo: Albedo | None = Field(description="the largest directional albedo, of R, G or B; null: without a model")
+    flags: list[str] = Field(description="sentences on what is no physics")
+
+
+class PublishedFits(_Record):
+    """A file of published fits."""
+
+    name: str
+    comment: str = Field(description="the lines that the file begins with")
+    fits: list[PublishedFit]
+    sentences: list[str] = Field(description="what is not known of the conventions of the file")
+
+
+@cache
+def _named() -> dict[str, dict[str, Any]]:
+    with _NAMED.open("rb") as file:
+        return tomllib.load(file)
+
+
+def read_published(path: str | os.PathLike[str]) -> PublishedFits:
+    """Return the fits of a text with a line for each material, and what is no physics in them.
+
+    A line is ``NAME = Aggregate(Lambertian(albedo = [R, G, B]), LOBE(albedo = [R, G, B], roughness = NUMBER))``, or one
+    lobe alone. Lines that begin with # are comments. A scale above 1, a refractive index below 1, a number outside the
+    range of the model, and an albedo above 1 are flagged. Albedos are computed where the formula of the lobe is known,
+    at polar angles of the light of 0 to 85 degrees.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is no such text; the sentence names the line.
+    OSError
+        If it cannot be read.
+    """
+    path = Path(path)
+    if path.stat().st_size > _MOST_BYTES:
+        raise FileFormatError(f"{path}: it has more than {_MOST_BYTES} bytes, too many for a list of fits")
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except UnicodeDecodeError:
+        raise FileFormatError(f"{path}: it is no text in UTF-8") from None
+    comments = [line.lstrip("# ") for line in lines if line.startswith("#")]
+    fits = [
+        _fit(path, number, line)
+        for number, line in enumerate(lines, 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not fits:
+        raise FileFormatError(f"{path}: it has no line of the form NAME = LOBE(NUMBER = ...)")
+    names = {term.name for one in fits for term in one.terms} - {_FLAT}
+    sentences = [
+        f"{name}: no model of the registry is taken for it, because {_named()[name]['unsure']}."
+        for name in sorted(names)
+        if "unsure" in _named().get(name, {})
+    ]
+    sentences += [f"{name}: its formula is not known." for name in sorted(names - set(_named()))]
+    return PublishedFits(name=path.stem, comment=" ".join(comments)[:_MOST_LINE], fits=fits, sentences=sentences)
+
+
+def recipe_of(published: PublishedFits, channel: str = "G", tolerance: float = 0.05) -> str:
+    """Return a recipe of the fits that are models of the registry and are not flagged.
+
+    Parameters
+    ----------
+    published : PublishedFits
+        The fits.
+    channel : {"R", "G", "B"}
+        The channel whose reflectances are taken: the files state no wavelengths.
+    tolerance : float [1]
+        Of the tables.
+
+    Raises
+    ------
+    ParameterError
+        If the channel is unknown, or no fit is a model of the registry.
+    """
+    if channel not in CHANNELS:
+        raise ParameterError("channel", f"{channel!r} is not one of {', '.join(CHANNELS)}", channel, CHANNELS)
+    parts = {}
+    for one in published.fits:
+        if one.model is None or one.flags:
+            continue
+        name = slug(f"{one.name}-{published.name}-{channel}")[:MOST_NAME].rstrip("-")
+        table = {
+            "title": f"{one.name}, channel {channel}",
+            "model": one.model,
+            "source": f"{published.name}{SUFFIX}, line {one.line}. {published.comment}".strip(),
+            "parameters": _parameters(one.terms, CHANNELS.index(channel)),
+        }
+        Material.from_table(name, table)
+        parts[name] = toml_of(name, table)
+    if not parts:
+        raise ParameterError(
+            "recipe", f"no fit of {published.name} is a model of the registry without a flag", published.name
+        )
+    listed = ", ".join(f'"{name}"' for name in parts)
+    return f"materials = [{listed}]\ntolerance = {tolerance:g}\n\n" + "\n".join(parts.values())
+
+
+def _fit(path: Path, number: int, line: str) -> PublishedFit:
+    name, sign, text = line.partition(" = ")
+    if not sign or len(line) > _MOST_LINE:
+        raise FileFormatError(f"{path}: line {number} is not NAME = LOBE(NUMBER = ...): {line[:60]!r}")
+    try:
+        terms = _terms(ast.parse(text.strip(), mode="eval").body)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        reason = error.args[0] if isinstance(error, _UnreadableError) else "it is not LOBE(NUMBER = ...)"
+        raise FileFormatError(f"{path}: line {number} ({name.strip()[:60]}): {reason}") from None
+    model = _model(terms)
+    flags = _flags(terms)
+    albedo = None
+    if model is not None and not _out_of_range(model, terms):
+        albedo = _albedo(model, terms)
+        if not albedo.conserves:
+            flags.append(f"it reflects {albedo.value:.3g} of the light from {albedo.theta_i_deg:g} degrees")
+    elif model is not None:
+        flags += _out_of_range(model, terms)
+    return PublishedFit(name=name.strip(), line=number, terms=terms, model=model, albedo=albedo, flags=flags)
+
+
+class _UnreadableError(ValueError):
+    """A part of a line that is no term and no number."""
+
+
+def _terms(node: ast.expr) -> list[Lobe]:
+    """Return the terms of a call: those of its arguments, or itself."""
+    if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+        raise _UnreadableError("it is not LOBE(NUMBER = ...)")
+    name = node.func.id
+    if node.args and node.keywords:
+        raise _UnreadableError(f"{name} has both terms and numbers")
+    if node.args:
+        return [term for part in node.args for term in _terms(part)]
+    return [Lobe(name=name, numbers={str(word.arg): _numbers(name, word) for word in node.keywords})]
+
+
+def _numbers(name: str, word: ast.keyword) -> list[float]:
+    """Return the value of a keyword as one number or three."""
+    parts = word.value.elts if isinstance(word.value, ast.List) else [word.value]
+    try:
+        values = [float(ast.literal_eval(part)) for part in parts]
+    except (ValueError, TypeError, SyntaxError, OverflowError):
+        raise _UnreadableError(f"{word.arg} of {name} is neither a number nor a list of numbers") from None
+    if len(values) not in (1, len(CHANNELS)) or not all(map(math.isfinite, values)):
+        raise _UnreadableError(f"{word.arg} of {name} has {len(values)} values; 1 or 3 finite ones are read")
+    return values
+
+
+def _model(terms: list[Lobe]) -> str | None:
+    """Return the model of the registry that some terms are, or None."""
+    lobes = [term for term in terms if term.name != _FLAT]
+    if not lobes:
+        return flat_model() if len(terms) == 1 else None
+    known = _named().get(lobes[0].name, {})
+    if len(lobes) > 1 or len(terms) > 2 or "model" not in known:
+        return None
+    return str(known["model"]) if set(known["parameters"].values()) == set(lobes[0].numbers) else None
+
+
+def _parameters(terms: list[Lobe], channel: int) -> dict[str, float]:
+    """Return the parameters of the model of some terms in a channel, as recipes write them."""
+    model = _model(terms)
+    assert model is not None
+    values: dict[str, float] = {}
+    spec = MODELS[model]
+    uniform = spec.uniform or spec.parameters[0].name
+    for term in terms:
+        if term.name == _FLAT:
+            values[uniform] = _of(term.numbers["albedo"], channel)
+            continue
+        for name, theirs in _named()[term.name]["parameters"].items():
+            values[name] = _of(term.numbers[theirs], channel)
+    return {uniform: 0.0} | values
+
+
+def _of(numbers: list[float], channel: int) -> float:
+    return numbers[min(channel, len(numbers) - 1)]
+
+
+def _flags(terms: list[Lobe]) -> list[str]:
+    flags = []
+    for term in terms:
+        known = _named().get(term.name, {"scale": "albedo"})
+        scale = max(term.numbers.get(known.get("scale", ""), [0.0]))
+        if scale > 1.0:
+            flags.append(f"the scale of {term.name} is {scale:g}, above 1")
+        index = min(term.numbers.get(known.get("index", ""), [math.inf]))
+        if index < 1.0:
+            flags.append(f"the refractive index of {term.name} is {index:g}, below 1")
+    return flags
+
+
+def _out_of_range(model: str, terms: list[Lobe]) -> list[str]:
+    """Return sentences on numbers outside the ranges of a model."""
+    flags: list[str] = []
+    for channel in range(len(CHANNELS)):
+        for name, value in _parameters(terms, channel).items():
+            try:
+                MODELS[model].parameter(name).check(value)
+            except ParameterError as error:
+                flags.append(f"{name}: {error.sentence}")
+    return list(dict.fromkeys(flags))
+
+
+def _albedo(model: str, terms: list[Lobe]) -> Albedo:
+    """Return the largest directional albedo [1], in the channel whose reflectances add up to most."""
+    given = [_parameters(terms, channel) for channel in range(len(CHANNELS))]
+    bright = [sum(v for name, v in one.items() if MODELS[model].parameter(name).reflectance) for one in given]
+    one: dict[str, Any] = dict(given[int(np.argmax(bright))])
+    computed = directional_albedo(model, radians(np.array(_ANGLES_DEG)), tolerance=_TOLERANCE, **one)
+    index = int(np.argmax(computed.albedo))
+    value, error = float(computed.albedo[index]), float(computed.error[index])
+    return Albedo(theta_i_deg=_ANGLES_DEG[index], value=value, error=error, conserves=value <= 1.0 + error + _TOLERANCE)

@@ -1,0 +1,271 @@
+"""The command `brdfdb fit`: its ranking, JSON, page and recipe, published fits, and its sentences on mistakes."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import NamedTuple
+
+import jsonschema
+import numpy as np
+import pytest
+
+from brdfdb.geometry import unit_vector
+from brdfdb.models import MODELS
+from brdfdb.store.reader import Store
+from brdfdb_pipelines import recipe_file
+from brdfdb_pipelines.documents import schema
+from tests.pipelines.command import Captured, run
+
+TRUTH = {"rho_d": 0.2, "rho_s": 0.1, "alpha_x": 0.25, "alpha_y": 0.25}
+HEADER = "theta_i_deg,theta_r_deg,delta_phi_deg,f_r"
+
+
+def rows() -> list[list[float]]:
+    """Return noisy samples of a surface: theta_i, theta_r, delta_phi [degree] and f_r [1/sr]."""
+    grid = np.meshgrid([10.0, 30.0, 55.0], np.arange(0.0, 81.0, 10.0), [0.0, 90.0, 170.0, 180.0], indexing="ij")
+    theta_i, theta_r, turn = (axis.ravel() for axis in grid)
+    light, viewer = np.deg2rad([theta_i, 0.0 * theta_i]), np.deg2rad([theta_r, turn])
+    f_r = MODELS["ward"].vectors(unit_vector(*light), unit_vector(*viewer), **TRUTH)
+    noise = 1.0 + 0.03 * np.random.default_rng(1).standard_normal(f_r.shape)
+    return np.stack([theta_i, theta_r, turn, f_r * noise], axis=1).tolist()
+
+
+def written(path: Path, lines: list[list[float]]) -> Path:
+    text = "\n".join([HEADER, *(",".join(f"{value:.6g}" for value in line) for line in lines), ""])
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def tile(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(tmp_path_factory.mktemp("fit") / "tile.csv", rows())
+
+
+class Answer(NamedTuple):
+    printed: str
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def answer(tile: Path) -> Answer:
+    """The answer to one fit of three models, with all files."""
+    files = [part for name, kind in KINDS.items() for part in (f"--{kind}", tile.parent / name)]
+    models = [part for name in ("lambert", "ward", "lambert + beckmann_schlick") for part in ("--model", name)]
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        assert run("fit", tile, *models, *files) == 0
+    return Answer(printed.getvalue(), tile.parent)
+
+
+KINDS = {"fit.json": "json", "new/fit.html": "page", "fit.toml": "recipe"}
+
+
+def test_the_ranking_is_printed(answer: Answer) -> None:
+    first, heading, *others = answer.printed.splitlines()
+    assert first.startswith("tile: 108 values at 3 incidences, log")
+    assert heading.split() == ["model", "held", "out", "all", "numbers", "BIC", "albedo"]
+    ranked = [
+        re.match(r"  (lambert \+ beckmann_schlick|ward|lambert) +([\d.]+) +([\d.]+) +(\d+)", line)
+        for line in others[:3]
+    ]
+    assert [line[1] for line in ranked if line] == ["ward", "lambert + beckmann_schlick", "lambert"]
+    held = [float(line[2]) for line in ranked if line]
+    assert 0.02 < held[0] < 0.045 < held[1] < held[2]
+    assert "best: ward" in others
+    numbers = {line.split()[0]: line for line in others if "95 %:" in line}
+    assert numbers.keys() == {"alpha_x", "rho_d", "rho_s"}
+    for name, line in numbers.items():
+        value, error, low, high = map(float, re.findall(r"([\d.]+) ± ([\d.]+)  95 %: ([\d.]+) to ([\d.]+)", line)[0])
+        assert abs(value - TRUTH[name]) < 4.0 * error
+        assert (low, high) == pytest.approx((value - 1.96 * error, value + 1.96 * error), rel=0.02)
+
+
+def test_json_has_its_schema(answer: Answer) -> None:
+    document = json.loads((answer.folder / "fit.json").read_text(encoding="utf-8"))
+    jsonschema.validate(document, json.loads(schema("fits")))
+    assert [one["model"] for one in document["fits"]] == ["ward", "lambert + beckmann_schlick", "lambert"]
+    assert document["ranked_by"] == "held-out rms of ln"
+    assert document["left_out"] == {"below_horizon": 0, "holes": 0, "at_horizon": 0, "unusable": 0}
+    assert document["receiver_solid_angle_sr"] is None
+
+
+class Page(HTMLParser):
+    """The elements of a page that are open, and how many there were."""
+
+    VOID = ("meta", "link", "br", "img", "input", "hr")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.count: dict[str, int] = {}
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.count[tag] = self.count.get(tag, 0) + 1
+        assert not any(name.startswith("on") for name, _ in attrs)
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in self.VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_page_is_html_with_figures_and_no_script(answer: Answer) -> None:
+    text = (answer.folder / "new" / "fit.html").read_text(encoding="utf-8")
+    page = Page()
+    page.feed(text)
+    assert text.startswith("<!doctype html>")
+    assert page.open == []
+    assert "script" not in page.count
+    assert page.count["figure"] == 6  # a cut and a map for each incidence
+    assert page.count["svg"] >= 6
+    assert not re.search(r"(src|href)=.?https?:", text)
+    for words in ("The best of 3 fits is", "held out", "residuals", "theta_i = 55 degrees", "[define.tile-as-ward]"):
+        assert words in text
+
+
+def test_the_recipe_is_that_of_the_best_model(answer: Answer) -> None:
+    (job,) = recipe_file.load(answer.folder / "fit.toml").jobs()
+    assert job.material.name == "tile-as-ward"
+    assert job.material.parameters["alpha_x"] == pytest.approx(TRUTH["alpha_x"], rel=0.05)
+
+
+def test_the_recipe_builds(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    recipe, store = tmp_path / "fit.toml", tmp_path / "store"
+    assert run("fit", tile, "--model", "lambert", "--recipe", recipe) == 0
+    assert run("build", recipe, "--store", store, "--jobs", "1") == 0
+    (job,) = recipe_file.load(recipe).jobs()
+    assert Store(store)["tile-as-lambert"].lookup(0.5, 0.0, 0.3, 3.0) == pytest.approx(
+        job.material.parameters["rho"] / np.pi, rel=1e-3
+    )
+    capsys.readouterr()
+
+
+def test_an_aperture_can_be_said(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    out = tmp_path / "fit.json"
+    assert run("fit", tile, "--model", "ward", "--receiver-deg", "4", "--source-deg", "1", "--json", out) == 0
+    assert "  seen through the aperture: receiver 4°, light 1°\n" in capsys.readouterr().out
+    document = json.loads(out.read_text(encoding="utf-8"))
+    assert document["receiver_solid_angle_sr"] == pytest.approx(np.pi * np.deg2rad(2.0) ** 2, rel=1e-3)
+    (alpha,) = (one["value"] for one in document["fits"][0]["estimates"] if one["name"] == "alpha_x")
+    assert alpha == pytest.approx(TRUTH["alpha_x"], rel=0.03)
+
+
+def test_two_lengths_that_are_not_told_apart_are_named(tmp_path: Path, capsys: Captured) -> None:
+    lines = np.array(rows())
+    wi = unit_vector(np.deg2rad(lines[:, 0]), np.zeros(len(lines)))
+    wr = unit_vector(np.deg2rad(lines[:, 1]), np.deg2rad(lines[:, 2]))
+    rough = {"wavelength_nm": 500.0, "sigma_0_um": 2.0, "tau_um": 8.0, "n": 1.7, "k": 0.0, "a": 0.3}
+    lines[:, 3] = MODELS["he_torrance"].vectors(wi, wr, **rough) * (lines[:, 3] / lines[:, 3].mean()) ** 0
+    data, page = written(tmp_path / "rough.csv", lines.tolist()), tmp_path / "rough.html"
+    options = ("--model", "he_torrance", "--refractive-index", "constant/1.7/0.0", "--wavelength-nm", "500")
+    assert run("fit", data, *options, "--page", page) == 0
+    printed = capsys.readouterr().out
+    assert "  note  sigma_0_um and tau_um are correlated by 0.99" in printed or "by 1.000" in printed
+    assert "only their ratio is measured." in printed
+    assert "only their ratio is measured." in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--model", "wrad"], "model: 'wrad' is unknown; closest: ward"),
+        (["--model", "ward +"], "model: 'ward +' is no model and no sum of models"),
+        (["--model", "lambert", "--residual", "uncertainty"], "has no uncertainties; choose log, relative or cosine"),
+        (["--channel", "green"], "channel: 'green' is not one of grey"),
+        (["--wavelength-nm", "-5"], "wavelength_nm: -5 is not a positive number"),
+        (["--receiver-deg", "0"], "receiver-deg: 0 is outside (0, 30] degrees"),
+        (["--source-deg", "nan"], "source-deg: nan is outside (0, 30] degrees"),
+        (["--model", "oren_nayar_unidirectional"], "the light is in one azimuth alone"),
+    ],
+)
+def test_mistakes_are_one_sentence(
+    options: list[str], sentence: str, tile: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    out = tmp_path / "fit.json"
+    assert run("fit", tile, *options, "--json", out) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("brdfdb: ")
+    assert sentence in error
+    assert error.count("\n") == 1
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ([float("nan"), 20.0, 0.0, 0.3], "theta_i"),
+        ([20.0, 20.0, 0.0, float("inf")], "f_r"),
+    ],
+)
+def test_samples_that_are_none_are_refused(line: list[float], sentence: str, tmp_path: Path, capsys: Captured) -> None:
+    data = written(tmp_path / "wrong.csv", [*rows()[:5], line])
+    assert run("fit", data, "--model", "lambert") == 2
+    error = capsys.readouterr().err
+    assert str(data) in error
+    assert sentence in error
+    assert error.count("\n") == 1
+
+
+def test_values_that_are_left_out_are_counted(tmp_path: Path, capsys: Captured) -> None:
+    wrong = [[20.0, 130.0, 0.0, 0.3], [95.0, 0.0, 0.0, 0.3], [20.0, 21.0, 0.0, float("nan")], [20.0, 22.0, 0.0, -0.1]]
+    data = written(tmp_path / "some.csv", [*rows(), *wrong, [20.0, 90.0, 0.0, 0.3]])
+    assert run("fit", data, "--model", "lambert") == 0
+    printed = capsys.readouterr().out
+    assert "  left out: 2 below the horizon, 1 holes, 1 at the horizon, 1 not positive\n" in printed
+
+
+def test_files_without_a_usable_sample_are_refused(tmp_path: Path, capsys: Captured) -> None:
+    dark = written(tmp_path / "dark.csv", [[*line[:3], -0.01] for line in rows()])
+    assert run("fit", dark, "--model", "lambert") == 2
+    assert "dark has no value that a log residual can use" in capsys.readouterr().err
+    holes = written(tmp_path / "holes.csv", [[*line[:3], float("nan")] for line in rows()])
+    assert run("fit", holes, "--model", "lambert") == 2
+    assert "no value" in capsys.readouterr().err
+    noise = tmp_path / "noise.csv"
+    noise.write_bytes(np.random.default_rng(0).bytes(4096))
+    for file, words in ((noise, "no format recognises it"), (tmp_path / "missing.csv", "No such file or directory")):
+        assert run("fit", file) == 2
+        error = capsys.readouterr().err
+        assert words in error
+        assert error.count("\n") == 1
+
+
+def test_a_sum_has_no_recipe(tile: Path, tmp_path: Path, capsys: Captured) -> None:
+    recipe = tmp_path / "fit.toml"
+    assert run("fit", tile, "--model", "lambert + ward", "--recipe", recipe) == 2
+    assert "no fit is one model of the registry" in capsys.readouterr().err
+    assert not recipe.exists()
+
+
+PUBLISHED = """\
+# Lobes of tiles
+tile-1 = Aggregate(Lambertian(albedo = [0.1, 0.2, 0.3]), NganWard(albedo = [0.05, 0.06, 0.07], roughness = 0.3))
+slab = Aggregate(Lambertian(albedo = [0.0, 0.0, 0.0]), NganHe(albedo = [2.5, 9, 1], autocorrelation = 28.0, eta = 0.9))
+"""
+
+
+def test_published_fits_are_listed_and_become_a_recipe(tmp_path: Path, capsys: Captured) -> None:
+    data, out, recipe = tmp_path / "tiles.fit", tmp_path / "tiles.json", tmp_path / "tiles.toml"
+    data.write_text(PUBLISHED, encoding="utf-8")
+    assert run("fit", data, "--json", out, "--recipe", recipe, "--channel", "R") == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("tiles: 2 published fits, Lambertian + NganWard + NganHe\n  Lobes of tiles\n")
+    assert (
+        "    no physics: the scale of NganHe is 9, above 1\n    no physics: the refractive index of NganHe is 0.9"
+        in printed
+    )
+    assert "  1 of 2 are no physics; 1 are models of the registry (ward)" in printed
+    assert "  note  NganHe: no model of the registry is taken for it" in printed
+    assert [len(one["flags"]) for one in json.loads(out.read_text(encoding="utf-8"))["fits"]] == [0, 2]
+    assert [job.material.name for job in recipe_file.load(recipe).jobs()] == ["tile-1-tiles-r"]
+    assert run("fit", data, "--model", "ward") == 2
+    assert "--model: " in capsys.readouterr().err
