@@ -37,6 +37,7 @@ PRINTED = 5e-4  # half of the last digit of checkBSDF
 BLACK = 1e-3  # total up to which Radiance takes a surface as black
 PAIRS = 2000
 QUICK = ("glossy-grey-paper",)
+QUICK_KINDS = ("half", "quarter")  # WINDOW takes half a minute for a full matrix
 MEASURED = "Totals and f_r as Radiance and pyWinCalc see the files, against the tables, and the size and time of each."
 # The lobe that Radiance's own plastic2 evaluates; wide, because cells blur narrow ones
 BOUNDED = {"rho_d": 0.2, "rho_s": 0.3, "alpha_x": 0.3, "alpha_y": 0.45}
@@ -161,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             trees.add(
                 name, written.nbytes / 1e6, seconds, error.p99, error.p99_hemisphere, seen, error.l1, total, wrong
             )
-            for kind in klems.kinds:
+            for kind in QUICK_KINDS if options.quick else klems.kinds:
                 written, seconds = timed(klems.write, table, path, kind=kind)
                 error = written.error
                 assert error is not None
