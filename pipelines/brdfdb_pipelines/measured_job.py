@@ -144,6 +144,7 @@ class MeasuredJob:
                 name=self.name,
                 title=title,
                 provenance=self.table.source or file,
+                nodes=read.nodes() if read.nodes is not None and read.listed else None,
             )
         return source.recorded(file=self.files, file_sha256=self.sha256)
 
