@@ -250,8 +250,8 @@ def _plain_grid(source: Source, *, halves: bool) -> Grid:
                 np.linspace(0.0, sides * 180.0, sides * 18 + 1),
             )
             return Grid(dict(zip(ANISOTROPIC_HALF_DIFFERENCE_AXES, nodes, strict=True)))
-        nodes = theta_h, np.linspace(0.0, 90.0, 19), np.linspace(0.0, sides * 90.0, sides * 18 + 1)
-        return Grid(dict(zip(HALF_DIFFERENCE_AXES, nodes, strict=True)))
+        isotropic = theta_h, np.linspace(0.0, 90.0, 19), np.linspace(0.0, sides * 90.0, sides * 18 + 1)
+        return Grid(dict(zip(HALF_DIFFERENCE_AXES, isotropic, strict=True)))
     end = POLE_END_DEG if source.grazing_pole else 90.0
     if anisotropic:
         theta = np.linspace(0.0, end, 10)
