@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[1]
 SOURCES = [path for folder in ("brdfdb", "pipelines", "api") for path in sorted((ROOT / folder).rglob("*.py"))]
 GLOSSARY = ROOT / "docs" / "reference" / "glossary.md"
@@ -48,27 +46,36 @@ def test_the_glossary_retires_words() -> None:
     assert {"Dirac part", "representation", "candidate"} <= set(_retired())
 
 
-@pytest.mark.parametrize("path", [*SOURCES, *PAGES], ids=lambda path: str(path.relative_to(ROOT)))
-def test_no_retired_word_is_used(path: Path) -> None:
-    prose = _prose(path) if path.suffix == ".py" else enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+def test_no_retired_word_is_used() -> None:
     words = re.compile(r"\b(" + "|".join(map(re.escape, _retired())) + r")s?\b", flags=re.IGNORECASE)
-    assert [f"line {number}: {hit.group()}" for number, text in prose if (hit := words.search(text))] == []
+    pages = ((path, enumerate(path.read_text(encoding="utf-8").splitlines(), 1)) for path in PAGES)
+    lines = (*((path, _prose(path)) for path in SOURCES), *pages)
+    text = ((path, number, line) for path, prose in lines for number, line in prose)
+    assert [f"{path}:{number}: {hit.group()}" for path, number, line in text if (hit := words.search(line))] == []
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_variables_are_nouns(path: Path) -> None:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    names = [
-        *((n.lineno, n.id) for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)),
-        *((n.lineno, n.arg) for n in ast.walk(tree) if isinstance(n, ast.arg)),
-    ]
-    assert [f"line {line}: {name}" for line, name in names if name in EMPTY_NAMES] == []
+def test_variables_are_nouns() -> None:
+    stored = (
+        (f"{path}:{node.lineno}", node.id if isinstance(node, ast.Name) else node.arg)
+        for path in SOURCES
+        for node in ast.walk(_tree(path))
+        if isinstance(node, ast.arg) or (isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store))
+    )
+    assert [f"{place}: {name}" for place, name in stored if name in EMPTY_NAMES] == []
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_docstrings_of_functions_begin_with_a_verb(path: Path) -> None:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
-    plain = [n for n in functions if not any("property" in ast.unparse(d) for d in n.decorator_list)]
-    first = [(n.name, text) for n in plain if (text := ast.get_docstring(n))]
-    assert [f"{name}: {text.splitlines()[0]}" for name, text in first if NO_VERB.match(text)] == []
+def test_docstrings_of_functions_begin_with_a_verb() -> None:
+    plain = (
+        (path, node)
+        for path in SOURCES
+        for node in ast.walk(_tree(path))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and not any("property" in ast.unparse(each) for each in node.decorator_list)
+    )
+    first = ((path, node.name, text) for path, node in plain if (text := ast.get_docstring(node)))
+    assert [f"{path}: {name}: {text.splitlines()[0]}" for path, name, text in first if NO_VERB.match(text)] == []
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))

@@ -14,7 +14,7 @@ from brdfdb.figure import Numbers, numbers, rows
 from brdfdb.geometry import radians
 from brdfdb.materials.provenance import KnownExcess
 from brdfdb.parameters import Floats
-from brdfdb.tables.albedo import QUADRATURE_TOLERANCE, directional_albedo, hemispherical_albedo
+from brdfdb.tables.albedo import directional_albedo, hemispherical_albedo, tolerance_of
 from brdfdb.tables.grids import Axis
 from brdfdb.tables.stated_error import Error
 from brdfdb.tables.table import Table
@@ -120,7 +120,7 @@ def table_energy_of(
     worst_theta, worst_wavelength = np.unravel_index(np.argmax(finite), finite.shape)
     largest = float(finite[worst_theta, worst_wavelength])
     judge = _judge(table, theta_i, _known(diffuse))
-    certain = _known(albedo - np.minimum(integration, QUADRATURE_TOLERANCE)[:, np.newaxis])
+    certain = _known(albedo - np.minimum(integration, tolerance_of(table))[:, np.newaxis])
     one = limit_of(None, theta_i)
     first = _first_above_1(table, theta_i, np.max(finite, axis=1) - one)
     unexplained = theta_i[judge.unexplained(certain, one)]

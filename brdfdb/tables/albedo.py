@@ -17,6 +17,7 @@ from brdfdb.tables.table import Table
 
 # Absolute, of the albedo of a table whose interpolant has no exact integral; its kinks are worth no more
 QUADRATURE_TOLERANCE = 2e-5
+MEASURED_TOLERANCE = 2e-4  # of measured tables: their data are uncertain by more, and it takes a quarter of the time
 # Absolute, of the largest albedo that a table states: three digits are shown, and it takes a third of the time
 LARGEST_TOLERANCE = 1e-3
 _MOST_PANELS = 1000
@@ -62,7 +63,7 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
     theta_i_deg : array (theta_i,) [degree], optional
         The lights, in [0, 90].
     tolerance : float [1], optional
-        Absolute tolerance of the quadrature, where the integral is not exact; by default `QUADRATURE_TOLERANCE`.
+        Absolute tolerance of the quadrature, where the integral is not exact; by default `tolerance_of`.
 
     Returns
     -------
@@ -79,7 +80,7 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
     is known.
     """
     if not linear_in_angles(table):
-        within = QUADRATURE_TOLERANCE if tolerance is None else tolerance
+        within = tolerance_of(table) if tolerance is None else tolerance
         return _integrated(table, THETA_I_DEG if theta_i_deg is None else theta_i_deg, within)
     nodes = table.axes_deg["theta_i"]
     theta_weights = _theta_weights(radians(table.axes_deg["theta_r"]))
@@ -100,6 +101,11 @@ def directional_albedo(table: Table, theta_i_deg: Axis | None = None, tolerance:
         matrix = np.stack([np.interp(lights, nodes, one) for one in np.eye(nodes.size)], axis=1)
         nodes, albedo = lights, np.tensordot(matrix, albedo, axes=1)
     return TableAlbedo(nodes, phi_i, np.asarray(albedo), np.zeros(nodes.size))
+
+
+def tolerance_of(table: Table) -> float:
+    """Return the absolute tolerance [1] of the albedo of a table, where its integral is not exact."""
+    return QUADRATURE_TOLERANCE if table.metadata.measured is None else MEASURED_TOLERANCE
 
 
 def largest_albedo(table: Table, source: Source) -> LargestAlbedo:
