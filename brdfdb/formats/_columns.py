@@ -51,6 +51,25 @@ _WAVELENGTH = ("wavelength", "wavelength_nm", "lambda", "wl", "wvl", "wave")
 _COLOURS = (("r", "g", "b"), ("x", "y", "z"))
 _OF_FACTORS = re.compile(r"\b(?:BRF|HCRF|reflectance factors?)\b", re.IGNORECASE)
 _NUMBER_NM = re.compile(r"(?P<word>[a-z_]*?)[_@]?(?P<number>\d+(?:\.\d+)?)_?(?P<unit>nm|um|µm|μm)?$")
+_PERCENT = re.compile(r"%|(?:^|[\W_])(?:percent|pct)(?:$|[\W_])", re.IGNORECASE)
+_BRACKETS = re.compile(r"[\[(](.*?)[\])]")
+_KNOWN_UNITS = (
+    "",
+    "-",
+    "1",
+    "1/sr",
+    "/sr",
+    "sr-1",
+    "sr^-1",
+    "sr**-1",
+    "sr⁻¹",
+    "sr^{-1}",
+    "per sr",
+    "nm",
+    "um",
+    "µm",
+    "μm",
+)
 _COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s?")
 
 
@@ -189,7 +208,18 @@ def plain_name(name: str) -> str:
     text = name.strip().lower().replace("θ", "theta").replace("φ", "phi").replace("ϕ", "phi").replace("δ", "delta_")
     text = re.sub(r"[\[(].*?[\])]", "", text)
     text = re.sub(r"[^a-z0-9.µμ]+", "_", text).strip("_")
-    return re.sub(r"_(?:deg|degrees?|rad|radians?)$", "", text)
+    return re.sub(r"_(?:deg|degrees?|rad|radians?|percent|pct)$", "", text)
+
+
+def in_percent(name: str) -> bool:
+    """Return True if a name says that its numbers are percent."""
+    return _PERCENT.search(name) is not None
+
+
+def unknown_unit(name: str) -> str:
+    """Return the unit in brackets of a name of values if it is none that is known, else an empty text."""
+    units = [unit.strip() for unit in _BRACKETS.findall(name)]
+    return next((unit for unit in units if unit.lower() not in _KNOWN_UNITS and not in_percent(unit)), "")
 
 
 def wavelength_of(name: str) -> float | None:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
+from brdfdb.formats import text
 from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
 from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._text_file import lines_of
@@ -39,6 +40,7 @@ options = OPTIONS
 _DIGITS = 5
 _ANGLE_BYTES, _VALUE_BYTES, _MOST_BYTES = 8, 10, 40_000_000  # of a number in a row, and of a file, about
 _ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r", "delta_phi", "theta_h", "phi_h", "theta_d", "phi_d")
+_ENOUGH = {"theta_i", "theta_r"}  # of a text of others, beside an azimuth
 _COLUMNS = "columns: angles [degree], then f_r [1/sr], one column a wavelength; the last angle changes fastest"
 
 
@@ -102,18 +104,21 @@ def write(
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of a text whose columns are angles, then f_r or wavelengths, or that says so."""
     try:
-        text = head.decode("utf-8", "ignore")
+        start = head.decode("utf-8", "ignore")
     except ValueError:
         return False
-    first = [line for line in text.splitlines() if not line.startswith("#")][:1]
+    first = [line for line in start.splitlines() if not line.startswith("#")][:1]
     names = [name.strip() for name in first[0].split(",")] if first else []
     of_values = tuple(itertools.dropwhile(_ANGLES.__contains__, names))
     alone = len(of_values) == 1 or (bool(of_values) and _wavelengths(of_values) is not None)
-    return f"# {_COLUMNS}" in text or (alone and len(of_values) < len(names))
+    return f"# {_COLUMNS}" in start or (alone and len(of_values) < len(names))
 
 
 def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     """Return f_r of a text, interpolated linearly if its rows are those of a grid; else the samples that it lists.
+
+    A text without the line on columns that `write` puts into the record is read by `brdfdb.formats.text` if its
+    columns are angles of light and viewer.
 
     Raises
     ------
@@ -133,6 +138,8 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
         else:
             line = ""
         names = tuple(name.strip() for name in line.split(","))
+        if _COLUMNS not in comments and set(names) >= _ENOUGH and {"delta_phi", "phi_r"} & set(names):
+            return text.read(path)
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # an empty file
             numbers = np.loadtxt(texts, delimiter=",", ndmin=2, dtype=np.float64)

@@ -23,10 +23,12 @@ from brdfdb.formats._columns import (
     QUANTITIES,
     Layout,
     fields_of,
+    in_percent,
     layout_of,
     number_of,
     quantity_of,
     roles_of,
+    unknown_unit,
     wavelength_of,
 )
 from brdfdb.formats._nodes import samples_at_angles
@@ -102,10 +104,7 @@ def read(
     turned = _angles(path, rows, roles, layout, angles, record)
     names = [layout.names[column] for column in roles["values"]]
     scale = _scale(quantity_of(names), layout, quantity, turned[:, 2], record)
-    values: Array = rows[:, roles["values"]] * scale
-    uncertainty: Array | None = rows[:, roles["uncertainty"]] * scale if "uncertainty" in roles else None
-    if uncertainty is not None and uncertainty.shape != values.shape:
-        raise FileFormatError(f"{path}: line {layout.line}: there are not as many uncertainties as values")
+    values, uncertainty = _values(path, rows, roles, layout, scale, record)
     at = _wavelengths(path, names, layout)
     if "wavelength" in roles:
         if values.shape[1] != 1:
@@ -249,6 +248,34 @@ def _scale(named: str, layout: Layout, quantity: str, theta_r: Array, record: di
         cosine = np.cos(theta_r)
         return np.where(cosine > 1e-6, 1.0 / np.maximum(cosine, 1e-6), np.nan)[:, np.newaxis]
     return np.ones((1, 1))
+
+
+def _values(
+    path: Path, rows: Array, roles: Mapping[str, list[int]], layout: Layout, scale: Array, record: dict[str, Any]
+) -> tuple[Array, Array | None]:
+    """Return f_r [1/sr] of rows, shape (N, C), and their uncertainties if there are any."""
+    names = {role: [layout.names[column] for column in roles.get(role, ())] for role in ("values", "uncertainty")}
+    notes = [
+        f"The unit {unit!r} of the column {name} is not known: its numbers were taken as they stand."
+        for name in (*names["values"], *names["uncertainty"])
+        if (unit := unknown_unit(name))
+    ]
+    percent = np.array([in_percent(name) for name in names["values"]])
+    if percent.any():
+        notes.append("Values in percent were divided by 100.")
+    values: Array = rows[:, roles["values"]] * np.where(percent, 0.01, 1.0) * scale
+    uncertainty: Array | None = None
+    if "uncertainty" in roles:
+        given = rows[:, roles["uncertainty"]]
+        if given.shape != values.shape:
+            raise FileFormatError(f"{path}: line {layout.line}: there are not as many uncertainties as values")
+        relative = np.array([in_percent(name) for name in names["uncertainty"]])
+        if relative.any():
+            notes.append("Uncertainties in percent were taken as percent of the values of their rows.")
+        uncertainty = np.where(relative, 0.01 * given * np.abs(values), given * np.where(percent, 0.01, 1.0) * scale)
+    if notes:
+        record["notes"] = [*record.get("notes", ()), *notes]
+    return values, uncertainty
 
 
 def _wavelengths(path: Path, names: Iterable[str], layout: Layout) -> Array | None:

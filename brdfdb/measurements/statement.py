@@ -328,7 +328,7 @@ def _hints(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]
 
 def _notes(record: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what a reader noted in a record, in sentences."""
-    notes = []
+    notes = [str(note) for note in record.get("notes", ())]
     if text := _QUANTITIES.get(record.get("quantity", "")):
         notes.append(f"The file holds {text}: f_r was made of them.")
     if "exchanged" in record:

@@ -12,6 +12,9 @@ from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._columns import role_of, wavelength_of
 from brdfdb.measurements import Samples
+from brdfdb.measurements.statement import statement
+
+SR = "sza,vza,raa,brdf [1/sr]\n10,20,180,0.5\n"
 
 
 def samples(tmp_path: Path, text: str, **keywords: Any) -> Samples:
@@ -149,3 +152,22 @@ def test_columns_that_do_not_exist_are_refused(tmp_path: Path) -> None:
         samples(tmp_path, text, theta_i="src")
     with pytest.raises(ParameterError, match="quantity: 'percent' is not one of auto, f_r"):
         samples(tmp_path, text, quantity="percent")
+
+
+def test_percent_in_a_name_is_a_hundredth(tmp_path: Path) -> None:
+    header = "sza [deg],vza [deg],raa [deg],"
+    sheet = samples(tmp_path, f"{header}brdf,unc (%)\n10,20,180,0.5,3\n")
+    assert sheet.uncertainty is not None
+    assert sheet.uncertainty[0] == pytest.approx([0.015])
+    assert any("percent of the values of their rows" in note for note in statement(sheet).notes)
+    for name in ("BRF [%]", "BRF %", "brf_percent"):
+        assert samples(tmp_path, f"{header}{name}\n10,20,180,3\n").values[0] == pytest.approx([0.03 / np.pi])
+    path = tmp_path / "sheet.csv"
+    path.write_text("theta_i,theta_r,delta_phi,brf [%]\n10,20,180,3\n")
+    assert formats.samples(path).values[0] == pytest.approx([0.03 / np.pi])
+
+
+def test_a_unit_that_is_not_known_is_stated(tmp_path: Path) -> None:
+    sheet = samples(tmp_path, "sza,vza,raa,brdf [furlong]\n10,20,180,0.5\n")
+    assert any("'furlong' of the column brdf [furlong] is not known" in note for note in statement(sheet).notes)
+    assert not any("not known" in note for note in statement(samples(tmp_path, SR)).notes)
