@@ -95,14 +95,6 @@ class Layout:
     titles: tuple[str, ...]
 
     @property
-    def units(self) -> str:
-        """The unit that the names give for angles: "deg", "rad" or "" if they give none."""
-        text = " ".join(name.lower() for name in self.names if role_of(name) in ANGLES)
-        if re.search(r"[\W_]rad", text):
-            return "rad"
-        return "deg" if "deg" in text or "°" in text else ""
-
-    @property
     def names_factors(self) -> bool:
         """True if a line before the numbers speaks of reflectance factors."""
         return any(_OF_FACTORS.search(line) for line in self.titles)
@@ -209,6 +201,13 @@ def plain_name(name: str) -> str:
     text = re.sub(r"[\[(].*?[\])]", "", text)
     text = re.sub(r"[^a-z0-9.µμ]+", "_", text).strip("_")
     return re.sub(r"_(?:deg|degrees?|rad|radians?|percent|pct)$", "", text)
+
+
+def angle_unit(name: str) -> str:
+    """Return the unit of angles that a name gives: "deg", "rad", or "" if it gives none."""
+    if re.search(r"[\W_]rad", name.lower()):
+        return "rad"
+    return "deg" if "deg" in name.lower() or "°" in name else ""
 
 
 def in_percent(name: str) -> bool:

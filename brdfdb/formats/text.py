@@ -22,6 +22,7 @@ from brdfdb.formats._columns import (
     ANGLES,
     QUANTITIES,
     Layout,
+    angle_unit,
     fields_of,
     in_percent,
     layout_of,
@@ -73,7 +74,8 @@ def read(
     quantity : {"auto", "f_r", "reflectance_factor", "f_r_cos"}
         Quantity of the values. By default the one that names or titles give, such as BRF, and else f_r.
     angles : {"auto", "deg", "rad"}
-        Unit of the angles. By default the one that names give, and else radians where no angle exceeds 2 pi.
+        Unit of the angles. By default the one that names give, and else degrees; the record has a note where the
+        numbers may be radians as well.
     **columns : str or sequence of str
         Names of columns for theta_i, phi_i, theta_r, phi_r, delta_phi, values, uncertainty and wavelength; numbers from
         1 in a text without names. A role that is not given is recognised by names.
@@ -202,12 +204,15 @@ def _angles(
         if np.any(np.isnan(column)):
             line = f"line {layout.line}, field {layout.names[roles[name][0]]}"
             raise FileFormatError(f"{path}: {line}: an angle is missing")
-    unit = layout.units or unit if unit == "auto" else unit
-    largest = max(float(np.abs(column).max()) for column in given.values())
-    if unit == "auto":
-        unit = "rad" if 0.0 < largest <= 2.0 * np.pi + 1e-3 else "deg"
-    record["angles"] = {"deg": "degrees", "rad": "radians"}[unit]
-    given = {name: np.deg2rad(column) if unit == "deg" else column for name, column in given.items()}
+    units = {name: unit if unit != "auto" else angle_unit(layout.names[roles[name][0]]) for name in given}
+    named = sorted(set(units.values()) - {""})
+    other = named[0] if len(named) == 1 else "deg"  # of columns whose names give none
+    if not named and _may_be_radians(given):
+        text = "no polar angle exceeds pi/2 and no azimuth 2 pi, so they may be radians: --angles rad reads them so"
+        record["notes"] = [f"Angles were taken as degrees, but no name gives a unit, {text}."]
+    units = {name: unit or other for name, unit in units.items()}
+    record["angles"] = " and ".join({"deg": "degrees", "rad": "radians"}[unit] for unit in sorted(set(units.values())))
+    given = {name: np.deg2rad(column) if units[name] == "deg" else column for name, column in given.items()}
     if "phi_i" not in given:
         record["azimuths"] = RELATIVE
         given["phi_i"] = np.zeros(len(rows))
@@ -223,6 +228,13 @@ def _angles(
             raise FileFormatError(f"{path}: line {layout.line}: theta_{side} of {shown:g} degrees is no polar angle")
     phi_r = given["phi_r"] if "phi_r" in given else given["phi_i"] + given["delta_phi"]
     return np.stack([given["theta_i"], given["phi_i"], given["theta_r"], phi_r], axis=1)
+
+
+def _may_be_radians(given: Mapping[str, Array]) -> bool:
+    """Return True if angles without a unit are as small as radians are, and not 0 alone."""
+    largest = {name: float(np.abs(column).max(initial=0.0)) for name, column in given.items()}
+    within = all(size <= (0.5 if name.startswith("theta") else 2.0) * np.pi + 1e-3 for name, size in largest.items())
+    return within and any(largest.values())
 
 
 def _exchange(given: dict[str, Array], record: dict[str, Any]) -> None:

@@ -79,7 +79,7 @@ def test_the_caller_names_columns_and_the_quantity(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("header", "row"),
     [
-        ("theta_i,theta_r,raa,brdf", "0.5,1.25,3.1415927,0.3"),  # none exceeds 2 pi
+        ("theta_i,theta_r_rad,raa,brdf", "0.5,1.25,3.1415927,0.3"),  # one name is enough
         ("theta_i [rad],theta_r [rad],raa [rad],brdf", "0.5,1.25,3.1415927,0.3"),
         ("theta_i [deg],theta_r [deg],raa [deg],brdf", "0.5,1.25,3.1415927,0.3"),
     ],
@@ -88,6 +88,21 @@ def test_the_unit_of_angles_is_that_of_the_names(header: str, row: str, tmp_path
     sheet = samples(tmp_path, f"{header}\n{row}\n")
     expected = np.radians(0.5) if "deg" in header else 0.5
     assert sheet.theta_i == pytest.approx([expected])
+    assert "notes" not in sheet.record
+
+
+@pytest.mark.parametrize("header", ["theta_i,theta_r,delta_phi,brdf", "sza,vza,raa,brdf"])
+def test_angles_without_a_unit_are_degrees_and_small_ones_are_stated(header: str, tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(f"{header}\n0.5,1.25,3.1415927,0.3\n")
+    sheet = formats.samples(path)
+    assert np.degrees(sheet.theta_i) == pytest.approx([0.5])
+    assert any("taken as degrees" in note and "--angles rad" in note for note in statement(sheet).notes)
+    radians = formats.samples(path, angles="rad")
+    assert radians.theta_r == pytest.approx([1.25])
+    assert statement(radians).notes == ()
+    path.write_text(f"{header}\n0.5,1.25,10,0.3\n")  # 10 exceeds 2 pi
+    assert statement(formats.samples(path)).notes == ()
 
 
 def test_a_negative_polar_angle_is_at_the_opposite_azimuth(tmp_path: Path) -> None:
