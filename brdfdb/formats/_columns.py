@@ -48,7 +48,7 @@ _UNCERTAINTY = (
     "standard_deviation",
 )
 _WAVELENGTH = ("wavelength", "wavelength_nm", "lambda", "wl", "wvl", "wave")
-_COLOURS = (("r", "g", "b"), ("x", "y", "z"))
+_COLOURS = (("R", "G", "B"), ("r", "g", "b"), ("X", "Y", "Z"))  # x, y, z are positions
 _OF_FACTORS = re.compile(r"\b(?:BRF|HCRF|reflectance factors?)\b", re.IGNORECASE)
 _NUMBER_NM = re.compile(r"(?P<word>[a-z_]*?)[_@]?(?P<number>\d+(?:\.\d+)?)_?(?P<unit>nm|um|µm|μm)?$")
 _PERCENT = re.compile(r"%|(?:^|[\W_])(?:percent|pct)(?:$|[\W_])", re.IGNORECASE)
@@ -189,9 +189,10 @@ def roles_of(names: Sequence[str]) -> dict[str, list[int]]:
                 at = plain.index(f"{angle}_s")
                 roles[f"{angle}_i"] = [column for column in roles.get(f"{angle}_i", []) if column != at]
                 roles[f"{angle}_r"] = [at]
+    bare = [_BRACKETS.sub("", name).strip() for name in names]
     for colour in _COLOURS:
-        if "values" not in roles and set(colour) <= set(plain):
-            roles["values"] = [plain.index(channel) for channel in colour]
+        if "values" not in roles and set(colour) <= set(bare):
+            roles["values"] = [bare.index(channel) for channel in colour]
     return {role: columns for role, columns in roles.items() if role and columns}
 
 

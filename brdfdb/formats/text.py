@@ -105,7 +105,7 @@ def read(
     record: dict[str, Any] = {"titles": list(layout.titles)} if layout.titles else {}
     turned = _angles(path, rows, roles, layout, angles, record)
     names = [layout.names[column] for column in roles["values"]]
-    scale = _scale(quantity_of(names), layout, quantity, turned[:, 2], record)
+    scale = _scale(path, names, layout, quantity, turned[:, 2], record)
     values, uncertainty = _values(path, rows, roles, layout, scale, record)
     at = _wavelengths(path, names, layout)
     if "wavelength" in roles:
@@ -123,6 +123,8 @@ def read(
     if at is None and len(names) == 1 and length is not None:
         at = np.array([length])
     channels = [f"{nm:g}nm" for nm in at] if at is not None else ["grey"] if len(names) == 1 else names
+    if channels == ["r", "g", "b"]:
+        channels = ["R", "G", "B"]
     left = set(range(len(layout.names))) - {column for columns_ in roles.values() for column in columns_}
     if left:
         record["columns_left_out"] = [layout.names[column] for column in sorted(left)]
@@ -248,18 +250,29 @@ def _exchange(given: dict[str, Array], record: dict[str, Any]) -> None:
         record["exchanged"] = "theta exceeds 90 degrees and phi does not: phi was read as the polar angle"
 
 
-def _scale(named: str, layout: Layout, quantity: str, theta_r: Array, record: dict[str, Any]) -> Array:
-    """Return the factor, shape (N, 1) or (1, 1), that makes f_r of values."""
-    if quantity == "auto":
-        factors = named in ("", "f_r") and layout.names_factors and named != "f_r"
-        quantity = "reflectance_factor" if factors else named or "f_r"
-    record["quantity"] = quantity
-    if quantity == "reflectance_factor":
-        return np.full((1, 1), 1.0 / np.pi)
-    if quantity == "f_r_cos":
-        cosine = np.cos(theta_r)
-        return np.where(cosine > 1e-6, 1.0 / np.maximum(cosine, 1e-6), np.nan)[:, np.newaxis]
-    return np.ones((1, 1))
+def _scale(
+    path: Path, names: Sequence[str], layout: Layout, quantity: str, theta_r: Array, record: dict[str, Any]
+) -> Array:
+    """Return the factors, shape (N, C) or (1, C), that make f_r of values: each column has the quantity of its name."""
+    quantities = [quantity_of([name]) for name in names]
+    distinct = sorted(set(quantities) - {""})
+    if len(distinct) > 1 and any(wavelength_of(name) is None for name in names):
+        shown = " and ".join(next(n for n, q in zip(names, quantities, strict=True) if q == one) for one in distinct)
+        raise FileFormatError(f"{path}: line {layout.line}: {shown} are different quantities; name one as values")
+    if quantity != "auto":
+        quantities = [quantity] * len(names)
+    other = distinct[0] if len(distinct) == 1 else "f_r"  # of names that give none
+    if not distinct and layout.names_factors:
+        other = "reflectance_factor"
+    quantities = [one or other for one in quantities]
+    record["quantity"] = next((one for one in quantities if one != "f_r"), "f_r")
+    cosine = np.cos(theta_r)
+    of_quantity = {
+        "f_r": np.ones_like(cosine),
+        "reflectance_factor": np.full_like(cosine, 1.0 / np.pi),
+        "f_r_cos": np.where(cosine > 1e-6, 1.0 / np.maximum(cosine, 1e-6), np.nan),
+    }
+    return np.stack([of_quantity[one] for one in quantities], axis=1)
 
 
 def _values(

@@ -186,3 +186,21 @@ def test_a_unit_that_is_not_known_is_stated(tmp_path: Path) -> None:
     sheet = samples(tmp_path, "sza,vza,raa,brdf [furlong]\n10,20,180,0.5\n")
     assert any("'furlong' of the column brdf [furlong] is not known" in note for note in statement(sheet).notes)
     assert not any("not known" in note for note in statement(samples(tmp_path, SR)).notes)
+
+
+def test_each_column_has_the_quantity_of_its_own_name(tmp_path: Path) -> None:
+    sheet = samples(tmp_path, "sza,vza,raa,brdf_550nm,brf_650nm\n10,20,180,0.5,0.5\n")
+    assert sheet.values[0] == pytest.approx([0.5, 0.5 / np.pi])
+    for names in ("brf,brdf", "brdf,brf"):
+        text = f"sza,vza,raa,{names}\n10,20,180,0.5,0.5\n"
+        with pytest.raises(FileFormatError, match="line 1: brdf and brf are different quantities; name one as values"):
+            samples(tmp_path, text)
+        assert samples(tmp_path, text, values="brf").values == pytest.approx(0.5 / np.pi)
+
+
+def test_small_letters_are_colours_and_positions(tmp_path: Path) -> None:
+    assert samples(tmp_path, "sza,vza,raa,r,g,b\n10,20,180,1,2,3\n").channels == ("R", "G", "B")
+    assert samples(tmp_path, "sza,vza,raa,X,Y,Z\n10,20,180,1,2,3\n").channels == ("X", "Y", "Z")
+    assert samples(tmp_path, "sza,vza,raa,x,y,z,brdf\n10,20,180,1,2,3,4\n").values.tolist() == [[4.0]]
+    with pytest.raises(FileFormatError, match="is none of values"):
+        samples(tmp_path, "sza,vza,raa,x,y,z\n10,20,180,1,2,3\n", angles="deg")

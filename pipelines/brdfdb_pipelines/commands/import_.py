@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("f_r", "reflectance_factor", "f_r_cos"),
         help="quantity of the values of a text (default: the one that its names or titles give, else f_r)",
     )
-    parser.add_argument("--angles", choices=("deg", "rad"), help="unit of the angles of a text (default: by its names, else degrees)")
+    parser.add_argument(
+        "--angles", choices=("deg", "rad"), help="unit of the angles of a text (default: by its names, else degrees)"
+    )
     parser.add_argument("--member", metavar="NAME", help="the file of an archive (.zip) that is read (default: all)")
     parser.add_argument(
         "--side", choices=("back", "front"), help="side of a Klems matrix, as the file names it (default: back)"
