@@ -28,6 +28,7 @@ _CLAIM = 0.05  # relative difference of a header from its own values that is sta
 _EXCESS = 1.02  # albedo above which the unit is doubted
 _BLACK = 2e-4  # albedo below which the unit is doubted: the blackest coatings reflect more
 _QUANTITIES = {"reflectance_factor": "reflectance factors", "f_r_cos": "values with the cosine of the viewer"}
+_MISSING = np.array([-1.0, -99.0, -999.0, -9999.0])  # numbers that files write for values that are missing
 _SHOWN = 6  # incidences in sentences
 
 
@@ -226,7 +227,7 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         reciprocity=reciprocity_of(full, one_side),
         claims=_claims(samples, integrated),
         notes=_notes(samples.record),
-        hints=_hints(samples, integrated),
+        hints=(*_sentinels(samples), *_hints(samples, integrated)),
     )
 
 
@@ -323,6 +324,24 @@ def _hints(samples: Samples, incidences: Sequence[Incidence]) -> tuple[str, ...]
     if 0.0 <= albedo < _BLACK:
         text = f"Units? Too dark: {how} {albedo:.2g}, and the blackest coatings reflect more."
         return (f"{text} A thousand times is {1e3 * albedo:.2g}.",)
+    return ()
+
+
+def _sentinels(samples: Samples) -> tuple[str, ...]:
+    """Return whether negative values look like marks of missing ones, in a sentence with the number of the file."""
+    known = samples.values[samples.known]
+    low = float(known.min(initial=0.0))
+    if low >= 0.0:
+        return ()
+    number = low * (np.pi if samples.record.get("quantity") == "reflectance_factor" else 1.0)
+    marks = np.isclose(known, low, rtol=1e-9, atol=0.0)
+    count, others = int(marks.sum()), known[~marks]
+    if not others.size or (count == 1 and not np.isclose(number, _MISSING).any()):
+        return ()
+    far = low < -float(np.abs(others).max()) and low < 10.0 * min(float(others.min()), 0.0)
+    if far or np.isclose(number, _MISSING).any():
+        verb, they = ("is", "does it") if count == 1 else ("are", "do they")
+        return (f"{counted(count, 'value')} {verb} {number:.4g}: {they} mean missing?",)
     return ()
 
 

@@ -153,3 +153,23 @@ def test_the_document_is_json_with_the_sentences() -> None:
     assert document["incidences"][0]["theta_i_deg"] == 10.0
     assert "The file holds reflectance factors: f_r was made of them." in document["sentences"]
     assert "2 rows below the horizon were left out." in document["sentences"]
+
+
+@pytest.mark.parametrize(
+    ("number", "count", "sentence"),
+    [
+        (-999.0, 3, "3 values are -999: do they mean missing?"),
+        (-9999.0, 1, "1 value is -9999: does it mean missing?"),
+        (-5.0, 2, "2 values are -5: do they mean missing?"),  # far below all others
+        (-1e-3, 3, None),  # noise about a dark value
+        (-5.0, 1, None),
+    ],
+)
+def test_negative_numbers_that_may_mean_missing_are_stated(number: float, count: int, sentence: str | None) -> None:
+    sheet = samples()
+    values = sheet.values * np.linspace(0.9, 1.1, len(sheet))[:, np.newaxis]
+    values[10 : 10 + count] = number
+    hints = statement(replace(sheet, values=values)).hints
+    assert [hint for hint in hints if "missing" in hint] == ([sentence] if sentence else [])
+    factors = replace(sheet, values=values / np.pi, record={"quantity": "reflectance_factor"})
+    assert any(hint == sentence for hint in statement(factors).hints) == (sentence is not None)
