@@ -48,6 +48,7 @@ _ROLES = (*ANGLES, "values", "uncertainty", "wavelength")
 keywords = (*_ROLES, "quantity", "angles")
 _UNITS = ("auto", "deg", "rad")
 _SHOWN = 200  # characters of names that a sentence repeats
+_IN_PLANE = 1e-6  # sine of an angle to the plane of incidence that is rounding
 _UPRIGHT = np.radians(90.0 + 1e-6)
 
 
@@ -215,10 +216,11 @@ def _angles(
     units = {name: unit or other for name, unit in units.items()}
     record["angles"] = " and ".join({"deg": "degrees", "rad": "radians"}[unit] for unit in sorted(set(units.values())))
     given = {name: np.deg2rad(column) if units[name] == "deg" else column for name, column in given.items()}
-    if "phi_i" not in given:
-        record["azimuths"] = RELATIVE
+    relative = "phi_i" not in given
+    if relative:
         given["phi_i"] = np.zeros(len(rows))
     _exchange(given, record)
+    swept = bool(np.any(given["theta_i"] < 0.0)) and np.ptp(given["phi_i"]) == 0.0
     for side in ("i", "r"):
         theta, phi = given[f"theta_{side}"], f"phi_{side}" if f"phi_{side}" in given else "delta_phi"
         given[phi] = np.where(theta < 0.0, given[phi] + np.pi, given[phi])
@@ -228,8 +230,13 @@ def _angles(
         if np.any(np.abs(theta) > np.pi * (1.0 + 1e-9)):
             shown = np.rad2deg(np.abs(theta).max())
             raise FileFormatError(f"{path}: line {layout.line}: theta_{side} of {shown:g} degrees is no polar angle")
-    phi_r = given["phi_r"] if "phi_r" in given else given["phi_i"] + given["delta_phi"]
-    return np.stack([given["theta_i"], given["phi_i"], given["theta_r"], phi_r], axis=1)
+    phi_i = given["phi_i"]
+    phi_r = given["phi_r"] if "phi_r" in given else phi_i + given["delta_phi"]
+    in_plane = np.abs(np.sin(phi_r - phi_i)) * np.sin(given["theta_r"]) < _IN_PLANE
+    if relative or (swept and in_plane.all()):  # signed angles in one plane: the surface has not turned
+        record["azimuths"] = RELATIVE
+        phi_i, phi_r = np.zeros(len(rows)), phi_r - phi_i
+    return np.stack([given["theta_i"], phi_i, given["theta_r"], phi_r], axis=1)
 
 
 def _may_be_radians(given: Mapping[str, Array]) -> bool:

@@ -354,6 +354,10 @@ def _notes(record: Mapping[str, Any]) -> tuple[str, ...]:
         notes.append(f"Letters exchanged: {record['exchanged']}.")
     if count := record.get("below_the_horizon"):
         notes.append(f"{counted(count, 'row')} below the horizon {'was' if count == 1 else 'were'} left out.")
+    if count := record.get("repeated"):
+        verb = "repeats the directions and values of another and was"
+        verb = verb if count == 1 else "repeat the directions and values of others and were"
+        notes.append(f"{counted(count, 'row')} {verb} left out.")
     if left := record.get("columns_left_out"):
         notes.append(f"Columns left out: {', '.join(left)}.")
     if side := record.get("side"):

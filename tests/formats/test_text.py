@@ -12,6 +12,7 @@ from brdfdb import formats
 from brdfdb.errors import FileFormatError, ParameterError
 from brdfdb.formats._columns import role_of, wavelength_of
 from brdfdb.measurements import Samples
+from brdfdb.measurements.samples import RELATIVE
 from brdfdb.measurements.statement import statement
 
 SR = "sza,vza,raa,brdf [1/sr]\n10,20,180,0.5\n"
@@ -106,7 +107,7 @@ def test_angles_without_a_unit_are_degrees_and_small_ones_are_stated(header: str
 
 
 def test_a_negative_polar_angle_is_at_the_opposite_azimuth(tmp_path: Path) -> None:
-    sheet = samples(tmp_path, "theta_i theta_r raa brdf\n30 -40 0 0.3\n-30 40 0 0.3\n")
+    sheet = samples(tmp_path, "theta_i theta_r raa brdf\n30 -40 0 0.3\n-30 40 0 0.4\n")
     assert np.degrees(sheet.theta_r) == pytest.approx([40.0, 40.0])
     assert np.degrees(sheet.phi_r - sheet.phi_i) % 360.0 == pytest.approx([180.0, 180.0])
 
@@ -204,3 +205,25 @@ def test_small_letters_are_colours_and_positions(tmp_path: Path) -> None:
     assert samples(tmp_path, "sza,vza,raa,x,y,z,brdf\n10,20,180,1,2,3,4\n").values.tolist() == [[4.0]]
     with pytest.raises(FileFormatError, match="is none of values"):
         samples(tmp_path, "sza,vza,raa,x,y,z\n10,20,180,1,2,3\n", angles="deg")
+
+
+def test_a_sweep_of_signed_angles_in_one_plane_is_relative_to_the_light(tmp_path: Path) -> None:
+    rows = "30,0,40,0,1\n30,0,-40,0,2\n-30,0,40,0,3\n-30,0,-40,0,4\n"
+    for text in (
+        "aoi,phi_i,theta_scat,phi_scat,brdf\n" + rows,
+        "aoi,theta_scat,phi_scat,brdf\n" + rows.replace(",0,40", ",40").replace(",0,-40", ",-40"),
+    ):
+        sweep = samples(tmp_path, text)
+        assert not sweep.turned
+        assert sweep.record["azimuths"] == RELATIVE
+        assert np.degrees(sweep.phi_r - sweep.phi_i) % 360.0 == pytest.approx([0.0, 180.0, 180.0, 0.0])
+    of_surface = samples(tmp_path, "sza,saa,vza,vaa,brdf\n-30,0,40,20,1\n30,0,40,20,2\n")
+    assert of_surface.turned  # not in one plane: the azimuths are those of the surface
+
+
+def test_rows_that_repeat_are_stated(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text("theta_i,theta_r,delta_phi,brdf\n10,20,180,0.5\n10,20,180,0.5\n10,20,180,0.6\n")
+    sheet = formats.samples(path)
+    assert len(sheet) == 2
+    assert "1 row repeats the directions and values of another and was left out." in statement(sheet).notes
