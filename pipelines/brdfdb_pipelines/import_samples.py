@@ -85,7 +85,10 @@ def run(
     if out is not None and count != 1:
         raise ParameterError("--out", f"it takes the samples of one file, and there are {count}", count, 1)
     if tables is not None:
-        targets = import_tables.named(targets, tables, count)
+        targets, same = import_tables.named(targets, tables, count)
+        result.refused += same
+        for sentence in same:
+            terminal.say(sentence)
     start = time.monotonic()
     for number, target in enumerate(targets, 1):
         label = f"{target.label}, {number} of {len(targets)}" if len(targets) > 1 else target.label

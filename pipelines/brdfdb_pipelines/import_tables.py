@@ -41,6 +41,12 @@ class Target:
         """Return the paths of the files."""
         return ", ".join(map(str, self.files))
 
+    @property
+    def shown(self) -> str:
+        """Return the paths of the files, and the member of an archive."""
+        member = self.keys.get("member", "")
+        return f"{self.label} ({member})" if member else self.label
+
     @cached_property
     def table(self) -> MeasuredTable:
         """Return the keys, checked."""
@@ -92,18 +98,20 @@ class Made:
     report: AuditReport | None = None
 
 
-def named(targets: Sequence[Target], tables: Tables, count: int) -> list[Target]:
-    """Return materials with their names: that of the command line, or those of files and members, as words.
+def named(targets: Sequence[Target], tables: Tables, count: int) -> tuple[list[Target], list[str]]:
+    """Return materials with their names, and a sentence on each name that several would have: none of these is made.
+
+    A name is that of the command line, or that of the file or the member, as words.
 
     Raises
     ------
     ParameterError
-        If a name is given to several materials, is that of another one or of a preset, or is not made of words.
+        If a name is given to several materials, is that of a preset, or is not made of words.
     """
     for option, text in (("--name", tables.name), ("--title", tables.title)):
         if text is not None and count != 1:
             raise ParameterError(option, f"it is for one material, and there are {count}", text)
-    materials: dict[str, Target] = {}
+    materials: dict[str, list[Target]] = {}
     for target in targets:
         first = target.files[0]
         name = tables.name or slug(target.keys.get("member", "").removesuffix(".h5") or first.stem)
@@ -113,16 +121,17 @@ def named(targets: Sequence[Target], tables: Tables, count: int) -> list[Target]
             )
         if name in presets():
             raise ParameterError("--name", f"{name!r} is the name of a preset; give {first} another", name)
-        if name in materials:
-            raise ParameterError(
-                "--name",
-                f"{target.label} and {materials[name].label} would both be {name!r}; import one alone, with a name",
-                name,
-            )
         title = {} if tables.title is None else {"title": tables.title}
-        materials[name] = replace(target, name=name, keys={**target.keys, **title})
-        assert materials[name].table  # checked before anything is read
-    return list(materials.values())
+        one = replace(target, name=name, keys={**target.keys, **title})
+        assert one.table  # checked before anything is read
+        materials.setdefault(name, []).append(one)
+    refused = [
+        f"{' and '.join(one.shown for one in same)} would {'both' if len(same) == 2 else 'all'} be {name!r}; "
+        "import one alone, with --name"
+        for name, same in materials.items()
+        if len(same) > 1
+    ]
+    return [same[0] for same in materials.values() if len(same) == 1], refused
 
 
 def make(targets: Sequence[Target], tables: Tables) -> Made:

@@ -248,6 +248,22 @@ def test_options_that_cannot_be_are_refused_before_anything_is_read(
     assert not Path("s").exists()
 
 
+def test_files_of_one_name_are_refused_and_others_imported(
+    tmp_path: Path, clay: Samples, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "A").mkdir()
+    for path in ("ok.csv", "A/Ok.csv", "other.csv"):
+        _csv(Path(path), clay)
+    (tmp_path / "word.csv").write_text("theta_i,theta_r,delta_phi,brdf\n10,20,0,1\n10,20,0,abc\n")
+    assert run("import", "ok.csv", "A/Ok.csv", "word.csv", "other.csv", "--recipe", "other.toml") == 2
+    captured = capsys.readouterr()
+    assert "ok.csv and A/Ok.csv would both be 'ok'" in captured.err
+    assert "word.csv: line 3, field brdf: 'abc' is not a number" in " ".join(captured.err.split())
+    assert captured.out.startswith("other.csv: ")
+    assert 'materials = ["other"]' in (tmp_path / "other.toml").read_text()
+
+
 def test_requests_of_recipes_without_new_keys_are_those_of_before(tmp_path: Path, clay: Samples) -> None:
     """A table that was built earlier is not built again because a recipe has more keys now."""
     _csv(tmp_path / "clay.csv", clay)
