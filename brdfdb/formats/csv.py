@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import os
-import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import FileFormatError
 from brdfdb.formats import text
+from brdfdb.formats._columns import number_of
 from brdfdb.formats._dense_files import OPTIONS, dense_record, reading_of_rows
 from brdfdb.formats._record import lines, of_lines, specular_remark
 from brdfdb.formats._text_file import lines_of
@@ -129,34 +130,65 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
 
     path = Path(path)
     comments: list[str] = []
-    try:
-        texts = (line for _, line in lines_of(path))
-        for line in texts:
-            if not line.startswith("#"):
-                break
-            comments.append(line[1:].strip())
-        else:
-            line = ""
-        names = tuple(name.strip() for name in line.split(","))
-        if _COLUMNS not in comments and set(names) >= _ENOUGH and {"delta_phi", "phi_r"} & set(names):
-            return text.read(path)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # an empty file
-            numbers = np.loadtxt(texts, delimiter=",", ndmin=2, dtype=np.float64)
-    except FileFormatError:
-        raise
-    except (ValueError, UserWarning) as error:
-        raise FileFormatError(f"{path}: it is no table of numbers ({error})") from error
+    numbered = lines_of(path)
+    first, line = 0, ""
+    for number, line in numbered:
+        if not line.startswith("#"):
+            first = number
+            break
+        comments.append(line[1:].strip())
+    names = tuple(name.strip() for name in line.split(","))
+    if not line or line.startswith("#"):
+        raise FileFormatError(f"{path}: it has no line with the names of columns")
+    if _COLUMNS not in comments and set(names) >= _ENOUGH and {"delta_phi", "phi_r"} & set(names):
+        return text.read(path)
+    numbers = _numbers(path, first, names, numbered)
     angles = tuple(name for name in names if name in _ANGLES)
-    if not angles or numbers.shape[1] != len(names) or names[: len(angles)] != angles or len(names) == len(angles):
+    if not angles or names[: len(angles)] != angles or len(names) == len(angles):
         raise FileFormatError(f"{path}: the columns {', '.join(names)[:200]} are not angles, then values of f_r")
     known = of_lines(comments)
     at = _wavelengths(names[len(angles) :])
+    if at is not None and np.unique(at).size != at.size:
+        raise FileFormatError(f"{path}: line {first}: a wavelength stands twice")
     columns = {name: numbers[:, index] for index, name in enumerate(angles)}
     reading = reading_of_rows(path, columns, numbers[:, len(angles) :], at, known)
     if isinstance(reading, Samples) and _COLUMNS in comments:
         raise FileFormatError(f"{path}: rows of the grid are missing")
     return reading
+
+
+def _numbers(
+    path: Path, first: int, names: tuple[str, ...], numbered: Iterator[tuple[int, str]]
+) -> NDArray[np.float64]:
+    """Return the rows below the names of columns in line `first`, shape (N, columns)."""
+    start = next(((number, line) for number, line in numbered if line.strip() and not line.startswith("#")), None)
+    if start is None:
+        raise FileFormatError(f"{path}: line {first} has the names of columns, and no row follows")
+    rows = itertools.chain([start], numbered)
+    try:
+        numbers = np.loadtxt((line for _, line in rows), delimiter=",", ndmin=2, dtype=np.float64)
+    except FileFormatError:
+        raise
+    except ValueError:
+        wrong = _wrong_row(names, itertools.islice(lines_of(path), first, None))
+        raise FileFormatError(f"{path}: {wrong}") from None
+    if numbers.shape[1] != len(names):
+        raise FileFormatError(
+            f"{path}: line {start[0]} has {numbers.shape[1]} fields, and there are {len(names)} names"
+        )
+    return numbers
+
+
+def _wrong_row(names: tuple[str, ...], rows: Iterator[tuple[int, str]]) -> str:
+    """Return what is wrong with the first row that cannot be read."""
+    for number, line in rows:
+        fields = [field.strip() for field in line.partition("#")[0].split(",")]
+        if len(fields) != len(names) and any(fields):
+            return f"line {number} has {len(fields)} fields, and there are {len(names)} names"
+        for field, name in zip(fields, names, strict=False):
+            if number_of(field or "empty", ",") is None and any(fields):
+                return f"line {number}, field {name}: {field[:40]!r} is not a number"
+    return "it is no table of numbers"
 
 
 def _wavelengths(names: tuple[str, ...]) -> NDArray[np.float64] | None:

@@ -138,6 +138,9 @@ def _layout(path: Path) -> tuple[Layout, int]:
     """Return the layout of a text, and the line of its first row."""
     layout = layout_of(itertools.islice(lines_of(path), _LONGEST_TITLE))
     if layout is None:
+        for number, line in itertools.islice(lines_of(path), _LONGEST_TITLE):
+            if not _missing(roles_of([name for part in line.split(",") for name in part.split()])):
+                raise FileFormatError(f"{path}: line {number} has the names of columns, and no row of numbers follows")
         raise FileFormatError(
             f"{path}: line 1: none of the first {_LONGEST_TITLE} lines is a row of four numbers or more"
         )

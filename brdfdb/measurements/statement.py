@@ -416,10 +416,15 @@ def _on_albedo(known: Statement) -> list[str]:
 def _shown(channels: tuple[str, ...], values: tuple[float, ...]) -> str:
     """Return values of channels as text: all of up to three, else the smallest and the largest."""
     if len(channels) == 1:
-        return f"{values[0]:.4f}"
+        return _digits(values[0])
     low, high = int(np.argmin(values)), int(np.argmax(values))
     some = range(len(channels)) if len(channels) <= 3 else (low, high)
-    return (", " if len(channels) <= 3 else " to ").join(f"{values[at]:.4f} ({channels[at]})" for at in some)
+    return (", " if len(channels) <= 3 else " to ").join(f"{_digits(values[at])} ({channels[at]})" for at in some)
+
+
+def _digits(value: float) -> str:
+    """Return a number with four digits behind the point, and no more than four that count."""
+    return f"{value:.4f}" if 1e-3 <= abs(value) < 1.0 or value == 0.0 else f"{value:.4g}"
 
 
 def _on_pairs(known: Statement) -> list[str]:

@@ -227,3 +227,23 @@ def test_rows_that_repeat_are_stated(tmp_path: Path) -> None:
     sheet = formats.samples(path)
     assert len(sheet) == 2
     assert "1 row repeats the directions and values of another and was left out." in statement(sheet).notes
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("theta_i,theta_r,brdf\n1,2,3\n1,2,abc\n", "line 3, field brdf: 'abc' is not a number"),
+        ("theta_i,theta_r,brdf\n1,2,3\n1,2\n", "line 3 has 2 fields, and there are 3 names"),
+        ("theta_i,theta_r,brdf\n1,2\n", "line 2 has 2 fields, and there are 3 names"),
+        ("theta_i,theta_r,brdf\n", "line 1 has the names of columns, and no row follows"),
+        ("theta_i,theta_r,550nm,550nm\n1,2,3,4\n", "line 1: a wavelength stands twice"),
+        ("theta_i,theta_r,delta_phi,550nm,550nm\n1,2,3,4,5\n", "line 1: a wavelength stands twice"),
+        ("theta_i,theta_r,delta_phi,brdf\n1,2,3,4\n1,2,3,abc\n", "line 3, field brdf: 'abc' is not a number"),
+        ("theta_i,theta_r,delta_phi,brdf\n", "line 1 has the names of columns, and no row of numbers follows"),
+    ],
+)
+def test_a_damaged_csv_is_refused_with_line_and_name(text: str, sentence: str, tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text(text)
+    with pytest.raises(FileFormatError, match=rf"sheet\.csv: {sentence}$"):
+        formats.read(path, "csv")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -173,3 +174,10 @@ def test_negative_numbers_that_may_mean_missing_are_stated(number: float, count:
     assert [hint for hint in hints if "missing" in hint] == ([sentence] if sentence else [])
     factors = replace(sheet, values=values / np.pi, record={"quantity": "reflectance_factor"})
     assert any(hint == sentence for hint in statement(factors).hints) == (sentence is not None)
+
+
+def test_numbers_in_sentences_have_four_digits_at_most() -> None:
+    for value in (1e30, 12345.678, 1e-30, 0.123456):
+        for sentence in statement(samples(value)).sentences:
+            for number in re.findall(r"\d+(?:\.\d+)?", sentence.replace("e+", "e").replace("e-", "e")):
+                assert len(number.replace(".", "").lstrip("0")) <= 4, sentence
