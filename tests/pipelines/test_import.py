@@ -29,7 +29,7 @@ def test_units_that_are_wrong_are_noticed_and_can_be_said(tile: Path, capsys: Ca
     assert run("import", tile, *OPTIONS) == 0
     printed = capsys.readouterr().out
     assert printed.startswith(f"{tile}: tile\n  97 samples of 1 channel: 1 direction of the light, from one azimuth")
-    assert "Albedo at theta_i 20: 2.5133;" in printed
+    assert "Albedo at theta_i 20: 2.513;" in printed
     assert "Units? An albedo above 1: the values integrate to 2.513. The values may be reflectance factors" in printed
     assert run("import", tile, *OPTIONS, "--quantity", "reflectance_factor") == 0
     printed = capsys.readouterr().out
