@@ -105,7 +105,10 @@ class Left(_Record):
     below_horizon: int = Field(description="values of the file with a direction below the horizon")
     holes: int
     at_horizon: int = Field(description="a direction at 90 degrees, where models are 0")
-    unusable: int = Field(description="not positive, where logarithms or relative differences are taken")
+    unusable: int = Field(
+        description="not positive, where logarithms or relative differences are taken; without a positive finite "
+        "uncertainty, where differences are over it"
+    )
 
 
 class Fits(_Record):
@@ -123,6 +126,7 @@ class Fits(_Record):
     source_solid_angle_sr: float | None = Field(description="solid angle of the light; null: not known")
     receiver_solid_angle_sr: float | None = Field(description="solid angle of the receiver; null: not known")
     left_out: Left
+    remarks: list[str] = Field(description="on the samples, and on the residual for them")
     ranked_by: Literal["held-out rms of ln", "BIC"]
     fits: list[Fit]
     outliers: list[Outlier] = Field(description="the farthest samples of the best fit, farthest first")

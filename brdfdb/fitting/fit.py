@@ -15,7 +15,7 @@ from brdfdb.fitting.fitted import Fitted
 from brdfdb.fitting.held_out import held_out
 from brdfdb.fitting.material import material_of
 from brdfdb.fitting.problem import Point, Problem
-from brdfdb.fitting.remarks import remarks_of
+from brdfdb.fitting.remarks import remarks_of, remarks_on_samples
 from brdfdb.fitting.residuals import Kind, Residual
 from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
@@ -200,6 +200,7 @@ def fits(
             at_horizon=counting.at_horizon,
             unusable=counting.left_out,
         ),
+        remarks=remarks_on_samples(samples, counting),
         ranked_by="held-out rms of ln" if by_held_out else "BIC",
         fits=[one for one, _ in made],
         outliers=far,

@@ -168,6 +168,7 @@ def lines(document: Fits) -> list[str]:
     ]
     if reasons:
         text.append(f"  left out: {', '.join(reasons)}")
+    text += [f"  note  {sentence}" for sentence in document.remarks]
     text += _aperture(document)
     width = max(len(one.model) for one in document.fits)
     text.append(f"  {'model':<{width}}  held out    all   numbers      BIC  albedo")

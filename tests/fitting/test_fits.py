@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -124,6 +126,36 @@ def test_holes_and_negatives_are_counted() -> None:
     weighted, _ = fits(samples(values), ["oren_nayar"], residual="cosine", profiles=False)
     assert (weighted.left_out.holes, weighted.left_out.unusable) == (1, 0)
     assert weighted.samples == document.samples + 2
+
+
+def with_uncertainty(values: Array, uncertainty: Array) -> Samples:
+    return replace(samples(values), uncertainty=uncertainty)
+
+
+def test_a_stated_uncertainty_that_the_residual_does_not_follow_is_remarked() -> None:
+    clean = truth("ward", **(WARD | {"rho_d": 0.02}))
+    values = clean + 0.003 * np.random.default_rng(0).standard_normal(clean.shape)
+    stated = np.full_like(values, 0.003)
+    document, _ = fits(with_uncertainty(values, stated), ["ward"], profiles=False)
+    (sentence,) = document.remarks
+    assert "--residual uncertainty" in sentence
+    weighted, _ = fits(with_uncertainty(values, stated), ["ward"], residual="uncertainty", profiles=False)
+    assert weighted.remarks == []
+    diffuse = next(one for one in weighted.fits[0].estimates if one.name == "rho_d")
+    assert diffuse.low < 0.02 < diffuse.high
+    even, _ = fits(with_uncertainty(noisy(clean), NOISE * clean), ["ward"], profiles=False)
+    assert even.remarks == []
+    stated[0] = np.nan
+    partly, _ = fits(with_uncertainty(values, stated), ["ward"], profiles=False)
+    assert partly.remarks == []
+
+
+def test_many_values_left_out_are_remarked_where_an_uncertainty_is_stated() -> None:
+    values = noisy(truth("oren_nayar", rho=0.5, sigma=0.6))
+    values[::40] = -0.01
+    document, _ = fits(with_uncertainty(values, NOISE * np.abs(values)), ["lambert"], profiles=False)
+    (sentence,) = document.remarks
+    assert sentence.startswith("11 values that are not positive are left out")
 
 
 @pytest.mark.parametrize("residual", ["log", "relative", "cosine"])
