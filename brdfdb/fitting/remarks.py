@@ -8,7 +8,7 @@ import numpy as np
 
 from brdfdb.fitting.document import Fit
 from brdfdb.fitting.fitted import Fitted
-from brdfdb.fitting.residuals import Residual
+from brdfdb.fitting.residuals import CREDIBLE, Residual
 from brdfdb.geometry import degrees
 from brdfdb.measurements import Samples
 from brdfdb.measurements.aperture import RESOLVED
@@ -50,8 +50,14 @@ def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
 
 
 def remarks_on_samples(samples: Samples, residual: Residual) -> list[str]:
-    """Return a sentence if the samples state uncertainties that the residual should follow."""
+    """Return a sentence if uncertainties are no credible ones, or the residual does not follow those that are stated."""
     used = residual.used
+    if residual.raised:
+        verb = "uncertainty is" if residual.raised == 1 else "uncertainties are"
+        return [
+            f"{residual.raised} {verb} below {100.0 * CREDIBLE:g} % of the median and of the median relative to f_r, "
+            "and taken for the lower of the two."
+        ]
     if residual.kind == "uncertainty" or samples.uncertainty is None:
         return []
     stated = samples.uncertainty[used]

@@ -150,6 +150,37 @@ def test_a_stated_uncertainty_that_the_residual_does_not_follow_is_remarked() ->
     assert partly.remarks == []
 
 
+@pytest.mark.parametrize("value", [0.03, 0.0])
+def test_one_tiny_uncertainty_does_not_capture_a_fit(value: float) -> None:
+    values = truth("ward", **WARD) + 0.003 * np.random.default_rng(0).standard_normal((408, 1))
+    stated = np.full_like(values, 0.003)
+    values[7], stated[7] = value, 1e-12
+    document, fitted = fits(with_uncertainty(values, stated), ["ward"], residual="uncertainty", profiles=False)
+    assert fitted[0].point.values[:, 0] == pytest.approx([0.2, 0.1], rel=0.02)
+    (sentence,) = document.remarks
+    assert sentence.startswith("1 uncertainty is below 1 % of the median")
+
+
+def test_only_uncertainties_that_no_noise_explains_are_raised() -> None:
+    values = truth("ward", **(WARD | {"rho_d": 1e-4, "alpha_x": 0.05, "alpha_y": 0.05}))
+    assert values.max() > 1e4 * values.min()
+    for stated in (np.full_like(values, 1e-3), 0.03 * values, 1e-3 * np.sqrt(values)):
+        assert Residual(with_uncertainty(values, stated), "uncertainty").raised == 0
+
+
+def test_infinite_uncertainties_are_left_out_and_counted() -> None:
+    values = noisy(truth("ward", **WARD))
+    stated = NOISE * values
+    some = with_uncertainty(values, stated)
+    some.uncertainty[5:8] = np.inf  # type: ignore[index]
+    document, fitted = fits(some, ["ward"], residual="uncertainty", profiles=False)
+    assert (document.left_out.unusable, document.samples) == (3, 405)
+    assert fitted[0].point.values[:, 0] == pytest.approx([0.2, 0.1], rel=0.02)
+    some.uncertainty[:] = np.inf  # type: ignore[index]
+    with pytest.raises(ParameterError, match="no value that the residual uncertainty can use"):
+        fit(some, "ward", residual="uncertainty")
+
+
 def test_many_values_left_out_are_remarked_where_an_uncertainty_is_stated() -> None:
     values = noisy(truth("oren_nayar", rho=0.5, sigma=0.6))
     values[::40] = -0.01
