@@ -46,7 +46,9 @@ class HeldOut(_Record):
 
     theta_i_deg: list[list[float]] = Field(description="polar angles of the light of each group")
     rms_ln: list[float] = Field(description="root mean square of ln(model / sample) of each group")
-    rms: float = Field(description="the same over all samples that were left out in turn")
+    rms: float = Field(
+        description="the same over all samples that were left out in turn, less the outliers of every fit"
+    )
     median: float = Field(description="median of abs(ln(model / sample)) over them")
 
 
@@ -77,7 +79,9 @@ class Fit(_Record):
 
     model: str = Field(description="a model of the registry, or models joined by +")
     estimates: list[Estimate]
-    rms_ln: float | None = Field(description="root mean square of ln(model / sample) over positive samples")
+    rms_ln: float | None = Field(
+        description="root mean square of ln(model / sample) over positive samples, less the outliers of every fit"
+    )
     median_ln: float | None = Field(description="median of its absolute value")
     sigma: float = Field(description="robust standard deviation of the residuals: 1.4826 times their median size")
     held_out: HeldOut | None = Field(description="null: the light has one direction alone")
@@ -131,4 +135,8 @@ class Fits(_Record):
     fits: list[Fit]
     outliers: list[Outlier] = Field(description="the farthest samples of the best fit, farthest first")
     outlier_count: int = Field(description="samples farther than 6 robust standard deviations from the best fit")
+    shared_outlier_count: int = Field(
+        description="samples farther than that from every fit, which the errors and the ranking leave out; 0 where they "
+        "are more than 2 % of all: then they are no accident"
+    )
     skipped: dict[str, str] = Field(description="models that cannot describe the samples, with the reason")

@@ -50,7 +50,7 @@ def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
 
 
 def remarks_on_samples(samples: Samples, residual: Residual) -> list[str]:
-    """Return a sentence if uncertainties are no credible ones, or the residual does not follow those that are stated."""
+    """Return a sentence on uncertainties that are no credible ones, or that the residual does not follow."""
     used = residual.used
     if residual.raised:
         verb = "uncertainty is" if residual.raised == 1 else "uncertainties are"

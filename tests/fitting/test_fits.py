@@ -118,6 +118,27 @@ def test_a_spike_is_an_outlier() -> None:
     assert document.outlier_count == 1
 
 
+def test_an_outlier_of_every_fit_does_not_decide_the_ranking() -> None:
+    values = noisy(truth("ward", **WARD))
+    values[37] = 5e4
+    document, _ = fits(samples(values), ["lambert", "ggx_schlick", "ward"], profiles=False)
+    assert document.shared_outlier_count == 1
+    assert [one.model for one in document.fits] == ["ward", "ggx_schlick", "lambert"]
+    best = document.fits[0]
+    assert best.held_out is not None
+    assert best.held_out.rms == pytest.approx(NOISE, rel=0.1)
+    assert best.rms_ln == pytest.approx(NOISE, rel=0.1)
+
+
+def test_what_no_fit_has_at_many_samples_counts() -> None:
+    values = noisy(truth("lambert", rho=0.5))
+    values[::20] *= 100.0
+    document, _ = fits(samples(values), ["lambert"], profiles=False)
+    assert (document.outlier_count, document.shared_outlier_count) == (21, 0)
+    assert document.fits[0].held_out is not None
+    assert document.fits[0].held_out.rms > 1.0
+
+
 def test_holes_and_negatives_are_counted() -> None:
     values = noisy(truth("oren_nayar", rho=0.5, sigma=0.6))
     values[3], values[5], values[7] = np.nan, -0.01, 0.0
