@@ -136,7 +136,7 @@ class Fits(_Record):
     outliers: list[Outlier] = Field(description="the farthest samples of the best fit, farthest first")
     outlier_count: int = Field(description="samples farther than 6 robust standard deviations from the best fit")
     shared_outlier_count: int = Field(
-        description="samples farther than that from every fit, which the errors and the ranking leave out; 0 where they "
-        "are more than 2 % of all: then they are no accident"
+        description="samples farther than that from every fit, which the errors and the ranking leave out; 0 where "
+        "they are more than 2 % of all: then they are no accident"
     )
     skipped: dict[str, str] = Field(description="models that cannot describe the samples, with the reason")

@@ -335,6 +335,8 @@ def _notes(record: Mapping[str, Any]) -> tuple[str, ...]:
         notes.append(f"Letters exchanged: {record['exchanged']}.")
     if count := record.get("below_the_horizon"):
         notes.append(f"{counted(count, 'row')} below the horizon {'was' if count == 1 else 'were'} left out.")
+    if sentence := record.get("contradiction"):
+        notes.append(sentence)
     if left := record.get("columns_left_out"):
         notes.append(f"Columns left out: {', '.join(left)}.")
     if side := record.get("side"):
