@@ -31,6 +31,7 @@ ROBUST = 3.0  # robust standard deviations of residuals from which on a sample c
 FAR = 6.0  # the same, from which on a sample of the best fit is an outlier
 MAD = 1.4826  # standard deviation of normal noise over the median of its size
 _MANY = 0.02  # share of the samples from which on outliers of every fit are no accident
+_REACHED, _NEARLY_ALL = 0.1, 5.0  # share of f_r that a fit must have, at this percentage of the samples
 _LISTED = 20  # outliers that are listed
 _SETTLED = 0.05  # relative change of the scale that ends the iterations
 _SCALES, _EVALUATIONS = 4, 60
@@ -173,7 +174,8 @@ def fits(
     Raises
     ------
     ParameterError
-        If a name is unknown, a model that was named cannot describe the samples, or no sample counts.
+        If a name is unknown, a model that was named cannot describe the samples, no sample counts, or f_r is so large
+        that all fits are below a tenth of it at 95 % of the samples.
     """
     counting = Residual(samples, residual)
     made, skipped, shared = _made(samples, models, residual, refractive_index, tick)
@@ -240,8 +242,24 @@ def _made(
     if models is None:
         slow = "its values are integrals, which take minutes; name it to fit it"
         skipped |= {name: slow for name in MODELS if name not in tried}
+    _check_reach([fitted for fitted, _ in found])
     shared = _shared_outliers([fitted for fitted, _ in found])
     return [(_document(fitted, errors, shared), fitted) for fitted, errors in found], skipped, shared
+
+
+def _check_reach(found: Sequence[Fitted]) -> None:
+    """Raise ParameterError if f_r of the samples is beyond what any of the models can have."""
+    for one in found:
+        logs = one.logarithms[np.isfinite(one.logarithms)]
+        if not logs.size or np.percentile(logs, 100.0 - _NEARLY_ALL) > np.log(_REACHED):
+            return
+    samples = found[0].samples
+    median = float(np.nanmedian(samples.values))
+    raise ParameterError(
+        "samples",
+        f"{samples.name} has a median f_r of {median:.3g} /sr, and no model reaches these values; check their unit",
+        median,
+    )
 
 
 def _shared_outliers(found: Sequence[Fitted]) -> Mask:

@@ -268,6 +268,20 @@ def test_only_the_ratio_of_two_lengths_is_measured() -> None:
     assert "only their ratio is measured" in pair.sentence
 
 
+@pytest.mark.parametrize("size", [1e30, 1e300])
+def test_values_that_no_model_reaches_are_refused(size: float) -> None:
+    values = size * noisy(truth("ward", **WARD))
+    with pytest.raises(ParameterError, match="no model reaches these values"):
+        fits(samples(values), ["lambert", "ward", "ggx_schlick"], profiles=False)
+
+
+def test_a_bright_mirror_lobe_and_faint_values_are_not_refused() -> None:
+    values = truth("ward", **(WARD | {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": 0.02, "alpha_y": 0.02}))
+    for some in (values, 1e-30 * values):
+        document, _ = fits(samples(noisy(some)), ["lambert", "ward"], profiles=False)
+        assert len(document.fits) == 2
+
+
 def test_a_slightly_rough_surface_tells_two_lengths_apart() -> None:
     parameters = {"sigma_0_um": 0.05, "tau_um": 1.5, "a": 0.3, "wavelength_nm": 500.0, "n": 1.7, "k": 0.0}
     document, _ = fits(
