@@ -23,8 +23,8 @@ def contradiction(parts: Sequence[Samples]) -> str:
     """Return a sentence if parts hold different values at the same directions, else an empty text.
 
     Each part is compared with those before it, direction by direction, and the one that differs most is named. They
-    contradict if the larger value is 1.3 times
-    the smaller one in the median, or the difference three times its uncertainty.
+    contradict if the larger value is 1.3 times the smaller one in the median, or the difference three times its
+    uncertainty.
     """
     codes = [_codes(part) for part in parts]
     values = np.concatenate([part.values for part in parts])
