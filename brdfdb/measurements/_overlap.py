@@ -3,23 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import counted
 from brdfdb.geometry import degrees
-
-if TYPE_CHECKING:
-    from brdfdb.measurements.samples import Samples
+from brdfdb.parameters import Floats
 
 _SAME_DEG = 0.01  # directions closer than this are one
 _RATIO = 1.3  # of the larger to the smaller value, in the median, above which files contradict
 _UNLIKELY = 3.0  # standard uncertainties of the difference, in the median, from which on files contradict
 
 
-def contradiction(parts: Sequence[Samples]) -> str:
+class Part(Protocol):
+    """Directions, values and uncertainties, as `brdfdb.measurements.Samples` has them."""
+
+    @property
+    def name(self) -> str:
+        """Name of the file."""
+
+    @property
+    def theta_i(self) -> Floats:
+        """Polar angles of the light (N,) [rad]."""
+
+    @property
+    def phi_i(self) -> Floats:
+        """Azimuths of the light (N,) [rad]."""
+
+    @property
+    def theta_r(self) -> Floats:
+        """Polar angles of the viewer (N,) [rad]."""
+
+    @property
+    def phi_r(self) -> Floats:
+        """Azimuths of the viewer (N,) [rad]."""
+
+    @property
+    def values(self) -> Floats:
+        """Values of f_r (N, C) [1/sr]."""
+
+    @property
+    def uncertainty(self) -> Floats | None:
+        """Standard uncertainties (N, C) [1/sr]."""
+
+
+def contradiction(parts: Sequence[Part]) -> str:
     """Return a sentence if parts hold different values at the same directions, else an empty text.
 
     Each part is compared with those before it, direction by direction, and the one that differs most is named. They
@@ -50,14 +80,14 @@ def contradiction(parts: Sequence[Samples]) -> str:
     return sentence
 
 
-def _noise(part: Samples) -> NDArray[np.floating[Any]]:
+def _noise(part: Part) -> Floats:
     """Return the standard uncertainties (N, C) [1/sr] of a part, 0 where none is stated."""
     return np.zeros(part.values.shape) if part.uncertainty is None else part.uncertainty
 
 
-def _codes(part: Samples) -> NDArray[np.int64]:
+def _codes(part: Part) -> NDArray[np.int64]:
     """Return a number for each pair of directions, shape (N,): the same number, the same directions."""
-    code = np.zeros(len(part), dtype=np.int64)
+    code = np.zeros(len(part.theta_i), dtype=np.int64)
     turn = round(360.0 / _SAME_DEG)
     for theta, phi in ((part.theta_i, part.phi_i), (part.theta_r, part.phi_r)):
         ring, azimuth = (np.rint(degrees(angle) / _SAME_DEG).astype(np.int64) for angle in (theta, phi))
