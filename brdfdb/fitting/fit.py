@@ -224,7 +224,7 @@ def _made(
     tick: Callable[[str], None],
 ) -> tuple[list[tuple[Fit, Fitted]], dict[str, str], Mask]:
     """Return the fits of all models that can describe the samples, why others are left out, and shared outliers."""
-    found: list[tuple[Fitted, Floats | None]] = []
+    searches: list[tuple[Fitted, Floats | None]] = []
     skipped: dict[str, str] = {}
     tried = fitted_by_default() if models is None else models
     for model in tried:
@@ -236,24 +236,24 @@ def _made(
                 raise
             skipped[model] = error.sentence
             continue
-        found.append((fitted, predicted(fitted)))
-    if not found:
+        searches.append((fitted, predicted(fitted)))
+    if not searches:
         raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
     if models is None:
         slow = "its values are integrals, which take minutes; name it to fit it"
         skipped |= {name: slow for name in MODELS if name not in tried}
-    _check_reach([fitted for fitted, _ in found])
-    shared = _shared_outliers([fitted for fitted, _ in found])
-    return [(_document(fitted, errors, shared), fitted) for fitted, errors in found], skipped, shared
+    _check_reach([fitted for fitted, _ in searches])
+    shared = _shared_outliers([fitted for fitted, _ in searches])
+    return [(_document(fitted, errors, shared), fitted) for fitted, errors in searches], skipped, shared
 
 
-def _check_reach(found: Sequence[Fitted]) -> None:
+def _check_reach(searches: Sequence[Fitted]) -> None:
     """Raise ParameterError if f_r of the samples is beyond what any of the models can have."""
-    for one in found:
+    for one in searches:
         logs = one.logarithms[np.isfinite(one.logarithms)]
         if not logs.size or np.percentile(logs, 100.0 - _NEARLY_ALL) > np.log(_REACHED):
             return
-    samples = found[0].samples
+    samples = searches[0].samples
     median = float(np.nanmedian(samples.values))
     raise ParameterError(
         "samples",
@@ -262,12 +262,12 @@ def _check_reach(found: Sequence[Fitted]) -> None:
     )
 
 
-def _shared_outliers(found: Sequence[Fitted]) -> Mask:
+def _shared_outliers(searches: Sequence[Fitted]) -> Mask:
     """Return the samples (N, C) that are far from every fit; none where they are too many to be accidents."""
-    of_fits = [np.abs(_sigmas(one)) > FAR for one in found]
-    hidden = [one.hidden[:, np.newaxis] for one in found]
+    of_fits = [np.abs(_sigmas(one)) > FAR for one in searches]
+    hidden = [one.hidden[:, np.newaxis] for one in searches]
     far = np.any(of_fits, axis=0) & np.all([a | b for a, b in zip(of_fits, hidden, strict=True)], axis=0)
-    return far if far.sum() <= max(_MANY * found[0].samples.known.sum(), 1.0) else np.zeros_like(far)
+    return far if far.sum() <= max(_MANY * searches[0].samples.known.sum(), 1.0) else np.zeros_like(far)
 
 
 def _rank(one: Fit) -> tuple[float, float]:
