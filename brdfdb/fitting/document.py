@@ -46,7 +46,9 @@ class HeldOut(_Record):
 
     theta_i_deg: list[list[float]] = Field(description="polar angles of the light of each group")
     rms_ln: list[float] = Field(description="root mean square of ln(model / sample) of each group")
-    rms: float = Field(description="the same over all samples that were left out in turn")
+    rms: float = Field(
+        description="the same over all samples that were left out in turn, less the outliers of every fit"
+    )
     median: float = Field(description="median of abs(ln(model / sample)) over them")
 
 
@@ -77,7 +79,9 @@ class Fit(_Record):
 
     model: str = Field(description="a model of the registry, or models joined by +")
     estimates: list[Estimate]
-    rms_ln: float | None = Field(description="root mean square of ln(model / sample) over positive samples")
+    rms_ln: float | None = Field(
+        description="root mean square of ln(model / sample) over positive samples, less the outliers of every fit"
+    )
     median_ln: float | None = Field(description="median of its absolute value")
     sigma: float = Field(description="robust standard deviation of the residuals: 1.4826 times their median size")
     held_out: HeldOut | None = Field(description="null: the light has one direction alone")
@@ -105,7 +109,10 @@ class Left(_Record):
     below_horizon: int = Field(description="values of the file with a direction below the horizon")
     holes: int
     at_horizon: int = Field(description="a direction at 90 degrees, where models are 0")
-    unusable: int = Field(description="not positive, where logarithms or relative differences are taken")
+    unusable: int = Field(
+        description="not positive, where logarithms or relative differences are taken; without a positive finite "
+        "uncertainty, where differences are over it"
+    )
 
 
 class Fits(_Record):
@@ -123,8 +130,13 @@ class Fits(_Record):
     source_solid_angle_sr: float | None = Field(description="solid angle of the light; null: not known")
     receiver_solid_angle_sr: float | None = Field(description="solid angle of the receiver; null: not known")
     left_out: Left
+    remarks: list[str] = Field(description="on the samples, and on the residual for them")
     ranked_by: Literal["held-out rms of ln", "BIC"]
     fits: list[Fit]
     outliers: list[Outlier] = Field(description="the farthest samples of the best fit, farthest first")
     outlier_count: int = Field(description="samples farther than 6 robust standard deviations from the best fit")
+    shared_outlier_count: int = Field(
+        description="samples farther than that from every fit, which the errors and the ranking leave out; 0 where "
+        "they are more than 2 % of all: then they are no accident"
+    )
     skipped: dict[str, str] = Field(description="models that cannot describe the samples, with the reason")

@@ -12,16 +12,17 @@ from brdfdb.fitting.albedo import albedo_of
 from brdfdb.fitting.document import Fit, Fits, Left, Outlier
 from brdfdb.fitting.estimates import correlations_of, estimates_of
 from brdfdb.fitting.fitted import Fitted
-from brdfdb.fitting.held_out import held_out
+from brdfdb.fitting.held_out import held_out, predicted
 from brdfdb.fitting.material import material_of
 from brdfdb.fitting.problem import Point, Problem
-from brdfdb.fitting.remarks import remarks_of
+from brdfdb.fitting.remarks import remarks_of, remarks_on_samples
 from brdfdb.fitting.residuals import Kind, Residual
 from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
 from brdfdb.measurements import Samples
 from brdfdb.measurements.aperture import View
 from brdfdb.models import MODELS
+from brdfdb.parameters import Floats
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,6 +30,8 @@ Mask = NDArray[np.bool_]
 ROBUST = 3.0  # robust standard deviations of residuals from which on a sample counts less than squared
 FAR = 6.0  # the same, from which on a sample of the best fit is an outlier
 MAD = 1.4826  # standard deviation of normal noise over the median of its size
+_MANY = 0.02  # share of the samples from which on outliers of every fit are no accident
+_REACHED, _NEARLY_ALL = 0.1, 5.0  # share of f_r that a fit must have, at this percentage of the samples
 _LISTED = 20  # outliers that are listed
 _SETTLED = 0.05  # relative change of the scale that ends the iterations
 _SCALES, _EVALUATIONS = 4, 60
@@ -165,15 +168,17 @@ def fits(
     -------
     Fits, list of Fitted
         The document, and the fits in its order. They are ranked by the root mean square of ln(model / sample) over
-        incidences that were left out, or by BIC where the light has one direction.
+        incidences that were left out, or by BIC where the light has one direction. Samples that are outliers of every
+        fit do not count in it, unless they are many.
 
     Raises
     ------
     ParameterError
-        If a name is unknown, a model that was named cannot describe the samples, or no sample counts.
+        If a name is unknown, a model that was named cannot describe the samples, no sample counts, or f_r is so large
+        that all fits are below a tenth of it at 95 % of the samples.
     """
     counting = Residual(samples, residual)
-    made, skipped = _made(samples, models, residual, refractive_index, tick)
+    made, skipped, shared = _made(samples, models, residual, refractive_index, tick)
     by_held_out = made[0][0].held_out is not None
     made.sort(key=lambda one: _rank(one[0]))
     if profiles:
@@ -200,10 +205,12 @@ def fits(
             at_horizon=counting.at_horizon,
             unusable=counting.left_out,
         ),
+        remarks=remarks_on_samples(samples, counting),
         ranked_by="held-out rms of ln" if by_held_out else "BIC",
         fits=[one for one, _ in made],
         outliers=far,
         outlier_count=count,
+        shared_outlier_count=int(shared.sum()),
         skipped=skipped,
     )
     return document, [fitted for _, fitted in made]
@@ -215,9 +222,9 @@ def _made(
     residual: Kind,
     refractive_index: str | None,
     tick: Callable[[str], None],
-) -> tuple[list[tuple[Fit, Fitted]], dict[str, str]]:
-    """Return the fits of all models that can describe the samples, and why others are left out."""
-    made: list[tuple[Fit, Fitted]] = []
+) -> tuple[list[tuple[Fit, Fitted]], dict[str, str], Mask]:
+    """Return the fits of all models that can describe the samples, why others are left out, and shared outliers."""
+    searches: list[tuple[Fitted, Floats | None]] = []
     skipped: dict[str, str] = {}
     tried = fitted_by_default() if models is None else models
     for model in tried:
@@ -229,13 +236,38 @@ def _made(
                 raise
             skipped[model] = error.sentence
             continue
-        made.append((_document(fitted), fitted))
-    if not made:
+        searches.append((fitted, predicted(fitted)))
+    if not searches:
         raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
     if models is None:
         slow = "its values are integrals, which take minutes; name it to fit it"
         skipped |= {name: slow for name in MODELS if name not in tried}
-    return made, skipped
+    _check_reach([fitted for fitted, _ in searches])
+    shared = _shared_outliers([fitted for fitted, _ in searches])
+    return [(_document(fitted, errors, shared), fitted) for fitted, errors in searches], skipped, shared
+
+
+def _check_reach(searches: Sequence[Fitted]) -> None:
+    """Raise ParameterError if f_r of the samples is beyond what any of the models can have."""
+    for one in searches:
+        logs = one.logarithms[np.isfinite(one.logarithms)]
+        if not logs.size or np.percentile(logs, 100.0 - _NEARLY_ALL) > np.log(_REACHED):
+            return
+    samples = searches[0].samples
+    median = float(np.nanmedian(samples.values))
+    raise ParameterError(
+        "samples",
+        f"{samples.name} has a median f_r of {median:.3g} /sr, and no model reaches these values; check their unit",
+        median,
+    )
+
+
+def _shared_outliers(searches: Sequence[Fitted]) -> Mask:
+    """Return the samples (N, C) that are far from every fit; none where they are too many to be accidents."""
+    of_fits = [np.abs(_sigmas(one)) > FAR for one in searches]
+    hidden = [one.hidden[:, np.newaxis] for one in searches]
+    far = np.any(of_fits, axis=0) & np.all([a | b for a, b in zip(of_fits, hidden, strict=True)], axis=0)
+    return far if far.sum() <= max(_MANY * searches[0].samples.known.sum(), 1.0) else np.zeros_like(far)
 
 
 def _rank(one: Fit) -> tuple[float, float]:
@@ -243,9 +275,9 @@ def _rank(one: Fit) -> tuple[float, float]:
     return (0.0 if one.held_out is None else float(f"{one.held_out.rms:.3g}"), one.bic)
 
 
-def _document(fitted: Fitted) -> Fit:
+def _document(fitted: Fitted, errors: Floats | None, shared: Mask) -> Fit:
     """Return the record of a fit, with intervals of its covariance."""
-    logs = fitted.logarithms[np.isfinite(fitted.logarithms)]
+    logs = fitted.logarithms[np.isfinite(fitted.logarithms) & ~shared]
     used = fitted.problem.residual.count
     searched = len(fitted.problem.free) + fitted.point.values.size
     deviance = used * float(np.log(max(2.0 * fitted.point.cost / used, 1e-300)))
@@ -258,7 +290,7 @@ def _document(fitted: Fitted) -> Fit:
         rms_ln=float(np.sqrt(np.mean(logs**2))) if logs.size else None,
         median_ln=float(np.median(np.abs(logs))) if logs.size else None,
         sigma=fitted.sigma,
-        held_out=held_out(fitted),
+        held_out=held_out(fitted.samples, errors, shared),
         numbers=searched,
         aic=deviance + 2.0 * (searched + 1),
         bic=deviance + (searched + 1) * float(np.log(used)),
@@ -288,13 +320,17 @@ def _pattern(fitted: Fitted) -> float:
     return min(float(np.sum((r * r[nearest])[used]) / size), 1.0) if size > 0.0 else 0.0
 
 
+def _sigmas(fitted: Fitted) -> Floats:
+    """Return the residuals (N, C) of all samples over their robust standard deviation; 0 where they do not count."""
+    residual = Residual(fitted.samples, fitted.problem.residual.kind)
+    counts = residual.used & ~fitted.hidden[:, np.newaxis]
+    of_all = residual.of(fitted.seen(fitted.view)) / max(fitted.sigma, _LEAST_SCALE)
+    return np.asarray(np.where(counts, of_all, 0.0))
+
+
 def _outliers(fitted: Fitted) -> tuple[list[Outlier], int]:
     """Return the samples that are far from a fit, the farthest first, and their number."""
-    samples, problem = fitted.samples, fitted.problem
-    residual = Residual(samples, problem.residual.kind)
-    f_r = fitted.seen(fitted.view)
-    counts = residual.used & ~fitted.hidden[:, np.newaxis]
-    sigmas = np.where(counts, residual.of(f_r) / max(fitted.sigma, _LEAST_SCALE), 0.0)
+    samples, f_r, sigmas = fitted.samples, fitted.seen(fitted.view), _sigmas(fitted)
     far = np.argwhere(np.abs(sigmas) > FAR)
     order = np.argsort(-np.abs(sigmas[far[:, 0], far[:, 1]]), kind="stable")[:_LISTED]
     listed = [

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from brdfdb.fitting.document import Fit
 from brdfdb.fitting.fitted import Fitted
+from brdfdb.fitting.residuals import CREDIBLE, Residual
 from brdfdb.geometry import degrees
+from brdfdb.measurements import Samples
 from brdfdb.measurements.aperture import RESOLVED
 
 NARROW = 0.05  # width of a lobe, in slopes, below which usual apertures change it
 PATTERN = 0.5  # correlation of neighbouring residuals from which on the rest is a pattern
+UNEVEN = 3.0  # ratio of relative uncertainties, at the ends of the middle 90 %, from which on weights matter
+LEFT_OUT = 0.01  # share of values that are not positive, from which on it matters that they are left out
 
 
 def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
@@ -40,6 +46,36 @@ def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
         sentences.append("The samples state no wavelength; lengths are those at 550 nm, and scale with it.")
     if len(surface.terms) > 1:
         sentences.append("A sum is no model of the registry: it takes a source that is a function.")
+    return sentences
+
+
+def remarks_on_samples(samples: Samples, residual: Residual) -> list[str]:
+    """Return a sentence on uncertainties that are no credible ones, or that the residual does not follow."""
+    used = residual.used
+    if residual.raised:
+        verb = "uncertainty is" if residual.raised == 1 else "uncertainties are"
+        return [
+            f"{residual.raised} {verb} below {100.0 * CREDIBLE:g} % of the median and of the median relative to f_r, "
+            "and taken for the lower of the two."
+        ]
+    if residual.kind == "uncertainty" or samples.uncertainty is None:
+        return []
+    stated = samples.uncertainty[used]
+    if not np.all((stated > 0.0) & np.isfinite(stated)):
+        return []
+    sentences = []
+    sizes = np.abs(samples.values[used])
+    low, high = np.percentile(stated[sizes > 0.0] / sizes[sizes > 0.0], [5.0, 95.0]) if sizes.any() else (1.0, 1.0)
+    advice = "--residual uncertainty weights samples by what is stated."
+    if high > UNEVEN * low:
+        sentences.append(
+            f"The stated uncertainty is {100.0 * low:.2g} to {100.0 * high:.2g} % of f_r at 90 % of the samples, and "
+            f"the residual {residual.kind} does not follow it: intervals may miss the truth. {advice}"
+        )
+    elif residual.left_out > LEFT_OUT * (residual.count + residual.left_out):
+        sentences.append(
+            f"{residual.left_out} values that are not positive are left out, which makes the rest too bright. {advice}"
+        )
     return sentences
 
 

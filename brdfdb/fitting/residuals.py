@@ -16,6 +16,7 @@ KINDS: tuple[Kind, ...] = ("log", "relative", "cosine", "uncertainty")
 
 _LEAST = 1e-6  # share of the smallest sample that is added to both sides before logarithms: the model may be 0
 _NOTHING = 1e-12  # the same of the largest, for samples that fall beneath what any instrument resolves
+CREDIBLE = 0.01  # share of the median uncertainty, absolute and relative, below which an uncertainty is a mistake
 _HORIZON_COSINE = 1e-4  # directions closer to the horizon are left out: models are 0 there
 
 
@@ -34,9 +35,12 @@ class Residual:
     ----------
     used : array (N, C) of bool
         Samples that count. Holes do not, nor directions at the horizon, nor, of "log" and "relative", samples that are
-        not positive, nor, of "uncertainty", samples without a positive one.
+        not positive, nor, of "uncertainty", samples without a positive finite one.
     holes, at_horizon, left_out : int
         Numbers of values that do not count, in this order of reasons.
+    raised : int
+        Number of uncertainties that are below a hundredth of the usual one, which they are raised to, so that no sample
+        outweighs all others. The usual one is the median, or the median relative to y where that is less.
 
     Raises
     ------
@@ -64,16 +68,19 @@ class Residual:
                 usable = positive
             elif kind == "uncertainty":
                 assert samples.uncertainty is not None
-                usable = samples.uncertainty > 0.0
+                usable = (samples.uncertainty > 0.0) & np.isfinite(samples.uncertainty)
             else:
                 usable = known
         self.left_out = int(np.sum(self.used & ~usable))
         self.used &= usable
         if not self.used.any():
-            raise ParameterError("samples", f"{samples.name} has no value that a {kind} residual can use", samples.name)
+            raise ParameterError(
+                "samples", f"{samples.name} has no value that the residual {kind} can use", samples.name
+            )
         y = np.where(self.used, self.truth, 1.0)
         usable_y = y[self.used]
         least = max(_LEAST * float(usable_y.min()), _NOTHING * float(usable_y.max()))
+        self.raised = 0
         self.floor = least if kind == "log" else 0.0
         if kind == "log":
             self.weight, self.goal = np.where(self.used, 1.0, 0.0), np.log(y + self.floor)
@@ -85,7 +92,10 @@ class Residual:
             weight = np.broadcast_to(cosines[:, np.newaxis], y.shape) / (size if size > 0.0 else 1.0)
         else:
             assert samples.uncertainty is not None
-            weight = 1.0 / np.where(self.used, samples.uncertainty, 1.0)
+            stated = np.where(self.used, samples.uncertainty, 1.0)
+            usual = _usual_uncertainty(y, stated, self.used)
+            low = self.used & (stated < CREDIBLE * usual)
+            self.raised, weight = int(low.sum()), 1.0 / np.where(low, usual, stated)
         self.weight, self.goal = np.where(self.used, weight, 0.0), y
 
     @property
@@ -97,7 +107,7 @@ class Residual:
         """Return the residual of some of the samples, with the same weights."""
         part = object.__new__(Residual)
         part.kind, part.floor = self.kind, self.floor
-        part.holes = part.at_horizon = part.left_out = 0
+        part.holes = part.at_horizon = part.left_out = part.raised = 0
         for name in ("truth", "used", "weight", "goal"):
             setattr(part, name, getattr(self, name)[rows])
         return part
@@ -112,6 +122,20 @@ class Residual:
         if self.kind != "log":
             return self.weight
         return np.asarray(self.weight / (np.maximum(f_r, 0.0) + self.floor))
+
+
+def _usual_uncertainty(y: Floats, stated: Floats, used: NDArray[np.bool_]) -> Floats:
+    """Return the uncertainty (N, C) that each sample would have, were it as uncertain as others.
+
+    Constant noise is far below the median relative to y in highlights, and noise in proportion to y is far below the
+    median in the dark. Hence it is the lower of the two. A sample of 0 counts as the dimmest of the others.
+    """
+    median, sizes = float(np.median(stated[used])), np.abs(y)
+    others = used & (sizes > 0.0)
+    if not others.any():
+        return np.full_like(stated, median)
+    relative = float(np.median(stated[others] / sizes[others]))
+    return np.asarray(np.minimum(median, relative * np.maximum(sizes, sizes[others].min())))
 
 
 def logarithms(samples: Samples, f_r: Floats) -> Floats:

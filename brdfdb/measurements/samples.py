@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import check_phi, check_theta, degrees, radians, unit_vector
+from brdfdb.measurements._overlap import contradiction
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
@@ -242,7 +243,8 @@ class Samples:
 def joined(parts: Sequence[Samples]) -> Samples:
     """Return the samples of several pictures or files of one surface as one.
 
-    Name and record are those of the first part, instruments and origins those of all.
+    Name and record are those of the first part, instruments and origins those of all. Where parts hold different values
+    at the same directions, a sentence says so in the entry "contradiction" of the record.
 
     Raises
     ------
@@ -274,7 +276,11 @@ def joined(parts: Sequence[Samples]) -> Samples:
             "; ".join(dict.fromkeys(part.instrument.name for part in parts if part.instrument.name))
         )
     provenance = "; ".join(dict.fromkeys(part.provenance for part in parts if part.provenance))
-    return replace(first, **arrays, uncertainty=uncertainty, instrument=instrument, provenance=provenance)
+    sentence = contradiction(parts)
+    record = {**first.record, "contradiction": sentence} if sentence else first.record
+    return replace(
+        first, **arrays, uncertainty=uncertainty, instrument=instrument, provenance=provenance, record=record
+    )
 
 
 def _check_channels(first: Samples, other: Samples) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from brdfdb.errors import counted
 from brdfdb.geometry import degrees
 from brdfdb.measurements._disk import averaged, integrals
+from brdfdb.measurements._notes import notes_of
 from brdfdb.measurements._swaps import Reciprocity, reciprocity_of
 from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
@@ -27,7 +28,6 @@ _PEAK = 0.1  # share of one viewer in an albedo from which on it is not known
 _CLAIM = 0.05  # relative difference of a header from its own values that is stated
 _EXCESS = 1.02  # albedo above which the unit is doubted
 _BLACK = 2e-4  # albedo below which the unit is doubted: the blackest coatings reflect more
-_QUANTITIES = {"reflectance_factor": "reflectance factors", "f_r_cos": "values with the cosine of the viewer"}
 _MISSING = np.array([-1.0, -99.0, -999.0, -9999.0])  # numbers that files write for values that are missing
 _SHOWN = 6  # incidences in sentences
 
@@ -226,7 +226,7 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
         incidences=integrated,
         reciprocity=reciprocity_of(full, one_side),
         claims=_claims(samples, integrated),
-        notes=_notes(samples.record),
+        notes=notes_of(samples.record),
         hints=(*_sentinels(samples), *_hints(samples, integrated)),
     )
 
@@ -343,28 +343,6 @@ def _sentinels(samples: Samples) -> tuple[str, ...]:
         verb, they = ("is", "does it") if count == 1 else ("are", "do they")
         return (f"{counted(count, 'value')} {verb} {number:.4g}: {they} mean missing?",)
     return ()
-
-
-def _notes(record: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what a reader noted in a record, in sentences."""
-    notes = [str(note) for note in record.get("notes", ())]
-    if text := _QUANTITIES.get(record.get("quantity", "")):
-        notes.append(f"The file holds {text}: f_r was made of them.")
-    if "exchanged" in record:
-        notes.append(f"Letters exchanged: {record['exchanged']}.")
-    if count := record.get("below_the_horizon"):
-        notes.append(f"{counted(count, 'row')} below the horizon {'was' if count == 1 else 'were'} left out.")
-    if count := record.get("repeated"):
-        verb = "repeats the directions and values of another and was"
-        verb = verb if count == 1 else "repeat the directions and values of others and were"
-        notes.append(f"{counted(count, 'row')} {verb} left out.")
-    if left := record.get("columns_left_out"):
-        notes.append(f"Columns left out: {', '.join(left)}.")
-    if side := record.get("side"):
-        notes.append(f"Side: {side}, as the file names it.")
-    if network := record.get("network"):
-        notes.append(f"{network}.")
-    return tuple(notes)
 
 
 def _on_angles(known: Statement) -> list[str]:

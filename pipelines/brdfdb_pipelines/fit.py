@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from brdfdb import formats
-from brdfdb.errors import BrdfdbError, ParameterError
+from brdfdb.errors import BrdfdbError, ParameterError, counted
 from brdfdb.fitting.document import Estimate, Fit, Fits
 from brdfdb.fitting.figure import figure_of
 from brdfdb.fitting.fit import fits
@@ -168,6 +168,7 @@ def lines(document: Fits) -> list[str]:
     ]
     if reasons:
         text.append(f"  left out: {', '.join(reasons)}")
+    text += [f"  note  {sentence}" for sentence in document.remarks]
     text += _aperture(document)
     width = max(len(one.model) for one in document.fits)
     text.append(f"  {'model':<{width}}  held out    all   numbers      BIC  albedo")
@@ -179,6 +180,8 @@ def lines(document: Fits) -> list[str]:
             f"  {one.model:<{width}}  {held} {alone}   {one.numbers:7d} {one.bic:8.0f}  {one.albedo.value:6.3f}{light}"
         )
     text.append("  held out, all: rms of ln(model / sample), at incidences left out of the fit, and of all")
+    if document.shared_outlier_count:
+        text.append(f"  both leave out {counted(document.shared_outlier_count, 'value')} far from every fit")
     text += [
         f"  not fitted: {reason if reason.startswith(name) else f'{name}, {reason}'}"
         for name, reason in document.skipped.items()

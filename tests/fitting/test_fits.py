@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -116,6 +118,27 @@ def test_a_spike_is_an_outlier() -> None:
     assert document.outlier_count == 1
 
 
+def test_an_outlier_of_every_fit_does_not_decide_the_ranking() -> None:
+    values = noisy(truth("ward", **WARD))
+    values[37] = 5e4
+    document, _ = fits(samples(values), ["lambert", "ggx_schlick", "ward"], profiles=False)
+    assert document.shared_outlier_count == 1
+    assert [one.model for one in document.fits] == ["ward", "ggx_schlick", "lambert"]
+    best = document.fits[0]
+    assert best.held_out is not None
+    assert best.held_out.rms == pytest.approx(NOISE, rel=0.1)
+    assert best.rms_ln == pytest.approx(NOISE, rel=0.1)
+
+
+def test_what_no_fit_has_at_many_samples_counts() -> None:
+    values = noisy(truth("lambert", rho=0.5))
+    values[::20] *= 100.0
+    document, _ = fits(samples(values), ["lambert"], profiles=False)
+    assert (document.outlier_count, document.shared_outlier_count) == (21, 0)
+    assert document.fits[0].held_out is not None
+    assert document.fits[0].held_out.rms > 1.0
+
+
 def test_holes_and_negatives_are_counted() -> None:
     values = noisy(truth("oren_nayar", rho=0.5, sigma=0.6))
     values[3], values[5], values[7] = np.nan, -0.01, 0.0
@@ -124,6 +147,67 @@ def test_holes_and_negatives_are_counted() -> None:
     weighted, _ = fits(samples(values), ["oren_nayar"], residual="cosine", profiles=False)
     assert (weighted.left_out.holes, weighted.left_out.unusable) == (1, 0)
     assert weighted.samples == document.samples + 2
+
+
+def with_uncertainty(values: Array, uncertainty: Array) -> Samples:
+    return replace(samples(values), uncertainty=uncertainty)
+
+
+def test_a_stated_uncertainty_that_the_residual_does_not_follow_is_remarked() -> None:
+    clean = truth("ward", **(WARD | {"rho_d": 0.02}))
+    values = clean + 0.003 * np.random.default_rng(0).standard_normal(clean.shape)
+    stated = np.full_like(values, 0.003)
+    document, _ = fits(with_uncertainty(values, stated), ["ward"], profiles=False)
+    (sentence,) = document.remarks
+    assert "--residual uncertainty" in sentence
+    weighted, _ = fits(with_uncertainty(values, stated), ["ward"], residual="uncertainty", profiles=False)
+    assert weighted.remarks == []
+    diffuse = next(one for one in weighted.fits[0].estimates if one.name == "rho_d")
+    assert diffuse.low < 0.02 < diffuse.high
+    even, _ = fits(with_uncertainty(noisy(clean), NOISE * clean), ["ward"], profiles=False)
+    assert even.remarks == []
+    stated[0] = np.nan
+    partly, _ = fits(with_uncertainty(values, stated), ["ward"], profiles=False)
+    assert partly.remarks == []
+
+
+@pytest.mark.parametrize("value", [0.03, 0.0])
+def test_one_tiny_uncertainty_does_not_capture_a_fit(value: float) -> None:
+    values = truth("ward", **WARD) + 0.003 * np.random.default_rng(0).standard_normal((408, 1))
+    stated = np.full_like(values, 0.003)
+    values[7], stated[7] = value, 1e-12
+    document, fitted = fits(with_uncertainty(values, stated), ["ward"], residual="uncertainty", profiles=False)
+    assert fitted[0].point.values[:, 0] == pytest.approx([0.2, 0.1], rel=0.02)
+    (sentence,) = document.remarks
+    assert sentence.startswith("1 uncertainty is below 1 % of the median")
+
+
+def test_only_uncertainties_that_no_noise_explains_are_raised() -> None:
+    values = truth("ward", **(WARD | {"rho_d": 1e-4, "alpha_x": 0.05, "alpha_y": 0.05}))
+    assert values.max() > 1e4 * values.min()
+    for stated in (np.full_like(values, 1e-3), 0.03 * values, 1e-3 * np.sqrt(values)):
+        assert Residual(with_uncertainty(values, stated), "uncertainty").raised == 0
+
+
+def test_infinite_uncertainties_are_left_out_and_counted() -> None:
+    values = noisy(truth("ward", **WARD))
+    stated = NOISE * values
+    some = with_uncertainty(values, stated)
+    some.uncertainty[5:8] = np.inf  # type: ignore[index]
+    document, fitted = fits(some, ["ward"], residual="uncertainty", profiles=False)
+    assert (document.left_out.unusable, document.samples) == (3, 405)
+    assert fitted[0].point.values[:, 0] == pytest.approx([0.2, 0.1], rel=0.02)
+    some.uncertainty[:] = np.inf  # type: ignore[index]
+    with pytest.raises(ParameterError, match="no value that the residual uncertainty can use"):
+        fit(some, "ward", residual="uncertainty")
+
+
+def test_many_values_left_out_are_remarked_where_an_uncertainty_is_stated() -> None:
+    values = noisy(truth("oren_nayar", rho=0.5, sigma=0.6))
+    values[::40] = -0.01
+    document, _ = fits(with_uncertainty(values, NOISE * np.abs(values)), ["lambert"], profiles=False)
+    (sentence,) = document.remarks
+    assert sentence.startswith("11 values that are not positive are left out")
 
 
 @pytest.mark.parametrize("residual", ["log", "relative", "cosine"])
@@ -182,6 +266,20 @@ def test_only_the_ratio_of_two_lengths_is_measured() -> None:
     (pair,) = document.fits[0].correlations
     assert pair.coefficient > 0.99
     assert "only their ratio is measured" in pair.sentence
+
+
+@pytest.mark.parametrize("size", [1e30, 1e300])
+def test_values_that_no_model_reaches_are_refused(size: float) -> None:
+    values = size * noisy(truth("ward", **WARD))
+    with pytest.raises(ParameterError, match="no model reaches these values"):
+        fits(samples(values), ["lambert", "ward", "ggx_schlick"], profiles=False)
+
+
+def test_a_bright_mirror_lobe_and_faint_values_are_not_refused() -> None:
+    values = truth("ward", **(WARD | {"rho_d": 0.0, "rho_s": 1.0, "alpha_x": 0.02, "alpha_y": 0.02}))
+    for some in (values, 1e-30 * values):
+        document, _ = fits(samples(noisy(some)), ["lambert", "ward"], profiles=False)
+        assert len(document.fits) == 2
 
 
 def test_a_slightly_rough_surface_tells_two_lengths_apart() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ import pytest
 import xarray as xr
 
 from brdfdb.errors import ParameterError
-from brdfdb.measurements import Instrument, Samples
+from brdfdb.measurements import Instrument, Samples, joined
+from brdfdb.measurements.statement import statement
 
 
 def samples(**changes: Any) -> Samples:
@@ -104,3 +106,24 @@ def test_a_dataset_without_units_is_refused() -> None:
         Samples.from_xarray(xr.Dataset({"brdf": ("sample", [1.0]), **bare}))
     with pytest.raises(ParameterError, match="dataset: it has no brdf"):
         Samples.from_xarray(xr.Dataset(bare))
+
+
+def test_joined_files_that_contradict_say_so() -> None:
+    first = samples(uncertainty=None)
+    turned_round = first.phi_r + 2.0 * np.pi
+    twice = joined([first, samples(uncertainty=None, values=1.4 * first.values, phi_r=turned_round)])
+    sentence = "At 4 directions that both files have, f_r differs by 40 % in the median."
+    assert sentence in statement(twice).sentences
+    third = samples(uncertainty=None, values=0.5 * first.values, name="dark")
+    assert (
+        joined([first, first, third]).record["contradiction"].startswith("At 4 directions that dark and files before")
+    )
+    assert "contradiction" not in joined([first, samples(uncertainty=None, values=1.1 * first.values)]).record
+    elsewhere = samples(uncertainty=None, values=9.0 * first.values, phi_i=np.ones(4), theta_i=first.theta_i + 0.1)
+    assert "contradiction" not in joined([first, elsewhere]).record
+
+
+def test_joined_files_that_differ_beyond_their_uncertainties_say_so() -> None:
+    first = samples(uncertainty=np.full((4, 2), 0.001))
+    sentence = joined([first, replace(first, values=1.1 * first.values)]).record["contradiction"]
+    assert sentence.endswith("f_r differs by 10 % in the median, which is beyond the stated uncertainties.")

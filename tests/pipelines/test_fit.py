@@ -226,7 +226,7 @@ def test_values_that_are_left_out_are_counted(tmp_path: Path, capsys: Captured) 
 def test_files_without_a_usable_sample_are_refused(tmp_path: Path, capsys: Captured) -> None:
     dark = written(tmp_path / "dark.csv", [[*line[:3], -0.01] for line in rows()])
     assert run("fit", dark, "--model", "lambert") == 2
-    assert "dark has no value that a log residual can use" in capsys.readouterr().err
+    assert "dark has no value that the residual log can use" in capsys.readouterr().err
     holes = written(tmp_path / "holes.csv", [[*line[:3], float("nan")] for line in rows()])
     assert run("fit", holes, "--model", "lambert") == 2
     assert "no value" in capsys.readouterr().err

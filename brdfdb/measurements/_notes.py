@@ -1,0 +1,34 @@
+"""Sentences on what a reader noted in the record of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from brdfdb.errors import counted
+
+_QUANTITIES = {"reflectance_factor": "reflectance factors", "f_r_cos": "values with the cosine of the viewer"}
+
+
+def notes_of(record: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what a reader noted in a record, in sentences."""
+    notes = [str(note) for note in record.get("notes", ())]
+    if text := _QUANTITIES.get(record.get("quantity", "")):
+        notes.append(f"The file holds {text}: f_r was made of them.")
+    if "exchanged" in record:
+        notes.append(f"Letters exchanged: {record['exchanged']}.")
+    if count := record.get("below_the_horizon"):
+        notes.append(f"{counted(count, 'row')} below the horizon {'was' if count == 1 else 'were'} left out.")
+    if count := record.get("repeated"):
+        verb = "repeats the directions and values of another and was"
+        verb = verb if count == 1 else "repeat the directions and values of others and were"
+        notes.append(f"{counted(count, 'row')} {verb} left out.")
+    if sentence := record.get("contradiction"):
+        notes.append(sentence)
+    if left := record.get("columns_left_out"):
+        notes.append(f"Columns left out: {', '.join(left)}.")
+    if side := record.get("side"):
+        notes.append(f"Side: {side}, as the file names it.")
+    if network := record.get("network"):
+        notes.append(f"{network}.")
+    return tuple(notes)
