@@ -8,9 +8,12 @@ import pytest
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import unit_vector
 from brdfdb.materials import presets
+from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource
 from brdfdb.measurements.colours import spectra_of_colours
 from brdfdb.measurements.measured_source import MARGIN
+from brdfdb.measurements.record import Noise
+from brdfdb.models import MODELS
 from brdfdb.parameters import Floats
 from brdfdb.spectra import PICTURE_NM, linear_srgb
 from tests.measurements.made_up import scans, scattered
@@ -62,6 +65,40 @@ def test_isotropic_data_that_turn_are_anisotropic() -> None:
     brushed = _of(lambda wi, wr: 0.1 + 0.3 * ((wi + wr)[:, :1] / np.linalg.norm(wi + wr, axis=1, keepdims=True)) ** 2)
     assert brushed.anisotropic
     assert brushed.reciprocal
+
+
+@pytest.mark.parametrize("alpha", [(0.03, 0.3), (0.03, 0.09), (0.005, 0.05)])
+def test_narrow_lobe_that_turns_is_anisotropic(alpha: tuple[float, float]) -> None:
+    assert _of(_lobe(0.1, 0.5, *alpha)).anisotropic
+    assert not _of(_lobe(0.1, 0.5, alpha[0], alpha[0])).anisotropic
+
+
+def test_narrow_lobe_that_leans_to_one_side_is_not_mirrored() -> None:
+    def leaning(wi: Floats, wr: Floats) -> Floats:
+        across = wi[:, :1] * wr[:, 1:2] - wi[:, 1:2] * wr[:, :1]
+        return 0.3 + 10.0 * np.exp(-(((across - 0.03) / 0.02) ** 2)) * (np.sum(wi * wr * [-1, -1, 1], 1) > 0.9)[:, None]
+
+    assert _of(leaning).anisotropic
+
+
+def test_narrow_lobe_that_is_not_reciprocal_is_seen_within_the_noise_of_the_rest() -> None:
+    lobe = _lobe(0.0, 0.5, 0.005, 0.005)
+
+    def one_sided(wi: Floats, wr: Floats) -> Floats:
+        return 0.1 + lobe(wi, wr) * (1.0 + 0.5 * np.sign(wi[:, 2:] - wr[:, 2:]))
+
+    source = MeasuredSource.of_function(
+        one_sided, ("grey",), None, name="a", title="a", provenance="this test", noise=Noise(median=0.01, p95=0.02)
+    )
+    assert not source.reciprocal
+
+
+def _lobe(rho_d: float, rho_s: float, alpha_x: float, alpha_y: float) -> Evaluate:
+    def f_r(wi: Floats, wr: Floats) -> Floats:
+        values = MODELS["ward"].vectors(wi, wr, rho_d=rho_d, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
+        return np.asarray(values).reshape(len(wi), 1)
+
+    return f_r
 
 
 def test_mean_of_mirror_images_is_taken_and_its_asymmetry_stated() -> None:
