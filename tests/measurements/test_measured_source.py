@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import unit_vector
+from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.quadrature import narrowest, reflected_share
 from brdfdb.materials import presets
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource
@@ -151,6 +152,27 @@ def test_conserving_source_has_no_albedo_above_1(of_light: bool) -> None:
     change = made.measured.changes[-1]
     assert change.law == "conserving"
     assert 0.0 < change.changed.p99 <= change.changed.max < 1.0
+
+
+@pytest.mark.parametrize("alpha", [(0.03, 0.03), (0.05, 0.05), (0.03, 0.3)])
+def test_conserving_source_has_no_albedo_above_1_though_its_lobe_is_narrow(alpha: tuple[float, float]) -> None:
+    ward = {"rho_d": 0.1, "rho_s": 1.0, "alpha_x": alpha[0], "alpha_y": alpha[1]}
+    lobe = _lobe(**ward)
+    made = _of(lambda wi, wr: 1.3 * lobe(wi, wr)).made("conserving").brdf_at(None)
+
+    def reflected(wi: Floats, wr: Floats) -> Floats:
+        viewers = wr.reshape(-1, 3)
+        return made(np.broadcast_to(wi, viewers.shape), viewers).reshape(*wr.shape[:-1], 1)
+
+    albedos = [
+        reflected_share(
+            reflected, theta, phi, narrowest(MODELS["ward"], np.cos(theta), ward), tolerance=2e-4, most_panels=2000
+        ).albedo[0]
+        for theta in radians(np.array([0.0, 1.2, 12.5, 28.0, 33.0, 38.0, 42.5, 61.0, 88.5]))
+        for phi in ((0.0, 0.2, 1.3) if alpha[0] < alpha[1] else (0.0,))
+    ]
+    assert max(albedos) <= 1.0
+    assert np.percentile(albedos, 60) > 0.99  # no darker than the law asks for
 
 
 def test_reciprocal_source_is_the_mean_of_both_ways() -> None:
