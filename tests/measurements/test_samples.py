@@ -104,3 +104,10 @@ def test_a_dataset_without_units_is_refused() -> None:
         Samples.from_xarray(xr.Dataset({"brdf": ("sample", [1.0]), **bare}))
     with pytest.raises(ParameterError, match="dataset: it has no brdf"):
         Samples.from_xarray(xr.Dataset(bare))
+
+
+def test_uncertainty_of_nan_alone_is_not_known_and_an_infinite_one_is_refused() -> None:
+    assert samples(uncertainty=np.full((4, 2), np.nan)).uncertainty is None
+    assert samples(uncertainty=np.where(np.eye(4, 2) > 0.0, 0.1, np.nan)).uncertainty is not None
+    with pytest.raises(ParameterError, match="uncertainty: a value is infinite"):
+        samples(uncertainty=np.full((4, 2), np.inf))
