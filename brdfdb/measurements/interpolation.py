@@ -277,7 +277,9 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     most likely one. Their scales are those with the smallest error at samples that are held out. Of scans, which have
     many viewers for one light, all samples of a light are held out together: neighbours in a scan would tell too much.
     The gap is then twice that of the samples, and the stated error is rather too large between incidences than too
-    small. Samples without such a pattern are held out in ten parts, by chance.
+    small: of two lights it is that of extrapolation. Where some gaps are wider than most, such as one without lights,
+    or a hole among the viewers, it is too small within them. Samples without such a pattern are held out in ten parts,
+    by chance.
     """
     _check_values(samples)
     own, alpha, words = lambert_and_lobe(samples)
@@ -315,7 +317,7 @@ def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
         noise = np.nan_to_num(np.nanmean(uncertainty / slope, axis=1)) / max(float(np.std(y)), 1e-3)
     incidence = np.unique(samples.incidence[samples.known.any(axis=1)], return_inverse=True)[1].reshape(-1)
     lights = int(incidence.max()) + 1
-    scans = lights > 2 and np.median(np.bincount(incidence)) >= _REGULAR
+    scans = lights > 1 and np.median(np.bincount(incidence)) >= _REGULAR
     rng = np.random.default_rng(_SEED)
     if scans:
         group = (np.arange(lights) if lights <= _MOST_ROUNDS else rng.permutation(lights) % _MOST_ROUNDS)[incidence]

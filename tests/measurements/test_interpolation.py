@@ -43,6 +43,16 @@ def test_stated_error_is_that_of_incidences_held_out_from_the_beginning(name: st
     assert 1.0 / RIGHT < np.mean(p95) / np.percentile(np.concatenate(errors), 95) < RIGHT
 
 
+def test_stated_error_of_two_lights_is_that_between_them() -> None:
+    f_r = presets()["blue-plastic"].brdf_at(None)
+    fitted = fit(scans(f_r, np.array([10.0, 65.0]), 0.01))
+    stated, between = fitted.held_out, scans(f_r, np.array([30.0, 40.0, 50.0]), 0.0)
+    values = fitted.f_r(between.w_i, between.w_r)
+    error = np.abs(values - between.values) / values
+    assert stated.scheme == "incidences"
+    assert stated.p95 > np.percentile(error, 95)
+
+
 def _held_out_from_the_beginning(samples: Samples, held: NDArray[np.bool_]) -> tuple[HeldOut, Floats]:
     kept, fresh = samples.selected(~held), samples.selected(held)
     fitted = fit(kept)
