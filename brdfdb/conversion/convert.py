@@ -31,8 +31,10 @@ from brdfdb.lobes import Lobe
 from brdfdb.materials import Material, Source, written_name
 from brdfdb.materials.provenance import MOST_NAME
 from brdfdb.materials.recipe_text import rounded, toml_of
+from brdfdb.measurements import MeasuredSource
 from brdfdb.models import MODELS
 from brdfdb.parameters import ModelSpec, closest
+from brdfdb.tables.table_source import TableSource
 
 Array = NDArray[np.float64]
 
@@ -314,7 +316,7 @@ def _measured(request: _Request, fit: _Fit) -> Conversion:
     searched = fit.result.numbers if target.searched_index else {}
     conversion = Conversion(
         source=source.name,
-        source_model=source.model if isinstance(source, Material) else "",
+        source_model=_model_of(source),
         model=spec.name,
         weigh=request.weigh,
         parameters=material.parameters,
@@ -370,3 +372,10 @@ def _table(request: _Request, fit: _Fit, origin: str) -> dict[str, Any]:
     if at is not None and stated and (target.spec.spectral or target.colours):
         table["wavelengths_nm"] = at.tolist()
     return {**table, "parameters": values}
+
+
+def _model_of(source: Source) -> str:
+    """Return the model of a source, "measured" of measured data, or nothing of a function."""
+    if isinstance(source, Material):
+        return source.model
+    return "measured" if isinstance(source, MeasuredSource | TableSource) and source.measured is not None else ""

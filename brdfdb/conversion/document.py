@@ -42,7 +42,7 @@ class Conversion(_Record):
     """The parameters of a model that come closest to a source, and the error that is left."""
 
     source: str = Field(description="name of the source")
-    source_model: str = Field(description="its model; empty for a function")
+    source_model: str = Field(description="its model, or measured; empty for a function")
     model: str = Field(description="the model whose parameters were searched")
     weigh: Literal["light", "lightness"] = Field(description="what the search made least: l1, or that of cube roots")
     parameters: dict[str, Number | Spectrum] = Field(description="all parameters, angles in radians")

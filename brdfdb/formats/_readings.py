@@ -36,6 +36,8 @@ class FileTable(Lookups):
         The record in the file or beside it; empty of files of other programs.
     nodes : callable or None
         Gives the values of the file at their own directions above the horizon, unaltered; None of a formula.
+    listed : bool
+        True if the file lists the directions that were measured, which may leave some out: f_r there is extrapolated.
     """
 
     name: str
@@ -44,6 +46,7 @@ class FileTable(Lookups):
     evaluate: Callable[[Floats, Floats], Floats] = field(repr=False)
     record: Mapping[str, Any] = field(default_factory=dict, repr=False)
     nodes: Callable[[], Samples] | None = field(default=None, repr=False)
+    listed: bool = False
 
     def lookup_vectors(self, wi: ArrayLike, wr: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Return f_r [1/sr] for unit vectors: a last axis for the channels, or for the wavelengths that are given."""

@@ -155,7 +155,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     if one_side:
         nodes, values = (*nodes[:2], nodes[2][nodes[2] < 4.0]), values[:, :, nodes[2] < 4.0]
     grid = AngularGrid(Spherical(anisotropic, one_side), nodes, values)
-    return FileTable(name, names, at, grid.evaluate, document, listed)
+    return FileTable(name, names, at, grid.evaluate, document, listed, listed=True)
 
 
 def _write_rows(stream: Sink, grid: AngularGrid, names: tuple[str, ...]) -> None:

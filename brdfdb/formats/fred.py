@@ -151,7 +151,7 @@ def read(path: str | os.PathLike[str]) -> FileTable | Samples:
     angles = np.deg2rad(rows[:, :4])
     angles[:, 3] = np.deg2rad((rows[:, 1] + 180.0 - rows[:, 3]) % 360.0)
     nodes = functools.partial(samples_at_angles, angles, rows[:, 4:], name, channels, at, known)
-    return nodes() if grid is None else FileTable(name, channels, at, grid.evaluate, known, nodes)
+    return nodes() if grid is None else FileTable(name, channels, at, grid.evaluate, known, nodes, listed=True)
 
 
 def _write_blocks(stream: Sink, grid: AngularGrid) -> int:

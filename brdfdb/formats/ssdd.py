@@ -145,7 +145,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     name = str(document.get("name") or block.entries.get("NAME") or path.stem)
     angles = [np.deg2rad(axis) for axis in block.angles]
     nodes = functools.partial(samples_of_grid, grid.system, angles, block.values, name, names, at, document)
-    return FileTable(name, names, at, grid.evaluate, document, nodes)
+    return FileTable(name, names, at, grid.evaluate, document, nodes, listed=True)
 
 
 def _systems(table: Table, comparison: Comparison) -> list[System]:

@@ -147,7 +147,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     encoding = "dj_brdf" if known.get("encoding") == "dj_brdf" else "linear"
     name = str(known.get("name") or path.stem)
     nodes = functools.partial(_samples, planes, encoding, name, known)
-    return FileTable(name, RGB, None, _Reader(numbers, encoding), known, nodes)
+    return FileTable(name, RGB, None, _Reader(numbers, encoding), known, nodes, listed=True)
 
 
 def _samples(planes: Floats, encoding: str, name: str, known: dict[str, Any]) -> Samples:

@@ -181,7 +181,7 @@ def read(path: str | os.PathLike[str]) -> FileTable:
     names = XYZ if text.content == "XYZ" else LUMINOUS if luminous else ("grey",)
     name = str(document.get("name") or path.name.partition(".")[0])
     listed = functools.partial(_samples, name, names, text, document)
-    return FileTable(name, names, None, grid.evaluate, document, listed)
+    return FileTable(name, names, None, grid.evaluate, document, listed, listed=True)
 
 
 def _samples(name: str, names: tuple[str, ...], text: _zemax_file.Text, document: dict[str, Any]) -> Samples:

@@ -179,7 +179,7 @@ def _tables(
     for tolerance in dict.fromkeys(tolerances):
         percent = f"{100.0 * tolerance:g}"
         key = f"table-{percent.replace('.', '-')}"
-        if isinstance(planned, MeasuredSource):
+        if isinstance(planned, MeasuredSource) or (isinstance(planned, TableSource) and planned.measured is not None):
             layout, _ = tabulated(planned, wavelength_nm, tolerance)
         else:
             layout = replace(plan(planned, wavelength_nm, tolerance), source=held)
@@ -241,12 +241,17 @@ def _plain_grid(source: Source, *, halves: bool) -> Grid:
     anisotropic = source.anisotropic
     turn = 90.0 if source.elliptical else 360.0
     if halves:
-        theta_h = 90.0 * np.linspace(0.0, 1.0, 31) ** 2
+        theta_h, sides = 90.0 * np.linspace(0.0, 1.0, 31) ** 2, 2 - source.reciprocal
         if anisotropic:
-            nodes = theta_h, np.linspace(0.0, turn, 7), np.linspace(0.0, 90.0, 10), np.linspace(0.0, 180.0, 19)
+            nodes = (
+                theta_h,
+                np.linspace(0.0, turn, 7),
+                np.linspace(0.0, 90.0, 10),
+                np.linspace(0.0, sides * 180.0, sides * 18 + 1),
+            )
             return Grid(dict(zip(ANISOTROPIC_HALF_DIFFERENCE_AXES, nodes, strict=True)))
-        quarter = np.linspace(0.0, 90.0, 19)
-        return Grid(dict(zip(HALF_DIFFERENCE_AXES, (theta_h, quarter, quarter), strict=True)))
+        isotropic = theta_h, np.linspace(0.0, 90.0, 19), np.linspace(0.0, sides * 90.0, sides * 18 + 1)
+        return Grid(dict(zip(HALF_DIFFERENCE_AXES, isotropic, strict=True)))
     end = POLE_END_DEG if source.grazing_pole else 90.0
     if anisotropic:
         theta = np.linspace(0.0, end, 10)

@@ -64,7 +64,7 @@ class Hull:
         if not turned:
             x = np.concatenate([x, x * [1.0, 1.0, -1.0]])
         centre = x.mean(axis=0)
-        _, spread, axes = np.linalg.svd(x - centre, full_matrices=True)
+        _, spread, axes = np.linalg.svd(np.linalg.qr(x - centre, mode="r"), full_matrices=True)
         spread = np.pad(spread, (0, x.shape[1] - spread.size))
         wide = spread > _FLAT * max(spread[0], 1e-12)
         along, across = axes[wide], axes[~wide]

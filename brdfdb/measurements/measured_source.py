@@ -28,6 +28,7 @@ _COLOURS = (("R", "G", "B"), ("X", "Y", "Z"))
 _LIGHTS_DEG, _HALF_DEG = (10.0, 20.0, 30.0), np.linspace(0.0, 60.0, 121)  # where the width of a lobe is looked for
 MARGIN = 0.003  # of the albedo of data that are made to conserve energy: measured tables exceed them by 0.0012
 _CLEAR = 3.0  # a peak so many times as bright as the surface far from it is a lobe
+_BETWEEN = 0.05  # share of the pairs of directions outside of the hull of a file that lists all: its hull has corners
 _PROBED = 2000  # pairs at which the share of negative values of a function is counted
 
 
@@ -92,7 +93,7 @@ class MeasuredSource(FunctionSource):
             relative = (uncertainty / np.maximum(np.abs(samples.values), floor_of(samples)))[samples.known]
             noise = Noise(**_named(("median", "p95"), np.nanpercentile(relative, [50.0, 95.0])))
         some = samples.known.any(axis=1)
-        hull = Hull.of(samples.w_i[some], samples.w_r[some], turned=samples.turned)
+        hull = _hull(samples, turned=samples.turned)
         known = samples.values[samples.known]
         measured = Measured(
             by=samples.instrument.name,
@@ -124,6 +125,7 @@ class MeasuredSource(FunctionSource):
         title: str,
         provenance: str,
         noise: Noise | None = None,
+        nodes: Samples | None = None,
     ) -> Self:
         """Return measured f_r that is known everywhere, such as that of a file, as a source.
 
@@ -139,6 +141,9 @@ class MeasuredSource(FunctionSource):
             A slug, a line for people, and where the data come from.
         noise : Noise, optional
             Uncertainty of the values.
+        nodes : Samples, optional
+            Values at the directions that were measured: f_r outside of their hull is marked as extrapolated. By default
+            f_r is known everywhere, as it is where nearly all directions lie within the hull.
 
         Raises
         ------
@@ -155,6 +160,7 @@ class MeasuredSource(FunctionSource):
 
         known = None if noise is None else 2.6 * noise.p95
         turned = symmetry.is_turned(f_r, known)
+        hull = None if nodes is None else _hull_of(nodes, turned=turned)
         seen = None if turned else symmetry.mirror(f_r, known)
         if seen is not None and not seen.assumed:
             turned = True
@@ -163,8 +169,9 @@ class MeasuredSource(FunctionSource):
             samples=0,
             negative=float(f"{np.mean(values < 0.0):.3g}"),
             interpolation="as the tools of the file evaluate it",
-            reciprocity=symmetry.reciprocity(f_r, None, known),
+            reciprocity=symmetry.reciprocity(f_r, hull, known),
             mirror=seen,
+            hull=None if hull is None else hull.planes.tolist(),
             noise=noise,
         )
         mirrored = _mirrored(f_r) if seen is not None and seen.assumed and _differs(seen) else f_r
@@ -270,6 +277,18 @@ def slug(name: str) -> str:
     if not words:
         raise ParameterError("name", f"{name!r} has no letters or digits", name)
     return words
+
+
+def _hull(samples: Samples, *, turned: bool) -> Hull:
+    """Return the hull of the directions at which a value is known."""
+    some = samples.known.any(axis=1)
+    return Hull.of(samples.w_i[some], samples.w_r[some], turned=turned)
+
+
+def _hull_of(nodes: Samples, *, turned: bool) -> Hull | None:
+    """Return the hull of the nodes of a file, or None if nearly all pairs of directions lie within it."""
+    hull = _hull(nodes, turned=turned)
+    return None if np.mean(hull.outside(*symmetry.drawn_pairs(up_to_deg=90.0))) <= _BETWEEN else hull
 
 
 def _named(names: tuple[str, ...], values: Floats) -> dict[str, float]:

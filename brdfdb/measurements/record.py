@@ -77,7 +77,7 @@ class Measured(BaseModel):
     file: str = Field(default="", description="name of the file; of joined files all, with commas between them")
     file_sha256: str = Field(default="", description="sha256 of the file, or of each of the files")
     channels: list[str] = Field(description="channels of the data")
-    samples: int = Field(description="number of samples; 0: f_r is known everywhere")
+    samples: int = Field(description="number of samples; 0: f_r is that of a file between its values")
     incidences: int = Field(default=0, description="number of directions of the light")
     holes: int = Field(default=0, description="number of values that are missing")
     negative: float = Field(description="share of the values below 0; f_r is 0 there")
@@ -111,7 +111,8 @@ class Measured(BaseModel):
 
     def in_words(self) -> list[str]:
         """Return sentences on origin, errors, symmetries and changes."""
-        of = f"{self.samples} samples of {self.incidences} incidences" if self.samples else "f_r of a file, everywhere"
+        known = "f_r of a file, between its values" if self.hull else "f_r of a file, everywhere"
+        of = f"{self.samples} samples of {self.incidences} incidences" if self.samples else known
         lines = [f"{of}, channels {', '.join(self.channels)}{f'; {self.by}' if self.by else ''}"]
         if self.file:
             lines.append(f"file {self.file}, sha256 {self.file_sha256[:_SHOWN]}...")

@@ -23,10 +23,10 @@ _IN_OCTAVE = 400
 _WITHIN = 1.2  # times the noise is how large the asymmetry may be, because both are estimates
 
 
-def drawn_pairs(hull: Hull | None = None) -> tuple[Floats, Floats]:
-    """Return pairs of unit vectors (N, 3) up to 80 degrees; those of samples lie within them, also exchanged."""
+def drawn_pairs(hull: Hull | None = None, up_to_deg: float = _UP_TO_DEG) -> tuple[Floats, Floats]:
+    """Return pairs of unit vectors (N, 3) up to an angle [degree]; with a hull, those within it, also exchanged."""
     rng = np.random.default_rng(_SEED)
-    theta = np.arccos(rng.uniform(np.cos(radians(_UP_TO_DEG)), 1.0, (2, _DRAWN)))
+    theta = np.arccos(rng.uniform(np.cos(radians(up_to_deg)), 1.0, (2, _DRAWN)))
     phi = rng.uniform(0.0, 2.0 * np.pi, (2, _DRAWN))
     wi, wr = (unit_vector(theta[k], phi[k]) for k in (0, 1))
     if hull is None:

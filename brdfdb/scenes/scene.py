@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -190,6 +191,10 @@ class Scene(BaseModel):
     illuminant: str = Field(default=ILLUMINANT, description="spectrum of all light: a name of colour-science")
     observer: str = Field(default=OBSERVER, description="a name of colour-science")
     wavelengths_nm: list[float] = WAVELENGTHS_NM
+    hold_ends: bool = Field(
+        default=False,
+        description="true: beyond the wavelengths of a table of the store f_r is that of its first or last wavelength",
+    )
     tolerance: Tolerance = Tolerance(ciede2000=1.0)
     define: dict[str, dict[str, Any]] = Field(default={}, description="materials of your own, as in the preset files")
     store: Text | None = Field(
@@ -243,7 +248,7 @@ class Scene(BaseModel):
         sources = _materials(self)
         for name in self.stored:
             assert self.store is not None  # `_materials` has made sure of this
-            sources[name] = _stored(self.store, name)
+            sources[name] = _stored(self.store, name, tuple(self.wavelengths_nm) if self.hold_ends else None)
             _check_range(name, sources[name], self.wavelengths_nm)
         return sources
 
@@ -264,10 +269,12 @@ class Scene(BaseModel):
 
 
 @functools.lru_cache(maxsize=64)
-def _stored(root: str, name: str) -> Source:
+def _stored(root: str, name: str, held_to: tuple[float, ...] | None) -> Source:
     """Return a material of a store. It is kept in memory, because a scene needs it at every list of points."""
     try:
-        return source_of_table(Store(root)[name.removeprefix(STORED)])
+        return source_of_table(
+            Store(root)[name.removeprefix(STORED)], held_to=None if held_to is None else np.array(held_to)
+        )
     except BrdfdbError as error:
         raise ParameterError(f"material {name}", str(error)) from None
 
@@ -279,12 +286,19 @@ def _check_range(name: str, source: Source, wavelengths_nm: list[float]) -> None
         return
     outside = [one for one in wavelengths_nm if not at[0] <= one <= at[-1]]
     if outside:
+        within = "give the scene a range within it, or " if covers_visible(_within(at, wavelengths_nm)) else ""
         raise ParameterError(
             "wavelengths_nm",
-            f"{outside[0]:g} is outside [{at[0]:g}, {at[-1]:g}] nm of {name}; give the scene a range within it",
+            f"{outside[0]:g} is outside [{at[0]:g}, {at[-1]:g}] nm of {name}; {within}set hold_ends = true, which "
+            "takes f_r of the nearest wavelength that it has",
             outside[0],
             (at[0], at[-1]),
         )
+
+
+def _within(at: Sequence[float], wavelengths_nm: list[float]) -> list[float]:
+    """Return the wavelengths of a scene within the range of a table."""
+    return [one for one in wavelengths_nm if at[0] <= one <= at[-1]]
 
 
 def _materials(scene: Scene) -> dict[str, Source]:

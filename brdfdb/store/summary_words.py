@@ -18,6 +18,9 @@ ERRORS_EXPLAINED = (
 COLUMNS = ("what the paper says?", "model conserves energy?")  # headings of the two answers
 
 
+REPORTS = ("audit.json", "audit-part.json")  # of all materials, and of those that were named or imported
+
+
 class Audited(NamedTuple):
     """The answers of an audit in a few words: is it what the paper says, does the published model conserve energy."""
 
@@ -30,11 +33,20 @@ def last_audit(root: Path) -> dict[tuple[str, str], Audited]:
 
     Audits of older programs have one verdict, which stands for the first answer.
     """
-    try:
-        report = json.loads((root / "audit.json").read_bytes())
-        return {(str(one["material"]), str(one["revision"])): _answers(one) for one in report["materials"]}
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
+    return {(one["material"], one["revision"]): _answers(one) for one in audited_materials(root)}
+
+
+def audited_materials(root: Path) -> list[dict[str, Any]]:
+    """Return the entries of the reports that lie in a store: of all materials and of some, the newer report last."""
+    entries: list[dict[str, Any]] = []
+    paths = [path for name in REPORTS if (path := root / name).exists()]
+    for path in sorted(paths, key=lambda path: path.stat().st_mtime_ns):
+        try:
+            of_report = json.loads(path.read_bytes())["materials"]
+            entries += [one for one in of_report if {"material", "revision", "verdict"} <= one.keys()]
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            continue
+    return entries
 
 
 def _answers(one: Mapping[str, Any]) -> Audited:

@@ -25,6 +25,7 @@ from brdfdb.tables.layout import Interpolation, Layout
 from brdfdb.tables.mixture import mixture_of
 from brdfdb.tables.planner import check_tolerance, offset_of
 from brdfdb.tables.table import Table
+from brdfdb.tables.table_source import TableSource
 
 _LADDER = (16, 24, 36, 54, 72)  # nodes of theta_h or theta_i
 _ANISOTROPIC_LADDER = (10, 14, 20)
@@ -37,14 +38,14 @@ _SHARES = {"theta_d": 0.6, "phi_d": 0.7, "theta_r": 1.0, "delta_phi": 1.0, "phi_
 
 
 def tabulated(
-    source: MeasuredSource, wavelength_nm: NDArray[np.float64] | None, tolerance: float
+    source: MeasuredSource | TableSource, wavelength_nm: NDArray[np.float64] | None, tolerance: float
 ) -> tuple[Layout, NDArray[np.float32]]:
     """Return the layout of a table of measured data, and its values, which were tabulated to choose it.
 
     Parameters
     ----------
-    source : MeasuredSource
-        Measured data.
+    source : MeasuredSource or TableSource
+        Measured data, or a table of them.
     wavelength_nm : array (L,) [nm], or None
         For spectral data, and only for them.
     tolerance : float
@@ -90,8 +91,9 @@ def tabulated(
     assert layout is not None
     kept = "keeps" if reached <= tolerance else "is the finest grid of measured data, and does not keep"
     reason = f"{math.prod(layout.grid.shape)} nodes; {kept} to a tolerance of {tolerance:g} against the data"
-    recorded = source.recorded(extrapolated=_extrapolated(source, layout.grid))
-    return replace(layout, source=recorded, reason=reason), values
+    if isinstance(source, MeasuredSource):
+        layout = replace(layout, source=source.recorded(extrapolated=_extrapolated(source, layout.grid)))
+    return replace(layout, reason=reason), values
 
 
 def _extrapolated(source: MeasuredSource, grid: Grid) -> float | None:

@@ -10,18 +10,30 @@ from pydantic import PrivateAttr
 
 from brdfdb.materials import FunctionRecord, FunctionSource, Material, Source
 from brdfdb.materials.function_source import Function
+from brdfdb.measurements.record import Measured
 from brdfdb.parameters import Floats
 from brdfdb.tables.table import Table
 
 
 class TableSource(FunctionSource):
-    """A table as a source: the values of its lookups are its f_r."""
+    """A table as a source: the values of its lookups are its f_r.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    held_to : array (L,) [nm], optional
+        Wavelengths, increasing, at which the source is known. Beyond the range of a table of two or more wavelengths
+        f_r is that of its first or last one. By default the source has the range of the table.
+    """
 
     _table: Table = PrivateAttr()
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: Table, held_to: NDArray[np.float64] | None = None) -> None:
         recorded = table.source
         wavelength_nm, metadata = table.wavelength_nm, table.metadata
+        if held_to is not None and wavelength_nm is not None and wavelength_nm.size > 1:
+            wavelength_nm = np.union1d(wavelength_nm, held_to)
         stated = metadata.source or "source not stated"
         record: dict[str, Any] = {
             "name": table.name,
@@ -32,9 +44,14 @@ class TableSource(FunctionSource):
             "elliptical": table.anisotropic and table.grid.copies == 4,
         }
         if isinstance(recorded, FunctionRecord):
-            record |= {"grazing_pole": recorded.grazing_pole, "alpha": recorded.alpha}
+            record |= {name: getattr(recorded, name) for name in ("reciprocal", "grazing_pole", "alpha")}
         super().__init__(brdf=_brdf_of(table), **record)
         self._table = table
+
+    @property
+    def measured(self) -> Measured | None:
+        """Return the record of the data if the table is measured, or None."""
+        return self._table.metadata.measured
 
     @property
     def has_specular(self) -> bool:
@@ -48,7 +65,7 @@ class TableSource(FunctionSource):
 
     def specular_reflectance(self, theta_i: ArrayLike, wavelength_nm: ArrayLike | None = None) -> Floats:
         """Return the reflectance [1] of the specular part at theta_i [rad], 0 without one; shaped as by `lookup`."""
-        return self._table.specular_reflectance(theta_i, wavelength_nm)
+        return self._table.specular_reflectance(theta_i, _held(self._table, wavelength_nm))
 
     def _check_function(self) -> None:
         """Take the table as it is: between its nodes the two halves of a symmetry differ by its error."""
@@ -56,17 +73,23 @@ class TableSource(FunctionSource):
 
 def _brdf_of(table: Table) -> Function:
     def brdf(wi: Floats, wr: Floats, wavelength_nm: NDArray[np.float64] | None) -> Floats:
-        return table.lookup_vectors(wi, wr, wavelength_nm)
+        return table.lookup_vectors(wi, wr, _held(table, wavelength_nm))
 
     return brdf
 
 
-def source_of_table(table: Table) -> Source:
-    """Return the material that a table was tabulated from, or else the table as a source.
+def _held(table: Table, wavelength_nm: ArrayLike | None) -> ArrayLike | None:
+    """Return wavelengths [nm], or the end of the range of a table where they are beyond it."""
+    stored = table.wavelength_nm
+    return wavelength_nm if wavelength_nm is None or stored is None else np.clip(wavelength_nm, stored[0], stored[-1])
+
+
+def source_of_table(table: Table, held_to: NDArray[np.float64] | None = None) -> Source:
+    """Return the material that a table was tabulated from, or else the table as a source, as of `TableSource`.
 
     Raises
     ------
     ParameterError
         If the table holds what no f_r can be, or its name is not that of a material.
     """
-    return table.source if isinstance(table.source, Material) else TableSource(table)
+    return table.source if isinstance(table.source, Material) else TableSource(table, held_to)

@@ -12,7 +12,7 @@ import brdfdb
 from brdfdb.errors import CannotHoldError, ParameterError, WriteError, counted
 from brdfdb.formats import EXPORTERS
 from brdfdb.formats._written import Written
-from brdfdb.store.summary_words import NOT_AUDITED
+from brdfdb.store.summary_words import NOT_AUDITED, audited_materials
 from brdfdb_pipelines import terminal, workers
 
 _FEW = 3  # materials that are written before other processes would have started
@@ -104,18 +104,13 @@ def _write(
 
 def _verdicts(root: Path, audit: Path | None, revisions: Mapping[str, str]) -> dict[str, str]:
     """Return the verdicts of an audit report on these revisions by name; none if the store has no report."""
-    path = root / "audit.json" if audit is None else audit
     try:
-        materials = json.loads(path.read_bytes())["materials"]
-        given = {entry["material"]: (entry["revision"], entry["verdict"]) for entry in materials}
+        materials = audited_materials(root) if audit is None else json.loads(audit.read_bytes())["materials"]
+        given = {(entry["material"], entry["revision"]): entry["verdict"] for entry in materials}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        if audit is None:
-            return {}
         reason = error.strerror if isinstance(error, OSError) else "it is no report of `brdfdb audit`"
         raise ParameterError("audit", f"{audit} cannot be read: {reason}", str(audit)) from None
-    return {
-        name: given[name][1] for name, revision in revisions.items() if name in given and given[name][0] == revision
-    }
+    return {key[0]: given[key] for key in revisions.items() if key in given}
 
 
 def _report(exports: list[_Export], directory: Path, file_format: str) -> bool:

@@ -109,8 +109,8 @@ def run(
         audited = import_summary.lines_of(tables.store, made.report) if made.report and tables.store else []
     if json:
         print(_json.dumps(_document(result, audited), indent=1, ensure_ascii=False, allow_nan=False))
-    elif result.report is not None:
-        import_summary.show(audited, result.report)
+    elif result.report is not None and tables is not None:
+        import_summary.show(audited, result.report, tables.tolerance)
     return result
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -27,6 +28,8 @@ class Line:
     ----------
     material, revision : str
         Name and revision.
+    error_p95 : float [1]
+        Relative error of the table that 95 of 100 values keep to, against the data: the one that a tolerance bounds.
     asymmetry_median, asymmetry_p99 : float [1] or None
         abs(f - f') / (abs(f) + abs(f')) of the data, f' with light and viewer exchanged; None: the data cannot tell.
     uncertainty : float [1] or None
@@ -45,6 +48,7 @@ class Line:
 
     material: str
     revision: str
+    error_p95: float
     asymmetry_median: float | None
     asymmetry_p99: float | None
     uncertainty: float | None
@@ -60,7 +64,7 @@ def lines_of(root: Path, report: AuditReport) -> list[Line]:
     store = Store(root)
     lines = []
     for audited in report.materials:
-        measured = store.metadata(audited.material).measured
+        measured, error = store.metadata(audited.material).measured, store[audited.material].error
         assert measured is not None
         seen, uncertainty = measured.reciprocity.asymmetry, measured.uncertainty
         energy, reciprocity = audited.of(Energy).table, audited.of(Reciprocity)
@@ -68,6 +72,7 @@ def lines_of(root: Path, report: AuditReport) -> list[Line]:
             Line(
                 audited.material,
                 audited.revision,
+                math.nan if error is None else error.overall.p95,
                 None if seen is None else seen.median,
                 None if seen is None else seen.p99,
                 uncertainty,
@@ -98,17 +103,17 @@ def document(lines: Sequence[Line], report: AuditReport) -> dict[str, Any]:
     }
 
 
-def show(lines: Sequence[Line], report: AuditReport) -> None:
+def show(lines: Sequence[Line], report: AuditReport, tolerance: float) -> None:
     """Print a line for each table, the problems of tables, and the summary."""
     print()
-    numbers = ("asymmetry, median", "99 of 100", "uncertainty", "albedo up to")
+    numbers = ("table error", "asymmetry, median", "99 of 100", "uncertainty", "albedo up to")
     terminal.print_table(
         f"Measured tables in {report.store}",
         ("material", *numbers, "audit"),
         [
             (
                 line.material,
-                *map(_percent, (line.asymmetry_median, line.asymmetry_p99, line.uncertainty)),
+                *map(_percent, (line.error_p95, line.asymmetry_median, line.asymmetry_p99, line.uncertainty)),
                 "not finite" if line.albedo is None else f"{line.albedo:.4f} at {line.at_theta_i_deg:g}°",
                 line.verdict,
             )
@@ -116,18 +121,21 @@ def show(lines: Sequence[Line], report: AuditReport) -> None:
         ],
         numbers=numbers,
     )
+    print("table error: 95 of 100 values of a table are so near to the data, interpolated")
     print("asymmetry: |f - f'| / (|f| + |f'|) of the data up to 80 degrees, f' with light and viewer exchanged")
     for audited in report.materials:
         for problem in audited.problems():
             print(f"{audited.material}: {problem}")
-    for sentence in sentences(lines):
+    for sentence in sentences(lines, tolerance):
         print(sentence)
     violating = len(report.violations)
     print(f"{counted(len(lines), 'table')} audited: passes {len(lines) - violating}, violates {violating}")
 
 
-def sentences(lines: Sequence[Line]) -> list[str]:
-    """Return the summary of asymmetries and albedos in sentences."""
+def sentences(lines: Sequence[Line], tolerance: float) -> list[str]:
+    """Return the summary of errors, asymmetries and albedos in sentences."""
+    far = [f"{line.material}: {_percent(line.error_p95)}" for line in lines if not line.error_p95 <= tolerance]
+    missed = f"table error beyond the tolerance of {_percent(tolerance)}, on the finest grid: {_named(far)}"
     medians = [line.asymmetry_median for line in lines if line.asymmetry_median is not None]
     asymmetry = "reciprocity asymmetry: the data cannot tell"
     if medians:
@@ -138,7 +146,7 @@ def sentences(lines: Sequence[Line]) -> list[str]:
     judged = f"asymmetric beyond their uncertainty: {_named(beyond)}"
     if unknown:
         judged += f"; {unknown} of {len(lines)} state no uncertainty, and are not judged"
-    return [asymmetry, judged, f"albedo above 1: {_named([line.material for line in lines if line.above_1])}"]
+    return [missed, asymmetry, judged, f"albedo above 1: {_named([line.material for line in lines if line.above_1])}"]
 
 
 def _named(names: Sequence[str]) -> str:

@@ -33,7 +33,7 @@ from brdfdb_pipelines.recipe_grids import STRICT, RecipeError
 if TYPE_CHECKING:
     from brdfdb.formats._readings import FileTable
 
-MEASURED_VERSION = 2  # of the way from a file to the values of its table
+MEASURED_VERSION = 3  # of the way from a file to the values of its table
 _ADDED = {"columns", "quantity", "angles", "side"}  # keys of a request that are left out where they are empty
 _MARGINS = 3  # tables of data that are made to conserve, each a little darker, until none is above 1
 
@@ -144,6 +144,7 @@ class MeasuredJob:
                 name=self.name,
                 title=title,
                 provenance=self.table.source or file,
+                nodes=read.nodes() if read.nodes is not None and read.listed else None,
             )
         return source.recorded(file=self.files, file_sha256=self.sha256)
 

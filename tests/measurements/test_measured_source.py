@@ -10,8 +10,9 @@ from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.quadrature import narrowest, reflected_share
 from brdfdb.materials import presets
 from brdfdb.materials.source import Evaluate
-from brdfdb.measurements import MeasuredSource
+from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.measurements.colours import spectra_of_colours
+from brdfdb.measurements.coordinates import Hull
 from brdfdb.measurements.measured_source import MARGIN
 from brdfdb.measurements.record import Noise
 from brdfdb.models import MODELS
@@ -182,3 +183,33 @@ def test_reciprocal_source_is_the_mean_of_both_ways() -> None:
     assert made.measured.changes[0].changed.median > 0.1
     with pytest.raises(ParameterError, match="neither reciprocal nor conserving"):
         made.made("pretty")
+
+
+@pytest.mark.parametrize(("lights_deg", "marked"), [((10.0, 40.0, 70.0), True), ((0.0, 45.0, 89.9), False)])
+def test_file_is_extrapolated_beyond_the_nodes_that_it_lists(lights_deg: tuple[float, ...], marked: bool) -> None:
+    theta_i, theta_r, turn = (
+        radians(a.ravel())
+        for a in np.meshgrid(np.array(lights_deg), np.array([0.0, 45.0, 89.9]), np.arange(0.0, 181.0, 10.0))
+    )
+    nodes = Samples(
+        "nodes", theta_i, 0.0 * theta_i, theta_r, turn, ("grey",), None, np.full((theta_i.size, 1), 0.2), None
+    )
+    source = MeasuredSource.of_function(
+        lambda wi, _: np.full((len(wi), 1), 0.2),
+        ("grey",),
+        None,
+        name="file",
+        title="File",
+        provenance="made up",
+        nodes=nodes,
+    )
+    viewer = unit_vector(radians(np.full(3, 30.0)), radians(np.full(3, 100.0)))
+    outside = source.extrapolated(unit_vector(radians(np.array([5.0, 40.0, 80.0])), np.zeros(3)), viewer)
+    assert outside.tolist() == [marked, False, marked]
+    assert (source.measured.hull is not None) == marked
+
+
+def test_hull_of_many_samples_takes_little_memory() -> None:
+    rng = np.random.default_rng(1)
+    wi, wr = (unit_vector(rng.uniform(0.0, 1.2, 200_000), rng.uniform(0.0, 6.0, 200_000)) for _ in range(2))
+    assert Hull.of(wi, wr, turned=False).outside(wi[:100], wr[:100]).sum() == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -75,3 +76,20 @@ def test_a_pointer_of_an_older_program_is_read_and_a_wrong_one_is_not(root: Path
     wrong = older | {"formula_error": 0.1}
     with pytest.raises(StoreError, match=r"HEAD\.json has no valid 'formula_error'"):
         check_fields(wrong, summary_fields(wrong), "white", "HEAD.json")
+
+
+def test_answers_of_a_part_of_a_store_stand_beside_those_of_all(tmp_path: Path) -> None:
+    def entry(material: str, revision: str, text: str) -> dict[str, object]:
+        answers = {"as_published": {"text": text}, "conserves_energy": {"text": text}}
+        return {"material": material, "revision": revision, "verdict": text, **answers}
+
+    whole, part = tmp_path / "audit.json", tmp_path / "audit-part.json"
+    whole.write_text(json.dumps({"materials": [entry("a", "r1", "old"), entry("b", "r1", "old")]}), encoding="utf-8")
+    part.write_text(json.dumps({"materials": [entry("b", "r1", "new"), entry("c", "r1", "new")]}), encoding="utf-8")
+    os.utime(whole, (1.0, 1.0))
+    answers = last_audit(tmp_path)
+    assert [answers[name, "r1"].as_published for name in "abc"] == ["old", "new", "new"]
+    os.utime(part, (0.0, 0.0))
+    assert last_audit(tmp_path)["b", "r1"].as_published == "old"
+    part.write_text("{", encoding="utf-8")
+    assert set(last_audit(tmp_path)) == {("a", "r1"), ("b", "r1")}

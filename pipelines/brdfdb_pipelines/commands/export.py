@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "--audit",
             type=Path,
             metavar="FILE",
-            help="report of `brdfdb audit` whose verdicts go into the files (default: DIR/audit.json of the store)",
+            help="report of `brdfdb audit` whose verdicts go into the files (default: those in the store)",
         )
         add_jobs(command, "materials that are written at a time")
         if "tolerance" in options_of(exporter):
