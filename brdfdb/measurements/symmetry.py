@@ -81,8 +81,10 @@ def reciprocity(f_r: Evaluate, hull: Hull | None, noise: float | None) -> Symmet
 
     The asymmetry is the larger one of pairs everywhere and of `lobe_pairs`.
     """
-    found = [asymmetry_of(f_r(wi, wr), f_r(wr, wi)) for wi, wr in (drawn_pairs(hull), lobe_pairs(hull)[:2]) if len(wi)]
-    seen = max((one for one in found if one is not None), key=lambda one: one.p99, default=None)
+    spreads = [
+        asymmetry_of(f_r(wi, wr), f_r(wr, wi)) for wi, wr in (drawn_pairs(hull), lobe_pairs(hull)[:2]) if len(wi)
+    ]
+    seen = max((one for one in spreads if one is not None), key=lambda one: one.p99, default=None)
     allowed = _ROUNDING if noise is None else max(_WITHIN * noise, _ROUNDING)
     return Symmetry(assumed=seen is not None and seen.p99 <= allowed, asymmetry=seen, allowed=noise)
 
