@@ -28,6 +28,9 @@ _ROUGHNESS = (0.01, 0.1)  # noise that no uncertainty states, relative to the sp
 _PARTS = 10  # parts of samples without a pattern, held out one at a time
 _REGULAR = 8  # samples of an incidence, and more, make a scan
 _MOST_ROUNDS = 24  # incidences that are held out one by one; more of them are held out in groups
+_SIGMAS = 1.4826  # standard deviations in the median magnitude of normal noise, inverted
+_ABSURD = 3.0  # times the noise, and the largest value, is what no value is below 0 by
+_OFTEN = 3  # samples with the same number below 0 that make it suspicious
 _JITTER = 1e-9  # added to the diagonal of a matrix, relative to it, so that rounding leaves it positive
 _SEED = 1998
 
@@ -52,7 +55,7 @@ class Interpolation:
     alpha : float
         Width [1] of the lobe that the coordinates crowd in.
     level : array (C,) [1/sr]
-        Noise of small values: their uncertainty, or the root mean square of the values below 0.
+        Noise of small values: their uncertainty, or that of the values below 0, which a few wrong ones do not set.
     scales : tuple
         Scales of the coordinates, and the noise of the logarithm that no uncertainty states, relative to its spread.
     turned : bool
@@ -158,6 +161,58 @@ def _listed(samples: Samples) -> tuple[Floats, Floats, Floats, Floats | None]:
     return samples.w_i[rows], samples.w_r[rows], samples.values[rows], uncertainty
 
 
+def _check_values(samples: Samples) -> None:
+    """Refuse samples of which no value is above 0, or that stand for holes with numbers that noise does not explain.
+
+    Raises
+    ------
+    ParameterError
+        If a value is below minus three times the largest one, or a channel has the same number three times or more,
+        below 0 by three times its noise or the tenth percentile of the values above 0.
+    """
+    values = samples.values
+    largest, lowest = np.max(values, where=samples.known, initial=0.0), np.min(values, where=samples.known, initial=0.0)
+    if not largest > 0.0:
+        raise ParameterError("values", "no value is above 0, which leaves nothing to tabulate", float(largest))
+    if lowest < -_ABSURD * largest:
+        raise ParameterError(
+            "values", f"{lowest:g} is no f_r, of which the largest is {largest:g}; a hole is nan", lowest
+        )
+    for channel, column in zip(samples.channels, values.T, strict=True):
+        numbers, counts = np.unique(column[column < 0.0], return_counts=True)
+        often = numbers[counts >= _OFTEN]
+        if often.size == 0 or not np.any(column > 0.0):
+            continue
+        noise = [
+            np.percentile(column[column > 0.0], 10.0),
+            _SIGMAS * np.median(np.append(-numbers[numbers > often[0]], 0.0)),
+        ]
+        if samples.uncertainty is not None:
+            noise.append(np.nanmedian(samples.uncertainty))
+        if -often[0] > _ABSURD * max(noise):
+            times = int(counts[np.searchsorted(numbers, often[0])])
+            raise ParameterError(
+                "values",
+                f"{often[0]:g} is the value of {times} samples of {channel}, and no f_r; a hole is nan",
+                often[0],
+            )
+
+
+def _noise_below_zero(values: Floats) -> Floats:
+    """Return the noise [1/sr] (C,) that values below 0 show; 0 without any.
+
+    It is that of the median of their magnitudes, and at most the magnitude that twice as many values stay below: where
+    f_r is less than its noise, half of the values are below 0.
+    """
+    noise = np.zeros(values.shape[1])
+    for c, column in enumerate(values.T):
+        below = -column[column < 0.0]
+        if below.size:
+            small = np.sort(np.abs(column[np.isfinite(column)]))
+            noise[c] = min(_SIGMAS * np.median(below), small[min(2 * below.size, small.size) - 1])
+    return noise
+
+
 def floor_of(samples: Samples) -> Floats:
     """Return the floor [1/sr] (C,) of relative errors: `FLOOR` of the mean f_r of the samples, above 0."""
     mean = np.nanmean(np.abs(samples.values), axis=0)
@@ -211,14 +266,22 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
     base : callable, optional
         f_r that the ratio is taken to; by default `lambert_and_lobe`, of the same samples.
 
+    Raises
+    ------
+    ParameterError
+        If there are too few samples, no value is above 0, or numbers far below 0 stand for holes.
+
     Notes
     -----
     The radial functions (1 + r) exp(-r) are those of a smooth random function with noise, of which the result is the
     most likely one. Their scales are those with the smallest error at samples that are held out. Of scans, which have
     many viewers for one light, all samples of a light are held out together: neighbours in a scan would tell too much.
     The gap is then twice that of the samples, and the stated error is rather too large between incidences than too
-    small. Samples without such a pattern are held out in ten parts, by chance.
+    small: of two lights it is that of extrapolation. Where some gaps are wider than most, such as one without lights,
+    or a hole among the viewers, it is too small within them. Samples without such a pattern are held out in ten parts,
+    by chance.
     """
+    _check_values(samples)
     own, alpha, words = lambert_and_lobe(samples)
     f_base = own if base is None else base
     problem, level, scheme = _problem(samples, f_base)
@@ -241,12 +304,10 @@ def fit(samples: Samples, base: Base | None = None) -> Fitted:
 def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
     """Return the problem, the noise (C,) [1/sr] of small values, and the scheme by which groups are held out."""
     wi, wr, values, uncertainty = _listed(samples)
-    below = np.where(values < 0.0, values, 0.0)
-    level = np.maximum(
-        np.sqrt(np.sum(below**2, axis=0) / np.maximum(np.sum(below < 0.0, axis=0), 1)), floor_of(samples)
-    )
+    level = np.maximum(_noise_below_zero(values), floor_of(samples))
     if uncertainty is not None:
-        level = np.maximum(np.nanmedian(uncertainty, axis=0), level)
+        uncertainty = np.where(np.isnan(uncertainty), np.nanmedian(uncertainty), uncertainty)  # as of the others
+        level = np.maximum(np.median(uncertainty, axis=0), level)
     of_base = _logarithm(base(wi, wr), level)
     y = _logarithm(values, level) - of_base
     y = np.where(np.isfinite(y), y, np.nanmean(y, axis=1, keepdims=True))  # a hole of one channel is like the others
@@ -256,7 +317,7 @@ def _problem(samples: Samples, base: Base) -> tuple[_Problem, Floats, str]:
         noise = np.nan_to_num(np.nanmean(uncertainty / slope, axis=1)) / max(float(np.std(y)), 1e-3)
     incidence = np.unique(samples.incidence[samples.known.any(axis=1)], return_inverse=True)[1].reshape(-1)
     lights = int(incidence.max()) + 1
-    scans = lights > 2 and np.median(np.bincount(incidence)) >= _REGULAR
+    scans = lights > 1 and np.median(np.bincount(incidence)) >= _REGULAR
     rng = np.random.default_rng(_SEED)
     if scans:
         group = (np.arange(lights) if lights <= _MOST_ROUNDS else rng.permutation(lights) % _MOST_ROUNDS)[incidence]

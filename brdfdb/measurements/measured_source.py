@@ -84,7 +84,8 @@ class MeasuredSource(FunctionSource):
         Raises
         ------
         ParameterError
-            If there are too few samples, or the name is not a slug.
+            If there are too few samples, no value is above 0, numbers far below 0 stand for holes, or the name has no
+            letters or digits.
         """
         fitted = fit(samples, base)
         noise, uncertainty = None, samples.uncertainty

@@ -92,7 +92,8 @@ class Measured(BaseModel):
     hull: list[list[float]] | None = Field(
         default=None,
         description="half-spaces around the directions that were measured, each a normal and an offset [rad], as of "
-        "`brdfdb.measurements.coordinates.Hull`; null: f_r is known everywhere",
+        "`brdfdb.measurements.coordinates.Hull`; holes within are not marked; null: f_r is "
+        "known everywhere",
     )
     held_out: HeldOut | None = Field(default=None, description="null: f_r is known everywhere")
     noise: Noise | None = Field(default=None, description="null: not known")

@@ -72,7 +72,7 @@ class Samples:
     values : array (N, C) [1/sr]
         f_r without the cosine. A hole is nan. Noise may make values negative.
     uncertainty : array (N, C) [1/sr] or None
-        Standard uncertainty of each value; None if it is not known.
+        Standard uncertainty of each value, nan where it is not known; None, also of nan alone, if none is known.
     bandwidth_nm : array (C,) [nm] or None
         Full width of each band at half of its height; None if it is not known.
     instrument : Instrument
@@ -85,7 +85,8 @@ class Samples:
     Raises
     ------
     ParameterError
-        If shapes do not fit, an angle is outside its range, a value is infinite, or an uncertainty is negative.
+        If shapes do not fit, an angle is outside its range, a value is infinite, or an uncertainty is negative
+        or infinite.
     """
 
     name: str
@@ -131,6 +132,10 @@ class Samples:
             raise ParameterError("values", "a value is infinite; a hole is nan", np.inf)
         if self.uncertainty is not None and np.any(self.uncertainty < 0.0):
             raise ParameterError("uncertainty", f"{np.nanmin(self.uncertainty):g} is below 0", None, (0.0, np.inf))
+        if self.uncertainty is not None and np.any(np.isinf(self.uncertainty)):
+            raise ParameterError("uncertainty", "a value is infinite; what is not known is nan", np.inf)
+        if self.uncertainty is not None and np.all(np.isnan(self.uncertainty)):
+            object.__setattr__(self, "uncertainty", None)
 
     def __len__(self) -> int:
         return len(self.theta_i)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.materials.source import Evaluate
@@ -10,10 +13,13 @@ from brdfdb.measurements.coordinates import Hull
 from brdfdb.measurements.record import Spread, Symmetry
 from brdfdb.parameters import Floats
 
+_HALF_TURN = np.array([-1.0, -1.0, 1.0])
 MIRROR = np.array([1.0, -1.0, 1.0])  # of unit vectors, that exchanges left and right of the plane of phi = 0
 _DRAWN, _UP_TO_DEG, _SEED = 4000, 80.0, 1924
 _ROUNDING = 1e-6  # asymmetry that a file in float32 has
-_CONTRADICTED = 0.05  # median asymmetry of the mirror image above which data of unknown noise contradict it
+_CONTRADICTED = 0.05  # asymmetry above which data of unknown noise contradict a symmetry
+_SLOPES = np.geomspace(2.0**-9, 2.0, 11)  # of half vectors, from those of the narrowest lobes on: octaves
+_IN_OCTAVE = 400
 _WITHIN = 1.2  # times the noise is how large the asymmetry may be, because both are estimates
 
 
@@ -25,8 +31,34 @@ def drawn_pairs(hull: Hull | None = None, up_to_deg: float = _UP_TO_DEG) -> tupl
     wi, wr = (unit_vector(theta[k], phi[k]) for k in (0, 1))
     if hull is None:
         return wi, wr
-    inside = ~(hull.outside(wi, wr) | hull.outside(wr, wi))
+    inside = _inside(hull, wi, wr)
     return wi[inside], wr[inside]
+
+
+def lobe_pairs(hull: Hull | None = None) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Return pairs of unit vectors (N, 3) around the mirror direction and the light, and their octaves (N,).
+
+    As many pairs have half vectors with slopes of 0.002 to 0.004, as of 0.004 to 0.008, and so on up to 2: a lobe of
+    any width has a share of them. The same viewers, turned by 180 degrees, are about the light. Those of samples lie
+    within them, also exchanged.
+    """
+    rng = np.random.default_rng(_SEED)
+    octave = np.repeat(np.arange(_SLOPES.size - 1), _IN_OCTAVE)
+    slope = _SLOPES[octave] * 2.0 ** rng.uniform(0.0, 1.0, octave.size)
+    theta = np.arccos(rng.uniform(np.cos(radians(_UP_TO_DEG)), 1.0, octave.size))
+    phi = rng.uniform(0.0, 2.0 * np.pi, (2, octave.size))
+    wi, half = unit_vector(theta, phi[0]), unit_vector(np.arctan(slope), phi[1])
+    wr = 2.0 * np.sum(wi * half, axis=1, keepdims=True) * half - wi
+    wi, wr = np.concatenate([wi, wi]), np.concatenate([wr, wr * _HALF_TURN])
+    octave = np.concatenate([octave, octave + _SLOPES.size])
+    inside = wr[:, 2] > np.cos(radians(_UP_TO_DEG))
+    if hull is not None:
+        inside &= _inside(hull, wi, wr)
+    return wi[inside], wr[inside], octave[inside]
+
+
+def _inside(hull: Hull, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
+    return ~(hull.outside(wi, wr) | hull.outside(wr, wi))
 
 
 def spread_of(changes: Floats) -> Spread:
@@ -45,9 +77,14 @@ def asymmetry_of(f: Floats, other: Floats) -> Spread | None:
 
 
 def reciprocity(f_r: Evaluate, hull: Hull | None, noise: float | None) -> Symmetry:
-    """Return whether data keep to reciprocity within their noise [1]; it is not assumed where they cannot tell."""
-    wi, wr = drawn_pairs(hull)
-    seen = asymmetry_of(f_r(wi, wr), f_r(wr, wi)) if len(wi) else None
+    """Return whether data keep to reciprocity within their noise [1]; it is not assumed where they cannot tell.
+
+    The asymmetry is the larger one of pairs everywhere and of `lobe_pairs`.
+    """
+    spreads = [
+        asymmetry_of(f_r(wi, wr), f_r(wr, wi)) for wi, wr in (drawn_pairs(hull), lobe_pairs(hull)[:2]) if len(wi)
+    ]
+    seen = max((one for one in spreads if one is not None), key=lambda one: one.p99, default=None)
     allowed = _ROUNDING if noise is None else max(_WITHIN * noise, _ROUNDING)
     return Symmetry(assumed=seen is not None and seen.p99 <= allowed, asymmetry=seen, allowed=noise)
 
@@ -57,14 +94,33 @@ def mirror(f_r: Evaluate, noise: float | None) -> Symmetry:
     wi, wr = drawn_pairs()
     seen = asymmetry_of(f_r(wi, wr), f_r(wi * MIRROR, wr * MIRROR))
     allowed = _CONTRADICTED if noise is None else max(_WITHIN * noise, _CONTRADICTED)
-    return Symmetry(assumed=seen is None or seen.median <= allowed, asymmetry=seen, allowed=noise)
+    kept = seen is None or seen.median <= allowed
+    return Symmetry(assumed=kept and _of_lobes(f_r, lambda w: w * MIRROR) <= allowed, asymmetry=seen, allowed=noise)
 
 
 def is_turned(f_r: Evaluate, noise: float | None) -> bool:
     """Return True if f_r changes when the surface is turned about its normal, by more than noise or rounding."""
     wi, wr = drawn_pairs()
-    turn = np.random.default_rng(_SEED).uniform(0.0, 2.0 * np.pi, len(wi))
+    allowed = max(_CONTRADICTED, 0.0 if noise is None else noise)
+    seen = asymmetry_of(f_r(wi, wr), f_r(_turned(wi), _turned(wr)))
+    return (seen is not None and seen.median > allowed) or _of_lobes(f_r, _turned) > allowed
+
+
+def _turned(w: Floats) -> Floats:
+    """Return unit vectors (N, 3), each turned about the normal by an angle of its own: the same ones in each call."""
+    turn = np.random.default_rng(_SEED).uniform(0.0, 2.0 * np.pi, len(w))
     c, s = np.cos(turn), np.sin(turn)
-    turned = (np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], axis=1) for w in (wi, wr))
-    seen = asymmetry_of(f_r(wi, wr), f_r(*turned))
-    return seen is not None and seen.median > max(_CONTRADICTED, 0.0 if noise is None else noise)
+    return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], axis=1)
+
+
+def _of_lobes(f_r: Evaluate, moved: Callable[[Floats], Floats]) -> float:
+    """Return the largest asymmetry of `lobe_pairs` of an octave and a channel.
+
+    It is the sum of the differences of f_r times cosine over the sum of both. So bright pairs count, which are few
+    among all directions, and dark ones with more noise count less.
+    """
+    wi, wr, octave = lobe_pairs()
+    f, other = (f_r(a, b) * wr[:, 2:] for a, b in ((wi, wr), (moved(wi), moved(wr))))
+    number = octave[:, np.newaxis] == np.unique(octave)
+    apart, total = (number.T.astype(np.float64) @ part for part in (np.abs(f - other), np.abs(f) + np.abs(other)))
+    return float(np.max(apart / np.maximum(total, 1e-300)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -41,6 +43,16 @@ def test_stated_error_is_that_of_incidences_held_out_from_the_beginning(name: st
     assert 1.0 / RIGHT < np.mean(p95) / np.percentile(np.concatenate(errors), 95) < RIGHT
 
 
+def test_stated_error_of_two_lights_is_that_between_them() -> None:
+    f_r = presets()["blue-plastic"].brdf_at(None)
+    fitted = fit(scans(f_r, np.array([10.0, 65.0]), 0.01))
+    stated, between = fitted.held_out, scans(f_r, np.array([30.0, 40.0, 50.0]), 0.0)
+    values = fitted.f_r(between.w_i, between.w_r)
+    error = np.abs(values - between.values) / values
+    assert stated.scheme == "incidences"
+    assert stated.p95 > np.percentile(error, 95)
+
+
 def _held_out_from_the_beginning(samples: Samples, held: NDArray[np.bool_]) -> tuple[HeldOut, Floats]:
     kept, fresh = samples.selected(~held), samples.selected(held)
     fitted = fit(kept)
@@ -76,6 +88,39 @@ def test_noise_makes_no_lobe_where_there_are_no_samples() -> None:
 def test_too_few_samples_are_refused_with_their_number() -> None:
     with pytest.raises(ParameterError, match="6 values are too few"):
         fit(scattered(lambda wi, _: np.full((len(wi), 1), 0.1), 6, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "refusal"),
+    [
+        ([-999.0], "-999 is no f_r"),
+        ([-1.0] * 3, "-1 is the value of 3 samples of grey"),
+        ([0.0] * 200, "no value is above 0"),
+        ([-0.1] * 200, "no value is above 0"),
+    ],
+)
+def test_values_that_cannot_make_a_table_are_refused(numbers: list[float], refusal: str) -> None:
+    samples = _with(np.array(numbers), top=0.6)
+    with pytest.raises(ParameterError, match=refusal):
+        fit(samples)
+
+
+def test_a_few_wrong_values_below_zero_do_not_set_the_noise() -> None:
+    level = fit(_with(np.array([-0.3, -0.2, -0.25]), top=0.6)).f_r.level
+    assert level[0] < 0.02  # their root mean square is 0.25
+
+
+def test_values_that_are_rounded_around_zero_are_no_holes() -> None:
+    rng = np.random.default_rng(4)
+    samples = _with(np.round(0.002 * rng.standard_normal(200), 3), top=0.6)
+    assert fit(samples).f_r.level[0] == pytest.approx(0.002, rel=0.5)
+
+
+def _with(numbers: Floats, top: float) -> Samples:
+    """Return 200 samples, of which the first have other values; those left lie between 0.005 and `top`."""
+    samples = scattered(lambda wi, _: 0.005 + (top - 0.005) * wi[:, :1] ** 8, 200, 0.0)
+    values = np.concatenate([numbers[:, np.newaxis], samples.values[len(numbers) :]])
+    return replace(samples, values=values, uncertainty=None)
 
 
 def test_hull_has_what_lies_between_samples_and_nothing_else() -> None:

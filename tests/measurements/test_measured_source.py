@@ -7,11 +7,15 @@ import pytest
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import radians, unit_vector
+from brdfdb.integrals.quadrature import narrowest, reflected_share
 from brdfdb.materials import presets
+from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource, Samples
 from brdfdb.measurements.colours import spectra_of_colours
 from brdfdb.measurements.coordinates import Hull
 from brdfdb.measurements.measured_source import MARGIN
+from brdfdb.measurements.record import Noise
+from brdfdb.models import MODELS
 from brdfdb.parameters import Floats
 from brdfdb.spectra import PICTURE_NM, linear_srgb
 from tests.measurements.made_up import scans, scattered
@@ -65,6 +69,40 @@ def test_isotropic_data_that_turn_are_anisotropic() -> None:
     assert brushed.reciprocal
 
 
+@pytest.mark.parametrize("alpha", [(0.03, 0.3), (0.03, 0.09), (0.005, 0.05)])
+def test_narrow_lobe_that_turns_is_anisotropic(alpha: tuple[float, float]) -> None:
+    assert _of(_lobe(0.1, 0.5, *alpha)).anisotropic
+    assert not _of(_lobe(0.1, 0.5, alpha[0], alpha[0])).anisotropic
+
+
+def test_narrow_lobe_that_leans_to_one_side_is_not_mirrored() -> None:
+    def leaning(wi: Floats, wr: Floats) -> Floats:
+        across = wi[:, :1] * wr[:, 1:2] - wi[:, 1:2] * wr[:, :1]
+        return 0.3 + 10.0 * np.exp(-(((across - 0.03) / 0.02) ** 2)) * (np.sum(wi * wr * [-1, -1, 1], 1) > 0.9)[:, None]
+
+    assert _of(leaning).anisotropic
+
+
+def test_narrow_lobe_that_is_not_reciprocal_is_seen_within_the_noise_of_the_rest() -> None:
+    lobe = _lobe(0.0, 0.5, 0.005, 0.005)
+
+    def one_sided(wi: Floats, wr: Floats) -> Floats:
+        return 0.1 + lobe(wi, wr) * (1.0 + 0.5 * np.sign(wi[:, 2:] - wr[:, 2:]))
+
+    source = MeasuredSource.of_function(
+        one_sided, ("grey",), None, name="a", title="a", provenance="this test", noise=Noise(median=0.01, p95=0.02)
+    )
+    assert not source.reciprocal
+
+
+def _lobe(rho_d: float, rho_s: float, alpha_x: float, alpha_y: float) -> Evaluate:
+    def f_r(wi: Floats, wr: Floats) -> Floats:
+        values = MODELS["ward"].vectors(wi, wr, rho_d=rho_d, rho_s=rho_s, alpha_x=alpha_x, alpha_y=alpha_y)
+        return np.asarray(values).reshape(len(wi), 1)
+
+    return f_r
+
+
 def test_mean_of_mirror_images_is_taken_and_its_asymmetry_stated() -> None:
     def skewed(wi: Floats, wr: Floats) -> Floats:
         return np.asarray(0.1 + 0.005 * (wi[:, :1] * wr[:, 1:2] - wi[:, 1:2] * wr[:, :1]))
@@ -115,6 +153,27 @@ def test_conserving_source_has_no_albedo_above_1(of_light: bool) -> None:
     change = made.measured.changes[-1]
     assert change.law == "conserving"
     assert 0.0 < change.changed.p99 <= change.changed.max < 1.0
+
+
+@pytest.mark.parametrize("alpha", [(0.03, 0.03), (0.05, 0.05), (0.03, 0.3)])
+def test_conserving_source_has_no_albedo_above_1_though_its_lobe_is_narrow(alpha: tuple[float, float]) -> None:
+    ward = {"rho_d": 0.1, "rho_s": 1.0, "alpha_x": alpha[0], "alpha_y": alpha[1]}
+    lobe = _lobe(**ward)
+    made = _of(lambda wi, wr: 1.3 * lobe(wi, wr)).made("conserving").brdf_at(None)
+
+    def reflected(wi: Floats, wr: Floats) -> Floats:
+        viewers = wr.reshape(-1, 3)
+        return made(np.broadcast_to(wi, viewers.shape), viewers).reshape(*wr.shape[:-1], 1)
+
+    albedos = [
+        reflected_share(
+            reflected, theta, phi, narrowest(MODELS["ward"], np.cos(theta), ward), tolerance=2e-4, most_panels=2000
+        ).albedo[0]
+        for theta in radians(np.array([0.0, 1.2, 12.5, 28.0, 33.0, 38.0, 42.5, 61.0, 88.5]))
+        for phi in ((0.0, 0.2, 1.3) if alpha[0] < alpha[1] else (0.0,))
+    ]
+    assert max(albedos) <= 1.0
+    assert np.percentile(albedos, 60) > 0.99  # no darker than the law asks for
 
 
 def test_reciprocal_source_is_the_mean_of_both_ways() -> None:

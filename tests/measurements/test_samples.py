@@ -127,3 +127,10 @@ def test_joined_files_that_differ_beyond_their_uncertainties_say_so() -> None:
     first = samples(uncertainty=np.full((4, 2), 0.001))
     sentence = joined([first, replace(first, values=1.1 * first.values)]).record["contradiction"]
     assert sentence.endswith("f_r differs by 10 % in the median, which is beyond the stated uncertainties.")
+
+
+def test_uncertainty_of_nan_alone_is_not_known_and_an_infinite_one_is_refused() -> None:
+    assert samples(uncertainty=np.full((4, 2), np.nan)).uncertainty is None
+    assert samples(uncertainty=np.where(np.eye(4, 2) > 0.0, 0.1, np.nan)).uncertainty is not None
+    with pytest.raises(ParameterError, match="uncertainty: a value is infinite"):
+        samples(uncertainty=np.full((4, 2), np.inf))
