@@ -156,8 +156,10 @@ def _fit(path: Path, number: int, line: str) -> PublishedFit:
         raise FileFormatError(f"{path}: line {number} is not NAME = LOBE(NUMBER = ...): {line[:60]!r}")
     try:
         terms = _terms(ast.parse(text.strip(), mode="eval").body)
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        reason = error.args[0] if isinstance(error, _UnreadableError) else "it is not LOBE(NUMBER = ...)"
+    except FileFormatError as error:
+        raise FileFormatError(f"{path}: line {number} ({name.strip()[:60]}): {error}") from None
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        reason = "it is not LOBE(NUMBER = ...)"
         raise FileFormatError(f"{path}: line {number} ({name.strip()[:60]}): {reason}") from None
     model = _model(terms)
     flags = _flags(terms)
@@ -171,17 +173,13 @@ def _fit(path: Path, number: int, line: str) -> PublishedFit:
     return PublishedFit(name=name.strip(), line=number, terms=terms, model=model, albedo=albedo, flags=flags)
 
 
-class _UnreadableError(ValueError):
-    """A part of a line that is no term and no number."""
-
-
 def _terms(node: ast.expr) -> list[Lobe]:
     """Return the terms of a call: those of its arguments, or itself."""
     if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
-        raise _UnreadableError("it is not LOBE(NUMBER = ...)")
+        raise FileFormatError("it is not LOBE(NUMBER = ...)")
     name = node.func.id
     if node.args and node.keywords:
-        raise _UnreadableError(f"{name} has both terms and numbers")
+        raise FileFormatError(f"{name} has both terms and numbers")
     if node.args:
         return [term for part in node.args for term in _terms(part)]
     return [Lobe(name=name, numbers={str(word.arg): _numbers(name, word) for word in node.keywords})]
@@ -193,9 +191,9 @@ def _numbers(name: str, word: ast.keyword) -> list[float]:
     try:
         values = [float(ast.literal_eval(part)) for part in parts]
     except (ValueError, TypeError, SyntaxError, OverflowError):
-        raise _UnreadableError(f"{word.arg} of {name} is neither a number nor a list of numbers") from None
+        raise FileFormatError(f"{word.arg} of {name} is neither a number nor a list of numbers") from None
     if len(values) not in (1, len(CHANNELS)) or not all(map(math.isfinite, values)):
-        raise _UnreadableError(f"{word.arg} of {name} has {len(values)} values; 1 or 3 finite ones are read")
+        raise FileFormatError(f"{word.arg} of {name} has {len(values)} values; 1 or 3 finite ones are read")
     return values
 
 

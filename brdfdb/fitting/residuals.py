@@ -68,7 +68,7 @@ class Residual:
                 usable = positive
             elif kind == "uncertainty":
                 assert samples.uncertainty is not None
-                usable = (samples.uncertainty > 0.0) & np.isfinite(samples.uncertainty)
+                usable = samples.uncertainty > 0.0
             else:
                 usable = known
         self.left_out = int(np.sum(self.used & ~usable))

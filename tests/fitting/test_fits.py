@@ -189,15 +189,15 @@ def test_only_uncertainties_that_no_noise_explains_are_raised() -> None:
         assert Residual(with_uncertainty(values, stated), "uncertainty").raised == 0
 
 
-def test_infinite_uncertainties_are_left_out_and_counted() -> None:
+def test_uncertainties_that_are_not_known_are_left_out_and_counted() -> None:
     values = noisy(truth("ward", **WARD))
     stated = NOISE * values
     some = with_uncertainty(values, stated)
-    some.uncertainty[5:8] = np.inf  # type: ignore[index]
+    some.uncertainty[5:8] = np.nan  # type: ignore[index]
     document, fitted = fits(some, ["ward"], residual="uncertainty", profiles=False)
     assert (document.left_out.unusable, document.samples) == (3, 405)
     assert fitted[0].point.values[:, 0] == pytest.approx([0.2, 0.1], rel=0.02)
-    some.uncertainty[:] = np.inf  # type: ignore[index]
+    some.uncertainty[:] = np.nan  # type: ignore[index]
     with pytest.raises(ParameterError, match="no value that the residual uncertainty can use"):
         fit(some, "ward", residual="uncertainty")
 
