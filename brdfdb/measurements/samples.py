@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import check_phi, check_theta, degrees, radians, unit_vector
-from brdfdb.measurements._overlap import contradiction
 from brdfdb.parameters import Floats
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ RELATIVE = "relative to the light"  # entry "azimuths" of a record: the azimuth 
 ANGLES = ("theta_i", "phi_i", "theta_r", "phi_r")
 _HORIZON = 0.5 * np.pi * (1.0 + 1e-9)  # largest polar angle [rad], with rounding
 _SAME_LIGHT_DEG = 1e-4  # lights closer than this are one incidence
-_SHOWN = 100  # characters of the channels of a part that a refusal repeats
 
 
 @dataclass(frozen=True)
@@ -243,63 +241,6 @@ class Samples:
             provenance=str(attributes.get("provenance", "")),
             record=json.loads(attributes.get("record", "{}")),
         )
-
-
-def joined(parts: Sequence[Samples]) -> Samples:
-    """Return the samples of several pictures or files of one surface as one.
-
-    Name and record are those of the first part, instruments and origins those of all. Where parts hold different values
-    at the same directions, a sentence says so in the entry "contradiction" of the record.
-
-    Raises
-    ------
-    ParameterError
-        If there is none, they have different channels, or their azimuths have no direction in common: those of one
-        part are relative to its light, and lights of another come from other azimuths of the surface than 0.
-    """
-    if not parts:
-        raise ParameterError("parts", "there are no samples to join", 0)
-    first = parts[0]
-    relative = next((part for part in parts if part.record.get("azimuths") == RELATIVE), None)
-    for other in parts:
-        _check_channels(first, other)
-        of_surface = other.record.get("azimuths") != RELATIVE and np.any((other.theta_i > 0.0) & (other.phi_i != 0.0))
-        if relative is not None and of_surface:
-            raise ParameterError(
-                "parts",
-                f"azimuths of {relative.name} are relative to the light, and those of {other.name} to the surface",
-                other.name,
-            )
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in (*ANGLES, "values")
-    }
-    noises = [part.uncertainty for part in parts if part.uncertainty is not None]
-    uncertainty = np.concatenate(noises) if len(noises) == len(parts) else None
-    instrument = first.instrument
-    if any(part.instrument != instrument for part in parts):
-        instrument = Instrument(
-            "; ".join(dict.fromkeys(part.instrument.name for part in parts if part.instrument.name))
-        )
-    provenance = "; ".join(dict.fromkeys(part.provenance for part in parts if part.provenance))
-    sentence = contradiction(parts)
-    record = {**first.record, "contradiction": sentence} if sentence else first.record
-    return replace(
-        first, **arrays, uncertainty=uncertainty, instrument=instrument, provenance=provenance, record=record
-    )
-
-
-def _check_channels(first: Samples, other: Samples) -> None:
-    """Raise ParameterError if the channels of two parts differ."""
-    if other.channels != first.channels:
-        names = (", ".join(part.channels) for part in (other, first))
-        theirs, ours = (text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..." for text in names)
-        raise ParameterError(
-            "parts", f"{other.name} has the channels {theirs}, and {first.name} has {ours}", other.channels
-        )
-    for name in ("wavelength_nm", "bandwidth_nm"):
-        one, two = getattr(first, name), getattr(other, name)
-        if (one is None) != (two is None) or (one is not None and not np.array_equal(one, two)):
-            raise ParameterError("parts", f"{other.name} and {first.name} differ in {name}", two)
 
 
 def _angle(dataset: xr.Dataset, name: str, count: int) -> Floats:

@@ -61,7 +61,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Tables:
-    """What to make of imported samples.
+    """Request for tables of imported samples.
 
     Attributes
     ----------

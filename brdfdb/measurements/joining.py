@@ -1,0 +1,123 @@
+"""Samples of several files or pictures of one surface as one, and what contradicts between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brdfdb.errors import ParameterError, counted
+from brdfdb.geometry import degrees
+from brdfdb.measurements.samples import ANGLES, RELATIVE, Instrument, Samples
+from brdfdb.parameters import Floats
+
+_SHOWN = 100  # characters of the channels of a part that a refusal repeats
+_SAME_DEG = 0.01  # directions closer than this are one
+_RATIO = 1.3  # of the larger to the smaller value, in the median, above which files contradict
+_UNLIKELY = 3.0  # standard uncertainties of the difference, in the median, from which on files contradict
+
+
+def joined(parts: Sequence[Samples]) -> Samples:
+    """Return the samples of several pictures or files of one surface as one.
+
+    Name and record are those of the first part, instruments and origins those of all. Where parts hold different values
+    at the same directions, a sentence says so in the entry "contradiction" of the record.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, they have different channels, or their azimuths have no direction in common: those of one
+        part are relative to its light, and lights of another come from other azimuths of the surface than 0.
+    """
+    if not parts:
+        raise ParameterError("parts", "there are no samples to join", 0)
+    first = parts[0]
+    relative = next((part for part in parts if part.record.get("azimuths") == RELATIVE), None)
+    for other in parts:
+        _check_channels(first, other)
+        of_surface = other.record.get("azimuths") != RELATIVE and np.any((other.theta_i > 0.0) & (other.phi_i != 0.0))
+        if relative is not None and of_surface:
+            raise ParameterError(
+                "parts",
+                f"azimuths of {relative.name} are relative to the light, and those of {other.name} to the surface",
+                other.name,
+            )
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in (*ANGLES, "values")
+    }
+    noises = [part.uncertainty for part in parts if part.uncertainty is not None]
+    uncertainty = np.concatenate(noises) if len(noises) == len(parts) else None
+    instrument = first.instrument
+    if any(part.instrument != instrument for part in parts):
+        instrument = Instrument(
+            "; ".join(dict.fromkeys(part.instrument.name for part in parts if part.instrument.name))
+        )
+    provenance = "; ".join(dict.fromkeys(part.provenance for part in parts if part.provenance))
+    sentence = _contradiction(parts)
+    record = {**first.record, "contradiction": sentence} if sentence else first.record
+    return replace(
+        first, **arrays, uncertainty=uncertainty, instrument=instrument, provenance=provenance, record=record
+    )
+
+
+def _check_channels(first: Samples, other: Samples) -> None:
+    """Raise ParameterError if the channels of two parts differ."""
+    if other.channels != first.channels:
+        names = (", ".join(part.channels) for part in (other, first))
+        theirs, ours = (text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..." for text in names)
+        raise ParameterError(
+            "parts", f"{other.name} has the channels {theirs}, and {first.name} has {ours}", other.channels
+        )
+    for name in ("wavelength_nm", "bandwidth_nm"):
+        one, two = getattr(first, name), getattr(other, name)
+        if (one is None) != (two is None) or (one is not None and not np.array_equal(one, two)):
+            raise ParameterError("parts", f"{other.name} and {first.name} differ in {name}", two)
+
+
+def _contradiction(parts: Sequence[Samples]) -> str:
+    """Return a sentence if parts hold different values at the same directions, else an empty text.
+
+    Each part is compared with those before it, direction by direction, and the one that differs most is named. They
+    contradict if the larger value is 1.3 times the smaller one in the median, or the difference three times its
+    uncertainty.
+    """
+    codes = [_codes(part) for part in parts]
+    values = np.concatenate([part.values for part in parts])
+    noises = np.concatenate([_noise(part) for part in parts])
+    worst, sentence = 0.0, ""
+    for number in range(1, len(parts)):
+        before = np.concatenate(codes[:number])
+        _, one, two = np.intersect1d(before, codes[number], return_indices=True)
+        two = two + len(before)
+        positive = np.minimum(values[one], values[two]) > 0.0
+        if not positive.any():
+            continue
+        a, b, u = values[one][positive], values[two][positive], np.hypot(noises[one], noises[two])[positive]
+        ratio = float(np.median(np.maximum(a, b) / np.minimum(a, b)))
+        stated = (u > 0.0) & np.isfinite(u)
+        beyond = stated.any() and float(np.median(np.abs(a - b)[stated] / u[stated])) > _UNLIKELY
+        if ratio > worst and (ratio > _RATIO or beyond):
+            files = "both files have" if len(parts) == 2 else f"{parts[number].name} and files before it have"
+            what = f"f_r differs by {100.0 * (ratio - 1.0):.3g} % in the median"
+            end = ", which is beyond the stated uncertainties" if beyond else ""
+            directions = counted(int(np.sum(positive.any(axis=1))), "direction")
+            worst, sentence = ratio, f"At {directions} that {files}, {what}{end}."
+    return sentence
+
+
+def _noise(part: Samples) -> Floats:
+    """Return the standard uncertainties (N, C) [1/sr] of a part, 0 where none is stated."""
+    return np.zeros(part.values.shape) if part.uncertainty is None else part.uncertainty
+
+
+def _codes(part: Samples) -> NDArray[np.int64]:
+    """Return a number for each pair of directions, shape (N,): the same number, the same directions."""
+    code = np.zeros(len(part.theta_i), dtype=np.int64)
+    turn = round(360.0 / _SAME_DEG)
+    for theta, phi in ((part.theta_i, part.phi_i), (part.theta_r, part.phi_r)):
+        ring, azimuth = (np.rint(degrees(angle) / _SAME_DEG).astype(np.int64) for angle in (theta, phi))
+        code = (code * turn + ring) * turn + np.where(ring == 0, 0, azimuth % turn)
+    return code
