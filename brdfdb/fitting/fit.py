@@ -15,7 +15,7 @@ from brdfdb.fitting.fitted import Fitted
 from brdfdb.fitting.held_out import held_out, predicted
 from brdfdb.fitting.material import material_of
 from brdfdb.fitting.problem import Point, Problem
-from brdfdb.fitting.remarks import remarks_of, remarks_on_samples
+from brdfdb.fitting.remarks import remarks_of, remarks_on_samples, sees_anisotropy
 from brdfdb.fitting.residuals import Kind, Residual
 from brdfdb.fitting.surface import ASSUMED_NM, NotDescribedError, Surface, fitted_by_default
 from brdfdb.geometry import degrees, radians, versine
@@ -95,9 +95,8 @@ def fit(samples: Samples, model: str, *, residual: Kind = "log", refractive_inde
     >>> print(np.round(fitted.point.values, 3))
     [[0.7]]
     """
-    surface = Surface(
-        model, samples.wavelength_nm, len(samples.channels), turned=samples.turned, entry=refractive_index
-    )
+    turned = sees_anisotropy(samples)
+    surface = Surface(model, samples.wavelength_nm, len(samples.channels), turned=turned, entry=refractive_index)
     fitted = _searched(samples, surface, residual, np.zeros(len(samples), dtype=np.bool_))
     hidden = _hidden(fitted)
     if hidden.any() and np.any(fitted.problem.residual.used[~hidden[fitted.rows]]):

@@ -354,7 +354,8 @@ def _parsed(name: str) -> list[str]:
             )
         model = match[2]
         if model not in MODELS:
-            raise ParameterError("model", f"{model!r} is unknown{closest(model, MODELS)}", model, tuple(MODELS))
+            hint = closest(model, MODELS) or f"; the models are {', '.join(MODELS)}"
+            raise ParameterError("model", f"{model!r} is unknown{hint}", model, tuple(MODELS))
         names += [model] * int(match[1] or 1)
     if not 1 <= len(names) <= _MOST_LOBES:
         raise ParameterError("model", f"{name!r} has {len(names)} terms; 1 to {_MOST_LOBES} are allowed", name)

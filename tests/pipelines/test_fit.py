@@ -65,8 +65,9 @@ KINDS = {"fit.json": "json", "new/fit.html": "page", "fit.toml": "recipe"}
 
 
 def test_the_ranking_is_printed(answer: Answer) -> None:
-    first, heading, *others = answer.printed.splitlines()
+    first, note, heading, *others = answer.printed.splitlines()
     assert first.startswith("tile: 108 values at 3 incidences, log")
+    assert note.startswith("  note  The light comes from one azimuth of the surface")
     assert heading.split() == ["model", "held", "out", "all", "numbers", "BIC", "albedo"]
     ranked = [
         re.match(r"  (lambert \+ beckmann_schlick|ward|lambert) +([\d.]+) +([\d.]+) +(\d+)", line)
@@ -178,6 +179,7 @@ def test_two_lengths_that_are_not_told_apart_are_named(tmp_path: Path, capsys: C
     ("options", "sentence"),
     [
         (["--model", "wrad"], "model: 'wrad' is unknown; closest: ward"),
+        (["--model", "nosuch"], "model: 'nosuch' is unknown; the models are lambert, "),
         (["--model", "ward +"], "model: 'ward +' is no model and no sum of models"),
         (["--model", "lambert", "--residual", "uncertainty"], "has no uncertainties; choose log, relative or cosine"),
         (["--channel", "green"], "channel: 'green' is not one of grey"),
