@@ -61,13 +61,13 @@ def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
 
 
 def remarks_on_samples(samples: Samples, residual: Residual) -> list[str]:
-    """Return sentences on lights that cannot tell anisotropy, and on uncertainties that the residual does not follow."""
+    """Return sentences on lights that cannot tell anisotropy, and on uncertainties that are not followed."""
     sentences = _on_uncertainties(samples, residual)
     if sees_anisotropy(samples):
         return sentences
     return [
-        "The light comes from one azimuth of the surface: whether the surface is anisotropic cannot be told, and models "
-        "with two widths are fitted with one.",
+        "The light comes from one azimuth of the surface: whether the surface is anisotropic cannot be told, and "
+        "models with two widths are fitted with one.",
         *sentences,
     ]
 
@@ -104,7 +104,8 @@ def _on_uncertainties(samples: Samples, residual: Residual) -> list[str]:
 
 def _of_aperture(fit: Fit, fitted: Fitted) -> list[str]:
     """Return sentences on what an aperture hides, or one that is not known."""
-    width, half_angle = min(fitted.surface.widths(fitted.point.x), default=math.inf), fitted.view.half_angle
+    width = float(np.min(fitted.surface.widths(fitted.point.x[np.newaxis]), initial=math.inf))
+    half_angle = fitted.view.half_angle
     sentences = []
     if fit.at_mirror:
         sentences.append(

@@ -16,15 +16,15 @@ from brdfdb.fitting.residuals import Residual
 from brdfdb.fitting.surface import NotDescribedError, Surface, fitted_by_default
 from brdfdb.fitting.uncertainty import NORMAL_95, _root
 from brdfdb.geometry import unit_vector
-from brdfdb.measurements import Samples
+from brdfdb.measurements import Instrument, Samples
 from brdfdb.measurements.aperture import View
 from brdfdb.models import MODELS
 
 NOISE = 0.03
 ROUNDING = 1e-9  # measured: 4e-13, of the polynomials of all models
 ONE_AZIMUTH = (
-    "The light comes from one azimuth of the surface: whether the surface is anisotropic cannot be told, and models with "
-    "two widths are fitted with one."
+    "The light comes from one azimuth of the surface: whether the surface is anisotropic cannot be told, and models "
+    "with two widths are fitted with one."
 )
 GRADIENT = 1e-4  # measured: 8e-6, of differences of the cost with a step of 1e-5
 
@@ -76,6 +76,36 @@ def test_polynomial_of_a_surface_is_the_model(name: str) -> None:
         expected += scale * term.spec.vectors(wi, wr, **given)
     found = surface.f_r(x, values, View(wi, wr))[:, 0]
     assert np.max(np.abs(found - expected)) <= ROUNDING * np.max(expected)
+
+
+@pytest.mark.parametrize("aperture_sr", [None, 0.01])
+@pytest.mark.parametrize("name", ["hapke", "lambert + 2 he_torrance", "ward", "ggx_compensated"])
+def test_points_that_are_evaluated_together_have_the_values_of_each(name: str, aperture_sr: float | None) -> None:
+    made = samples(noisy(truth("ward", **WARD)))
+    view = View(made.w_i, made.w_r, Instrument(receiver_solid_angle_sr=aperture_sr))
+    at = np.array([450.0] if name in ("hapke", "ggx_compensated") else [450.0, 650.0])
+    together, alone = (Surface(name, at, len(at), turned=True, entry="constant/1.5/0.1") for _ in range(2))
+    points = np.random.default_rng(5).uniform(0.1, 0.9, (6, len(alone.shape)))
+    expected = np.array([alone.basis(x, view) for x in points])
+    assert np.max(np.abs(together.bases(points, view) - expected)) <= ROUNDING * np.max(expected)
+    several = [alone.widths(x[np.newaxis])[0] for x in points]
+    assert together.widths(points) == pytest.approx(np.array(several))
+
+
+def test_the_neighbours_of_a_point_are_one_call_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = samples(noisy(truth("ward", **WARD)))
+    surface = Surface("hapke", None, 1, turned=False)
+    problem = Problem(surface, View(made.w_i, made.w_r), Residual(made, "log"))
+    point = problem.at(np.full(len(problem.free), 0.4))
+    spec, calls = surface.terms[0].spec, []
+
+    def counted(*directions: Array, **given: Array) -> Array:
+        calls.append(given)
+        return spec.vectors(*directions, **given)
+
+    monkeypatch.setattr(surface.terms[0], "spec", replace(spec, vectors=counted))
+    assert problem.shape_jacobian(point).shape == (6, len(made), 1)
+    assert len(calls) == 1
 
 
 def test_errors_are_as_large_as_the_standard_errors_say() -> None:
