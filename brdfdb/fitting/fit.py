@@ -36,6 +36,7 @@ _LISTED = 20  # outliers that are listed
 _SETTLED = 0.05  # relative change of the scale that ends the iterations
 _SCALES, _EVALUATIONS = 4, 60
 _LEAST_SCALE = 1e-9  # of noise-free samples
+INTERRUPTED = "the search was interrupted"  # why a model was not fitted
 _NEAR_MIRROR = float(radians(3.0))  # angle from the mirror direction within which apertures may catch a specular part
 _COUNTS = 0.01  # share of f_r that a specular part adds in an aperture of that half angle, so that it counts
 
@@ -147,6 +148,7 @@ def fits(
     refractive_index: str | None = None,
     profiles: bool = True,
     tick: Callable[[str], None] = lambda _: None,
+    keep_finished: bool = False,
 ) -> tuple[Fits, list[Fitted]]:
     """Fit several models to samples and rank them.
 
@@ -162,6 +164,8 @@ def fits(
         True to correct the intervals of the best fit by profiles where the covariance misleads.
     tick : callable
         A function that is called with the name of each model before it is fitted.
+    keep_finished : bool
+        True to end at Ctrl-C with the models that are finished, if there are any.
 
     Returns
     -------
@@ -177,13 +181,21 @@ def fits(
         that all fits are below a tenth of it at 95 % of the samples.
     """
     counting = Residual(samples, residual)
-    made, skipped, shared = _made(samples, models, residual, refractive_index, tick)
+    searches, skipped = _searches(samples, models, residual, refractive_index, tick, keep_finished)
+    interrupted = INTERRUPTED in skipped.values()
+    shared = _shared_outliers([fitted for fitted, _ in searches])
+    made = [(_document(fitted, errors, shared), fitted) for fitted, errors in searches]
     by_held_out = made[0][0].held_out is not None
     made.sort(key=lambda one: _rank(one[0]))
-    if profiles:
-        tick("intervals")
+    if profiles and not interrupted:
         first, fitted = made[0]
-        made[0] = first.model_copy(update={"estimates": estimates_of(fitted, profiles=True)}), fitted
+        try:
+            tick("intervals")
+            made[0] = first.model_copy(update={"estimates": estimates_of(fitted, profiles=True)}), fitted
+        except KeyboardInterrupt:
+            if not keep_finished:
+                raise
+            interrupted = True
     far, count = _outliers(made[0][1])
     indexed = any(fitted.surface.indexed for _, fitted in made)
     document = Fits(
@@ -211,39 +223,44 @@ def fits(
         outlier_count=count,
         shared_outlier_count=int(shared.sum()),
         skipped=skipped,
+        interrupted=interrupted,
     )
     return document, [fitted for _, fitted in made]
 
 
-def _made(
+def _searches(
     samples: Samples,
     models: Sequence[str] | None,
     residual: Kind,
     refractive_index: str | None,
     tick: Callable[[str], None],
-) -> tuple[list[tuple[Fit, Fitted]], dict[str, str], Mask]:
-    """Return the fits of all models that can describe the samples, why others are left out, and shared outliers."""
+    keep_finished: bool,
+) -> tuple[list[tuple[Fitted, Floats | None]], dict[str, str]]:
+    """Return the fits of all models that can describe the samples with their errors held out, and why others lack."""
     searches: list[tuple[Fitted, Floats | None]] = []
     skipped: dict[str, str] = {}
     tried = fitted_by_default() if models is None else models
-    for model in tried:
-        tick(model)
+    for number, model in enumerate(tried):
         try:
+            tick(model)
             fitted = fit(samples, model, residual=residual, refractive_index=refractive_index)
+            searches.append((fitted, predicted(fitted)))
         except NotDescribedError as error:
             if models is not None and len(models) == 1:
                 raise
             skipped[model] = error.sentence
-            continue
-        searches.append((fitted, predicted(fitted)))
+        except KeyboardInterrupt:
+            if not (keep_finished and searches):
+                raise
+            skipped |= dict.fromkeys(tried[number:], INTERRUPTED)
+            break
     if not searches:
         raise ParameterError("model", f"none can describe {samples.name}: {next(iter(skipped.values()))}")
     if models is None:
         slow = "its values are integrals, which take minutes; name it to fit it"
         skipped |= {name: slow for name in MODELS if name not in tried}
     _check_reach([fitted for fitted, _ in searches])
-    shared = _shared_outliers([fitted for fitted, _ in searches])
-    return [(_document(fitted, errors, shared), fitted) for fitted, errors in searches], skipped, shared
+    return searches, skipped
 
 
 def _check_reach(searches: Sequence[Fitted]) -> None:

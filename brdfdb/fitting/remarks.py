@@ -61,8 +61,10 @@ def remarks_of(fit: Fit, fitted: Fitted) -> list[str]:
 
 
 def remarks_on_samples(samples: Samples, residual: Residual) -> list[str]:
-    """Return sentences on lights that cannot tell anisotropy, and on uncertainties that are not followed."""
+    """Return sentences on lights that cannot tell anisotropy, uncertainties not followed, files that contradict."""
     sentences = _on_uncertainties(samples, residual)
+    if "contradiction" in samples.record:
+        sentences.append(str(samples.record["contradiction"]))
     if sees_anisotropy(samples):
         return sentences
     return [

@@ -129,12 +129,12 @@ class Term:
         widths = self.widths(points) if view.half_angle else None
         of_rows = np.full(len(rows), np.inf) if widths is None else np.repeat(widths, len(nodes))
         spread = np.array([view.points(width) for width in of_rows.tolist()])  # directions of the aperture
-        values = np.empty((len(rows), len(view)))
+        seen = np.empty((len(rows), len(view)))
         for count in np.unique(spread).tolist():
             same = np.flatnonzero(spread == count)
             for some in np.array_split(same, -(-same.size * count * len(view) // _VALUES)):
-                values[some] = self._seen(view, float(of_rows[some[0]]), [rows[row] for row in some.tolist()])
-        values = values.reshape(len(points), len(nodes), -1)
+                seen[some] = self._seen(view, float(of_rows[some[0]]), [rows[row] for row in some.tolist()])
+        values = seen.reshape(len(points), len(nodes), -1)
         return values if self.scaled else self.polynomial.parts(values)
 
     def _seen(self, view: View, width: float, points: Sequence[Numbers]) -> Floats:
