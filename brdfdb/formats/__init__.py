@@ -40,6 +40,7 @@ __all__ = [
 ]
 
 _TEXT = "text"
+_SHOWN = 200  # characters of names of columns that a refusal repeats
 _HEAD = 4096  # bytes of a file that tell its format
 
 
@@ -245,5 +246,9 @@ def _chosen(path: Path, file_format: str) -> Importer:
     for name, exporter in only_written.items():
         if path.name.endswith(exporter.suffix):
             raise FileFormatError(f"{path}: files of {name} are only written, not read")
-    hint = "" if b"\0" in head else "; a text is read with the names of its columns, such as theta_i=NAME"
-    raise FileFormatError(f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}{hint}")
+    known = f"{path}: no format recognises it; there are {', '.join(IMPORTERS)}"
+    columns = _MODULES[_TEXT].columns_of(head)
+    if columns:
+        shown = ", ".join(columns)[:_SHOWN]
+        known += f"; as a text it has the columns {shown}: name them, {_MODULES[_TEXT].HOW}"
+    raise FileFormatError(known)

@@ -186,7 +186,7 @@ def _wrong_row(names: tuple[str, ...], rows: Iterator[tuple[int, str]]) -> str:
         if len(fields) != len(names) and any(fields):
             return f"line {number} has {len(fields)} fields, and there are {len(names)} names"
         for field, name in zip(fields, names, strict=False):
-            if number_of(field or "empty", ",") is None and any(fields):
+            if number_of(field or "empty") is None and any(fields):
                 return f"line {number}, field {name}: {field[:40]!r} is not a number"
     return "it is no table of numbers"
 

@@ -47,6 +47,7 @@ _LONGEST_TITLE = 1000  # lines before the first row
 _ROLES = (*ANGLES, "values", "uncertainty", "wavelength")
 keywords = (*_ROLES, "quantity", "angles")
 _UNITS = ("auto", "deg", "rad")
+HOW = "theta_i=NAME and so on, at the command line --column theta_i=NAME"  # columns are named
 _SHOWN = 200  # characters of names that a sentence repeats
 _IN_PLANE = 1e-6  # sine of an angle to the plane of incidence that is rounding
 _UPRIGHT = np.radians(90.0 + 1e-6)
@@ -54,13 +55,23 @@ _UPRIGHT = np.radians(90.0 + 1e-6)
 
 def recognises(head: bytes) -> bool:
     """Return True for the first bytes of a text whose columns have names of angles and values."""
+    layout = _layout_of_head(head)
+    return layout is not None and not _missing(roles_of(layout.names))
+
+
+def columns_of(head: bytes) -> tuple[str, ...]:
+    """Return the names of the columns in the first bytes of a text, their numbers if they have none."""
+    layout = _layout_of_head(head)
+    return () if layout is None else layout.names
+
+
+def _layout_of_head(head: bytes) -> Layout | None:
+    """Return the layout of a text by its first bytes, without a line that they may cut; None of any other file."""
     if b"\0" in head and not head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return False
+        return None
     encoding = "utf-16" if head.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
     lines = head[: len(head) // 2 * 2].decode(encoding, "replace").splitlines(keepends=True)
-    whole = lines if len(head) < 4096 else lines[:-1]
-    layout = layout_of(enumerate(whole, 1))
-    return layout is not None and not _missing(roles_of(layout[0].names))
+    return layout_of(enumerate(lines if len(head) < 4096 else lines[:-1], 1))
 
 
 def read(
@@ -100,9 +111,9 @@ def read(
     for name, value, allowed in (("quantity", quantity, ("auto", *QUANTITIES)), ("angles", angles, _UNITS)):
         if value not in allowed:
             raise ParameterError(name, f"{value!r} is not one of {', '.join(allowed)}", value, allowed)
-    layout, first = _layout(path)
+    layout = _layout(path)
     roles = _roles(path, layout, columns)
-    rows = _rows(path, layout, first)
+    rows = _rows(path, layout)
     record: dict[str, Any] = {"titles": list(layout.titles)} if layout.titles else {}
     turned = _angles(path, rows, roles, layout, angles, record)
     names = [layout.names[column] for column in roles["values"]]
@@ -134,8 +145,8 @@ def read(
     )
 
 
-def _layout(path: Path) -> tuple[Layout, int]:
-    """Return the layout of a text, and the line of its first row."""
+def _layout(path: Path) -> Layout:
+    """Return the layout of a text; FileFormatError if it has no row, or its first row is damaged."""
     layout = layout_of(itertools.islice(lines_of(path), _LONGEST_TITLE))
     if layout is None:
         for number, line in itertools.islice(lines_of(path), _LONGEST_TITLE):
@@ -144,6 +155,8 @@ def _layout(path: Path) -> tuple[Layout, int]:
         raise FileFormatError(
             f"{path}: line 1: none of the first {_LONGEST_TITLE} lines is a row of four numbers or more"
         )
+    if layout.damaged:
+        raise FileFormatError(f"{path}: {layout.damaged}")
     return layout
 
 
@@ -165,7 +178,7 @@ def _roles(path: Path, layout: Layout, columns: Mapping[str, str | Sequence[str]
         known.pop("phi_r" if "delta_phi" in given else "delta_phi", None)
     roles = {role: numbers for role, numbers in (known | given).items() if numbers}
     if missing := _missing(roles):
-        raise FileFormatError(f"{path}: line {layout.line}: among the columns {shown} is none of {missing}; name it")
+        raise FileFormatError(f"{path}: line {layout.line}: among the columns {shown} is none of {missing}; name it: {HOW}")
     for role in (*ANGLES, "wavelength"):
         if len(roles.get(role, ())) > 1:
             names = [layout.names[column] for column in roles[role]]
@@ -181,20 +194,26 @@ def _missing(roles: Mapping[str, list[int]]) -> str:
     return ", ".join(missing)
 
 
-def _rows(path: Path, layout: Layout, first: int) -> Array:
+def _rows(path: Path, layout: Layout) -> Array:
     """Return the numbers of a text from its first row on, shape (N, columns)."""
     numbers, count = array("d"), len(layout.names)
+    decimals = ""  # the sign before decimals: a comma beside points may be that of thousands
     for line_number, line in lines_of(path):
-        if line_number < first or not line.strip() or line.lstrip().startswith(("#", "%")):
+        if line_number < layout.first or not line.strip() or line.lstrip().startswith(("#", "%")):
             continue
         fields = fields_of(line, layout.delimiter)
         fields = fields[:count] if len(fields) == count + 1 and not fields[-1] else fields
         if len(fields) != count:
             raise FileFormatError(f"{path}: line {line_number} has {len(fields)} fields, and the first row {count}")
         for field, name in zip(fields, layout.names, strict=True):
-            number = number_of(field, layout.delimiter)
+            number = number_of(field)
             if number is None or number in (np.inf, -np.inf):
                 raise FileFormatError(f"{path}: line {line_number}, field {name}: {field[:40]!r} is not a number")
+            sign = "," if "," in field else "." if "." in field else decimals
+            if decimals not in ("", sign):
+                where = f"line {line_number}, field {name}"
+                raise FileFormatError(f"{path}: {where}: {field[:40]!r} has {sign!r}, and numbers before it {decimals!r}")
+            decimals = sign
             numbers.append(number)
     return np.frombuffer(numbers, dtype=np.float64).reshape(-1, count)
 
