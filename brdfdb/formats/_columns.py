@@ -51,7 +51,7 @@ _UNCERTAINTY = (
 _WAVELENGTH = ("wavelength", "lambda", "wl", "wvl", "wave")
 _LENGTHS = {"nm": 1.0, "nanomet": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micro": 1e3, "m": 1e9}  # in nm
 _LENGTH = re.compile(r"(?:^|[\W_\d])(nm|um|µm|μm|m|(?:nano|micro)met(?:er|re)s?|microns?)(?=$|[\W_])", re.IGNORECASE)
-_AZIMUTHS = ("phi", "azimuth", "azi", "az", "azimuth_angle")  # of a viewer relative to the light, if there is no other
+AZIMUTHS = ("phi", "azimuth", "azi", "az", "azimuth_angle")  # of a viewer relative to the light, if there is no other
 _COLOURS = (("R", "G", "B"), ("r", "g", "b"), ("X", "Y", "Z"))  # x, y, z are positions
 _OF_FACTORS = re.compile(r"\b(?:BRF|HCRF|reflectance factors?)\b", re.IGNORECASE)
 _NUMBER_NM = re.compile(r"(?P<word>[a-z_]*?)[_@]?(?P<number>\d+(?:\.\d+)?)_?(?P<unit>nm|um|µm|μm)?$")
@@ -229,6 +229,8 @@ def _fault(line: _Line, delimiter: str | None, names: Sequence[str]) -> str:
 def role_of(name: str) -> str:
     """Return what a column is by its name: one of `ANGLES`, "values", "uncertainty", "wavelength"; "" if unknown."""
     plain = plain_name(name)
+    if plain in AZIMUTHS:  # "phi" is not "ph" and "i"
+        return ""
     if plain in _RELATIVE:
         return "delta_phi"
     if plain in _OTHERS:
@@ -262,7 +264,7 @@ def roles_of(names: Sequence[str]) -> dict[str, list[int]]:
     for colour in _COLOURS:
         if "values" not in roles and set(colour) <= set(bare):
             roles["values"] = [bare.index(channel) for channel in colour]
-    azimuths = [column for column, text in enumerate(plain) if text in _AZIMUTHS]
+    azimuths = [column for column, text in enumerate(plain) if text in AZIMUTHS]
     if len(azimuths) == 1 and not {"phi_i", "phi_r", "delta_phi"} & set(roles):
         roles["delta_phi"] = azimuths
     return {role: columns for role, columns in roles.items() if role and columns}

@@ -34,6 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wavelength-nm", type=float, metavar="NM", help="wavelength of samples of one channel that state none"
     )
     parser.add_argument(
+        "--azimuth",
+        choices=("light", "forward"),
+        default="light",
+        help="direction from which DATA counts azimuths: the light, or the one into which it travels (default: light)",
+    )
+    parser.add_argument(
         "--refractive-index",
         metavar="ENTRY",
         help="shelf/book/page of models with n and k (default: n and k are searched)",
@@ -68,6 +74,7 @@ def run(options: argparse.Namespace) -> int:
         residual=options.residual,
         channel=options.channel,
         wavelength_nm=options.wavelength_nm,
+        azimuth=options.azimuth,
         refractive_index=options.refractive_index,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
