@@ -45,6 +45,15 @@ def _turned(samples: Samples) -> Samples:
     return replace(samples, **changed, record={**samples.record, "azimuth": "forward"})
 
 
+def check_wavelength(wavelength_nm: float) -> None:
+    """Raise ParameterError if a wavelength [nm] that a user states is outside [10, 1e6] nm."""
+    low, high = _RANGE_NM
+    if not low <= wavelength_nm <= high:
+        raise ParameterError(
+            "wavelength_nm", f"{wavelength_nm:g} is outside [{low:g}, {high:g}] nm", wavelength_nm, _RANGE_NM
+        )
+
+
 def at_wavelength(reading: FileTable | Samples, wavelength_nm: float) -> FileTable | Samples:
     """Return f_r of a file that gives no wavelength, with the one [nm] that the user states.
 
@@ -53,11 +62,7 @@ def at_wavelength(reading: FileTable | Samples, wavelength_nm: float) -> FileTab
     ParameterError
         If the wavelength is outside [10, 1e6] nm, or the file states a wavelength or colours.
     """
-    low, high = _RANGE_NM
-    if not low <= wavelength_nm <= high:
-        raise ParameterError(
-            "wavelength_nm", f"{wavelength_nm:g} is outside [{low:g}, {high:g}] nm", wavelength_nm, _RANGE_NM
-        )
+    check_wavelength(wavelength_nm)
     from brdfdb.measurements.samples import Samples
 
     if isinstance(reading, Samples):

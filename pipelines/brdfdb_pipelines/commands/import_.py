@@ -81,11 +81,13 @@ def run(options: argparse.Namespace) -> int:
     """Read the files, print a statement on each, and make tables; return the exit code of the command."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # processes fill the cores: threads beside them wait
     from brdfdb.errors import ParameterError
+    from brdfdb.formats._stated import check_wavelength
     from brdfdb_pipelines import import_samples
     from brdfdb_pipelines.import_tables import TOLERANCE, Tables
 
     keys = {name: getattr(options, name) or "" for name in _KEYS}
     if options.wavelength_nm is not None:
+        check_wavelength(options.wavelength_nm)
         keys["wavelength_nm"] = options.wavelength_nm
     of_table = ("tolerance", "reciprocal", "conserving", "name", "title", "source")
     tables = None
