@@ -36,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--azimuth",
         choices=("light", "forward"),
-        default="light",
         help="direction from which DATA counts azimuths: the light, or the one into which it travels (default: light)",
     )
     parser.add_argument(
@@ -74,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
         residual=options.residual,
         channel=options.channel,
         wavelength_nm=options.wavelength_nm,
-        azimuth=options.azimuth,
+        azimuth=options.azimuth or "light",
         refractive_index=options.refractive_index,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
@@ -90,7 +89,7 @@ def _published(options: argparse.Namespace) -> int:
     from brdfdb.errors import ParameterError
     from brdfdb_pipelines import published_fits
 
-    for name in ("model", "wavelength_nm", "refractive_index", "receiver_deg", "source_deg", "page"):
+    for name in ("model", "wavelength_nm", "azimuth", "refractive_index", "receiver_deg", "source_deg", "page"):
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
             raise ParameterError(option, f"{options.data} holds the fits of others and no samples; leave it out")
