@@ -168,7 +168,8 @@ def statement(samples: Samples, progress: Callable[[float], None] | None = None)
     theta_i, theta_r = degrees(samples.theta_i), degrees(samples.theta_r)
     delta = degrees(samples.phi_r - samples.phi_i) % 360.0
     known = samples.known
-    one_side = not samples.turned and bool(np.all((delta < 180.01) | (delta > 359.99) | (theta_r == 0.0)))
+    in_plane = (np.abs(delta % 180.0 - 90.0) > 89.99) | (theta_r == 0.0)
+    one_side = not samples.turned and any(np.all(in_plane | side) for side in (delta < 180.0, delta > 180.0))
     zeros = samples.values == 0.0
     zeros = zeros if 0 < zeros.sum() < 0.5 * zeros.size else np.zeros_like(zeros)
     full = replace(samples, values=np.where(zeros, np.nan, samples.values)) if zeros.any() else samples

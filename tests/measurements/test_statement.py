@@ -49,11 +49,12 @@ def test_a_lambertian_surface_integrates_to_its_reflectance() -> None:
     assert not known.one_side
 
 
-def test_one_side_of_the_plane_of_incidence_is_mirrored() -> None:
+@pytest.mark.parametrize("first", [0.0, 180.0])
+def test_one_side_of_the_plane_of_incidence_is_mirrored(first: float) -> None:
     def ward(theta_i: Any, theta_r: Any, delta: Any) -> Any:
         return models.ward(theta_i, 0.0, theta_r, delta, rho_d=0.3, rho_s=0.2, alpha_x=0.4, alpha_y=0.4)
 
-    half = statement(samples(ward, turns=np.arange(0.0, 181.0, 15.0)))
+    half = statement(samples(ward, turns=first + np.arange(0.0, 181.0, 15.0)))
     full = statement(samples(ward))
     assert half.one_side
     for one, other in zip(half.incidences, full.incidences, strict=True):
