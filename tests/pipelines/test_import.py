@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from brdfdb import formats
+from brdfdb import formats, models
+from brdfdb_pipelines.import_summary import _percent
 from tests.pipelines.command import Captured, run
 
 
@@ -88,3 +89,27 @@ def test_one_file_is_written_at_a_time(tile: Path, tmp_path: Path, capsys: Captu
     assert "ward.fit: a file of published fits holds no samples; `brdfdb fit` lists them" in capsys.readouterr().err
     assert run("import", tmp_path / "missing.csv") == 2
     assert "missing.csv: No such file or directory" in capsys.readouterr().err
+
+
+def test_fits_take_azimuths_from_the_forward_direction(tmp_path: Path, capsys: Captured) -> None:
+    rows = ["sza,vza,raa,brdf"]
+    for light, viewer, turn in ((i, r, t) for i in (30, 60) for r in range(0, 81, 10) for t in range(0, 181, 30)):
+        angles = np.radians([light, 0.0, viewer, 180.0 - turn])
+        rows.append(f"{light},{viewer},{turn},{models.ward(*angles, rho_d=0.2, rho_s=0.1, alpha_x=0.2, alpha_y=0.2)}")
+    path = tmp_path / "forward.csv"
+    path.write_text("\n".join([*rows, ""]))
+    for options, found in ((["--azimuth", "forward"], True), ([], False)):
+        assert run("fit", path, "--model", "ward", *options, "--json", tmp_path / "fits.json") == 0
+        (fit,) = json.loads((tmp_path / "fits.json").read_text())["fits"]
+        assert (fit["rms_ln"] < 1e-3) == found
+    capsys.readouterr()
+    fits = tmp_path / "ward.fit"
+    fits.write_text("# published fits\nbrass = Ward(a = 0.1)\n")
+    assert run("fit", fits, "--azimuth", "forward") == 2
+    assert "--azimuth: " in capsys.readouterr().err
+
+
+def test_percentages_of_summaries_are_plain_numbers() -> None:
+    assert [_percent(value) for value in (None, 0.00123, 0.0999, 0.995, 2.5, 123.0)] == [
+        *("-", "0.12 %", "10 %", "100 %", "250 %", "12300 %")
+    ]
