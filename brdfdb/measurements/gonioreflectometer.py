@@ -373,7 +373,7 @@ def _smoothed(f_r: Array) -> Array:
     known = np.isfinite(f_r)
     weight = gaussian_filter(known.astype(np.float64), _SMOOTH)
     sums = gaussian_filter(np.where(known, f_r, 0.0), _SMOOTH)
-    return np.divide(sums, weight, where=known, out=np.full(f_r.shape, np.nan))
+    return np.asarray(np.divide(sums, weight, where=known, out=np.full(f_r.shape, np.nan)))
 
 
 def _rounded(f_r: Array, settings: Gonioreflectometer) -> Array:

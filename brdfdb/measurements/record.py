@@ -124,7 +124,7 @@ class Measured(BaseModel):
                 f"{held.p95:.2g}, 99 within {held.p99:.2g}, of f_r"
             )
         noise = "not stated" if self.noise is None else f"median {self.noise.median:.2g}, p95 {self.noise.p95:.2g}"
-        lines.append(f"noise of the samples: {noise}")
+        lines.append(f"noise of the {'samples' if self.samples else 'file'}: {noise}")
         for name, symmetry in (("reciprocity", self.reciprocity), ("mirror symmetry", self.mirror)):
             if symmetry is not None:
                 seen = symmetry.asymmetry
@@ -136,7 +136,8 @@ class Measured(BaseModel):
                 lines.append(f"{name} {'assumed' if symmetry.assumed else 'not assumed'}: {how}")
         if self.extrapolated is not None:
             lines.append(
-                f"{100.0 * self.extrapolated:.3g} % of the nodes lie outside of the samples: f_r there is extrapolated"
+                f"{100.0 * self.extrapolated:.3g} % of the nodes of the table lie outside of the "
+                f"{'samples' if self.samples else 'nodes of the file'}: f_r there is extrapolated"
             )
         if self.negative > 0.0:
             lines.append(f"{100.0 * self.negative:.3g} % of the values are below 0: f_r is 0 there")

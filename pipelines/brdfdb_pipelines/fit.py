@@ -34,6 +34,7 @@ def run(
     residual: Kind = "log",
     channel: str | None = None,
     wavelength_nm: float | None = None,
+    azimuth: str = "light",
     refractive_index: str | None = None,
     receiver_deg: float | None = None,
     source_deg: float | None = None,
@@ -57,6 +58,8 @@ def run(
         The one channel that is fitted.
     wavelength_nm : float [nm], optional
         Wavelength of samples of one channel that state none.
+    azimuth : str
+        As of `brdfdb.formats.read`.
     receiver_deg, source_deg : float [degree], optional
         Full angles of the cones of receiver and light, as the sample sees them, in place of what the file states.
     json, page, recipe : Path, optional
@@ -76,7 +79,7 @@ def run(
     BrdfdbError
         If a recipe is asked for and no fit is one model of the registry.
     """
-    samples = joined([_selected(formats.samples(file), channel, wavelength_nm) for file in data])
+    samples = joined([_selected(formats.samples(file, azimuth=azimuth), channel, wavelength_nm) for file in data])
     cones = {
         "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
         "source_solid_angle_sr": ("source-deg", source_deg),

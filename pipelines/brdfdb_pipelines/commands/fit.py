@@ -38,6 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wavelength-nm", type=float, metavar="NM", help="wavelength of samples of one channel that state none"
     )
     parser.add_argument(
+        "--azimuth",
+        choices=("light", "forward"),
+        help="direction from which DATA counts azimuths: the light, or the one into which it travels (default: light)",
+    )
+    parser.add_argument(
         "--refractive-index",
         metavar="ENTRY",
         help="shelf/book/page of models with n and k (default: n and k are searched)",
@@ -72,6 +77,7 @@ def run(options: argparse.Namespace) -> int:
         residual=options.residual,
         channel=options.channel,
         wavelength_nm=options.wavelength_nm,
+        azimuth=options.azimuth or "light",
         refractive_index=options.refractive_index,
         receiver_deg=options.receiver_deg,
         source_deg=options.source_deg,
@@ -93,7 +99,7 @@ def _published(options: argparse.Namespace) -> int:
     first, *others = options.data
     if others:
         raise ParameterError("DATA", f"{first} and {len(others)} more: published fits are listed one file at a time")
-    for name in ("model", "wavelength_nm", "refractive_index", "receiver_deg", "source_deg", "page"):
+    for name in ("model", "wavelength_nm", "azimuth", "refractive_index", "receiver_deg", "source_deg", "page"):
         if getattr(options, name):
             option = f"--{name.replace('_', '-')}"
             raise ParameterError(option, f"{first} holds the fits of others and no samples; leave it out")
