@@ -188,10 +188,9 @@ def fits(
     by_held_out = made[0][0].held_out is not None
     made.sort(key=lambda one: _rank(one[0]))
     if profiles and not interrupted:
-        first, fitted = made[0]
         try:
             tick("intervals")
-            made[0] = first.model_copy(update={"estimates": estimates_of(fitted, profiles=True)}), fitted
+            made[0] = _profiled(*made[0])
         except KeyboardInterrupt:
             if not keep_finished:
                 raise
@@ -210,12 +209,7 @@ def fits(
         refractive_index=refractive_index,
         source_solid_angle_sr=samples.instrument.source_solid_angle_sr,
         receiver_solid_angle_sr=samples.instrument.receiver_solid_angle_sr,
-        left_out=Left(
-            below_horizon=int(samples.record.get("below_the_horizon", 0)),
-            holes=counting.holes,
-            at_horizon=counting.at_horizon,
-            unusable=counting.left_out,
-        ),
+        left_out=_left_out(samples, counting),
         remarks=remarks_on_samples(samples, counting),
         ranked_by="held-out rms of ln" if by_held_out else "BIC",
         fits=[one for one, _ in made],
@@ -226,6 +220,21 @@ def fits(
         interrupted=interrupted,
     )
     return document, [fitted for _, fitted in made]
+
+
+def _left_out(samples: Samples, counting: Residual) -> Left:
+    """Return the numbers of values that no fit uses, by reason."""
+    return Left(
+        below_horizon=int(samples.record.get("below_the_horizon", 0)),
+        holes=counting.holes,
+        at_horizon=counting.at_horizon,
+        unusable=counting.left_out,
+    )
+
+
+def _profiled(record: Fit, fitted: Fitted) -> tuple[Fit, Fitted]:
+    """Return a fit with the intervals of profiles where the covariance misleads."""
+    return record.model_copy(update={"estimates": estimates_of(fitted, profiles=True)}), fitted
 
 
 def _searches(

@@ -80,14 +80,7 @@ def run(
         If a recipe is asked for and no fit is one model of the registry.
     """
     samples = joined([_selected(formats.samples(file, azimuth=azimuth), channel, wavelength_nm) for file in data])
-    cones = {
-        "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
-        "source_solid_angle_sr": ("source-deg", source_deg),
-    }
-    known: dict[str, Any] = {
-        name: _solid_angle(option, angle) for name, (option, angle) in cones.items() if angle is not None
-    }
-    samples = replace(samples, instrument=replace(samples.instrument, **known))
+    samples = _seen(samples, receiver_deg, source_deg)
     count = len(models or fitted_by_default()) + 1
     with terminal.progress(transient=True) as bar:
         task = bar.add_task("fit", total=count)
@@ -139,6 +132,18 @@ def _selected(samples: Samples, channel: str | None, wavelength_nm: float | None
     if not 0.0 < wavelength_nm < np.inf:
         raise ParameterError("wavelength_nm", f"{wavelength_nm:g} is not a positive number", wavelength_nm)
     return replace(samples, channels=(f"{wavelength_nm:g}nm",), wavelength_nm=np.array([wavelength_nm]))
+
+
+def _seen(samples: Samples, receiver_deg: float | None, source_deg: float | None) -> Samples:
+    """Return samples with the solid angles of the cones that are given."""
+    cones = {
+        "receiver_solid_angle_sr": ("receiver-deg", receiver_deg),
+        "source_solid_angle_sr": ("source-deg", source_deg),
+    }
+    known: dict[str, Any] = {
+        name: _solid_angle(option, angle) for name, (option, angle) in cones.items() if angle is not None
+    }
+    return replace(samples, instrument=replace(samples.instrument, **known))
 
 
 def _solid_angle(option: str, angle_deg: float) -> float:
