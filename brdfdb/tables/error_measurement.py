@@ -14,6 +14,7 @@ from brdfdb._elementary import COS_HORIZON
 from brdfdb.geometry import radians, unit_vector
 from brdfdb.integrals.sampling import mirrored_in_lobe, mixture_density
 from brdfdb.materials import FunctionRecord, Source
+from brdfdb.measurements import MeasuredSource
 from brdfdb.parameters import Floats
 from brdfdb.tables import places
 from brdfdb.tables._interpolation import weights_of_nodes
@@ -22,6 +23,7 @@ from brdfdb.tables.layout import PLAIN, Interpolation, Layout
 from brdfdb.tables.places import BANDS_DEG
 from brdfdb.tables.stated_error import Between, Error, Overall, Places
 from brdfdb.tables.table import Table, points
+from brdfdb.tables.table_source import TableSource
 from brdfdb.tables.worst_pair import worst_pair
 
 FLOOR = 1e-3  # share of the Lambertian BRDF with the albedo of the source
@@ -42,7 +44,7 @@ class Draw(NamedTuple):
     """Pairs of directions: unit vectors (N, 3), the band of theta_i of each, and what an integral weighs it with.
 
     `weight` is cos theta_r over the density with which the viewer was drawn; 0 below the horizon. `in_lobe` says which
-    viewers were drawn in the lobe.
+    viewers were drawn in the lobe, `measured` which pairs count: of measured data those that are not extrapolated.
     """
 
     wi: Floats
@@ -50,11 +52,12 @@ class Draw(NamedTuple):
     band: NDArray[np.int64]
     weight: Floats
     in_lobe: NDArray[np.bool_]
+    measured: NDArray[np.bool_]
 
     @property
     def above(self) -> NDArray[np.bool_]:
-        """Mask of the viewers above the horizon."""
-        return np.asarray(self.weight > 0.0)
+        """Mask of the pairs that count: the viewer is above the horizon, and f_r is not extrapolated."""
+        return np.asarray((self.weight > 0.0) & self.measured)
 
 
 def draw(
@@ -76,7 +79,8 @@ def draw(
     in_turn = None if wavelength_nm is None else wavelength_nm[np.arange(band.size) % wavelength_nm.size]
     lobe = None if source is None else source.lobe(wi[:, 2], in_turn)
     if lobe is None:
-        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), np.zeros(band.size, dtype=bool))
+        none = np.zeros(band.size, dtype=bool)
+        return Draw(wi, over, band, over[:, 2] * (2.0 * np.pi), none, _measured(source, wi, over))
     lobes = [
         lobe._replace(share=np.ones(1), alpha_x=width * lobe.alpha_x, alpha_y=width * lobe.alpha_y, visible=False)
         for width in WIDTHS
@@ -87,7 +91,20 @@ def draw(
         chosen = (which >= number) & (which < number + 1)
         wr = np.where(chosen[:, np.newaxis], mirrored_in_lobe(u, angle, wi, drawn), wr)
     density = 0.5 / (2.0 * np.pi) + 0.5 * np.mean([mixture_density(drawn, wi, wr) for drawn in lobes], axis=0)
-    return Draw(wi, wr, band, np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density, which < len(lobes))
+    weight = np.where(wr[:, 2] > 0.0, wr[:, 2], 0.0) / density
+    return Draw(wi, wr, band, weight, which < len(lobes), _measured(source, wi, wr))
+
+
+def _measured(source: Source | FunctionRecord | None, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
+    """Return which pairs of unit vectors (N, 3) count: all, or of measured data those that are not extrapolated.
+
+    If none of so many pairs was measured, such as of anisotropic data in a single plane, all count.
+    """
+    known = source.measured if isinstance(source, MeasuredSource | TableSource) else None
+    if known is None or known.extent is None:
+        return np.ones(len(wi), dtype=bool)
+    inside = ~known.extent.outside(wi, wr)
+    return inside if np.any(inside & (wr[:, 2] > 0.0)) else np.ones(len(wi), dtype=bool)
 
 
 def model_values(source: Source, wavelength_nm: NDArray[np.float64] | None, wi: Floats, wr: Floats) -> Floats:
@@ -161,6 +178,7 @@ def measure(
     truth = model_values(layout.source, layout.wavelength_nm, wi, wr)
     values = _looked_up(layout, read, wi, wr, layout.wavelength_nm)
     own = len(drawn.wi)
+    inside = _measured(layout.source, pairs.wi, pairs.wr)
     error = compare(values[:own], truth[:own], drawn, seed)
     floor = np.array(error.floor)  # as it is stated, to three digits
     above = drawn.above
@@ -177,7 +195,7 @@ def measure(
     measured = error.model_copy(
         update={
             "worst": worst,
-            "places": _in_places(relative(truth[own:], values[own:], floor), pairs),
+            "places": _in_places(relative(truth[own:], values[own:], floor), pairs, inside),
             "between": None if floor.size < 2 else _between(layout, read, drawn, pairs, floor, count),
         }
     )
@@ -194,10 +212,10 @@ def _between(
 ) -> Between:
     """Measure the error between wavelengths, at some of the directions that it was measured at on them."""
     assert layout.wavelength_nm is not None
-    few = _first(drawn.band, min(count, _SEARCHED_AT)) & drawn.above
+    few = _some(drawn, min(count, _SEARCHED_AT))
     how = layout.interpolation if layout.part_nm is None else PLAIN  # a mixture interpolates f_r itself
     at = worst_wavelengths(layout.source, layout.wavelength_nm, how, drawn.wi[few], drawn.wr[few], floor)
-    some = _first(drawn.band, math.ceil(count * _BETWEEN)) & drawn.above
+    some = _some(drawn, math.ceil(count * _BETWEEN))
     fewer = pairs.some(_first(pairs.sample, math.ceil(count * _BETWEEN_IN_PLACES)))
     wi, wr = np.concatenate([drawn.wi[some], fewer.wi]), np.concatenate([drawn.wr[some], fewer.wr])
     values, truth = _looked_up(layout, read, wi, wr, at), model_values(layout.source, at, wi, wr)
@@ -206,7 +224,7 @@ def _between(
     return Between(
         wavelength_nm=at.tolist(),
         bands=limits_of_bands(error[:own], drawn.band[some]),
-        places=_in_places(error[own:], fewer),
+        places=_in_places(error[own:], fewer, _measured(layout.source, fewer.wi, fewer.wr)),
     )
 
 
@@ -239,18 +257,27 @@ def limits_of_bands(error: Floats, band: NDArray[np.int64]) -> list[list[float]]
     return [_not_less(_limit(error[band == row])) for row in range(places.BANDS)]
 
 
+def _some(drawn: Draw, count: int) -> NDArray[np.bool_]:
+    """Return which pairs count, of the first `count` of each band; all that do where none of these does."""
+    first = _first(drawn.band, count) & drawn.above
+    return first if first.any() else drawn.above
+
+
 def _first(sample: NDArray[np.int64], count: int) -> NDArray[np.bool_]:
     """Return which members of samples are among the first `count` of theirs; those of a sample stand together."""
     return np.asarray(np.arange(sample.size) - np.searchsorted(sample, sample) < count)
 
 
-def _in_places(error: Floats, pairs: places.Pairs) -> Places:
-    """Return limits of errors (N, columns) at pairs drawn in places: the largest of the samples of each place."""
+def _in_places(error: Floats, pairs: places.Pairs, inside: NDArray[np.bool_]) -> Places:
+    """Return limits of errors (N, columns) at pairs drawn in places: the largest of the samples of each place.
+
+    `inside` says which pairs count. The limit of a place without any is 0.
+    """
     rows: dict[int, Floats] = {}
     for sample in range(pairs.sample[-1] + 1):
         members = pairs.sample == sample
         row = int(pairs.row[members][0])
-        rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[members]))
+        rows[row] = np.maximum(rows.get(row, 0.0), _limit(error[members & inside]))
 
     limits = {row: _not_less(limit) for row, limit in rows.items()}
     return Places(
@@ -284,16 +311,17 @@ def rank_of_limit(count: int, within: float, confidence: float) -> int:
 
 
 def compare(values: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Error:
-    """Return the error of values of f_r, shape (N, L), against the truth at the directions of a draw."""
+    """Return the error of values of f_r, shape (N, L), against the truth at the directions of a draw that count.
+
+    A band of theta_i without any, in which nothing was measured, repeats the error of all bands.
+    """
     floor = floor_of(truth, drawn)
     count = BANDS_DEG.size - 1
-    # rows of weights: each band of theta_i, then all of them
-    weights = np.concatenate(
-        [np.where(drawn.band == np.arange(count)[:, np.newaxis], drawn.weight, 0.0), [drawn.weight]]
-    )
-    l1 = mean_error(values, truth, weights)
+    above = drawn.above
+    bands_of = [above & (drawn.band == band) for band in range(count)]
+    chosen = [rows if rows.any() else above for rows in bands_of] + [above]  # each band of theta_i, then all of them
+    l1 = mean_error(values, truth, np.where(chosen, drawn.weight, 0.0))
     error = np.ascontiguousarray(relative(values, truth, floor).T)
-    chosen = [drawn.above & (drawn.band == band) for band in range(count)] + [drawn.above]
     percentiles = [np.percentile(error[:, rows], [50.0, 95.0, 99.0, 100.0], axis=1) for rows in chosen]
     # [statistic][band][wavelength]
     bands = np.stack([l1[:-1], *np.moveaxis(np.stack(percentiles[:-1]), 1, 0)])
@@ -302,7 +330,7 @@ def compare(values: Floats, truth: Floats, drawn: Draw, seed: int = SEED) -> Err
     return Error.model_validate(
         {
             "theta_i_deg": BANDS_DEG.tolist(),
-            "directions": int(np.count_nonzero(drawn.above)),
+            "directions": int(np.count_nonzero(above)),
             "seed": seed,
             "floor": _short(floor),
             "overall": dict(zip(names, _short(worst), strict=True)),

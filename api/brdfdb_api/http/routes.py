@@ -187,7 +187,7 @@ def material(request: Request, name: str, revision: str | None = None) -> Respon
         "axes_deg": {axis: np.ascontiguousarray(values) for axis, values in table.axes_deg.items()},
         "specular": table.specular is not None,
         "error": None if table.error is None else table.attrs["error"],
-        "measured": None if metadata.measured is None else metadata.measured.model_dump(exclude={"hull"}),
+        "measured": None if metadata.measured is None else metadata.measured.model_dump(exclude={"extent"}),
         "formula_error": table.attrs.get("formula_error"),
         "largest_albedo": table.attrs.get("largest_albedo"),
         "incomplete": metadata.gaps or None,

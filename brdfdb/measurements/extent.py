@@ -1,0 +1,195 @@
+"""The extent of measured directions: pairs of directions next to samples, or between samples that are close together."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import zlib
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from brdfdb.errors import ParameterError
+from brdfdb.geometry import degrees, radians
+from brdfdb.measurements.coordinates import places
+from brdfdb.measurements.samples import Samples
+from brdfdb.parameters import Floats
+
+_CELL_DEG, _TURNED_CELL_DEG = 2.5, 7.5  # cells of three coordinates, and of four, which are many more
+_REGULAR = 8  # samples of a light, and more, make a scan
+_THINNED = 400  # samples that the typical ball is measured with
+_LEAST = 1.5  # radius of a ball in cells, at least: smaller ones slip through the cells
+_FLAT = 1e-6  # spread along an axis, relative to the largest, that counts as none
+_ROUNDING = 1e-6  # of distances, in radii
+_SEED = 1983
+
+Cells = NDArray[np.bool_]
+
+
+class Extent(BaseModel):
+    """The pairs of directions that samples tell f_r of, in cells of some degrees.
+
+    A pair is extrapolated if it lies in a ball without samples. The ball is about as large as those that fit between
+    neighbouring samples of the same data, so that what lies between neighbours is measured, and holes, wide gaps and
+    everything beyond the last samples are extrapolated. With balls of any size this is the convex hull.
+
+    Notes
+    -----
+    Balls are those of coordinates in which lobes stay in place: the direction of the light, and that of the viewer less
+    the mirror direction, each as theta (cos phi, sin phi). An isotropic surface has theta_i alone, which continues
+    beyond the normal. Scans have many viewers for each light. Holes among the viewers are looked for at each light, with
+    balls twice as wide as those that typically fit between viewers. Then balls reach from a light to the
+    next. A gap between lights is thus extrapolated if it is about twice as wide as usual, which is as wide as
+    the gaps at which lights are held out. Samples without such a pattern have balls of one size for light and viewer.
+    Samples in one plane have cells in this plane.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    turned: bool = Field(description="true: the azimuth of the light counts, which makes four coordinates of three")
+    cell_deg: float = Field(ge=1.0, le=45.0, description="width of a cell in theta (cos phi, sin phi)")
+    cells: str = Field(
+        description="base64 of the zlib-compressed bits of the cells, 1 where f_r was measured, with theta n cells at "
+        "most: theta_i 0 to n, theta_r cos(delta_phi) -n to n, theta_r abs(sin(delta_phi)) 0 to n; turned: "
+        "theta (cos phi, sin phi) of light and viewer, each -n to n; the last varies fastest"
+    )
+
+    @classmethod
+    def of(cls, samples: Samples, *, turned: bool) -> Extent:
+        """Return the extent of the samples of which a value is known; `turned` if the azimuth of the light counts."""
+        some = samples.known.any(axis=1)
+        cell = radians(_TURNED_CELL_DEG if turned else _CELL_DEG)
+        x = places(samples.w_i[some], samples.w_r[some], turned=turned)
+        lights = 2 if turned else 1
+        light, sheared = x[:, :lights], _sheared(x, lights)
+        incidence = np.unique(samples.incidence[some], return_inverse=True)[1].reshape(-1)
+        scans = np.median(np.bincount(incidence)) >= _REGULAR
+        if scans:
+            of_light = _typical(light)
+            each = [_typical(sheared[incidence == one, lights:]) for one in np.unique(incidence)]
+            radii = np.repeat([2.0 ** (1.0 / lights) * of_light, 2.0 * float(np.median(each))], [lights, 2])
+        else:
+            radii = np.full(lights + 2, 4.0 ** (1.0 / (lights + 2)) * _typical(sheared))
+        radii = np.maximum(radii / cell, _LEAST)
+        at = np.unique(np.rint(x / cell).astype(np.int64), axis=0)
+        at = _sheared(at if turned else _symmetric(at), lights)
+        if scans:
+            ends = np.unique(at[:, :lights], axis=0)
+            at = np.concatenate([_filled_scan(at, end, radii) for end in ends])
+        at = _filled(at, radii)
+        at[:, lights:] -= _mirror_of(at, lights)
+        count = round(90.0 / degrees(cell))
+        shape = _shape(count, turned=turned)
+        low = np.array([0, -count, 0]) if not turned else np.full(4, -count)
+        at = at[np.all((at >= low) & (at - low < shape), axis=1)] - low
+        cells = np.zeros(shape, dtype=bool)
+        cells[tuple(at.T)] = True
+        packed = base64.b64encode(zlib.compress(np.packbits(cells).tobytes(), 9)).decode()
+        return cls(turned=turned, cell_deg=float(degrees(cell)), cells=packed)
+
+    @functools.cached_property
+    def measured(self) -> Cells:
+        """The cells, with three or four axes as `cells` has them.
+
+        Raises
+        ------
+        ParameterError
+            If they are damaged.
+        """
+        shape = _shape(round(90.0 / self.cell_deg), turned=self.turned)
+        size = (int(np.prod(shape)) + 7) // 8
+        try:
+            packed = zlib.decompressobj().decompress(base64.b64decode(self.cells, validate=True), size + 1)
+        except (ValueError, zlib.error):
+            packed = b""
+        if len(packed) != size:
+            raise ParameterError("extent", f"the cells are damaged: {len(packed)} bytes are not {size}", len(packed))
+        bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=int(np.prod(shape)))
+        return bits.astype(bool).reshape(shape)
+
+    def outside(self, wi: Floats, wr: Floats) -> NDArray[np.bool_]:
+        """Return which pairs of unit vectors (N, 3) are extrapolated."""
+        count = round(90.0 / self.cell_deg)
+        at = np.rint(places(wi, wr, turned=self.turned) / radians(self.cell_deg)).astype(np.int64)
+        at = at + count if self.turned else np.abs(at + np.array([0, count, 0]))
+        at = np.clip(at, 0, np.array(self.measured.shape) - 1)
+        return ~self.measured[tuple(at.T)]
+
+
+def _shape(count: int, *, turned: bool) -> tuple[int, ...]:
+    both = 2 * count + 1
+    return (both,) * 4 if turned else (count + 1, both, count + 1)
+
+
+def _mirror_of(x: NDArray[np.generic], lights: int) -> NDArray[np.generic]:
+    """Return what is added to the viewer (N, 2), so that 0 is the mirror direction."""
+    return x[:, :2] if lights == 2 else np.stack([x[:, 0], 0 * x[:, 0]], axis=1)
+
+
+def _sheared(x, lights):
+    return np.concatenate([x[:, :lights], x[:, lights:] + _mirror_of(x, lights)], axis=1)
+
+
+def _symmetric(at: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return isotropic places with their mirror images, and both with the surface turned by 180 degrees."""
+    both = np.concatenate([at, at * [1, 1, -1]])
+    return np.unique(np.concatenate([both, -both]), axis=0)
+
+
+def _typical(x: Floats) -> float:
+    """Return the radius of the balls that typically fit between points (N, D): the median over the volume.
+
+    Balls are those through the corners of the simplices of Delaunay's triangulation. Points in a plane or on
+    a line have balls there. 0 for fewer than two points.
+    """
+    from scipy.spatial import Delaunay
+
+    x = np.unique(np.round(x, 4), axis=0)
+    whole = len(x)
+    x = x[np.random.default_rng(_SEED).permutation(whole)[:_THINNED]]
+    x = x - x.mean(axis=0)
+    if len(x) < 2:
+        return 0.0
+    _, spread, axes = np.linalg.svd(x, full_matrices=False)
+    wide = spread > _FLAT * max(spread[0], 1e-12)
+    x = x @ axes[wide].T
+    sizes = x.shape[1]
+    if sizes == 0:
+        return 0.0
+    thinner = (len(x) / whole) ** (1.0 / sizes)
+    if sizes == 1:
+        gaps = np.diff(np.unique(np.round(x[:, 0], 6)))
+        return 0.5 * thinner * float(np.median(gaps))
+    corners = x[Delaunay(x).simplices]
+    edges = corners[:, 1:] - corners[:, :1]
+    volume = np.abs(np.linalg.det(edges))
+    good = volume > _FLAT * volume.max()
+    edges, volume = edges[good], volume[good]
+    centre = np.linalg.solve(edges, 0.5 * np.sum(edges**2, axis=2)[..., np.newaxis])[..., 0]
+    radius = np.linalg.norm(centre, axis=1)
+    order = np.argsort(radius)
+    part = np.cumsum(volume[order])
+    return thinner * float(radius[order][np.searchsorted(part, 0.5 * part[-1])])
+
+
+def _filled_scan(at: NDArray[np.int64], end: NDArray[np.int64], radii: Floats) -> NDArray[np.int64]:
+    """Return the cells of the viewers of one light, filled."""
+    own = np.all(at[:, : end.size] == end, axis=1)
+    viewers = _filled(at[own, end.size :], radii[end.size :])
+    return np.concatenate([np.broadcast_to(end, (len(viewers), end.size)), viewers], axis=1)
+
+
+def _filled(at: NDArray[np.int64], radii: Floats) -> NDArray[np.int64]:
+    """Return the cells (M, D) that are in no ball without cells `at` (N, D); `radii` (D,) are those of balls, in cells."""
+    from scipy.ndimage import distance_transform_edt
+
+    low, high = at.min(axis=0), at.max(axis=0)
+    room = np.where(high > low, np.ceil(radii).astype(np.int64) + 1, 0)  # balls stay in the plane of flat cells
+    empty = np.ones(high - low + 1 + 2 * room, dtype=bool)
+    empty[tuple((at - low + room).T)] = False
+    centres = distance_transform_edt(empty, sampling=1.0 / radii) >= 1.0 - _ROUNDING
+    if not centres.any():
+        return np.argwhere(np.ones_like(empty)) + low - room
+    filled = distance_transform_edt(~centres, sampling=1.0 / radii) >= 1.0 - 2.0 * _ROUNDING
+    return np.argwhere(filled) + low - room
