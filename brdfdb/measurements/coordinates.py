@@ -59,7 +59,7 @@ def beyond(wi: Floats, wr: Floats, of_wi: Floats, of_wr: Floats, *, turned: bool
         low, high = inside.min(initial=0.0), inside.max(initial=0.0)
         planes = np.array([[1.0, -high], [-1.0, low]])[:, 1 - inside.shape[1] :]
     at = places(wi, wr, turned=turned) - centre
-    outside = np.any(np.abs(at @ across.T) > _WITHIN, axis=1)
+    outside: NDArray[np.bool_] = np.any(np.abs(at @ across.T) > _WITHIN, axis=1)
     at = at @ along.T
     for plane in planes:  # one at a time: there may be many
         outside |= at @ plane[:-1] + plane[-1] > _WITHIN

@@ -1,23 +1,25 @@
-"""The extent of measured directions: pairs of directions next to samples, or between samples that are close together."""
+"""The extent of measured directions: pairs of directions at samples, or between samples that are close together."""
 
 from __future__ import annotations
 
 import base64
 import functools
 import zlib
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.errors import ParameterError
-from brdfdb.geometry import degrees, radians
+from brdfdb.geometry import HALF_PI, degrees, radians
 from brdfdb.measurements.coordinates import places
 from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
 
 _CELL_DEG, _TURNED_CELL_DEG = 2.5, 7.5  # cells of three coordinates, and of four, which are many more
 _REGULAR = 8  # samples of a light, and more, make a scan
+_LIGHTS, _VIEWERS, _SCATTERED = 2.0, 4.0, 4.0  # volume of a ball, in those that typically fit between samples
 _THINNED = 400  # samples that the typical ball is measured with
 _LEAST = 1.5  # radius of a ball in cells, at least: smaller ones slip through the cells
 _FLAT = 1e-6  # spread along an axis, relative to the largest, that counts as none
@@ -25,6 +27,7 @@ _ROUNDING = 1e-6  # of distances, in radii
 _SEED = 1983
 
 Cells = NDArray[np.bool_]
+_Number = TypeVar("_Number", np.float64, np.int64)
 
 
 class Extent(BaseModel):
@@ -36,13 +39,17 @@ class Extent(BaseModel):
 
     Notes
     -----
-    Balls are those of coordinates in which lobes stay in place: the direction of the light, and that of the viewer less
-    the mirror direction, each as theta (cos phi, sin phi). An isotropic surface has theta_i alone, which continues
-    beyond the normal. Scans have many viewers for each light. Holes among the viewers are looked for at each light, with
-    balls twice as wide as those that typically fit between viewers. Then balls reach from a light to the
-    next. A gap between lights is thus extrapolated if it is about twice as wide as usual, which is as wide as
-    the gaps at which lights are held out. Samples without such a pattern have balls of one size for light and viewer.
-    Samples in one plane have cells in this plane.
+    Balls are those of coordinates in which lobes stay in place: the direction of the light, and that of the viewer
+    less the mirror direction, each as theta (cos phi, sin phi). An isotropic surface has theta_i alone, which continues
+    beyond the normal, and mirror images. Balls stay in the plane of flat data, such as samples in the plane of
+    incidence, of which half a cell beside the plane is measured, too.
+
+    Scans have many viewers for each light. Holes among the viewers are looked for at each light, with balls twice as
+    wide as those that typically fit between viewers. Then balls reach from a light to the next: a gap between lights
+    is extrapolated if it is about twice as wide as usual, as are the gaps at lights that are held out. Samples
+    without such a pattern have balls of one size for light and viewer, with four times the typical volume.
+
+    The region is the alpha hull of Edelsbrunner, Kirkpatrick and Seidel (1983), of balls that are ellipsoids.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -59,8 +66,8 @@ class Extent(BaseModel):
     def of(cls, samples: Samples, *, turned: bool) -> Extent:
         """Return the extent of the samples of which a value is known; `turned` if the azimuth of the light counts."""
         some = samples.known.any(axis=1)
-        cell = radians(_TURNED_CELL_DEG if turned else _CELL_DEG)
-        x = places(samples.w_i[some], samples.w_r[some], turned=turned)
+        cell = float(radians(_TURNED_CELL_DEG if turned else _CELL_DEG))
+        x = np.asarray(places(samples.w_i[some], samples.w_r[some], turned=turned), dtype=np.float64)
         lights = 2 if turned else 1
         light, sheared = x[:, :lights], _sheared(x, lights)
         incidence = np.unique(samples.incidence[some], return_inverse=True)[1].reshape(-1)
@@ -68,9 +75,11 @@ class Extent(BaseModel):
         if scans:
             of_light = _typical(light)
             each = [_typical(sheared[incidence == one, lights:]) for one in np.unique(incidence)]
-            radii = np.repeat([2.0 ** (1.0 / lights) * of_light, 2.0 * float(np.median(each))], [lights, 2])
+            radii = np.array(
+                [_LIGHTS ** (1.0 / lights) * of_light] * lights + [_VIEWERS**0.5 * float(np.median(each))] * 2
+            )
         else:
-            radii = np.full(lights + 2, 4.0 ** (1.0 / (lights + 2)) * _typical(sheared))
+            radii = np.full(lights + 2, _SCATTERED ** (1.0 / (lights + 2)) * _typical(sheared))
         radii = np.maximum(radii / cell, _LEAST)
         at = np.unique(np.rint(x / cell).astype(np.int64), axis=0)
         at = _sheared(at if turned else _symmetric(at), lights)
@@ -78,11 +87,11 @@ class Extent(BaseModel):
             ends = np.unique(at[:, :lights], axis=0)
             at = np.concatenate([_filled_scan(at, end, radii) for end in ends])
         at = _filled(at, radii)
-        at[:, lights:] -= _mirror_of(at, lights)
-        count = round(90.0 / degrees(cell))
+        at = _sheared(at, lights, -1)
+        count = round(HALF_PI / cell)
         shape = _shape(count, turned=turned)
-        low = np.array([0, -count, 0]) if not turned else np.full(4, -count)
-        at = at[np.all((at >= low) & (at - low < shape), axis=1)] - low
+        at = at + _origin(count, turned=turned)
+        at = at[np.all((at >= 0) & (at < shape), axis=1)]
         cells = np.zeros(shape, dtype=bool)
         cells[tuple(at.T)] = True
         packed = base64.b64encode(zlib.compress(np.packbits(cells).tobytes(), 9)).decode()
@@ -112,9 +121,9 @@ class Extent(BaseModel):
         """Return which pairs of unit vectors (N, 3) are extrapolated."""
         count = round(90.0 / self.cell_deg)
         at = np.rint(places(wi, wr, turned=self.turned) / radians(self.cell_deg)).astype(np.int64)
-        at = at + count if self.turned else np.abs(at + np.array([0, count, 0]))
-        at = np.clip(at, 0, np.array(self.measured.shape) - 1)
-        return ~self.measured[tuple(at.T)]
+        at = at if self.turned else np.stack([at[:, 0], at[:, 1], np.abs(at[:, 2])], axis=1)
+        at = np.clip(at + _origin(count, turned=self.turned), 0, np.array(self.measured.shape) - 1)
+        return np.asarray(~self.measured[tuple(at.T)])
 
 
 def _shape(count: int, *, turned: bool) -> tuple[int, ...]:
@@ -122,13 +131,16 @@ def _shape(count: int, *, turned: bool) -> tuple[int, ...]:
     return (both,) * 4 if turned else (count + 1, both, count + 1)
 
 
-def _mirror_of(x: NDArray[np.generic], lights: int) -> NDArray[np.generic]:
-    """Return what is added to the viewer (N, 2), so that 0 is the mirror direction."""
-    return x[:, :2] if lights == 2 else np.stack([x[:, 0], 0 * x[:, 0]], axis=1)
+def _origin(count: int, *, turned: bool) -> NDArray[np.int64]:
+    """Return the index of the cell of light and viewer at the normal."""
+    return np.full(4, count) if turned else np.array([0, count, 0])
 
 
-def _sheared(x, lights):
-    return np.concatenate([x[:, :lights], x[:, lights:] + _mirror_of(x, lights)], axis=1)
+def _sheared(x: NDArray[_Number], lights: int, sign: int = 1) -> NDArray[_Number]:
+    """Return places (N, D) with the viewer relative to the mirror direction; with sign -1 the other way."""
+    moved = x.copy()
+    moved[:, lights : 2 * lights] += sign * x[:, :lights]
+    return moved
 
 
 def _symmetric(at: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -160,7 +172,7 @@ def _typical(x: Floats) -> float:
     thinner = (len(x) / whole) ** (1.0 / sizes)
     if sizes == 1:
         gaps = np.diff(np.unique(np.round(x[:, 0], 6)))
-        return 0.5 * thinner * float(np.median(gaps))
+        return float(0.5 * thinner * np.median(gaps))
     corners = x[Delaunay(x).simplices]
     edges = corners[:, 1:] - corners[:, :1]
     volume = np.abs(np.linalg.det(edges))
@@ -170,7 +182,7 @@ def _typical(x: Floats) -> float:
     radius = np.linalg.norm(centre, axis=1)
     order = np.argsort(radius)
     part = np.cumsum(volume[order])
-    return thinner * float(radius[order][np.searchsorted(part, 0.5 * part[-1])])
+    return float(thinner * radius[order][np.searchsorted(part, 0.5 * part[-1])])
 
 
 def _filled_scan(at: NDArray[np.int64], end: NDArray[np.int64], radii: Floats) -> NDArray[np.int64]:
@@ -181,7 +193,10 @@ def _filled_scan(at: NDArray[np.int64], end: NDArray[np.int64], radii: Floats) -
 
 
 def _filled(at: NDArray[np.int64], radii: Floats) -> NDArray[np.int64]:
-    """Return the cells (M, D) that are in no ball without cells `at` (N, D); `radii` (D,) are those of balls, in cells."""
+    """Return the cells (M, D) that are in no ball without cells `at` (N, D).
+
+    `radii` (D,) are the half axes of the balls, in cells.
+    """
     from scipy.ndimage import distance_transform_edt
 
     low, high = at.min(axis=0), at.max(axis=0)
@@ -190,6 +205,6 @@ def _filled(at: NDArray[np.int64], radii: Floats) -> NDArray[np.int64]:
     empty[tuple((at - low + room).T)] = False
     centres = distance_transform_edt(empty, sampling=1.0 / radii) >= 1.0 - _ROUNDING
     if not centres.any():
-        return np.argwhere(np.ones_like(empty)) + low - room
+        return np.asarray(np.argwhere(np.ones_like(empty)) + low - room)
     filled = distance_transform_edt(~centres, sampling=1.0 / radii) >= 1.0 - 2.0 * _ROUNDING
-    return np.argwhere(filled) + low - room
+    return np.asarray(np.argwhere(filled) + low - room)
