@@ -49,7 +49,11 @@ class Extent(BaseModel):
     is extrapolated if it is about twice as wide as usual, as are the gaps at lights that are held out. Samples
     without such a pattern have balls of one size for light and viewer, with four times the typical volume.
 
-    The region is the alpha hull of Edelsbrunner, Kirkpatrick and Seidel (1983), of balls that are ellipsoids.
+    The region is an alpha hull, with ellipsoids for balls.
+
+    References
+    ----------
+    edelsbrunner1983
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
