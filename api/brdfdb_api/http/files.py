@@ -6,6 +6,7 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from fastapi import APIRouter
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 
@@ -13,29 +14,27 @@ from brdfdb.errors import StoreError
 from brdfdb.store.files import sha256_of
 from brdfdb.store.manifest import check_manifest
 from brdfdb.store.paths import manifest_path
-from brdfdb_api.http.addresses import Revision, addresses, answers, both, shelf_of
 from brdfdb_api.http.errors import RequestError
+from brdfdb_api.http.openapi_notes import answers
 from brdfdb_api.http.responses import cache_headers, not_modified
+from brdfdb_api.http.routes import both, query_names, shelf_of
 
 ZIP = "application/zip"
 BYTES = "application/octet-stream"
 
 _PIECE = 1 << 20
 
-files = addresses()
+files = APIRouter()
 
 
 @both(
-    files,
     "/download.zarr",
+    router=files,
     tags=["files"],
-    responses=answers(
-        *(None, 304, 404, 503),
-        media={ZIP: "a zarr v3 group, for zarr.storage.ZipStore"},
-        headers=("Content-Disposition",),
-    ),
+    dependencies=[query_names()],
+    responses=answers(None, 304, 404, 422, 503, media={ZIP: "a zarr v3 group, for zarr.storage.ZipStore"}),
 )
-def download(request: Request, name: str, revision: Revision = None) -> Response:
+def download(request: Request, name: str, revision: str | None = None) -> Response:
     """Return a revision as one uncompressed zip file: xarray.open_zarr(zarr.storage.ZipStore(path, mode="r"))."""
     group, digest = _located(request, name, revision)
     headers = cache_headers(f"{name}-{group.name}-{digest[:16]}", "zip", immutable=revision is not None)
@@ -49,7 +48,8 @@ def download(request: Request, name: str, revision: Revision = None) -> Response
 @files.get(
     "/v1/store/materials/{name}/{revision}/{file:path}",
     tags=["files"],
-    responses=answers(None, 304, 404, 503, media={BYTES: "a file of the zarr group"}),
+    dependencies=[query_names()],
+    responses=answers(None, 304, 404, 422, 503, media={BYTES: "a file of the zarr group"}),
 )
 def stored_file(request: Request, name: str, revision: str, file: str) -> Response:
     """Return a file of a revision: ``xarray.open_zarr(".../v1/store/materials/NAME/REVISION")`` reads these."""

@@ -19,6 +19,7 @@ from brdfdb.tables.first_numbers import FormulaError, LargestAlbedo
 if TYPE_CHECKING:
     from brdfdb.tables.table import Table
 
+NPY = "application/x-npy"
 JSON = "application/json"
 REVISION = "Brdfdb-Revision"  # header that names the revision of the values of a lookup
 
