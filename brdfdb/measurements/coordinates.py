@@ -37,16 +37,10 @@ def features(wi: Floats, wr: Floats, alpha: float, scales: tuple[float, float, f
     return np.stack(columns, axis=1)
 
 
-def beyond(wi: Floats, wr: Floats, of_wi: Floats, of_wr: Floats, *, turned: bool) -> NDArray[np.bool_]:
-    """Return which pairs of unit vectors (N, 3) lie outside of the convex hull of others (M, 3), as of `places`.
-
-    Isotropic pairs count with their mirror images. Directions in one plane make a flat hull.
-    """
+def beyond(at: Floats, x: Floats) -> NDArray[np.bool_]:
+    """Return which points (N, D) lie outside of the convex hull of others (M, D); points in a plane make a flat hull."""
     from scipy.spatial import ConvexHull
 
-    x = places(of_wi, of_wr, turned=turned)
-    if not turned:
-        x = np.concatenate([x, x * [1.0, 1.0, -1.0]])
     centre = x.mean(axis=0)
     _, spread, axes = np.linalg.svd(np.linalg.qr(x - centre, mode="r"), full_matrices=True)
     spread = np.pad(spread, (0, x.shape[1] - spread.size))
@@ -58,7 +52,7 @@ def beyond(wi: Floats, wr: Floats, of_wi: Floats, of_wr: Floats, *, turned: bool
     else:
         low, high = inside.min(initial=0.0), inside.max(initial=0.0)
         planes = np.array([[1.0, -high], [-1.0, low]])[:, 1 - inside.shape[1] :]
-    at = places(wi, wr, turned=turned) - centre
+    at = at - centre
     outside: NDArray[np.bool_] = np.any(np.abs(at @ across.T) > _WITHIN, axis=1)
     at = at @ along.T
     for plane in planes:  # one at a time: there may be many

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from brdfdb.errors import ParameterError
 from brdfdb.geometry import HALF_PI, degrees, radians
-from brdfdb.measurements.coordinates import places
+from brdfdb.measurements.coordinates import beyond, places
 from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
 
@@ -33,23 +33,22 @@ _Number = TypeVar("_Number", np.float64, np.int64)
 class Extent(BaseModel):
     """The pairs of directions that samples tell f_r of, in cells of some degrees.
 
-    A pair is extrapolated if it lies in a ball without samples. The ball is about as large as those that fit between
-    neighbouring samples of the same data, so that what lies between neighbours is measured, and holes, wide gaps and
-    everything beyond the last samples are extrapolated. With balls of any size this is the convex hull.
+    A pair is extrapolated if it lies outside of the convex hull of the samples, or in a hole: a ball around a pair of
+    the hull, without samples. The ball is larger than those that fit between neighbouring samples of the same data. What
+    lies between neighbours is thus measured, and wide gaps are not.
 
     Notes
     -----
+    The hull is that of directions as theta (cos phi, sin phi). An isotropic surface has theta_i alone, which continues
+    beyond the normal, and mirror images. The hull of flat data, such as samples in the plane of incidence, is flat, and
+    cells make it wider by half a cell on either side.
+
     Balls are those of coordinates in which lobes stay in place: the direction of the light, and that of the viewer
-    less the mirror direction, each as theta (cos phi, sin phi). An isotropic surface has theta_i alone, which continues
-    beyond the normal, and mirror images. Balls stay in the plane of flat data, such as samples in the plane of
-    incidence, of which half a cell beside the plane is measured, too.
-
-    Scans have many viewers for each light. Holes among the viewers are looked for at each light, with balls twice as
-    wide as those that typically fit between viewers. Then balls reach from a light to the next: a gap between lights
-    is extrapolated if it is about twice as wide as usual, as are the gaps at lights that are held out. Samples
-    without such a pattern have balls of one size for light and viewer, with four times the typical volume.
-
-    The region is an alpha hull, with ellipsoids for balls.
+    less the mirror direction. Scans have many viewers for each light: balls are as wide as the typical gap between
+    lights on either side, and for viewers twice as wide as those that typically fit between them. So a hole among the
+    viewers of one light is found whatever its neighbours saw, and a gap between lights that is about twice as wide as
+    usual, as are the gaps at lights that are held out. Samples without such a pattern have balls of one size for light
+    and viewer, with four times the typical volume. Holes are those of the alpha hull.
 
     References
     ----------
@@ -86,18 +85,14 @@ class Extent(BaseModel):
             radii = np.full(lights + 2, _SCATTERED ** (1.0 / (lights + 2)) * _typical(sheared))
         radii = np.maximum(radii / cell, _LEAST)
         at = np.unique(np.rint(x / cell).astype(np.int64), axis=0)
-        at = _sheared(at if turned else _symmetric(at), lights)
-        if scans:
-            ends = np.unique(at[:, :lights], axis=0)
-            at = np.concatenate([_filled_scan(at, end, radii) for end in ends])
-        at = _filled(at, radii)
-        at = _sheared(at, lights, -1)
+        at = at if turned else _symmetric(at)
         count = round(HALF_PI / cell)
-        shape = _shape(count, turned=turned)
-        at = at + _origin(count, turned=turned)
-        at = at[np.all((at >= 0) & (at < shape), axis=1)]
-        cells = np.zeros(shape, dtype=bool)
-        cells[tuple(at.T)] = True
+        whole = np.argwhere(np.ones((2 * count + 1,) * at.shape[1], dtype=bool)) - count
+        inside = whole[~beyond(whole.astype(np.float64), at.astype(np.float64))]
+        inside = inside[~_in_holes(_sheared(inside, lights), _sheared(at, lights), radii)] + count
+        cells = np.zeros((2 * count + 1,) * at.shape[1], dtype=bool)
+        cells[tuple(inside.T)] = True
+        cells = cells if turned else cells[count:, :, count:]
         packed = base64.b64encode(zlib.compress(np.packbits(cells).tobytes(), 9)).decode()
         return cls(turned=turned, cell_deg=float(degrees(cell)), cells=packed)
 
@@ -140,10 +135,10 @@ def _origin(count: int, *, turned: bool) -> NDArray[np.int64]:
     return np.full(4, count) if turned else np.array([0, count, 0])
 
 
-def _sheared(x: NDArray[_Number], lights: int, sign: int = 1) -> NDArray[_Number]:
-    """Return places (N, D) with the viewer relative to the mirror direction; with sign -1 the other way."""
+def _sheared(x: NDArray[_Number], lights: int) -> NDArray[_Number]:
+    """Return places (N, D) with the viewer relative to the mirror direction."""
     moved = x.copy()
-    moved[:, lights : 2 * lights] += sign * x[:, :lights]
+    moved[:, lights : 2 * lights] += x[:, :lights]
     return moved
 
 
@@ -189,26 +184,21 @@ def _typical(x: Floats) -> float:
     return float(thinner * radius[order][np.searchsorted(part, 0.5 * part[-1])])
 
 
-def _filled_scan(at: NDArray[np.int64], end: NDArray[np.int64], radii: Floats) -> NDArray[np.int64]:
-    """Return the cells of the viewers of one light, filled."""
-    own = np.all(at[:, : end.size] == end, axis=1)
-    viewers = _filled(at[own, end.size :], radii[end.size :])
-    return np.concatenate([np.broadcast_to(end, (len(viewers), end.size)), viewers], axis=1)
-
-
-def _filled(at: NDArray[np.int64], radii: Floats) -> NDArray[np.int64]:
-    """Return the cells (M, D) that are in no ball without cells `at` (N, D).
+def _in_holes(inside: NDArray[np.int64], at: NDArray[np.int64], radii: Floats) -> NDArray[np.bool_]:
+    """Return which cells (N, D) are in a ball around one of them that has none of the cells `at` (M, D).
 
     `radii` (D,) are the half axes of the balls, in cells.
     """
     from scipy.ndimage import distance_transform_edt
 
-    low, high = at.min(axis=0), at.max(axis=0)
-    room = np.where(high > low, np.ceil(radii).astype(np.int64) + 1, 0)  # balls stay in the plane of flat cells
-    empty = np.ones(high - low + 1 + 2 * room, dtype=bool)
-    empty[tuple((at - low + room).T)] = False
-    centres = distance_transform_edt(empty, sampling=1.0 / radii) >= 1.0 - _ROUNDING
-    if not centres.any():
-        return np.asarray(np.argwhere(np.ones_like(empty)) + low - room)
-    filled = distance_transform_edt(~centres, sampling=1.0 / radii) >= 1.0 - 2.0 * _ROUNDING
-    return np.asarray(np.argwhere(filled) + low - room)
+    low = inside.min(axis=0)
+    shape = inside.max(axis=0) - low + 1
+    own = tuple((inside - low).T)
+    empty = np.ones(shape, dtype=bool)
+    empty[tuple((at - low).T)] = False
+    centre = distance_transform_edt(empty, sampling=1.0 / radii)[own] >= 1.0 - _ROUNDING
+    if not centre.any():
+        return np.asarray(centre)
+    free = np.ones(shape, dtype=bool)
+    free[tuple(part[centre] for part in own)] = False
+    return np.asarray(distance_transform_edt(free, sampling=1.0 / radii)[own] < 1.0 - 2.0 * _ROUNDING)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brdfdb.errors import ParameterError
-from brdfdb.measurements.coordinates import beyond, features, half_angles
+from brdfdb.measurements.coordinates import beyond, features, half_angles, places
 from brdfdb.measurements.record import HeldOut
 from brdfdb.measurements.samples import Samples
 from brdfdb.parameters import Floats
@@ -364,10 +364,11 @@ def _held_out(how: Interpolation, problem: _Problem, centres: _Problem) -> Float
 def _stated(samples: Samples, problem: _Problem, predicted: Floats, how: Interpolation, scheme: str) -> HeldOut:
     """Return the error at samples that were held out and lie within the directions of the others."""
     inside = np.ones(len(problem.wi), dtype=bool)
+    x = places(problem.wi, problem.wr, turned=samples.turned)
     for group in np.unique(problem.group):
         own = problem.group == group
-        pairs = (part[rows] for rows in (own, ~own) for part in (problem.wi, problem.wr))
-        inside[own] = ~beyond(*pairs, turned=samples.turned)
+        others = x[~own] if samples.turned else np.concatenate([x[~own], x[~own] * [1.0, 1.0, -1.0]])
+        inside[own] = ~beyond(x[own], others)
     counted = inside if inside.any() else ~inside
     f_r = np.maximum(2.0 * how.level * np.sinh(problem.of_base + predicted), 0.0)[counted]
     values, floor = problem.values[counted], floor_of(samples)

@@ -48,6 +48,9 @@ def test_material_says_by_whom_and_how_well_it_was_measured(client: Client, meas
 def test_catalogue_tells_measured_tables_apart(client: Client) -> None:
     lines = client.get("/v1/materials").json()["materials"]
     assert {line["name"]: line["measured"] for line in lines} == {"clay-vase": False, "my-clay": True}
+    assert [line["model"] for line in lines] == ["oren_nayar", None]
+    assert client.get("/v1/materials?q=none").json()["materials"] == []
+    assert client.get("/v1/materials/my-clay").json()["model"] is None
     only = client.get("/v1/materials?model=measured").json()["materials"]
     assert [line["name"] for line in only] == ["my-clay"]
 

@@ -14,7 +14,7 @@ from brdfdb.geometry import degrees, radians, unit_vector
 from brdfdb.materials import presets
 from brdfdb.materials.source import Evaluate
 from brdfdb.measurements import MeasuredSource, Samples
-from brdfdb.measurements.coordinates import beyond
+from brdfdb.measurements.coordinates import beyond, places
 from brdfdb.measurements.extent import Extent
 from brdfdb.measurements.interpolation import floor_of
 from brdfdb.parameters import Floats
@@ -75,7 +75,7 @@ def test_error_is_not_understated_where_it_is_stated(name: str, hole: str) -> No
     assert source.measured.held_out is not None
     assert np.percentile(error[measured], 95) < RIGHT * source.measured.held_out.p95
     if name.startswith("latex") and "mirror" in hole:  # nobody saw its lobe
-        inside_hull = ~beyond(wi, wr, samples.w_i, samples.w_r, turned=False)
+        inside_hull = ~beyond(places(wi, wr, turned=False), places(samples.w_i, samples.w_r, turned=False))
         assert np.percentile(error[inside_hull & ~measured], 95) > 10.0 * source.measured.held_out.p95
 
 

@@ -45,7 +45,7 @@ const origin = ({ by, file, samples, incidences }) => [
 const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [
   ["held out", left ? `95 of 100 samples within ${percent(left.p95)}` : "no samples", left ? `99 within ${percent(left.p99)}` : ""],
   ["noise", noise ? `95 of 100 below ${percent(noise.p95)}` : "not stated"],
-  ...(extrapolated === null ? [] : [["extrapolated", `${percent(extrapolated)} of the nodes`]]),
+  ...(extrapolated === null ? [] : [["measured", `${percent(1 - extrapolated)} of all directions`]]),
   ...(negative ? [["below 0", `${percent(negative)} of the values, which are 0 here`]] : []),
   ...changes.map(({ law, changed }) => [`made ${law}`, `by up to ${percent(changed.max)}`]),
 ];
