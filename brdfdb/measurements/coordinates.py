@@ -38,7 +38,7 @@ def features(wi: Floats, wr: Floats, alpha: float, scales: tuple[float, float, f
 
 
 def beyond(at: Floats, x: Floats) -> NDArray[np.bool_]:
-    """Return which points (N, D) lie outside of the convex hull of others (M, D); points in a plane make a flat hull."""
+    """Return which points (N, D) lie outside of the convex hull of others (M, D), which is flat if they are."""
     from scipy.spatial import ConvexHull
 
     centre = x.mean(axis=0)

@@ -34,8 +34,8 @@ class Extent(BaseModel):
     """The pairs of directions that samples tell f_r of, in cells of some degrees.
 
     A pair is extrapolated if it lies outside of the convex hull of the samples, or in a hole: a ball around a pair of
-    the hull, without samples. The ball is larger than those that fit between neighbouring samples of the same data. What
-    lies between neighbours is thus measured, and wide gaps are not.
+    the hull, without samples. The ball is larger than those that fit between neighbouring samples of the same data.
+    What lies between neighbours is thus measured, and wide gaps are not.
 
     Notes
     -----

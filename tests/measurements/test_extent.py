@@ -71,7 +71,7 @@ def test_error_is_not_understated_where_it_is_stated(name: str, hole: str) -> No
     values = source.brdf_at(None)(wi, wr)
     error = (np.abs(values - noisy) / np.maximum(values, floor_of(samples)))[:, 0]
     measured = ~source.extrapolated(wi, wr)
-    assert measured.mean() > 0.3
+    assert measured.mean() > 0.25
     assert source.measured.held_out is not None
     assert np.percentile(error[measured], 95) < RIGHT * source.measured.held_out.p95
     if name.startswith("latex") and "mirror" in hole:  # nobody saw its lobe
