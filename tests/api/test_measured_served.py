@@ -70,6 +70,14 @@ def test_lookup_with_its_error_marks_what_is_extrapolated(client: Client) -> Non
     assert client.post("/v1/materials/clay-vase/lookup?error=true", json=body).json()["extrapolated"] == [False, False]
 
 
+def test_cut_tells_where_it_is_extrapolated(client: Client, measured: Path) -> None:
+    lobe = client.get("/v1/materials/my-clay/lobe?theta_i=30").json()
+    theta_r = np.abs(lobe["axes_deg"]["theta_r"])
+    assert np.all(np.array(lobe["extrapolated"])[theta_r > 77.0])
+    assert not np.any(np.array(lobe["extrapolated"])[theta_r < 75.0])
+    assert client.get("/v1/materials/clay-vase/lobe?theta_i=30").json()["extrapolated"] is None
+
+
 def test_a_model_and_its_source_code_are_refused_in_a_sentence(client: Client) -> None:
     code = client.get("/v1/materials/my-clay/export/glsl")
     assert code.status_code == 422

@@ -38,8 +38,8 @@ export function show(info) {
 }
 
 /** What measured data are of. */
-const origin = ({ by, file, samples, incidences }) => [
-  samples ? `${samples} samples of ${incidences} lights` : "known everywhere", by, file && `file ${file}`].filter(Boolean).join("; ");
+const origin = ({ by, file, samples, incidences, extrapolated }) => [
+  samples ? `${samples} samples of ${incidences} lights` : `known ${extrapolated === null ? "everywhere" : "between its values"}`, by, file && `file ${file}`].filter(Boolean).join("; ");
 
 /** How far measured data are to be trusted, and where nothing was measured. */
 const data = ({ held_out: left, noise, extrapolated, negative, changes }) => [

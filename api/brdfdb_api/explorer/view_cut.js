@@ -30,7 +30,8 @@ function cut(into, series, answers, state) {
   }
   curves.forEach((curve, i) => {
     const points = curve.map((value, k) => at(thetas[i][k], out(value))), kind = i ? "second" : "first";
-    parts.push(pieces(points, (k) => !faint(i, k), kind), pieces(points, (k) => faint(i, k), `${kind} guess`));
+    parts.push(pieces(points, (k) => !faint(i, k), kind));
+    if (guessed[i].includes(true)) parts.push(pieces(points, (k) => faint(i, k), `${kind} guess`));
   });
   const rows = series.map(({ label }, i) => [i ? "second" : "first", label]);
   const some = guessed.findIndex((each) => each.includes(true));
